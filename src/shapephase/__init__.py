@@ -1,0 +1,46 @@
+"""shapephase: a free body changes its shape in a known way; how does it turn?"""
+
+from __future__ import annotations
+
+from . import errors
+from .body import Body, UnphysicalInertiaWarning
+from .catalog import load_body, robot_names
+from .connection import curvature, holonomy, mechanical_connection
+from .deformation import Deformation, articulated, particles, prescribed, rigid
+from .errors import ShapePhaseError
+from .gauge import horizontal_gauge, in_gauge, principal_gauge
+from .motion_record import load_motion
+from .phases import PhaseSplit, split
+from .reconstruction import Motion, momentum_from_rate, reconstruct
+from .return_map import closed_orbits
+from .shape_path import ShapePath
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Body",
+    "Deformation",
+    "Motion",
+    "PhaseSplit",
+    "ShapePath",
+    "ShapePhaseError",
+    "UnphysicalInertiaWarning",
+    "articulated",
+    "closed_orbits",
+    "curvature",
+    "errors",
+    "holonomy",
+    "horizontal_gauge",
+    "in_gauge",
+    "load_body",
+    "load_motion",
+    "mechanical_connection",
+    "momentum_from_rate",
+    "particles",
+    "prescribed",
+    "principal_gauge",
+    "reconstruct",
+    "rigid",
+    "robot_names",
+    "split",
+]

@@ -1,0 +1,59 @@
+"""Array types and the checks every public entry makes once; inside the library arrays are trusted."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import ShapeError
+
+Array = NDArray[np.float64]
+
+
+def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] = (), *, unit: str = "") -> Array:
+    """A float64 array in native byte order whose last axes are `trailing` (None: any length), all finite.
+
+    Raises
+    ------
+    ShapeError
+        For text, objects, complex numbers, masked entries, a wrong shape, NaN or infinity; the message
+        names the argument, the shape that came and the first bad entry.
+    """
+    array = _real_array(value, name, unit)
+    wanted = _shape_text(trailing)
+    if array.ndim < len(trailing) or any(
+        want is not None and have != want
+        for want, have in zip(trailing, array.shape[array.ndim - len(trailing) :], strict=False)
+    ):
+        raise ShapeError(f"{name}: expected shape {wanted}{_in(unit)}, got {array.shape}")
+    check_finite(array, name)
+    return array
+
+
+def check_finite(array: Array, name: str) -> None:
+    """Raise `ShapeError` naming the first entry that is NaN or infinite."""
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ShapeError(f"{name}: entry {list(where)} is {array[where]}; every entry must be a finite number")
+
+
+def _real_array(value: Any, name: str, unit: str) -> Array:
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        raise ShapeError(f"{name}: masked entries cannot be used; fill or drop them first")
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise ShapeError(f"{name}: expected numbers{_in(unit)} in one rectangular array ({error})") from None
+    if raw.dtype.kind not in "fiub":
+        raise ShapeError(f"{name}: expected real numbers{_in(unit)}, got an array of {raw.dtype}")
+    return np.ascontiguousarray(raw, dtype=np.float64).reshape(raw.shape)
+
+
+def _shape_text(trailing: tuple[int | None, ...]) -> str:
+    return "(..., " + ", ".join("N" if n is None else str(n) for n in trailing) + ")" if trailing else "(...)"
+
+
+def _in(unit: str) -> str:
+    return f" [{unit}]" if unit else ""

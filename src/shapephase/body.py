@@ -1,0 +1,394 @@
+"""A free-floating body: its locked inertia and the angular momentum that its joint motions carry."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from .arrays import Array, finite_array
+from .errors import ModelFileError, ShapeError, UnphysicalInertiaError, unknown_name
+from .inertia_tensor import triangle_defect
+from .urdf import Mimic
+
+_BASE = 6  # velocities of the free-flyer in Pinocchio's order
+
+
+class UnphysicalInertiaWarning(UserWarning):
+    """A link's inertia that no distribution of mass has, accepted because the caller asked so or it is harmless."""
+
+
+class Body:
+    """A tree of rigid links that floats freely; its shape is the vector of its independent joints.
+
+    Made by `load_body`. All quantities are in base axes, about the centre of mass of the whole body where
+    that matters (theory.md section 1). Shapes may have any leading axes. A Body can be pickled and used from
+    several threads.
+
+    Attributes
+    ----------
+    name : str
+    joint_names : tuple of the independent joints, in the order of the shape vector
+    n_shape : number of independent joints
+    mass : [kg]
+    joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
+    continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
+    """
+
+    def __init__(self, model: pin.Model, name: str, mimics: Mapping[str, Mimic] | None = None) -> None:
+        self._model = model
+        self._local = threading.local()
+        self.name = name
+        self.mass = float(pin.computeTotalMass(model))
+        moving = _moving_joints(model)
+        mimics = dict(mimics or {})
+        self.joint_names = tuple(n for n in moving if n not in mimics)
+        self._map, self._offset = _mimic_map(list(moving), self.joint_names, mimics)
+        self._plain = len(self.joint_names) == len(moving)
+        kinds = [model.joints[i] for i in moving.values()]
+        turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
+        self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
+        self._velocity_index = np.array([kind.idx_v for kind in kinds], dtype=int) - _BASE
+        self._turning = turning
+        self._neutral = pin.neutral(model)
+        independent = [list(moving).index(n) for n in self.joint_names]
+        self.continuous = turning[independent]
+        limits = np.stack([model.lowerPositionLimit, model.upperPositionLimit], axis=-1)
+        self.joint_limits = limits[self._configuration_index[independent]].reshape(-1, 2)
+        self.joint_limits[self.continuous] = [-np.inf, np.inf]
+        self.joint_limits.setflags(write=False)
+
+    @property
+    def n_shape(self) -> int:
+        """The number of independent joints."""
+        return len(self.joint_names)
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """The names of all links, those fixed to others included."""
+        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY and f.name != "universe")
+
+    def __repr__(self) -> str:
+        """One line for people."""
+        return f"Body({self.name!r}, {self.n_shape} joints, {self.mass:.6g} kg)"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the per-thread work space."""
+        return {key: value for key, value in self.__dict__.items() if key != "_local"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore, with a fresh work space."""
+        self.__dict__.update(state)
+        self._local = threading.local()
+
+    def shape(self, joints: Mapping[str, float] | None = None) -> Array:
+        """The shape with the named joints at the given coordinates and all others neutral: -> (n,) [rad or m].
+
+        Raises
+        ------
+        UnknownNameError
+            If a name is not one of `joint_names`.
+        """
+        shape = np.zeros(self.n_shape)
+        for name, value in (joints or {}).items():
+            shape[self.joint_index(name)] = finite_array(value, f"joint {name}").item()
+        return shape
+
+    def joint_index(self, name: str) -> int:
+        """The place of a joint in the shape vector. Raises UnknownNameError."""
+        if name not in self.joint_names:
+            raise unknown_name(f"joint of {self.name}", name, self.joint_names)
+        return self.joint_names.index(name)
+
+    def locked_inertia(self, shape: ArrayLike) -> Array:
+        """Inertia of the body frozen in a shape, about its centre of mass, base axes.
+
+        Parameters
+        ----------
+        shape : (..., n) [rad or m]
+
+        Returns
+        -------
+        (..., 3, 3) [kg m^2]
+
+        Raises
+        ------
+        ShapeError
+            If the last axis is not the body's n joints, or an entry is not finite.
+
+        Source: Cabrera 2006, section 2.3; theory.md A3.
+        """
+        r = self._checked(shape)
+        return self._angular_map(r.reshape(-1, self.n_shape))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
+
+    def momentum_matrix(self, shape: ArrayLike) -> Array:
+        """J(r), the angular momentum per unit joint rate with the base at rest: L_o = J(r) rate.
+
+        Parameters
+        ----------
+        shape : (..., n) [rad or m]
+
+        Returns
+        -------
+        (..., 3, n) about the centre of mass, base axes [kg m^2/s per unit of joint rate]
+
+        Raises as `locked_inertia`. Source: theory.md A7.
+        """
+        r = self._checked(shape)
+        return self._angular_map(r.reshape(-1, self.n_shape))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
+
+    def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """Angular momentum of a joint motion about the centre of mass with the base at rest.
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]; leading axes broadcast
+
+        Returns
+        -------
+        (..., 3) base axes [kg m^2/s]
+
+        Raises as `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
+        """
+        v = self._checked(rate, "rate")
+        return (self.momentum_matrix(shape) @ v[..., None])[..., 0]
+
+    def inertia_gradient(self, shape: ArrayLike) -> Array:
+        """dI/dr_k, exact: (..., n) -> (..., n, 3, 3) [kg m^2 per unit of joint].
+
+        Source: numerics.md section 4 (rate of the centroidal map at unit joint rates).
+        """
+        return self._gradient(shape)[..., :3]
+
+    def momentum_matrix_gradient(self, shape: ArrayLike) -> Array:
+        """dJ/dr_k, exact: (..., n) -> (..., n, 3, n), the first n counts k. Source: as `inertia_gradient`."""
+        return self._gradient(shape)[..., 3:]
+
+    def inertia_rate(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """dI/dt along a joint motion, exact: (..., n), (..., n) -> (..., 3, 3) [kg m^2/s]."""
+        r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
+        flat = self._angular_map_rate(r.reshape(-1, self.n_shape), v.reshape(-1, self.n_shape))
+        return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
+
+    def centre_of_mass(self, shape: ArrayLike) -> Array:
+        """Centre of mass of the whole body from the base origin, base axes: (..., n) -> (..., 3) [m]."""
+        r = self._checked(shape)
+        model, data = self._model, self._data()
+        configurations = self._configurations(r.reshape(-1, self.n_shape))
+        centres = np.empty((len(configurations), 3))
+        for row, q in enumerate(configurations):
+            centres[row] = pin.centerOfMass(model, data, q)
+        return centres.reshape(*r.shape[:-1], 3)
+
+    def link_pose(self, shape: ArrayLike, link: str) -> Array:
+        """Pose of a link in base axes from the base origin: (..., n) -> (..., 4, 4).
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such link.
+        """
+        if link not in self.link_names:
+            raise unknown_name(f"link of {self.name}", link, self.link_names)
+        r = self._checked(shape)
+        model, data = self._model, self._data()
+        frame = model.getFrameId(link, pin.FrameType.BODY)
+        configurations = self._configurations(r.reshape(-1, self.n_shape))
+        poses = np.empty((len(configurations), 4, 4))
+        for row, q in enumerate(configurations):
+            pin.forwardKinematics(model, data, q)
+            poses[row] = pin.updateFramePlacement(model, data, frame).homogeneous
+        return poses.reshape(*r.shape[:-1], 4, 4)
+
+    def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """T_0: kinetic energy of a joint motion about the centre of mass with the base at rest: -> (...) [J].
+
+        Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
+        """
+        r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
+        model, data = self._model, self._data()
+        rates = self._velocities(v.reshape(-1, self.n_shape))
+        energies = np.empty(len(rates))
+        for row, (q, full) in enumerate(zip(self._configurations(r.reshape(-1, self.n_shape)), rates, strict=True)):
+            pin.ccrba(model, data, q, full)
+            whole = pin.computeKineticEnergy(model, data, q, full)
+            energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / self.mass
+        return energies.reshape(r.shape[:-1])
+
+    def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
+        """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3).
+
+        Unchecked and in one pass: the library's own hot path.
+        """
+        whole = self._angular_map(shape)
+        return whole[:, :, :3], (whole[:, :, 3:] @ rate[:, :, None])[..., 0]
+
+    def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
+        array = finite_array(shape, name)
+        if array.ndim == 0 or array.shape[-1] != self.n_shape:
+            raise ShapeError(
+                f"{name}: expected (..., {self.n_shape}), one entry per joint of {self.name} "
+                f"({', '.join(self.joint_names)}), got shape {array.shape}"
+            )
+        return array
+
+    def _angular_map(self, shapes: Array) -> Array:
+        """[I, J] for each shape: (N, n) -> (N, 3, 3 + n)."""
+        model, data = self._model, self._data()
+        centroidal_map = pin.computeCentroidalMap
+        # data.Ag is a view, refreshed by each call (what the call returns is a copy): one copy a sample.
+        rows = data.Ag[3:, 3:]
+        whole = np.empty((len(shapes), *rows.shape))
+        for row, q in enumerate(self._configurations(shapes)):
+            centroidal_map(model, data, q)
+            whole[row] = rows
+        return self._independent(whole)
+
+    def _angular_map_rate(self, shapes: Array, rates: Array) -> Array:
+        """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""
+        model, data = self._model, self._data()
+        velocities = self._velocities(rates)
+        whole = np.empty((len(shapes), 3, model.nv - 3))
+        for row, (q, v) in enumerate(zip(self._configurations(shapes), velocities, strict=True)):
+            pin.dccrba(model, data, q, v)
+            whole[row] = data.dAg[3:, 3:]
+        return self._independent(whole)
+
+    def _gradient(self, shape: ArrayLike) -> Array:
+        r = self._checked(shape)
+        n = self.n_shape
+        shapes = np.repeat(r.reshape(-1, n), n, axis=0)
+        rates = np.tile(np.eye(n), (len(shapes) // max(n, 1), 1))
+        return self._angular_map_rate(shapes, rates).reshape(*r.shape[:-1], n, 3, 3 + n)
+
+    def _independent(self, whole: Array) -> Array:
+        """Columns of the full joints folded into those of the independent ones."""
+        joints = whole[:, :, 3 + self._velocity_index]
+        if not self._plain:
+            joints = joints @ self._map
+        return np.concatenate([whole[:, :, :3], joints], axis=-1)
+
+    def _configurations(self, shapes: Array) -> Array:
+        full = shapes if self._plain else shapes @ self._map.T + self._offset
+        q = np.empty((len(shapes), self._model.nq))
+        q[:] = self._neutral
+        if self._turning.any():
+            turning = self._configuration_index[self._turning]
+            fixed = self._configuration_index[~self._turning]
+            q[:, fixed] = full[:, ~self._turning]
+            q[:, turning] = np.cos(full[:, self._turning])
+            q[:, turning + 1] = np.sin(full[:, self._turning])
+        else:
+            q[:, self._configuration_index] = full
+        return q
+
+    def _velocities(self, rates: Array) -> Array:
+        v = np.zeros((len(rates), self._model.nv))
+        v[:, _BASE + self._velocity_index] = rates if self._plain else rates @ self._map.T
+        return v
+
+    def _data(self) -> pin.Data:
+        try:
+            return self._local.data
+        except AttributeError:
+            self._local.data = self._model.createData()
+            return self._local.data
+
+
+def body_from_urdf(text: str, name: str, where: str, mimics: Mapping[str, Mimic], on_unphysical: str) -> Body:
+    """A Body from checked URDF text.
+
+    Raises
+    ------
+    ModelFileError
+        If Pinocchio cannot build a model from it.
+    UnphysicalInertiaError
+        If a link's inertia is not positive semidefinite and `on_unphysical` is "error".
+    """
+    try:
+        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer(), _ROOT_JOINT)
+    except ValueError as error:
+        raise ModelFileError(f"{where}: not a valid URDF: {str(error).strip()}") from None
+    return body_from_model(model, name, where, mimics, on_unphysical)
+
+
+def body_from_model(
+    model: pin.Model, name: str, where: str, mimics: Mapping[str, Mimic] | None = None, on_unphysical: str = "error"
+) -> Body:
+    """A Body from a Pinocchio model whose root joint is a free-flyer. Raises as `body_from_urdf`."""
+    if on_unphysical not in ("error", "warn"):
+        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
+    if model.njoints < 2 or model.joints[1].shortname() != "JointModelFreeFlyer":
+        raise ModelFileError(
+            f"{where}: the model's root joint is no free-flyer, so the mass of its root link is lost; build it with "
+            "pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())"
+        )
+    _check_inertias(model, where, on_unphysical)
+    return Body(model, name, mimics)
+
+
+_ROOT_JOINT = "shapephase free-flyer"
+
+
+def _moving_joints(model: pin.Model) -> dict[str, int]:
+    """Names and numbers of the joints below the free-flyer, in Pinocchio's order."""
+    moving = {}
+    for number in range(2, model.njoints):
+        joint = model.joints[number]
+        kind = joint.shortname()
+        single = joint.nv == 1 and (joint.nq == 1 or kind.startswith("JointModelRUB") or "Unbounded" in kind)
+        if not single or "Mimic" in kind:
+            raise ModelFileError(
+                f"joint {model.names[number]!r} is a {kind}; joints of one axis are supported (revolute, continuous, "
+                "prismatic): replace it by a chain of those"
+            )
+        moving[model.names[number]] = number
+    return moving
+
+
+def _mimic_map(
+    moving: list[str], independent: tuple[str, ...], mimics: Mapping[str, Mimic]
+) -> tuple[Array, Array]:
+    """S and q0 of full = S independent + q0, followers of followers resolved."""
+    place = {name: column for column, name in enumerate(independent)}
+    matrix = np.zeros((len(moving), len(independent)))
+    offset = np.zeros(len(moving))
+    for row, name in enumerate(moving):
+        factor, leader = 1.0, name
+        while leader in mimics:
+            rule = mimics[leader]
+            offset[row] += factor * rule.offset
+            factor *= rule.multiplier
+            leader = rule.leader
+        if leader in place:
+            matrix[row, place[leader]] = factor
+        elif leader != name:
+            raise ModelFileError(f"joint {name!r} mimics {leader!r}, which is fixed or not part of the body")
+    return matrix, offset
+
+
+def _check_inertias(model: pin.Model, where: str, on_unphysical: str) -> None:
+    for number in range(1, model.njoints):
+        inertia = model.inertias[number]
+        tensor = inertia.inertia
+        joint = model.names[number] if number > 1 else "the base"
+        if not (np.isfinite(inertia.mass) and np.isfinite(tensor).all() and inertia.mass >= 0.0):
+            raise UnphysicalInertiaError(f"{where}: the links moved by {joint} have mass {inertia.mass} kg")
+        moments = np.linalg.eigvalsh(tensor)
+        if moments[0] < -1e-9 * max(moments[2], 0.0) - 1e-12 * inertia.mass:
+            message = f"{where}: the links moved by {joint} have principal moments {moments} kg m^2, one is negative"
+            if on_unphysical == "error":
+                raise UnphysicalInertiaError(message + "; mend the file, or load it with on_unphysical='warn'")
+            warnings.warn(message, UnphysicalInertiaWarning, stacklevel=4)
+        elif moments[2] > 0.0 and triangle_defect(tensor) > 1e-3:
+            warnings.warn(
+                f"{where}: the links moved by {joint} have principal moments {moments} kg m^2, which break the "
+                "triangle inequality: no distribution of mass has them",
+                UnphysicalInertiaWarning,
+                stacklevel=4,
+            )

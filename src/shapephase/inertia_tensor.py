@@ -1,0 +1,84 @@
+"""Inertia tensors: validity, inverse, principal axes; batched over leading axes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array
+from .errors import SingularInertiaError
+
+
+def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
+    """I^-1 of symmetric positive definite tensors: (..., 3, 3) -> (..., 3, 3), exactly symmetric.
+
+    Raises
+    ------
+    SingularInertiaError
+        If a tensor is not finite or its least eigenvalue is not above 1e-12 of its largest. `times` (...),
+        where given, are the instants that the message quotes.
+    """
+    a, b, c = inertia[..., 0, 0], inertia[..., 1, 1], inertia[..., 2, 2]
+    d, e, f = inertia[..., 1, 2], inertia[..., 0, 2], inertia[..., 0, 1]
+    adjugate = np.empty(inertia.shape)
+    adjugate[..., 0, 0] = b * c - d * d
+    adjugate[..., 1, 1] = a * c - e * e
+    adjugate[..., 2, 2] = a * b - f * f
+    adjugate[..., 0, 1] = adjugate[..., 1, 0] = e * d - f * c
+    adjugate[..., 0, 2] = adjugate[..., 2, 0] = f * d - e * b
+    adjugate[..., 1, 2] = adjugate[..., 2, 1] = f * e - d * a
+    determinant = a * adjugate[..., 0, 0] + f * adjugate[..., 0, 1] + e * adjugate[..., 0, 2]
+    trace = a + b + c
+    # least/largest eigenvalue lies between det/trace^3 and 4 times 27 of it: above 1e-5 no tensor is near-singular,
+    # the leading minors say whether it is positive, and the adjugate loses no digits.
+    safe = (determinant > 1e-5 * trace**3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
+    if safe.all():
+        return adjugate / determinant[..., None, None]
+    return _careful_inverse(inertia, times)
+
+
+def _careful_inverse(inertia: Array, times: Array | None) -> Array:
+    flat = inertia.reshape(-1, 3, 3)
+    finite = np.isfinite(flat).all(axis=(-1, -2))
+    moments = np.full((len(flat), 3), np.nan)
+    moments[finite] = np.linalg.eigvalsh(flat[finite])
+    bad = ~(moments[:, 0] > 1e-12 * moments[:, 2])
+    if bad.any():
+        first = int(np.argmax(bad))
+        when = "" if times is None else f" at t = {np.ravel(times)[first]:.9g} s"
+        raise SingularInertiaError(
+            f"locked inertia{when} is not positive definite: principal moments {moments[first]} kg m^2; "
+            "give mass to the links, or change the body so that it is not on one line"
+        )
+    inverse = np.linalg.inv(inertia)
+    return 0.5 * (inverse + np.swapaxes(inverse, -1, -2))
+
+
+def second_moment(inertia: Array) -> Array:
+    """The second-moment tensor of mass, J = tr(I)/2 - I: (..., 3, 3) -> (..., 3, 3) [kg m^2].
+
+    Any real distribution of mass has J positive semidefinite, which is the triangle inequality of the
+    principal moments. Source: theory.md A4.
+    """
+    half_trace = 0.5 * np.trace(inertia, axis1=-2, axis2=-1)
+    return half_trace[..., None, None] * np.eye(3) - inertia
+
+
+def triangle_defect(inertia: Array) -> Array:
+    """By how much the triangle inequality fails, relative to the largest moment; negative where it holds: (...)."""
+    moments = np.linalg.eigvalsh(inertia)
+    return (moments[..., 2] - moments[..., 1] - moments[..., 0]) / moments[..., 2]
+
+
+def principal_axes(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments, ascending, and a proper frame of principal axes.
+
+    Returns
+    -------
+    moments : (..., 3) [kg m^2]
+    axes : (..., 3, 3), columns are the axes, determinant +1: inertia = axes diag(moments) axes^T
+
+    Source: theory.md A11 (Marsden and Ratiu, section 15.3).
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    axes[..., :, 2] *= np.where(np.linalg.det(axes) < 0.0, -1.0, 1.0)[..., None]
+    return moments, axes

@@ -1,0 +1,121 @@
+"""One explicit eighth-order step of the attitude equation, written once for numbers, arrays and symbols.
+
+The attitude relative to the start, S(t), obeys S' = S hat(omega), omega = I^-1 S^T Pi_0 - I^-1 L_o, with Pi_0 the
+body angular momentum at the start (Cabrera 2006, equation 10). S is carried as a quaternion; the coefficients
+are those of Dormand and Prince 8(5,3) (Hairer, Norsett and Wanner, Solving ODEs I), as SciPy holds them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .arrays import Array
+
+Scalars = Sequence[Any]
+STAGES = 12
+
+
+@lru_cache(maxsize=1)
+def tableau() -> tuple[Array, Array, Array]:
+    """A (12, 12), b (12,), c (12,) of the eighth-order formula."""
+    from scipy.integrate import DOP853
+
+    return DOP853.A[:STAGES, :STAGES], DOP853.B[:STAGES], DOP853.C[:STAGES]
+
+
+def step(quat_xyzw: Scalars, momentum: Scalars | None, channels: Sequence[Scalars]) -> list[Any]:
+    """The quaternion of S after one step, normalised.
+
+    Parameters
+    ----------
+    quat_xyzw : four components at the start of the step; numbers, arrays or symbols
+    momentum : the three components of Pi_0, or None where it is zero
+    channels : for each of the 12 stage times the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
+        entries; without momentum just the last three
+    """
+    a, b, _ = tableau()
+    slopes: list[list[Any]] = []
+    for stage in range(STAGES):
+        inner = _combination(quat_xyzw, a[stage, :stage], slopes)
+        slopes.append(_slope(inner, momentum, channels[stage]))
+    x, y, z, w = _combination(quat_xyzw, b, slopes)
+    scale = 1.0 / (x * x + y * y + z * z + w * w) ** 0.5
+    return [x * scale, y * scale, z * scale, w * scale]
+
+
+def body_momentum(quat_xyzw: Scalars, momentum: Scalars) -> list[Any]:
+    """S^T Pi_0 for the unit quaternion of S."""
+    x, y, z, w = quat_xyzw
+    p, q, r = momentum
+    u, v, s = 2.0 * (y * r - z * q), 2.0 * (z * p - x * r), 2.0 * (x * q - y * p)
+    return [p - w * u + (y * s - z * v), q - w * v + (z * u - x * s), r - w * s + (x * v - y * u)]
+
+
+def turn_rate(momentum: Scalars, channels: Scalars) -> list[Any]:
+    """I^-1 Pi - I^-1 L_o from the nine channels."""
+    p, q, r = momentum
+    xx, yy, zz, yz, xz, xy, *drift = channels
+    return [
+        xx * p + xy * q + xz * r - drift[0],
+        xy * p + yy * q + yz * r - drift[1],
+        xz * p + yz * q + zz * r - drift[2],
+    ]
+
+
+def _slope(quat_xyzw: Scalars, momentum: Scalars | None, channels: Scalars) -> list[Any]:
+    x, y, z, w = quat_xyzw
+    if momentum is None:
+        a, b, c = (-drift for drift in channels)
+    else:
+        a, b, c = turn_rate(body_momentum(quat_xyzw, momentum), channels)
+    return [
+        0.5 * (w * a + y * c - z * b),
+        0.5 * (w * b + z * a - x * c),
+        0.5 * (w * c + x * b - y * a),
+        -0.5 * (x * a + y * b + z * c),
+    ]
+
+
+def _combination(start: Scalars, weights: Array, slopes: list[list[Any]]) -> list[Any]:
+    total = list(start)
+    for weight, slope in zip(weights, slopes, strict=True):
+        if weight != 0.0:
+            total = [t + float(weight) * s for t, s in zip(total, slope, strict=True)]
+    return total
+
+
+def relative_angle(first: Scalars, second: Scalars) -> Any:
+    """The angle between two nearby rotations given as unit quaternions, to first order [rad]."""
+    a, b, c, d = first
+    x, y, z, w = second
+    u = d * x - a * w - b * z + c * y
+    v = d * y - b * w - c * x + a * z
+    s = d * z - c * w - a * y + b * x
+    return 2.0 * (u * u + v * v + s * s) ** 0.5
+
+
+def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
+    """The matrix M of delta' = M delta for an error delta of the attitude, S exp(hat(delta)).
+
+    M = I^-1 hat(Pi) - hat(omega), scaled as the channels are (numerics.md section 1).
+    """
+    p, q, r = momentum
+    xx, yy, zz, yz, xz, xy, *_ = channels
+    a, b, c = turn_rate(momentum, channels)
+    return [
+        [xy * r - xz * q, xz * p - xx * r + c, xx * q - xy * p - b],
+        [yy * r - yz * q - c, yz * p - xy * r, xy * q - yy * p + a],
+        [yz * r - zz * q + b, zz * p - xz * r - a, xz * q - yz * p],
+    ]
+
+
+def steps_in_numpy(quat_xyzw: Array, momentum: Array | None, channels: Array) -> Array:
+    """`step` on arrays: quaternions (..., 4), momenta (..., 3), channels (..., 12, 9 or 3) -> (..., 4)."""
+    quaternion = [quat_xyzw[..., i] for i in range(4)]
+    start = None if momentum is None else [momentum[..., i] for i in range(3)]
+    stages = [[channels[..., s, i] for i in range(channels.shape[-1])] for s in range(STAGES)]
+    return np.stack(np.broadcast_arrays(*step(quaternion, start, stages)), axis=-1)

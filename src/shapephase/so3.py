@@ -1,0 +1,206 @@
+"""Rotations of space: matrices, rotation vectors and quaternions, batched over leading axes.
+
+A rotation matrix `R` takes body axes to inertial axes; quaternions are xyzw, as in SciPy and Pinocchio.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .arrays import Array, finite_array
+from .errors import ShapeError
+
+
+def hat(vector: Array) -> Array:
+    """The matrix of the cross product, hat(v) w = v x w: (..., 3) -> (..., 3, 3)."""
+    matrix = np.zeros((*vector.shape, 3))
+    matrix[..., 0, 1] = -vector[..., 2]
+    matrix[..., 0, 2] = vector[..., 1]
+    matrix[..., 1, 0] = vector[..., 2]
+    matrix[..., 1, 2] = -vector[..., 0]
+    matrix[..., 2, 0] = -vector[..., 1]
+    matrix[..., 2, 1] = vector[..., 0]
+    return matrix
+
+
+def vee(matrix: Array) -> Array:
+    """The vector of the antisymmetric part, the inverse of `hat`: (..., 3, 3) -> (..., 3)."""
+    return 0.5 * np.stack(
+        [
+            matrix[..., 2, 1] - matrix[..., 1, 2],
+            matrix[..., 0, 2] - matrix[..., 2, 0],
+            matrix[..., 1, 0] - matrix[..., 0, 1],
+        ],
+        axis=-1,
+    )
+
+
+def transpose(matrix: Array) -> Array:
+    """The inverse of a rotation: (..., 3, 3) -> (..., 3, 3)."""
+    return np.swapaxes(matrix, -1, -2)
+
+
+def apply(matrix: Array, vector: Array) -> Array:
+    """Matrix times vector over leading axes: (..., 3, 3), (..., 3) -> (..., 3)."""
+    return (matrix @ vector[..., None])[..., 0]
+
+
+def exp(rotation_vector: Array) -> Array:
+    """The rotation by |v| radians about v: (..., 3) -> (..., 3, 3)."""
+    return matrix_from_quat(quat_from_rotation_vector(rotation_vector))
+
+
+def log(matrix: Array) -> Array:
+    """The rotation vector with angle in [0, pi]: (..., 3, 3) -> (..., 3) [rad].
+
+    Through the quaternion, so accurate at every angle, half turns included.
+    """
+    quat_xyzw = quat_from_matrix(matrix)
+    sine = np.linalg.norm(quat_xyzw[..., :3], axis=-1)
+    cosine = quat_xyzw[..., 3]
+    small = sine < 1e-9
+    scale = np.where(small, 2.0, 2.0 * np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
+    return scale[..., None] * quat_xyzw[..., :3]
+
+
+def angle(matrix: Array) -> Array:
+    """The angle of a rotation, in [0, pi]: (..., 3, 3) -> (...) [rad]."""
+    return np.linalg.norm(log(matrix), axis=-1)
+
+
+def angle_about(matrix: Array, axis: Array) -> Array:
+    """The angle in (-pi, pi] of the turn about a unit axis nearest to the rotation [rad].
+
+    The twist of the swing-twist decomposition; exact when the rotation is a turn about `axis`.
+    """
+    quat_xyzw = quat_from_matrix(matrix)
+    twist = np.sum(quat_xyzw[..., :3] * axis, axis=-1)
+    return wrap(2.0 * np.arctan2(twist, quat_xyzw[..., 3]))
+
+
+def wrap(phase: Array | float) -> Array:
+    """A phase modulo 2 pi in (-pi, pi] [rad]."""
+    turn = 2.0 * np.pi
+    phase = np.asarray(phase, dtype=float)
+    inside = (phase > -np.pi) & (phase <= np.pi)
+    return np.where(inside, phase, np.pi - np.mod(np.pi - phase, turn))
+
+
+def between(start: Array, end: Array) -> Array:
+    """The rotation along the shortest great circle that takes the unit vector `start` to `end`.
+
+    For opposite vectors the half turn through `middle`: (..., 3), (..., 3) -> (..., 3, 3).
+    """
+    start, end = np.broadcast_arrays(start, end)
+    half = middle(start, end)
+    return matrix_from_quat(
+        normalised(np.concatenate([np.cross(start, half), np.sum(start * half, axis=-1, keepdims=True)], axis=-1))
+    )
+
+
+def middle(start: Array, end: Array) -> Array:
+    """The unit vector halfway between two; for opposite vectors one fixed perpendicular: (..., 3)."""
+    total = start + end
+    length = np.linalg.norm(total, axis=-1, keepdims=True)
+    opposite = length < 1e-8
+    return np.where(opposite, perpendicular(start), total / np.where(opposite, 1.0, length))
+
+
+def perpendicular(vector: Array) -> Array:
+    """A unit vector at right angles to each vector: (..., 3) -> (..., 3)."""
+    least = np.argmin(np.abs(vector), axis=-1)
+    across = np.cross(vector, np.eye(3)[least])
+    return across / np.linalg.norm(across, axis=-1, keepdims=True)
+
+
+def quat_from_rotation_vector(rotation_vector: Array) -> Array:
+    """xyzw of the rotation by |v| about v: (..., 3) -> (..., 4)."""
+    half = 0.5 * np.linalg.norm(rotation_vector, axis=-1, keepdims=True)
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * rotation_vector, np.cos(half)], axis=-1)
+
+
+def quat_from_matrix(matrix: Array) -> Array:
+    """xyzw with w >= 0 of a rotation matrix: (..., 3, 3) -> (..., 4).
+
+    The largest of the four components is found first and divides the others (Shepperd 1978), so no
+    rotation is near a singularity.
+    """
+    m = matrix
+    trace = m[..., 0, 0] + m[..., 1, 1] + m[..., 2, 2]
+    squares = np.stack([m[..., 0, 0], m[..., 1, 1], m[..., 2, 2], trace], axis=-1)
+    largest = np.argmax(squares, axis=-1)
+    rows = np.empty((*trace.shape, 4, 4))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        rows[..., i, i] = 1.0 + 2.0 * m[..., i, i] - trace
+        rows[..., i, j] = rows[..., j, i] = m[..., i, j] + m[..., j, i]
+        rows[..., i, 3] = rows[..., 3, i] = m[..., k, j] - m[..., j, k]
+    rows[..., 3, 3] = 1.0 + trace
+    chosen = np.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :]
+    return positive_scalar(normalised(chosen))
+
+
+def positive_scalar(quat_xyzw: Array) -> Array:
+    """The one of q and -q whose scalar part is not negative: (..., 4) -> (..., 4)."""
+    return np.where(quat_xyzw[..., 3:] < 0.0, -quat_xyzw, quat_xyzw)
+
+
+def normalised(vector: Array) -> Array:
+    """Each vector divided by its length: (..., k) -> (..., k)."""
+    return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+
+
+def matrix_from_quat(quat_xyzw: Array) -> Array:
+    """The rotation matrix of a unit quaternion xyzw: (..., 4) -> (..., 3, 3)."""
+    x, y, z, w = np.moveaxis(quat_xyzw, -1, 0)
+    matrix = np.empty((*x.shape, 3, 3))
+    matrix[..., 0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    matrix[..., 0, 1] = 2.0 * (x * y - z * w)
+    matrix[..., 0, 2] = 2.0 * (x * z + y * w)
+    matrix[..., 1, 0] = 2.0 * (x * y + z * w)
+    matrix[..., 1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    matrix[..., 1, 2] = 2.0 * (y * z - x * w)
+    matrix[..., 2, 0] = 2.0 * (x * z - y * w)
+    matrix[..., 2, 1] = 2.0 * (y * z + x * w)
+    matrix[..., 2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    return matrix
+
+
+def rotation_argument(value: object, name: str) -> Array:
+    """A user's rotation matrices, checked and made orthogonal to rounding: (..., 3, 3).
+
+    Raises
+    ------
+    ShapeError
+        If the shape is wrong, or a matrix is further than 1e-6 from a proper rotation.
+    """
+    matrix = finite_array(value, name, (3, 3))  # type: ignore[arg-type]
+    defect = float(np.max(np.abs(transpose(matrix) @ matrix - np.eye(3)), initial=0.0))
+    if defect > 1e-6:
+        raise ShapeError(f"{name}: not a rotation, R^T R differs from the identity by {defect:.2g}")
+    if np.any(np.linalg.det(matrix) < 0.0):
+        raise ShapeError(f"{name}: a reflection (determinant -1), not a rotation")
+    return orthonormalised(matrix)
+
+
+def orthonormalised(matrix: Array) -> Array:
+    """The nearest rotation to a matrix already within 1e-6 of one (two Newton-Schulz steps)."""
+    for _ in range(2):
+        matrix = 0.5 * matrix @ (3.0 * np.eye(3) - transpose(matrix) @ matrix)
+    return matrix
+
+
+def quat_argument(value: object, name: str) -> Array:
+    """Rotation matrix of a user's xyzw quaternion: (..., 4) -> (..., 3, 3).
+
+    Raises
+    ------
+    ShapeError
+        If its length differs from 1 by more than 1e-3: it is probably not a quaternion.
+    """
+    quat_xyzw = finite_array(value, name, (4,))  # type: ignore[arg-type]
+    length = np.linalg.norm(quat_xyzw, axis=-1)
+    worst = float(np.max(np.abs(length - 1.0), initial=0.0))
+    if worst > 1e-3:
+        raise ShapeError(f"{name}: a quaternion x y z w of length 1 is needed, its length differs by {worst:.3g}")
+    return matrix_from_quat(normalised(quat_xyzw))
