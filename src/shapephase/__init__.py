@@ -9,9 +9,9 @@ from .connection import curvature, holonomy, mechanical_connection
 from .deformation import Deformation, articulated, particles, prescribed, rigid
 from .errors import ShapePhaseError
 from .gauge import horizontal_gauge, in_gauge, principal_gauge
-from .motion_record import load_motion
+from .motion_files import read_shape_path, write_shape_path
 from .phases import PhaseSplit, split
-from .reconstruction import Motion, momentum_from_rate, reconstruct
+from .reconstruction import Motion, load_motion, momentum_from_rate, reconstruct
 from .return_map import closed_orbits
 from .shape_path import ShapePath
 
@@ -39,8 +39,10 @@ __all__ = [
     "particles",
     "prescribed",
     "principal_gauge",
+    "read_shape_path",
     "reconstruct",
     "rigid",
     "robot_names",
     "split",
+    "write_shape_path",
 ]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import ShapeError
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] = (), *, unit: str = "") -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# pyright: reportAttributeAccessIssue=false
 import threading
 import warnings
 from collections.abc import Mapping
@@ -37,6 +39,7 @@ class Body:
     n_shape : number of independent joints
     mass : [kg]
     joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
+    joint_units : "rad" or "m" for each joint
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     """
 
@@ -62,6 +65,8 @@ class Body:
         self.joint_limits = limits[self._configuration_index[independent]].reshape(-1, 2)
         self.joint_limits[self.continuous] = [-np.inf, np.inf]
         self.joint_limits.setflags(write=False)
+        sliding = [kind.shortname().startswith("JointModelP") for kind in kinds]
+        self.joint_units = tuple("m" if sliding[i] else "rad" for i in independent)
 
     @property
     def n_shape(self) -> int:
@@ -351,9 +356,7 @@ def _moving_joints(model: pin.Model) -> dict[str, int]:
     return moving
 
 
-def _mimic_map(
-    moving: list[str], independent: tuple[str, ...], mimics: Mapping[str, Mimic]
-) -> tuple[Array, Array]:
+def _mimic_map(moving: list[str], independent: tuple[str, ...], mimics: Mapping[str, Mimic]) -> tuple[Array, Array]:
     """S and q0 of full = S independent + q0, followers of followers resolved."""
     place = {name: column for column, name in enumerate(independent)}
     matrix = np.zeros((len(moving), len(independent)))

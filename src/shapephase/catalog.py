@@ -5,21 +5,16 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .body import Body, body_from_model, body_from_urdf
 from .errors import MissingExtraError, ModelFileError, unknown_name
 from .urdf import read_urdf
 
-if TYPE_CHECKING:
-    import pinocchio
-
 _EXAMPLE = "example:"
 
 
-def load_body(
-    source: str | os.PathLike[str] | pinocchio.Model, *, on_unphysical: str = "error"
-) -> Body:
+def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "error") -> Body:
     """Load a free-floating body.
 
     Parameters
@@ -94,6 +89,6 @@ def _from_file(path: Path, on_unphysical: str) -> Body:
 def _from_model(model: Any, on_unphysical: str) -> Body:
     import pinocchio
 
-    if not isinstance(model, pinocchio.Model):
+    if not isinstance(model, pinocchio.Model):  # pyright: ignore[reportAttributeAccessIssue]
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(model).__name__}")
     return body_from_model(model, model.name, f"model {model.name!r}", on_unphysical=on_unphysical)

@@ -91,8 +91,8 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
     if len(gap) and abs(gap[worst]) > _CLOSED:
         raise OpenPathError(
-            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from its "
-            "start; close the path, or use split(reconstruct(articulated(body, path), 0)) for the lift of an open one"
+            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from "
+            "its start; close the path, or split a reconstructed motion with zero momentum for the lift of an open one"
         )
     lift = stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
     return so3.matrix_from_quat(lift.quaternions[0, -1])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -120,7 +121,7 @@ def principal_frames(deformation: Deformation) -> Frames:
 
 def _principal_track(deformation: Deformation) -> tuple[Array, Array]:
     """Times and continuous principal frames, close enough that each tells its neighbours' axes apart."""
-    times = np.unique(np.concatenate([np.linspace(a, b, 33) for a, b in _pairs(deformation.breaks)]))
+    times = np.unique(np.concatenate([np.linspace(a, b, 33) for a, b in pairwise(deformation.breaks)]))
     while True:
         moments, axes = np.linalg.eigh(deformation.inertia(times))
         _check_apart(moments, times)
@@ -159,10 +160,6 @@ def _check_apart(moments: Array, times: Array) -> None:
             f"two principal moments meet at t = {times[row]:.9g} s ({moments[row]} kg m^2): the principal gauge has no "
             "unique frame there; use the horizontal gauge, or a body without that symmetry"
         )
-
-
-def _pairs(values: Array) -> list[tuple[float, float]]:
-    return list(zip(values[:-1], values[1:], strict=True))
 
 
 def _seen_from(deformation: Deformation, frames: Frames, name: str) -> Deformation:

@@ -1,66 +1,93 @@
-"""Motions in files: a whole motion as NPZ, its attitude in time as CSV."""
+"""Motions in files: a whole motion as NPZ, a time series as CSV."""
 
 from __future__ import annotations
 
 import json
 import os
 import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from . import so3
-from .arrays import Array, finite_array
-from .deformation import sampled_deformation
-from .errors import InputFileNotFoundError, ResultFileError, ShapeError
+from .arrays import Array
+from .deformation import Deformation, sampled_deformation
+from .errors import InputFileNotFoundError, ResultFileError
 from .files import write_whole
-from .reconstruction import Motion
 from .sampling import Interpolant, values_to_coefficients
 from .stepping import SteppedRotation
 
 _FORMAT = "shapephase motion 1"
-_STEPS = ("momentum", "times", "panel", "quaternions", "sampling_error", "stepping_error", "amplification", "propagator")
+_STEPS = (
+    "momentum",
+    "times",
+    "panel",
+    "quaternions",
+    "sampling_error",
+    "stepping_error",
+    "amplification",
+    "propagator",
+)
+_SAMPLES = ("edges", "coefficients", "inverse_error", "drift_error")
 _CENTRE_DEGREE = 16
 
 
-def save_motion(motion: Motion, stepped: SteppedRotation, path: str | os.PathLike[str]) -> None:
-    """Write a motion whole: the sampled deformation, the rotations, the inputs and versions."""
-    interpolant = stepped.interpolant
-    deformation = motion.deformation
+@dataclass(frozen=True, eq=False)
+class MotionRecord:
+    """What is kept of a motion: the sampled deformation, the rotations, and how they were made.
+
+    Attributes
+    ----------
+    deformation : for reading, one made of the samples; it needs neither body nor path
+    momentum, initial_attitude : batch + (3,), batch + (3, 3)
+    tolerance, method, evaluations : as in Motion
+    steps : S(t)
+    """
+
+    deformation: Deformation
+    momentum: Array
+    initial_attitude: Array
+    tolerance: float
+    method: str
+    evaluations: int
+    steps: SteppedRotation
+
+
+def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> None:
+    """Write a motion whole, with versions and units."""
+    interpolant, deformation = record.steps.interpolant, record.deformation
     header = {
         "format": _FORMAT,
         "shapephase": version("shapephase"),
         "numpy": np.__version__,
         "deformation": deformation.label,
-        "tolerance": motion.tolerance,
-        "method": motion.method,
-        "evaluations": motion.evaluations,
+        "tolerance": record.tolerance,
+        "method": record.method,
+        "evaluations": record.evaluations,
         "interpolant_evaluations": interpolant.evaluations,
         "shape_gap": deformation.shape_gap,
         "units": "SI: rad, s, m, kg m^2, kg m^2/s; quaternions x y z w",
     }
     arrays: dict[str, Any] = {
         "header": np.array(json.dumps(header)),
-        "spatial_momentum": motion.momentum,
-        "initial_attitude": motion.initial_attitude,
+        "spatial_momentum": record.momentum,
+        "initial_attitude": record.initial_attitude,
         "breaks": deformation.breaks,
-        "edges": interpolant.edges,
-        "coefficients": interpolant.coefficients,
-        "inverse_error": interpolant.inverse_error,
-        "drift_error": interpolant.drift_error,
-        "centre": _centre_coefficients(motion, interpolant.edges),
-        **{f"step_{name}": getattr(stepped, name) for name in _STEPS},
+        "centre": _centre_coefficients(deformation, interpolant.edges),
+        **{name: getattr(interpolant, name) for name in _SAMPLES},
+        **{f"step_{name}": getattr(record.steps, name) for name in _STEPS},
     }
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure
     write_whole(path, lambda stream: np.savez(stream, **arrays))
 
 
-def load_motion(path: str | os.PathLike[str]) -> Motion:
-    """Read a motion written by `Motion.save`; it needs neither the body nor the path it was made from.
+def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
+    """Read what `write_motion_record` wrote.
 
     Raises
     ------
@@ -76,48 +103,29 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
         with np.load(where, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         header = json.loads(str(arrays["header"]))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile) as error:
         raise ResultFileError(f"{where}: no motion that can be read ({error})") from None
     if header.get("format") != _FORMAT:
         raise ResultFileError(
             f"{where}: holds {header.get('format')!r}, this version reads {_FORMAT!r}; compute the motion anew"
         )
     try:
-        return _motion(header, arrays)
+        return _record(header, arrays)
     except KeyError as error:
         raise ResultFileError(f"{where}: the motion lacks {error}; compute it anew") from None
 
 
-def write_attitude_csv(
-    motion: Motion, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike
-) -> None:
-    """Attitude, angular velocity and base position of one motion as a table in time.
-
-    Raises
-    ------
-    ShapeError
-        If the motion is a batch.
-    """
-    if motion.batch:
-        raise ShapeError(f"a table holds one motion, this is a batch of {motion.batch}; reconstruct one of them")
-    t = np.linspace(0.0, motion.duration, 201) if times is None else finite_array(times, "times", (None,), unit="s")
-    quaternions = motion.quat_xyzw(t)
-    # One sign along the motion, so that a plot of the components does not jump.
-    flips = np.cumprod(np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0))
-    quaternions[1:] *= flips[:, None]
-    columns = [t, *quaternions.T, *motion.angular_velocity(t).T, *motion.base_position(t, **fall).T]  # type: ignore[arg-type]
-    names = "time,qx,qy,qz,qw,omega_x_rad_s,omega_y_rad_s,omega_z_rad_s,base_x_m,base_y_m,base_z_m"
-    lines = [names, *(",".join(repr(float(v)) for v in row) for row in np.stack(columns, axis=-1))]
-    write_whole(path, lambda stream: stream.write(("\n".join(lines) + "\n").encode()) and None)
+def write_table(path: str | os.PathLike[str], columns: Mapping[str, Array]) -> None:
+    """Write columns of numbers as CSV, every digit kept."""
+    rows = np.column_stack(list(columns.values())).tolist()
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    text = "\n".join(lines) + "\n"
+    write_whole(path, lambda stream: stream.write(text.encode()))
 
 
-def _motion(header: dict[str, Any], arrays: dict[str, Array]) -> Motion:
+def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecord:
     interpolant = Interpolant(
-        arrays["edges"],
-        arrays["coefficients"],
-        arrays["inverse_error"],
-        arrays["drift_error"],
-        int(header["interpolant_evaluations"]),
+        **{name: arrays[name] for name in _SAMPLES}, evaluations=int(header["interpolant_evaluations"])
     )
     deformation = sampled_deformation(
         interpolant,
@@ -127,22 +135,21 @@ def _motion(header: dict[str, Any], arrays: dict[str, Array]) -> Motion:
         float(header["shape_gap"]),
         str(header["deformation"]),
     )
-    steps = SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS})
-    return Motion(
+    return MotionRecord(
         deformation,
         arrays["spatial_momentum"],
         so3.orthonormalised(arrays["initial_attitude"]),
         float(header["tolerance"]),
         str(header["method"]),
         int(header["evaluations"]),
-        steps,
+        SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS}),
     )
 
 
-def _centre_coefficients(motion: Motion, edges: Array) -> Array:
+def _centre_coefficients(deformation: Deformation, edges: Array) -> Array:
     """Chebyshev coefficients of the centre of mass on the interpolant's panels: (P, n, 3)."""
     nodes = -np.cos(np.pi * np.arange(_CENTRE_DEGREE + 1) / _CENTRE_DEGREE)
     left, right = edges[:-1, None], edges[1:, None]
     times = np.clip(0.5 * (left + right) + 0.5 * (right - left) * nodes, left, right)
-    values = motion.deformation.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
+    values = deformation.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
     return values_to_coefficients(_CENTRE_DEGREE) @ values

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,7 +107,7 @@ def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
     elif gauge == "principal":
         frames = principal_frames(motion.deformation)
     dynamic, area, ends = _phase_integrals(motion, axis, frames, refine=gauge == "principal")
-    dynamic, area = dynamic * has_phase, area * has_phase
+    dynamic, area = np.where(has_phase, dynamic, 0.0), np.where(has_phase, area, 0.0)
     turned = _rotation_in_gauge(start, end, frames, duration)
     closing = so3.between(ends[:, 1], ends[:, 0])
     tilt = np.where(has_phase[:, None, None], turned.start @ closing @ so3.transpose(turned.start), np.eye(3))
@@ -124,7 +123,7 @@ def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
         montgomery_phase=phase.reshape(batch)[()],
         montgomery_angle=so3.wrap(phase).reshape(batch)[()],
         dynamic_phase=dynamic.reshape(batch)[()],
-        geometric_phase=-area.reshape(batch)[()],
+        geometric_phase=(0.0 - area).reshape(batch)[()],
         solid_angle=area.reshape(batch)[()],
         tilt=tilt.reshape(matrix),
         momentum_gap=(_angle_between(ends[:, 0], ends[:, 1]) * has_phase).reshape(batch)[()],
@@ -169,9 +168,7 @@ def _rotation_in_gauge(start: Array, end: Array, frames: Frames | None, duration
     return _Ends(start @ turns[0].T, end @ turns[1].T)
 
 
-def _phase_integrals(
-    motion: Motion, axis: Array, frames: Frames | None, *, refine: bool
-) -> tuple[Array, Array, Array]:
+def _phase_integrals(motion: Motion, axis: Array, frames: Frames | None, *, refine: bool) -> tuple[Array, Array, Array]:
     """Dynamic phase (B,), solid angle (B,), and the momentum directions in the gauge at both ends (B, 2, 3).
 
     The curve is cut at the integrator's steps, and finer where the gauge's own frame turns faster than those
@@ -238,5 +235,3 @@ def _momentum_curve(
 
 def _angle_between(a: Array, b: Array) -> Array:
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,11 +15,19 @@ from . import so3
 from .arrays import Array, finite_array
 from .deformation import Deformation
 from .errors import AccuracyNotReached, ShapeError, unknown_name
+from .inertia_tensor import inverse_inertia
+from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
 from .sampling import Interpolant
 from .shape_path import times_argument
 from .stepping import SteppedRotation, dop853_rotation, stepped_rotation
 
 METHODS = ("auto", "collocation", "dop853")
+_COLUMNS = (
+    "time",
+    *("qx", "qy", "qz", "qw"),
+    *("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s"),
+    *("base_x_m", "base_y_m", "base_z_m"),
+)
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
 
 
@@ -97,7 +106,7 @@ class Motion:
         times = times_argument(t, self.duration)
         inertia, internal = self.deformation.source.sample(times.ravel())
         pi = self.body_momentum(times).reshape(-1, times.size, 3)
-        omega = np.linalg.solve(inertia[None], (pi - internal)[..., None])[..., 0]
+        omega = so3.apply(inverse_inertia(inertia, times.ravel()), pi - internal)
         return omega.reshape(*self.batch, *times.shape, 3)
 
     def base_position(
@@ -161,23 +170,40 @@ class Motion:
         """How a small turn of the start, R(0) exp(hat(delta)), reaches the end: batch + (3, 3), to about 1e-4."""
         return _stepped(self).propagator.reshape(*self.batch, 3, 3)
 
-    def save(self, path: str) -> None:
-        """Write the motion to a file that `load_motion` reads, without need of the body."""
-        from .motion_record import save_motion
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
+        record = MotionRecord(
+            self.deformation,
+            self.momentum,
+            self.initial_attitude,
+            self.tolerance,
+            self.method,
+            self.evaluations,
+            _stepped(self),
+        )
+        write_motion_record(record, path)
 
-        save_motion(self, _stepped(self), path)
-
-    def write_csv(self, path: str, times: ArrayLike | None = None, **fall: ArrayLike) -> None:
-        """Write a time series: attitude, angular velocity, base position, each with its unit in the header.
+    def write_csv(self, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike) -> None:
+        """Write a time series: attitude (x y z w, one sign throughout), angular velocity, base position.
 
         Parameters
         ----------
         times : (N,) [s]; None: 201 even times
         fall : start, velocity, gravity as in `base_position`
-        """
-        from .motion_record import write_attitude_csv
 
-        write_attitude_csv(self, path, times, **fall)
+        Raises
+        ------
+        ShapeError
+            If the motion is a batch.
+        """
+        if self.batch:
+            raise ShapeError(f"a table holds one motion, this is a batch of {self.batch}; reconstruct one of them")
+        t = np.linspace(0.0, self.duration, 201) if times is None else finite_array(times, "times", (None,), unit="s")
+        quaternions = self.quat_xyzw(t)
+        flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
+        quaternions[1:] *= np.cumprod(flips)[:, None]
+        columns = [t, *quaternions.T, *self.angular_velocity(t).T, *self.base_position(t, **fall).T]
+        write_table(path, dict(zip(_COLUMNS, columns, strict=True)))
 
     @cached_property
     def _flat_attitude(self) -> Array:
@@ -244,6 +270,28 @@ def reconstruct(
     return Motion(deformation, spatial, start, float(goal), "collocation", sampler.evaluations, solution)
 
 
+def load_motion(path: str | os.PathLike[str]) -> Motion:
+    """Read a motion written by `Motion.save`; it needs neither the body nor the path it was made from.
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    ResultFileError
+        If the file is no motion, is damaged, or was written by a version with another format.
+    """
+    record = read_motion_record(path)
+    return Motion(
+        record.deformation,
+        record.momentum,
+        record.initial_attitude,
+        record.tolerance,
+        record.method,
+        record.evaluations,
+        record.steps,
+    )
+
+
 def momentum_from_rate(
     deformation: Deformation, angular_velocity: ArrayLike, attitude: ArrayLike | None = None
 ) -> Array:
@@ -284,10 +332,7 @@ def _dop853(deformation: Deformation, at_start: Array, tolerance: float) -> _Dop
     pieces = max(2, 64 // (len(deformation.breaks) - 1))
     times = np.unique(
         np.concatenate(
-            [
-                np.linspace(a, b, pieces)
-                for a, b in zip(deformation.breaks[:-1], deformation.breaks[1:], strict=True)
-            ]
+            [np.linspace(a, b, pieces) for a, b in zip(deformation.breaks[:-1], deformation.breaks[1:], strict=True)]
         )
     )
     for start in at_start:
@@ -295,9 +340,7 @@ def _dop853(deformation: Deformation, at_start: Array, tolerance: float) -> _Dop
         tight, second = dop853_rotation(deformation.source.sample, deformation.breaks, start, 0.1 * rtol)
         between = times[:-1] + 0.37 * np.diff(times)
         there = np.concatenate([times, between])
-        gap = so3.angle(
-            so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there))
-        )
+        gap = so3.angle(so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there)))
         dense.append(tight)
         estimates.append(float(gap.max()) + 1e-13)
         evaluations += first + second

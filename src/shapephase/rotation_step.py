@@ -7,7 +7,6 @@ are those of Dormand and Prince 8(5,3) (Hairer, Norsett and Wanner, Solving ODEs
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from .arrays import Array
 
-Scalars = Sequence[Any]
+Scalars = Any  # numbers, arrays or symbols, one for each component
 STAGES = 12
 
 
@@ -27,7 +26,7 @@ def tableau() -> tuple[Array, Array, Array]:
     return DOP853.A[:STAGES, :STAGES], DOP853.B[:STAGES], DOP853.C[:STAGES]
 
 
-def step(quat_xyzw: Scalars, momentum: Scalars | None, channels: Sequence[Scalars]) -> list[Any]:
+def step(quat_xyzw: Scalars, momentum: Scalars | None, channels: Scalars) -> list[Any]:
     """The quaternion of S after one step, normalised.
 
     Parameters

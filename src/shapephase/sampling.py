@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
-from .arrays import Array
+from .arrays import Array, Integers
 from .errors import AccuracyNotReached, ShapeError
 from .inertia_tensor import inverse_inertia
 
@@ -46,11 +47,11 @@ class Interpolant:
     drift_error: Array
     evaluations: int
 
-    def panel_of(self, times: Array) -> Array:
+    def panel_of(self, times: Array) -> Integers:
         """The panel of each time: (N,) -> (N,)."""
         return np.clip(np.searchsorted(self.edges, times, side="right") - 1, 0, len(self.edges) - 2)
 
-    def channels(self, times: Array, panel: Array) -> Array:
+    def channels(self, times: Array, panel: Integers) -> Array:
         """The nine channels at times of given panels: (N, k), (N,) -> (N, k, 9)."""
         left, right = self.edges[panel, None], self.edges[panel + 1, None]
         local = np.clip((2.0 * times - left - right) / (right - left), -1.0, 1.0)
@@ -65,7 +66,6 @@ class Interpolant:
         """I^-1 and I^-1 L_o: (N,) -> (N, 3, 3) [1/(kg m^2)], (N, 3) [rad/s]."""
         values = self.channels(times[:, None], self.panel_of(times))[:, 0]
         return values[:, _MATRIX].reshape(-1, 3, 3), values[:, 6:]
-
 
     def error(self, momentum: float) -> float:
         """Bound of the attitude error due to sampling, without amplification [rad]."""
@@ -123,11 +123,8 @@ class Sampler:
         self._span = float(breaks[-1] - breaks[0])
         self._most = _MOST_PANELS_A_BREAK + 40 * len(breaks)
         pieces = 1 if constant else 4 if oscillations is None else max(1, int(np.ceil(oscillations / 2.0)))
-        ends = [
-            np.linspace(left, right, pieces + 1)
-            for left, right in zip(breaks[:-1], breaks[1:], strict=True)
-        ]
-        self._panels = [_Panel(a, b) for e in ends for a, b in zip(e[:-1], e[1:], strict=True)]
+        ends = [np.linspace(left, right, pieces + 1) for left, right in pairwise(breaks)]
+        self._panels = [_Panel(a, b) for e in ends for a, b in pairwise(e)]
         self.evaluations = 0
         self._raise_degree(self._panels)
 
@@ -311,4 +308,4 @@ def values_to_coefficients(degree: int) -> Array:
 
 
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence away from the ends.
-_BETWEEN = np.sort((0.5 + 0.6180339887498949 * np.arange(64)) % 1.0)
+_BETWEEN = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))

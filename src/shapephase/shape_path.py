@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, check_finite, finite_array
+from .arrays import Array, Integers, check_finite, finite_array
 from .errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 
 _WHOLE_TURN = 2.0 * np.pi
@@ -349,7 +349,7 @@ class _Stretched:
 @dataclass(frozen=True, eq=False)
 class _Reordered:
     curve: Curve
-    order: Array
+    order: Integers
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         shapes, rates = self.curve(times)

@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any, Protocol
 
 import numpy as np
 
 from . import so3
-from .arrays import Array
+from .arrays import Array, Integers
 from .errors import AccuracyNotReached
 from .rotation_step import (
     STAGES,
@@ -23,16 +24,16 @@ from .rotation_step import (
     step,
     steps_in_numpy,
     tableau,
-    turn_rate,
     variation,
 )
-from .sampling import Evaluate, Interpolant, Sampler, chebyshev
+from .sampling import Evaluate, Interpolant, chebyshev
 
 _EPS = np.finfo(float).eps
 _SHARE = 64.0  # two half steps of order 8 err 255 times less than the whole one; a quarter of that is relied on
 _BLOCK = 256
 _SYMBOLIC_BATCH = 24
 _MOST_STEPS = 2_000_000
+_ROUNDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class SteppedRotation:
     interpolant: Interpolant
     momentum: Array
     times: Array
-    panel: Array
+    panel: Integers
     quaternions: Array
     sampling_error: Array
     stepping_error: Array
@@ -105,7 +106,23 @@ class SteppedRotation:
         return self.interpolant.inverse_and_drift(t)
 
 
-def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> SteppedRotation:
+class Samples(Protocol):
+    """What the integrator needs to know of a deformation; `Sampler` is one."""
+
+    def refine(self, momentum: float, tolerance: float) -> None:
+        """Sample until the attitude error for momenta up to this size is at most `tolerance` [rad]."""
+        ...
+
+    def error(self, momentum: float) -> float:
+        """Bound of the attitude error due to sampling [rad]."""
+        ...
+
+    def interpolant(self) -> Interpolant:
+        """What has been sampled so far."""
+        ...
+
+
+def stepped_rotation(sampler: Samples, momentum: Array, tolerance: float) -> SteppedRotation:
     """Integrate the attitude equation to a tolerance, sampling the deformation as far as that needs.
 
     Parameters
@@ -121,34 +138,41 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     size = float(np.max(np.linalg.norm(momentum, axis=-1), initial=0.0))
     moving = momentum if size > 0.0 else np.zeros((1, 3))
     sampling_target = 0.3 * tolerance
-    solution = None
-    for _ in range(12):
+    plan: _Plan | None = None
+    last: SteppedRotation | None = None
+    for _ in range(_ROUNDS):
         sampler.refine(size, sampling_target)
         interpolant = sampler.interpolant()
-        doubles = _first_plan(interpolant, size, tolerance) if solution is None else _plan_for(interpolant, solution)
+        doubles = _first_plan(interpolant, size, tolerance) if plan is None else _plan_for(interpolant, plan)
         solution, local = _run(interpolant, moving, doubles)
-        worst = float(np.max(solution.amplification))
-        sampling = sampler.error(size)
-        sums = np.max(np.add.reduceat(local, _starts(doubles), axis=1), axis=0) / _SHARE
+        growth = solution.amplification
         bound = replace(
             solution,
-            sampling_error=np.full(len(momentum), 1.0) * solution.amplification * sampling,
-            stepping_error=np.full(len(momentum), 1.0) * solution.amplification * local.sum(axis=1) / _SHARE,
+            sampling_error=growth * sampler.error(size),
+            stepping_error=growth * local.sum(axis=1) / _SHARE,
         )
         if np.all(bound.error_estimate <= tolerance):
             return _for_all(bound, momentum)
-        room = 0.6 * tolerance / worst
+        last = bound
+        room = 0.6 * tolerance / float(np.max(growth))
+        sums = np.max(np.add.reduceat(local, _starts(doubles), axis=1), axis=0) / _SHARE
         if sums.sum() > room:
             doubles = _finer(doubles, sums, room)
-        sampling_target = min(sampling_target, 0.3 * tolerance / worst)
-        solution = _Plan(interpolant.edges, doubles)
-        if doubles.sum() > _MOST_STEPS or np.all(bound.rounding_error > 0.9 * tolerance):
+        sampling_target = min(sampling_target, 0.5 * room)
+        plan = _Plan(interpolant.edges, doubles)
+        if doubles.sum() > _MOST_STEPS or np.any(bound.rounding_error > 0.9 * tolerance):
             break
-    raise AccuracyNotReached(
-        f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {np.max(bound.error_estimate):.3g} rad, of "
-        f"which sampling {np.max(bound.sampling_error):.3g}, stepping {np.max(bound.stepping_error):.3g} and rounding "
-        f"{np.max(bound.rounding_error):.3g}, with errors amplified {worst:.3g} times; loosen the tolerance or shorten "
-        "the motion"
+    raise _not_reached(tolerance, last)
+
+
+def _not_reached(tolerance: float, last: SteppedRotation | None) -> AccuracyNotReached:
+    if last is None:
+        return AccuracyNotReached(f"the tolerance {tolerance:.3g} rad was not reached")
+    parts = [float(np.max(part)) for part in (last.sampling_error, last.stepping_error, last.rounding_error)]
+    return AccuracyNotReached(
+        f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {np.max(last.error_estimate):.3g} rad, of "
+        f"which sampling {parts[0]:.3g}, stepping {parts[1]:.3g} and rounding {parts[2]:.3g}, with errors amplified "
+        f"{np.max(last.amplification):.3g} times; loosen the tolerance or shorten the motion"
     )
 
 
@@ -157,10 +181,10 @@ class _Plan:
     """Double steps for each panel of an interpolant."""
 
     edges: Array
-    doubles: Array
+    doubles: Integers
 
 
-def _first_plan(interpolant: Interpolant, size: float, tolerance: float) -> Array:
+def _first_plan(interpolant: Interpolant, size: float, tolerance: float) -> Integers:
     """Double steps per panel from the speed of rotation and the bandwidth of the panel."""
     widths = np.diff(interpolant.edges)
     means = np.abs(interpolant.coefficients)
@@ -171,7 +195,7 @@ def _first_plan(interpolant: Interpolant, size: float, tolerance: float) -> Arra
     return np.maximum(1, np.ceil(fineness * (0.15 * speed * widths + 0.1 * swings))).astype(int)
 
 
-def _plan_for(interpolant: Interpolant, plan: _Plan) -> Array:
+def _plan_for(interpolant: Interpolant, plan: _Plan) -> Integers:
     """The plan carried over to an interpolant whose panels may have been bisected since."""
     widths = np.diff(interpolant.edges)
     middle = 0.5 * (interpolant.edges[:-1] + interpolant.edges[1:])
@@ -179,18 +203,18 @@ def _plan_for(interpolant: Interpolant, plan: _Plan) -> Array:
     return np.maximum(1, np.ceil(plan.doubles[old] * widths / np.diff(plan.edges)[old] - 1e-9)).astype(int)
 
 
-def _finer(doubles: Array, sums: Array, room: float) -> Array:
+def _finer(doubles: Integers, sums: Array, room: float) -> Integers:
     """More double steps where the local errors are above their share."""
     shares = np.maximum(room * doubles / doubles.sum(), 0.1 * room / len(doubles))
     factor = np.clip((sums / shares) ** 0.125 * 1.05, 1.0, 8.0)
     return np.ceil(doubles * factor).astype(int)
 
 
-def _starts(doubles: Array) -> Array:
+def _starts(doubles: Integers) -> Integers:
     return np.concatenate([[0], np.cumsum(doubles)[:-1]])
 
 
-def _run(interpolant: Interpolant, momentum: Array, doubles: Array) -> tuple[SteppedRotation, Array]:
+def _run(interpolant: Interpolant, momentum: Array, doubles: Integers) -> tuple[SteppedRotation, Array]:
     """All double steps: the solution and the (B, D) differences between double and half steps [rad]."""
     still = not momentum.any()
     channels = _stage_channels(interpolant, doubles)
@@ -225,7 +249,7 @@ def _for_all(solution: SteppedRotation, momentum: Array) -> SteppedRotation:
     )
 
 
-def _stage_channels(interpolant: Interpolant, doubles: Array) -> Array:
+def _stage_channels(interpolant: Interpolant, doubles: Integers) -> Array:
     """Scaled channels at the 36 stages of each double step: (D, 36, 9).
 
     First the 12 stages of the whole step, then those of its two halves.
@@ -354,10 +378,10 @@ def _double_steps(length: int, with_momentum: bool) -> Callable[[Array, Array], 
         # A buffer holds one call's arguments; made anew, it can be used from any thread.
         buffer, evaluate = function.buffer()
         states, sides = (np.empty((columns, rows)) for rows, columns in sizes)
-        buffer.set_arg(0, memoryview(state))
-        buffer.set_arg(1, memoryview(channels))
-        buffer.set_res(0, memoryview(states))
-        buffer.set_res(1, memoryview(sides))
+        buffer.set_arg(0, state.data)
+        buffer.set_arg(1, channels.data)
+        buffer.set_res(0, states.data)
+        buffer.set_res(1, sides.data)
         evaluate()
         return states, sides
 
@@ -365,7 +389,7 @@ def _double_steps(length: int, with_momentum: bool) -> Callable[[Array, Array], 
 
 
 @lru_cache(maxsize=2)
-def _double_step_function(with_momentum: bool):
+def _double_step_function(with_momentum: bool) -> Any:
     import casadi
 
     state = casadi.SX.sym("state", 16 if with_momentum else 4)
@@ -383,9 +407,7 @@ def _double_step_function(with_momentum: bool):
     if momentum is None:
         return casadi.Function("double_step", [state, data], [casadi.vertcat(*end), side])
     doubled = [2.0 * channel for channel in stages[2 * STAGES]]
-    matrix = casadi.vertcat(
-        *(casadi.horzcat(*row) for row in variation(body_momentum(middle, momentum), doubled))
-    )
+    matrix = casadi.vertcat(*(casadi.horzcat(*row) for row in variation(body_momentum(middle, momentum), doubled)))
     propagator = casadi.reshape(casadi.vertcat(*parts[4:13]), 3, 3).T
     total = propagator
     for order in (4.0, 3.0, 2.0, 1.0):

@@ -1,0 +1,28 @@
+# The same checks as .ci/run, on the environment that the README's commands make.
+BIN ?= .venv/bin
+
+.PHONY: check lint types imports test notebooks full bench
+
+check: lint types imports test notebooks
+
+lint:
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types:
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+imports:
+	$(BIN)/lint-imports
+
+test:
+	$(BIN)/pytest -n auto -m "not full"
+
+notebooks:
+	$(BIN)/pytest --nbmake notebooks -p no:cacheprovider -W default
+
+full:
+	$(BIN)/pytest -n auto
+
+bench:
+	$(BIN)/python -m benchmarks

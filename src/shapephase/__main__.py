@@ -1,0 +1,5 @@
+"""`python -m shapephase`."""
+
+from .cli import main
+
+main()
