@@ -11,6 +11,7 @@ from .errors import ShapeError
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] = (), *, unit: str = "") -> Array:

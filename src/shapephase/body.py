@@ -4,6 +4,7 @@ from __future__ import annotations
 
 # Pinocchio fills its namespace at import time, where a type checker cannot look.
 # pyright: reportAttributeAccessIssue=false
+import math
 import threading
 import warnings
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike
 from .arrays import Array, finite_array
 from .errors import ModelFileError, ShapeError, UnphysicalInertiaError, unknown_name
 from .inertia_tensor import triangle_defect
-from .urdf import Mimic
+from .urdf import Mimic, UrdfText
 
 _BASE = 6  # velocities of the free-flyer in Pinocchio's order
 
@@ -101,7 +102,10 @@ class Body:
         """
         shape = np.zeros(self.n_shape)
         for name, value in (joints or {}).items():
-            shape[self.joint_index(name)] = finite_array(value, f"joint {name}").item()
+            coordinate = finite_array(value, f"joint {name}")
+            if coordinate.ndim:
+                raise ShapeError(f"joint {name}: one number is needed, got an array of shape {coordinate.shape}")
+            shape[self.joint_index(name)] = coordinate
         return shape
 
     def joint_index(self, name: str) -> int:
@@ -129,7 +133,7 @@ class Body:
         Source: Cabrera 2006, section 2.3; theory.md A3.
         """
         r = self._checked(shape)
-        return self._angular_map(r.reshape(-1, self.n_shape))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
+        return self._angular_map(self._rows(r))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def momentum_matrix(self, shape: ArrayLike) -> Array:
         """J(r), the angular momentum per unit joint rate with the base at rest: L_o = J(r) rate.
@@ -145,7 +149,7 @@ class Body:
         Raises as `locked_inertia`. Source: theory.md A7.
         """
         r = self._checked(shape)
-        return self._angular_map(r.reshape(-1, self.n_shape))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
+        return self._angular_map(self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
 
     def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """Angular momentum of a joint motion about the centre of mass with the base at rest.
@@ -177,14 +181,14 @@ class Body:
     def inertia_rate(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """dI/dt along a joint motion, exact: (..., n), (..., n) -> (..., 3, 3) [kg m^2/s]."""
         r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
-        flat = self._angular_map_rate(r.reshape(-1, self.n_shape), v.reshape(-1, self.n_shape))
+        flat = self._angular_map_rate(self._rows(r), self._rows(v))
         return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
         """Centre of mass of the whole body from the base origin, base axes: (..., n) -> (..., 3) [m]."""
         r = self._checked(shape)
         model, data = self._model, self._data()
-        configurations = self._configurations(r.reshape(-1, self.n_shape))
+        configurations = self._configurations(self._rows(r))
         centres = np.empty((len(configurations), 3))
         for row, q in enumerate(configurations):
             centres[row] = pin.centerOfMass(model, data, q)
@@ -203,7 +207,7 @@ class Body:
         r = self._checked(shape)
         model, data = self._model, self._data()
         frame = model.getFrameId(link, pin.FrameType.BODY)
-        configurations = self._configurations(r.reshape(-1, self.n_shape))
+        configurations = self._configurations(self._rows(r))
         poses = np.empty((len(configurations), 4, 4))
         for row, q in enumerate(configurations):
             pin.forwardKinematics(model, data, q)
@@ -217,9 +221,9 @@ class Body:
         """
         r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
         model, data = self._model, self._data()
-        rates = self._velocities(v.reshape(-1, self.n_shape))
+        rates = self._velocities(self._rows(v))
         energies = np.empty(len(rates))
-        for row, (q, full) in enumerate(zip(self._configurations(r.reshape(-1, self.n_shape)), rates, strict=True)):
+        for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), rates, strict=True)):
             pin.ccrba(model, data, q, full)
             whole = pin.computeKineticEnergy(model, data, q, full)
             energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / self.mass
@@ -241,6 +245,10 @@ class Body:
                 f"({', '.join(self.joint_names)}), got shape {array.shape}"
             )
         return array
+
+    def _rows(self, array: Array) -> Array:
+        """(..., n) -> (N, n); a body without joints has rows too."""
+        return array.reshape(math.prod(array.shape[:-1]), self.n_shape)
 
     def _angular_map(self, shapes: Array) -> Array:
         """[I, J] for each shape: (N, n) -> (N, 3, 3 + n)."""
@@ -267,8 +275,8 @@ class Body:
     def _gradient(self, shape: ArrayLike) -> Array:
         r = self._checked(shape)
         n = self.n_shape
-        shapes = np.repeat(r.reshape(-1, n), n, axis=0)
-        rates = np.tile(np.eye(n), (len(shapes) // max(n, 1), 1))
+        shapes = np.repeat(self._rows(r), n, axis=0)
+        rates = np.tile(np.eye(n), (math.prod(r.shape[:-1]), 1))
         return self._angular_map_rate(shapes, rates).reshape(*r.shape[:-1], n, 3, 3 + n)
 
     def _independent(self, whole: Array) -> Array:
@@ -305,8 +313,8 @@ class Body:
             return self._local.data
 
 
-def body_from_urdf(text: str, name: str, where: str, mimics: Mapping[str, Mimic], on_unphysical: str) -> Body:
-    """A Body from checked URDF text.
+def body_from_urdf(urdf: UrdfText, name: str, where: str, on_unphysical: str) -> Body:
+    """A Body from a checked URDF.
 
     Raises
     ------
@@ -315,29 +323,30 @@ def body_from_urdf(text: str, name: str, where: str, mimics: Mapping[str, Mimic]
     UnphysicalInertiaError
         If a link's inertia is not positive semidefinite and `on_unphysical` is "error".
     """
+    for link in urdf.inertias:
+        _check_inertia(f"{where}: link {link.link!r}", link.mass, link.inertia, on_unphysical)
+    root = "shapephase_free_flyer"
+    while root in urdf.text:
+        root += "_"
     try:
-        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer(), _ROOT_JOINT)
+        model = pin.buildModelFromXML(urdf.text, pin.JointModelFreeFlyer(), root)
     except ValueError as error:
-        raise ModelFileError(f"{where}: not a valid URDF: {str(error).strip()}") from None
-    return body_from_model(model, name, where, mimics, on_unphysical)
+        raise ModelFileError(f"{where}: Pinocchio does not accept it: {str(error).strip()}") from None
+    return Body(model, name, urdf.mimics)
 
 
-def body_from_model(
-    model: pin.Model, name: str, where: str, mimics: Mapping[str, Mimic] | None = None, on_unphysical: str = "error"
-) -> Body:
-    """A Body from a Pinocchio model whose root joint is a free-flyer. Raises as `body_from_urdf`."""
-    if on_unphysical not in ("error", "warn"):
-        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
+def body_from_model(model: pin.Model, name: str, where: str, on_unphysical: str) -> Body:
+    """A Body from a copy of a Pinocchio model whose root joint is a free-flyer. Raises as `body_from_urdf`."""
     if model.njoints < 2 or model.joints[1].shortname() != "JointModelFreeFlyer":
         raise ModelFileError(
             f"{where}: the model's root joint is no free-flyer, so the mass of its root link is lost; build it with "
             "pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())"
         )
-    _check_inertias(model, where, on_unphysical)
-    return Body(model, name, mimics)
-
-
-_ROOT_JOINT = "shapephase free-flyer"
+    for number in range(1, model.njoints):
+        moved = f"{where}: what joint {model.names[number]!r} moves"
+        inertia = model.inertias[number]
+        _check_inertia(moved, inertia.mass, inertia.inertia, on_unphysical)
+    return Body(model.copy(), name)
 
 
 def _moving_joints(model: pin.Model) -> dict[str, int]:
@@ -375,23 +384,22 @@ def _mimic_map(moving: list[str], independent: tuple[str, ...], mimics: Mapping[
     return matrix, offset
 
 
-def _check_inertias(model: pin.Model, where: str, on_unphysical: str) -> None:
-    for number in range(1, model.njoints):
-        inertia = model.inertias[number]
-        tensor = inertia.inertia
-        joint = model.names[number] if number > 1 else "the base"
-        if not (np.isfinite(inertia.mass) and np.isfinite(tensor).all() and inertia.mass >= 0.0):
-            raise UnphysicalInertiaError(f"{where}: the links moved by {joint} have mass {inertia.mass} kg")
-        moments = np.linalg.eigvalsh(tensor)
-        if moments[0] < -1e-9 * max(moments[2], 0.0) - 1e-12 * inertia.mass:
-            message = f"{where}: the links moved by {joint} have principal moments {moments} kg m^2, one is negative"
-            if on_unphysical == "error":
-                raise UnphysicalInertiaError(message + "; mend the file, or load it with on_unphysical='warn'")
-            warnings.warn(message, UnphysicalInertiaWarning, stacklevel=4)
-        elif moments[2] > 0.0 and triangle_defect(tensor) > 1e-3:
-            warnings.warn(
-                f"{where}: the links moved by {joint} have principal moments {moments} kg m^2, which break the "
-                "triangle inequality: no distribution of mass has them",
-                UnphysicalInertiaWarning,
-                stacklevel=4,
-            )
+def _check_inertia(place: str, mass: float, tensor: Array, on_unphysical: str) -> None:
+    if on_unphysical not in ("error", "warn"):
+        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
+    if not (np.isfinite(mass) and np.isfinite(tensor).all() and mass >= 0.0):
+        raise UnphysicalInertiaError(f"{place} has mass {mass} kg and inertia {tensor.tolist()} kg m^2")
+    moments = np.linalg.eigvalsh(tensor)
+    # What is left of an inertia by the rounding of moving it about is no fault of the file.
+    if moments[0] < -1e-9 * max(moments[2], 0.0) - 1e-12 * mass:
+        message = f"{place} has principal moments {moments} kg m^2, one of them negative"
+        if on_unphysical == "error":
+            raise UnphysicalInertiaError(message + "; mend the file, or load it with on_unphysical='warn'")
+        warnings.warn(message, UnphysicalInertiaWarning, stacklevel=5)
+    elif moments[2] > 0.0 and triangle_defect(tensor) > 1e-3:
+        warnings.warn(
+            f"{place} has principal moments {moments} kg m^2, which break the triangle inequality: no distribution "
+            "of mass has them",
+            UnphysicalInertiaWarning,
+            stacklevel=5,
+        )

@@ -83,7 +83,7 @@ def _example_files() -> dict[str, Path]:
 
 def _from_file(path: Path, on_unphysical: str) -> Body:
     urdf = read_urdf(path)
-    return body_from_urdf(urdf.text, path.stem, str(path), urdf.mimics, on_unphysical)
+    return body_from_urdf(urdf, path.stem, str(path), on_unphysical)
 
 
 def _from_model(model: Any, on_unphysical: str) -> Body:
@@ -91,4 +91,4 @@ def _from_model(model: Any, on_unphysical: str) -> Body:
 
     if not isinstance(model, pinocchio.Model):  # pyright: ignore[reportAttributeAccessIssue]
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(model).__name__}")
-    return body_from_model(model, model.name, f"model {model.name!r}", on_unphysical=on_unphysical)
+    return body_from_model(model, model.name, f"model {model.name!r}", on_unphysical)

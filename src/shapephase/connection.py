@@ -10,7 +10,7 @@ from .arrays import Array
 from .body import Body
 from .errors import OpenPathError
 from .inertia_tensor import inverse_inertia
-from .sampling import Sampler
+from .sampling import Sampler, sampler
 from .shape_path import ShapePath
 from .stepping import stepped_rotation
 
@@ -95,7 +95,7 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
             "its start; close the path, or split a reconstructed motion with zero momentum for the lift of an open one"
         )
     lift = stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
-    return so3.matrix_from_quat(lift.quaternions[0, -1])
+    return lift.end[0]
 
 
 def path_gap(body: Body, path: ShapePath) -> Array:
@@ -113,4 +113,11 @@ def path_sampler(body: Body, path: ShapePath) -> Sampler:
     def probe(times: Array) -> Array:
         return np.concatenate(path.curve(times), axis=1)
 
-    return Sampler(evaluate, path.breaks, oscillations=path.oscillations, probe=probe)
+    return sampler(
+        evaluate,
+        path.breaks,
+        oscillations=path.oscillations,
+        loops=path.loops,
+        smooth_loop=path.smooth_loop,
+        probe=probe,
+    )

@@ -15,7 +15,7 @@ from .body import Body
 from .connection import path_gap, path_sampler
 from .errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from .inertia_tensor import inverse_inertia
-from .sampling import Interpolant, Sampler, chebyshev
+from .sampling import Interpolant, Sampler, chebyshev, inside, sampler, unit_nodes, values_to_coefficients
 from .shape_path import ShapePath, times_argument
 
 _CLOSED = 1e-9
@@ -166,7 +166,7 @@ def particles(
 
     Parameters
     ----------
-    masses : (m,) [kg], positive
+    masses : (m,) [kg], positive, two or more
     positions : times (N,) -> positions (N, m, 3) [m], velocities (N, m, 3) [m/s]; need not be centred
     duration : [s]
     breaks : interior times where a derivative jumps [s]
@@ -183,8 +183,8 @@ def particles(
     Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
     """
     weights = finite_array(masses, "masses", (None,), unit="kg")
-    if weights.ndim != 1 or np.any(weights <= 0.0):
-        raise ShapeError(f"masses: (m,) numbers above 0 [kg] are needed, got {weights}")
+    if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
+        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {weights}")
     length = _duration_argument(duration)
     source = _Particles(weights, positions)
     ends, _ = source.centred(np.array([0.0, length]))
@@ -242,7 +242,7 @@ class _Rigid(_Original):
         return np.zeros((len(times), 3, 3))
 
     def sampler(self, breaks: Array) -> Sampler:
-        return Sampler(self.sample, breaks, constant=True)
+        return sampler(self.sample, breaks, oscillations=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +252,7 @@ class _Prescribed(_Original):
     breaks: Array
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        tensors = _inertia_argument(_returned(self.inertia(times), "inertia", (len(times), 3, 3)))
+        tensors = _inertia_argument(_returned(self.inertia(times), "inertia", (len(times), 3, 3)), times)
         if self.momentum is None:
             return tensors, np.zeros((len(times), 3))
         return tensors, _returned(self.momentum(times), "internal momentum", (len(times), 3))
@@ -261,7 +261,7 @@ class _Prescribed(_Original):
         return rate_of(lambda t: self.sample(t)[0], times, self.breaks)
 
     def sampler(self, breaks: Array) -> Sampler:
-        return Sampler(self.sample, breaks)
+        return sampler(self.sample, breaks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,7 +291,7 @@ class _Particles(_Original):
         return _inertia_of(rate + np.swapaxes(rate, -1, -2))
 
     def sampler(self, breaks: Array) -> Sampler:
-        return Sampler(self.sample, breaks)
+        return sampler(self.sample, breaks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,11 +311,11 @@ class _Sampled(_Original):
         panel = self.interpolant.panel_of(times)
         left, right = self.interpolant.edges[panel], self.interpolant.edges[panel + 1]
         basis = chebyshev(np.clip((2.0 * times - left - right) / (right - left), -1.0, 1.0), self.centre.shape[1])
-        return np.einsum("nk,nkc->nc", basis, self.centre[panel])
+        return np.einsum("nk,nkc->nc", basis, self.centre[panel % len(self.centre)])
 
     def sampler(self, breaks: Array) -> Sampler:
         edges = np.union1d(breaks, self.interpolant.edges)
-        return Sampler(self.sample, edges, oscillations=0.5)
+        return sampler(self.sample, edges, oscillations=0.5)
 
 
 def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> Array:
@@ -328,15 +328,14 @@ def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> 
     left, right = breaks[piece], breaks[piece + 1]
     half = 0.01 * (right - left)
     middle = np.clip(times, left + half, right - half)
-    nodes = np.cos(np.pi * np.arange(9) / 8)
-    inside = np.clip(middle[:, None] + half[:, None] * nodes, np.nextafter(left, right)[:, None], right[:, None])
-    values = function(np.minimum(inside, np.nextafter(right, left)[:, None]).ravel())
+    nodes = unit_nodes(8)
+    first, last = inside(left, right)
+    points = np.clip(middle[:, None] + half[:, None] * nodes, first[:, None], last[:, None])
+    values = function(points.ravel())
     values = values.reshape(len(times), 9, -1)
     local = (times - middle) / half
-    slopes = np.polynomial.chebyshev.chebval
-    series = np.linalg.solve(chebyshev(nodes, 9), np.eye(9))
-    derivative = np.polynomial.chebyshev.chebder(series)
-    weights = slopes(local, derivative).T / half[:, None]
+    derivative = np.polynomial.chebyshev.chebder(values_to_coefficients(8))
+    weights = np.polynomial.chebyshev.chebval(local, derivative).T / half[:, None]
     return np.einsum("nk,nkc->nc", weights, values).reshape(len(times), *function(times[:1]).shape[1:])
 
 
@@ -345,12 +344,12 @@ def _inertia_of(moment: Array) -> Array:
     return np.trace(moment, axis1=-2, axis2=-1)[:, None, None] * np.eye(3) - moment
 
 
-def _inertia_argument(tensors: Array) -> Array:
-    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max()
-    if skew > 1e-9 * np.abs(tensors).max():
+def _inertia_argument(tensors: Array, times: Array | None = None) -> Array:
+    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
+    if skew > 1e-9 * np.abs(tensors).max(initial=0.0):
         raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
     symmetric = 0.5 * (tensors + np.swapaxes(tensors, -1, -2))
-    inverse_inertia(symmetric)
+    inverse_inertia(symmetric, times)
     return symmetric
 
 

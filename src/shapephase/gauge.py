@@ -19,7 +19,7 @@ from .arrays import Array, finite_array
 from .deformation import Deformation, Source
 from .errors import GaugeError, ShapeError
 from .inertia_tensor import inverse_inertia
-from .sampling import Sampler
+from .sampling import Sampler, sampler
 from .stepping import SteppedRotation, stepped_rotation
 
 Frames = Callable[[Array], tuple[Array, Array]]
@@ -144,6 +144,12 @@ def _following(inertia: Array, frames: Array, times: Array) -> tuple[Array, Arra
     """Principal moments, ascending, and axes with the signs of nearby frames."""
     moments, axes = np.linalg.eigh(inertia)
     _check_apart(moments, times)
+    overlap = np.abs(np.sum(axes * frames, axis=-2)).min(axis=-1)
+    if np.any(overlap < 0.5):
+        raise GaugeError(
+            f"two principal moments change places near t = {times[np.argmin(overlap)]:.9g} s, too briefly to follow: "
+            "declare that time as a break, or use the horizontal gauge"
+        )
     return moments, _signed(axes, frames)
 
 
@@ -194,4 +200,4 @@ class _Gauged:
         return so3.apply(self.frames(times)[0], self.original.centre_of_mass(times))
 
     def sampler(self, breaks: Array) -> Sampler:
-        return Sampler(self.sample, breaks)
+        return sampler(self.sample, breaks)

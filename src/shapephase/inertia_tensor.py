@@ -17,6 +17,20 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
         If a tensor is not finite or its least eigenvalue is not above 1e-12 of its largest. `times` (...),
         where given, are the instants that the message quotes.
     """
+    with np.errstate(invalid="ignore", over="ignore"):
+        adjugate, determinant = _adjugate(inertia)
+    a = inertia[..., 0, 0]
+    trace = np.trace(inertia, axis1=-2, axis2=-1)
+    # least/largest eigenvalue lies between det/trace^3 and 4 times 27 of it: above 1e-5 no tensor is near-singular,
+    # the leading minors say whether it is positive, and the adjugate loses no digits.
+    safe = (determinant > 1e-5 * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
+    if safe.all():
+        return adjugate / determinant[..., None, None]
+    return _careful_inverse(inertia, times)
+
+
+def _adjugate(inertia: Array) -> tuple[Array, Array]:
+    """Adjugate and determinant of symmetric matrices."""
     a, b, c = inertia[..., 0, 0], inertia[..., 1, 1], inertia[..., 2, 2]
     d, e, f = inertia[..., 1, 2], inertia[..., 0, 2], inertia[..., 0, 1]
     adjugate = np.empty(inertia.shape)
@@ -27,13 +41,7 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
     adjugate[..., 0, 2] = adjugate[..., 2, 0] = f * d - e * b
     adjugate[..., 1, 2] = adjugate[..., 2, 1] = f * e - d * a
     determinant = a * adjugate[..., 0, 0] + f * adjugate[..., 0, 1] + e * adjugate[..., 0, 2]
-    trace = a + b + c
-    # least/largest eigenvalue lies between det/trace^3 and 4 times 27 of it: above 1e-5 no tensor is near-singular,
-    # the leading minors say whether it is positive, and the adjugate loses no digits.
-    safe = (determinant > 1e-5 * trace**3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
-    if safe.all():
-        return adjugate / determinant[..., None, None]
-    return _careful_inverse(inertia, times)
+    return adjugate, determinant
 
 
 def _careful_inverse(inertia: Array, times: Array | None) -> Array:

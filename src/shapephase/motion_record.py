@@ -18,7 +18,7 @@ from .arrays import Array
 from .deformation import Deformation, sampled_deformation
 from .errors import InputFileNotFoundError, ResultFileError
 from .files import write_whole
-from .sampling import Interpolant, values_to_coefficients
+from .sampling import Interpolant, unit_nodes, values_to_coefficients
 from .stepping import SteppedRotation
 
 _FORMAT = "shapephase motion 1"
@@ -32,8 +32,8 @@ _STEPS = (
     "amplification",
     "propagator",
 )
-_SAMPLES = ("edges", "coefficients", "inverse_error", "drift_error")
-_CENTRE_DEGREE = 16
+_SAMPLES = ("edges", "coefficients")
+_CENTRE_DEGREE = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +68,7 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "tolerance": record.tolerance,
         "method": record.method,
         "evaluations": record.evaluations,
+        "loops": interpolant.loops,
         "interpolant_evaluations": interpolant.evaluations,
         "shape_gap": deformation.shape_gap,
         "units": "SI: rad, s, m, kg m^2, kg m^2/s; quaternions x y z w",
@@ -77,7 +78,7 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "spatial_momentum": record.momentum,
         "initial_attitude": record.initial_attitude,
         "breaks": deformation.breaks,
-        "centre": _centre_coefficients(deformation, interpolant.edges),
+        "centre": _centre_coefficients(deformation, interpolant),
         **{name: getattr(interpolant, name) for name in _SAMPLES},
         **{f"step_{name}": getattr(record.steps, name) for name in _STEPS},
     }
@@ -125,7 +126,9 @@ def write_table(path: str | os.PathLike[str], columns: Mapping[str, Array]) -> N
 
 def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecord:
     interpolant = Interpolant(
-        **{name: arrays[name] for name in _SAMPLES}, evaluations=int(header["interpolant_evaluations"])
+        **{name: arrays[name] for name in _SAMPLES},
+        loops=int(header["loops"]),
+        evaluations=int(header["interpolant_evaluations"]),
     )
     deformation = sampled_deformation(
         interpolant,
@@ -146,9 +149,10 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
     )
 
 
-def _centre_coefficients(deformation: Deformation, edges: Array) -> Array:
+def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> Array:
     """Chebyshev coefficients of the centre of mass on the interpolant's panels: (P, n, 3)."""
-    nodes = -np.cos(np.pi * np.arange(_CENTRE_DEGREE + 1) / _CENTRE_DEGREE)
+    nodes = unit_nodes(_CENTRE_DEGREE)
+    edges = interpolant.edges[: len(interpolant.coefficients) + 1]
     left, right = edges[:-1, None], edges[1:, None]
     times = np.clip(0.5 * (left + right) + 0.5 * (right - left) * nodes, left, right)
     values = deformation.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)

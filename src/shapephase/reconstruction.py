@@ -265,9 +265,9 @@ def reconstruct(
     if method == "dop853":
         solution = _dop853(deformation, at_start, float(goal))
         return Motion(deformation, spatial, start, float(goal), method, solution.evaluations, solution)
-    sampler = deformation.sampler()
-    solution = stepped_rotation(sampler, at_start, float(goal))
-    return Motion(deformation, spatial, start, float(goal), "collocation", sampler.evaluations, solution)
+    solution = stepped_rotation(deformation.sampler(), at_start, float(goal))
+    evaluations = solution.interpolant.evaluations
+    return Motion(deformation, spatial, start, float(goal), "collocation", evaluations, solution)
 
 
 def load_motion(path: str | os.PathLike[str]) -> Motion:

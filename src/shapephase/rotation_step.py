@@ -1,8 +1,9 @@
 """One explicit eighth-order step of the attitude equation, written once for numbers, arrays and symbols.
 
-The attitude relative to the start, S(t), obeys S' = S hat(omega), omega = I^-1 S^T Pi_0 - I^-1 L_o, with Pi_0 the
-body angular momentum at the start (Cabrera 2006, equation 10). S is carried as a quaternion; the coefficients
-are those of Dormand and Prince 8(5,3) (Hairer, Norsett and Wanner, Solving ODEs I), as SciPy holds them.
+The attitude is carried as the quaternion of a frame that shares the momentum's direction as its z axis, so that
+Pi is the momentum's size times the third row of the rotation matrix: R' = R hat(omega),
+omega = I^-1 Pi - I^-1 L_o (Cabrera 2006, equation 10). The coefficients are those of Dormand and Prince 8(5,3)
+(Hairer, Norsett and Wanner, Solving ODEs I), as SciPy holds them.
 """
 
 from __future__ import annotations
@@ -26,32 +27,31 @@ def tableau() -> tuple[Array, Array, Array]:
     return DOP853.A[:STAGES, :STAGES], DOP853.B[:STAGES], DOP853.C[:STAGES]
 
 
-def step(quat_xyzw: Scalars, momentum: Scalars | None, channels: Scalars) -> list[Any]:
-    """The quaternion of S after one step, normalised.
+def step(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> list[Any]:
+    """The quaternion after one step, normalised.
 
     Parameters
     ----------
     quat_xyzw : four components at the start of the step; numbers, arrays or symbols
-    momentum : the three components of Pi_0, or None where it is zero
-    channels : for each of the 12 stage times the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
+    size : of the momentum [kg m^2/s], or None where it is zero
+    channels : for each of the 12 stage times half the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
         entries; without momentum just the last three
     """
     a, b, _ = tableau()
     slopes: list[list[Any]] = []
     for stage in range(STAGES):
         inner = _combination(quat_xyzw, a[stage, :stage], slopes)
-        slopes.append(_slope(inner, momentum, channels[stage]))
+        slopes.append(_slope(inner, size, channels[stage]))
     x, y, z, w = _combination(quat_xyzw, b, slopes)
     scale = 1.0 / (x * x + y * y + z * z + w * w) ** 0.5
     return [x * scale, y * scale, z * scale, w * scale]
 
 
-def body_momentum(quat_xyzw: Scalars, momentum: Scalars) -> list[Any]:
-    """S^T Pi_0 for the unit quaternion of S."""
+def body_momentum(quat_xyzw: Scalars, size: Any) -> list[Any]:
+    """R^T (0, 0, size) for the unit quaternion of R."""
     x, y, z, w = quat_xyzw
-    p, q, r = momentum
-    u, v, s = 2.0 * (y * r - z * q), 2.0 * (z * p - x * r), 2.0 * (x * q - y * p)
-    return [p - w * u + (y * s - z * v), q - w * v + (z * u - x * s), r - w * s + (x * v - y * u)]
+    double = 2.0 * size
+    return [double * (x * z - y * w), double * (y * z + x * w), double * (w * w + z * z) - size]
 
 
 def turn_rate(momentum: Scalars, channels: Scalars) -> list[Any]:
@@ -65,18 +65,13 @@ def turn_rate(momentum: Scalars, channels: Scalars) -> list[Any]:
     ]
 
 
-def _slope(quat_xyzw: Scalars, momentum: Scalars | None, channels: Scalars) -> list[Any]:
+def _slope(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> list[Any]:
     x, y, z, w = quat_xyzw
-    if momentum is None:
+    if size is None:
         a, b, c = (-drift for drift in channels)
     else:
-        a, b, c = turn_rate(body_momentum(quat_xyzw, momentum), channels)
-    return [
-        0.5 * (w * a + y * c - z * b),
-        0.5 * (w * b + z * a - x * c),
-        0.5 * (w * c + x * b - y * a),
-        -0.5 * (x * a + y * b + z * c),
-    ]
+        a, b, c = turn_rate(body_momentum(quat_xyzw, size), channels)
+    return [w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a, -(x * a + y * b + z * c)]
 
 
 def _combination(start: Scalars, weights: Array, slopes: list[list[Any]]) -> list[Any]:
@@ -112,9 +107,8 @@ def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
     ]
 
 
-def steps_in_numpy(quat_xyzw: Array, momentum: Array | None, channels: Array) -> Array:
-    """`step` on arrays: quaternions (..., 4), momenta (..., 3), channels (..., 12, 9 or 3) -> (..., 4)."""
+def steps_in_numpy(quat_xyzw: Array, size: Array | None, channels: Array) -> Array:
+    """`step` on arrays: quaternions (..., 4), sizes (...), channels (..., 12, 9 or 3) -> (..., 4)."""
     quaternion = [quat_xyzw[..., i] for i in range(4)]
-    start = None if momentum is None else [momentum[..., i] for i in range(3)]
     stages = [[channels[..., s, i] for i in range(channels.shape[-1])] for s in range(STAGES)]
-    return np.stack(np.broadcast_arrays(*step(quaternion, start, stages)), axis=-1)
+    return np.stack(np.broadcast_arrays(*step(quaternion, size, stages)), axis=-1)

@@ -38,6 +38,8 @@ class ShapePath:
     n_shape : number of joints
     joint_names : the joints in the order of the columns, or None where the path belongs to no body in particular
     oscillations : how often the path can swing between two breaks, an upper bound; None: unknown
+    loops : the path is its first `duration / loops` seconds, this many times
+    smooth_loop : whether it also goes smoothly from the end of a loop to its start
     """
 
     curve: Curve
@@ -46,6 +48,8 @@ class ShapePath:
     n_shape: int
     joint_names: tuple[str, ...] | None = None
     oscillations: float | None = None
+    loops: int = 1
+    smooth_loop: bool = False
 
     @staticmethod
     def fourier(
@@ -71,7 +75,8 @@ class ShapePath:
         period = _positive(duration)
         breaks = np.array([0.0, period])
         names = _names(joint_names, len(middle))
-        return ShapePath(_Fourier(middle, a, b, period), period, breaks, len(middle), names, float(a.shape[1]))
+        curve = _Fourier(middle, a, b, period)
+        return ShapePath(curve, period, breaks, len(middle), names, float(a.shape[1]), smooth_loop=True)
 
     @staticmethod
     def spline(
@@ -214,7 +219,7 @@ class ShapePath:
         OpenPathError
             If the path does not end where it begins (to whole turns of joints).
         """
-        if count < 1 or count != int(count):
+        if not np.isfinite(count) or count < 1 or count != int(count):
             raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {count}")
         gap = self.gap
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
@@ -223,8 +228,11 @@ class ShapePath:
             raise OpenPathError(f"only a loop can be repeated; joint {self._joint(joint)} ends {gap[joint]:.9g} off")
         starts = self.duration * np.arange(count)
         breaks = np.concatenate([*(start + self.breaks[:-1] for start in starts), [count * self.duration]])
+        if self.smooth_loop:
+            breaks = breaks[[0, -1]]
         curve = _Repeated(self.curve, self.duration, int(count), turns)
-        return replace(self, curve=curve, duration=count * self.duration, breaks=breaks)
+        loops = self.loops * int(count)
+        return replace(self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops)
 
     def matched(self, joint_names: Sequence[str], owner: str) -> ShapePath:
         """The same path with its columns in the order of `joint_names`, found by name where the path has names.
@@ -463,7 +471,7 @@ def _check_rates(path: ShapePath) -> None:
     a, b, _, d, e = shapes.reshape(5, len(middle), -1)
     slope = (a - 8 * b + 8 * d - e) / (12 * step[:, None])
     rate = rates.reshape(5, len(middle), -1)
-    scale = np.max(np.abs(rate), axis=0) + np.max(np.abs(shapes)) / path.duration
+    scale = np.max(np.abs(rate), axis=0) + np.ptp(shapes, axis=0) / path.duration
     wrong = np.abs(slope - rate[2]) > 1e-3 * scale
     if wrong.any():
         where, joint = (int(i) for i in np.argwhere(wrong)[0])

@@ -83,7 +83,7 @@ def wrap(phase: Array | float) -> Array:
     turn = 2.0 * np.pi
     phase = np.asarray(phase, dtype=float)
     inside = (phase > -np.pi) & (phase <= np.pi)
-    return np.where(inside, phase, np.pi - np.mod(np.pi - phase, turn))
+    return np.where(inside, phase, np.maximum(np.pi - np.mod(np.pi - phase, turn), np.nextafter(-np.pi, 0.0)))
 
 
 def between(start: Array, end: Array) -> Array:

@@ -1,0 +1,1 @@
+"""Speed and true error, side by side with what people use today: `make bench`."""
