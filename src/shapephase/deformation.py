@@ -16,7 +16,7 @@ from .connection import path_gap, path_sampler
 from .errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from .inertia_tensor import inverse_inertia
 from .sampling import Interpolant, Sampler, chebyshev, inside, sampler, unit_nodes, values_to_coefficients
-from .shape_path import ShapePath, times_argument
+from .shape_path import ShapePath, positive_argument, times_argument
 
 _CLOSED = 1e-9
 
@@ -122,7 +122,7 @@ def rigid(inertia: ArrayLike, duration: float) -> Deformation:
     Source: Cabrera 2006, example 2.6; theory.md A10.
     """
     tensor = _inertia_argument(finite_array(inertia, "inertia", (3, 3))[None])[0]
-    length = _duration_argument(duration)
+    length = positive_argument(duration)
     return Deformation(_Rigid(tensor), length, np.array([0.0, length]), np.eye(3), 0.0, "rigid body")
 
 
@@ -148,7 +148,7 @@ def prescribed(
     ShapeError, UnphysicalInertiaError
         If a function returns the wrong shape, or a tensor that is not symmetric.
     """
-    length = _duration_argument(duration)
+    length = positive_argument(duration)
     edges = _edges(breaks, length)
     source = _Prescribed(inertia, internal_momentum, edges)
     ends = source.sample(np.array([0.0, length]))[0]
@@ -185,7 +185,7 @@ def particles(
     weights = finite_array(masses, "masses", (None,), unit="kg")
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
         raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {weights}")
-    length = _duration_argument(duration)
+    length = positive_argument(duration)
     source = _Particles(weights, positions)
     ends, _ = source.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
@@ -358,13 +358,6 @@ def _returned(value: ArrayLike, name: str, wanted: tuple[int, ...]) -> Array:
     if array.shape != wanted:
         raise ShapeError(f"the function of the {name} must return {wanted} for these times, got {array.shape}")
     return array
-
-
-def _duration_argument(duration: float) -> float:
-    length = finite_array(duration, "duration", unit="s")
-    if length.ndim or length <= 0.0:
-        raise TrajectoryError(f"duration: a time above 0 s is needed, got {duration!r}")
-    return float(length)
 
 
 def _edges(breaks: ArrayLike, duration: float) -> Array:

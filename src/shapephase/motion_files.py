@@ -69,8 +69,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
 
     Parameters
     ----------
-    times : (N,) of the samples [s]; None: the breaks, with even times between them up to 401 or so. A spline
-        written at its own knots is read back as it was.
+    times : (N,) of the samples [s]; None: `path.sample_times`. A spline is read back as it was.
 
     Raises
     ------
@@ -84,7 +83,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
         raise unknown_name("kind of motion file", where.suffix, _SUFFIXES)
     if path.joint_names is None:
         raise TrajectoryError("a motion file names its joints, and this path has no joint names; make it with them")
-    t = _sample_times(path) if times is None else finite_array(times, "times", (None,), unit="s")
+    t = path.sample_times if times is None else finite_array(times, "times", (None,), unit="s")
     shapes = path.shape(t)
     if where.suffix.lower() == ".npz":
         arrays = {"time": t, "shapes": shapes, "joint_names": np.array(path.joint_names)}
@@ -95,12 +94,6 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     writer.writerow(["time", *path.joint_names])
     writer.writerows([[repr(float(v)) for v in row] for row in np.column_stack([t, shapes])])
     write_whole(where, lambda stream: stream.write(text.getvalue().encode()))
-
-
-def _sample_times(path: ShapePath) -> Array:
-    pieces = len(path.breaks) - 1
-    each = max(1, int(np.ceil(400 / pieces))) if pieces < 12 else 1
-    return np.unique(np.concatenate([np.linspace(a, b, each + 1) for a, b in zip(path.breaks[:-1], path.breaks[1:])]))
 
 
 def _joint_of(name: str, body: Body, where: Path) -> tuple[int, float]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .arrays import Array
 from .catalog import load_body
 from .errors import TrajectoryError, unknown_name
-from .shape_path import ShapePath
+from .shape_path import ShapePath, positive_argument
 
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
 
@@ -44,7 +44,7 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
     """
     if not 0.0 <= alpha < beta < 0.5 * np.pi:
         raise TrajectoryError(f"0 <= alpha < beta < pi/2 [rad] is needed, got alpha = {alpha!r}, beta = {beta!r}")
-    return _smooth_loop(_KaneScher(float(alpha), float(beta), float(duration)), duration, _WAIST)
+    return replace(_loop(_KaneScher(float(alpha), float(beta), float(duration)), duration, _WAIST), smooth_loop=True)
 
 
 def cat_righting(duration: float = 0.5) -> ShapePath:
@@ -55,7 +55,7 @@ def cat_righting(duration: float = 0.5) -> ShapePath:
     is its own mirror image run backwards turns about an axis in the plane of symmetry, so two are enough.
     """
     names = load_body("cat").joint_names
-    return _smooth_loop(_CatRighting(float(duration), names), duration, names)
+    return _loop(_CatRighting(float(duration), names), duration, names)
 
 
 def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
@@ -206,10 +206,9 @@ def _untwisted(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
     return angles, rates
 
 
-def _smooth_loop(curve: Callable[[Array], tuple[Array, Array]], duration: float, names: tuple[str, ...]) -> ShapePath:
-    if not duration > 0.0:
-        raise TrajectoryError(f"duration: a time above 0 s is needed, got {duration!r}")
-    return ShapePath(curve, float(duration), np.array([0.0, duration]), len(names), names, oscillations=4.0)
+def _loop(curve: Callable[[Array], tuple[Array, Array]], duration: float, names: tuple[str, ...]) -> ShapePath:
+    period = positive_argument(duration)
+    return ShapePath(curve, period, np.array([0.0, period]), len(names), names, oscillations=4.0)
 
 
 def _pair_loop(duration: float, joints: Mapping[str, tuple[float, ...]]) -> ShapePath:

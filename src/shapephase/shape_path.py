@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -72,7 +73,7 @@ class ShapePath:
         middle = finite_array(mean, "mean", (None,))
         a = finite_array(cosines, "cosines", (len(middle), None))
         b = finite_array(sines, "sines", a.shape)
-        period = _positive(duration)
+        period = positive_argument(duration)
         breaks = np.array([0.0, period])
         names = _names(joint_names, len(middle))
         curve = _Fourier(middle, a, b, period)
@@ -144,7 +145,7 @@ class ShapePath:
         TrajectoryError
             If the rates are not the derivatives of the shapes (checked at a few times).
         """
-        period = _positive(duration)
+        period = positive_argument(duration)
         inner = finite_array(breaks, "breaks", (None,))
         if np.any((inner < 0.0) | (inner > period)):
             raise TrajectoryError(f"breaks must lie in [0, {period:.9g}] s, got {inner}")
@@ -179,7 +180,7 @@ class ShapePath:
 
     def stretched(self, factor: float) -> ShapePath:
         """The same shapes, `factor` times as slowly."""
-        scale = _positive(factor, "factor", "a number")
+        scale = positive_argument(factor, "factor", "a number")
         duration = self.duration * scale
         breaks = self.breaks * scale
         breaks[-1] = duration
@@ -233,6 +234,14 @@ class ShapePath:
         curve = _Repeated(self.curve, self.duration, int(count), turns)
         loops = self.loops * int(count)
         return replace(self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops)
+
+    @property
+    def sample_times(self) -> Array:
+        """Times whose samples tell the path: a spline's knots, which tell it exactly, or some 400: (N,) [s]."""
+        if isinstance(self.curve, _PiecewisePolynomial) and len(self.curve.coefficients) == 4:
+            return self.breaks
+        pieces = [np.linspace(a, b, 400 // (len(self.breaks) - 1) + 2) for a, b in pairwise(self.breaks)]
+        return np.unique(np.concatenate(pieces))
 
     def matched(self, joint_names: Sequence[str], owner: str) -> ShapePath:
         """The same path with its columns in the order of `joint_names`, found by name where the path has names.
@@ -429,7 +438,8 @@ def _closes(a: Array, b: Array) -> bool:
     return bool(np.all(np.abs(a - b) <= 1e-9 * np.maximum(1.0, np.abs(a))))
 
 
-def _positive(value: float, name: str = "duration", unit: str = "a time in s") -> float:
+def positive_argument(value: float, name: str = "duration", unit: str = "a time in s") -> float:
+    """A user's number, checked to be finite and above 0. Raises TrajectoryError, ShapeError."""
     number = finite_array(value, name)
     if number.ndim or number <= 0.0:
         raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value!r}")
