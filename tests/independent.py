@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Protocol
 
@@ -233,7 +234,7 @@ def pinocchio_motion(
     wanted = np.linspace(0.0, joints.duration, 41) if times is None else np.asarray(times, dtype=float)
     values = np.empty((len(wanted), len(y)))
     edges = np.unique([0.0, *breaks, joints.duration])
-    for left, right in zip(edges[:-1], edges[1:]):
+    for left, right in pairwise(edges):
         inside = (wanted >= left) & (wanted <= right)
         run = solve_ivp(
             slope, (left, right), y, "DOP853", rtol=RTOL, atol=1e-14, max_step=(right - left) / 4, dense_output=True

@@ -757,10 +757,39 @@ def test_the_inertias_of_a_pinocchio_model_are_checked_too():
         assert sp.load_body(model, on_unphysical="warn").mass == 4.0
 
 
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("what", ["mass", "inertia", "negative"])
+def test_a_pinocchio_model_spoilt_by_hand_is_refused(number, what):
+    """Base or arm, a mass or an inertia that is no number or negative."""
+    model = pin.buildModelFromXML(
+        urdf(*LINKS[:2], joint("hip", "revolute", "base", "la")), pin.JointModelFreeFlyer(), "flyer"
+    )
+    if what == "inertia":
+        entries = np.array([1.0, 0, 0, 0, np.nan, 0, 1, 0, 0, 1])
+        model.inertias[number] = pin.Inertia.FromDynamicParameters(entries)
+    else:
+        model.inertias[number].mass = np.nan if what == "mass" else -1.0
+    with pytest.raises(UnphysicalInertiaError, match="flyer" if number == 1 else "hip"):
+        sp.load_body(model)
+
+
+@pytest.mark.parametrize("kind", [pin.JointModelPlanar, pin.JointModelSpherical, pin.JointModelFreeFlyer])
+def test_joints_of_several_axes_in_a_pinocchio_model_are_refused(kind):
+    model = pin.buildModelFromXML(urdf(*LINKS[:1]), pin.JointModelFreeFlyer())
+    number = model.addJoint(1, kind(), pin.SE3.Identity(), "hip")
+    model.appendBodyToJoint(number, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    with pytest.raises(ModelFileError, match=r"'hip' is a JointModel.*revolute, continuous, prismatic"):
+        sp.load_body(model)
+
+
 def test_a_broken_triangle_inequality_is_warned_about(load_urdf):
     text = urdf(LINKS[0], link("la", 1.0, [0.01, 0.01, 0.05]), joint("hip", "revolute", "base", "la"))
     with pytest.warns(sp.UnphysicalInertiaWarning, match=r"'la'.*triangle"):
         load_urdf(text)
+    # The rounding of a file's digits is not worth a word: up to a thousandth of the largest moment.
+    load_urdf(text.replace('izz="0.05"', 'izz="0.02001"'))
+    with pytest.warns(sp.UnphysicalInertiaWarning, match="triangle"):
+        load_urdf(text.replace('izz="0.05"', 'izz="0.02004"'))
 
 
 def test_a_body_on_one_line_is_refused_where_it_matters(load_urdf):

@@ -321,7 +321,7 @@ def test_more_joints_than_any_body_has_are_refused(load_urdf):
     """Pinocchio's work space grows with the cube of their number: 32 GB for a thousand."""
     links = [link(f"l{i}", 1.0, [0.1, 0.1, 0.1]) for i in range(1001)]
     joints = [joint(f"j{i}", "revolute", "l0", f"l{i + 1}") for i in range(1000)]
-    with pytest.raises(ModelFileError, match="1000|1001"):
+    with pytest.raises(ModelFileError, match=r"100[01]"):
         load_urdf(urdf(*links, *joints))
 
 

@@ -345,6 +345,11 @@ def test_going_round_again_is_a_power(rng):
     for count in (2, 7, 200):
         many = sp.holonomy(cat, path.repeated(count), 1e-10)
         np.testing.assert_allclose(many, np.linalg.matrix_power(once, count), atol=1e-9)
+    cubed = np.linalg.matrix_power(once, 3)
+    for three in (path.repeated(2).then(path), path.stretched(2.0).repeated(3), path.repeated(3).stretched(0.1)):
+        np.testing.assert_allclose(sp.holonomy(cat, three, 1e-10), cubed, atol=1e-9)
+    np.testing.assert_allclose(sp.holonomy(cat, path.repeated(3).reversed(), 1e-10), cubed.T, atol=1e-9)
+    np.testing.assert_allclose(sp.holonomy(cat, path.reversed().repeated(3), 1e-10), cubed.T, atol=1e-9)
     corners = sp.ShapePath.waypoints([0, 1, 2, 3], path.shape(path.duration * np.array([0.0, 0.3, 0.7, 1.0])))
     cornered = sp.holonomy(cat, corners, 1e-12)
     np.testing.assert_allclose(

@@ -76,6 +76,9 @@ def test_a_path_that_does_not_return_is_no_loop():
     assert deformation.closure is None
     assert deformation.shape_gap == pytest.approx(0.5)
     np.testing.assert_array_equal(deformation.breaks, [0, 1, 2])
+    for gap, closes in ((0.8e-9, True), (1.5e-9, False)):
+        path = sp.ShapePath.waypoints([0, 1, 2], [[0.0, 0.1], [1.0, 0.3], [gap, 0.1]])
+        assert (sp.articulated(diver, path).closure is not None) == closes
 
 
 def test_a_wheel_that_ends_whole_turns_on_is_a_loop():
@@ -152,6 +155,7 @@ def test_particles_are_sums_over_the_masses(rng):
             np.testing.assert_allclose(each.internal_momentum(t), momentum, atol=precision)
     t = rng.uniform(0.3, 2.7, 5)
     np.testing.assert_allclose(deformation.inertia_rate(t), slope(deformation.inertia, t, 0.02), atol=1e-12)
+    np.testing.assert_array_equal(deformation.centre_of_mass(t), np.zeros((5, 3)))
     assert deformation.closure is not None
     np.testing.assert_allclose(deformation.closure, np.eye(3), atol=1e-12)
 
@@ -227,8 +231,10 @@ def test_the_closure_of_particles_is_found():
         return POINTS * flat, POINTS * np.broadcast_to([0.0, 0.0, -2.0], flat.shape)
 
     mirrored = sp.particles(MASSES, mirror, 1.0)
+    larger = sp.particles(MASSES, lambda t: (10.0 * mirror(t)[0], 10.0 * mirror(t)[1]), 1.0)
     assert mirrored.closure is None
     assert mirrored.shape_gap > 0.1
+    assert larger.shape_gap == pytest.approx(mirrored.shape_gap, rel=1e-12)
 
 
 def test_particles_on_one_line_are_refused_when_reconstructed():
@@ -245,7 +251,14 @@ def test_particles_on_one_line_are_refused_when_reconstructed():
 def test_one_or_two_particles_are_no_body(count):
     """A2: they are always on a line."""
     with pytest.raises(ShapePhaseError):
-        sp.reconstruct(sp.particles(np.ones(count), lambda t: (np.ones((len(t), count, 3)),) * 2, 1.0), [0.0, 0.0, 1.0])
+        sp.reconstruct(
+            sp.particles(np.ones(count), lambda t: (np.eye(count, 3) + 0 * t[:, None, None],) * 2, 1.0), [0.0, 0.0, 1.0]
+        )
+
+
+def test_particles_in_one_place_are_no_body():
+    with pytest.raises(ShapePhaseError):
+        sp.reconstruct(sp.particles(MASSES, lambda t: (np.ones((len(t), 4, 3)),) * 2, 1.0), [0.0, 0.0, 1.0])
 
 
 def test_particles_that_meet_on_a_line_are_named_with_the_time():
@@ -312,11 +325,28 @@ def test_prescribed_functions_come_back(rng):
     np.testing.assert_allclose(deformation.internal_momentum(t), momentum(t.ravel()).reshape(3, 2, 3), atol=1e-15)
     np.testing.assert_array_equal(deformation.closure, np.eye(3))
     assert sp.prescribed(swelling, None, 2.0).internal_momentum(0.3).tolist() == [0.0, 0.0, 0.0]
-    half = sp.prescribed(swelling, None, 0.25)
-    assert half.closure is None
-    assert half.shape_gap > 0.01
+    part = sp.prescribed(swelling, None, 0.25)
+    assert part.closure is None
+    assert part.shape_gap == pytest.approx(0.1, rel=1e-12)  # 0.3 of 3
+    assert sp.prescribed(lambda t: 7.0 * swelling(t), None, 0.25).shape_gap == pytest.approx(0.1, rel=1e-12)
     assert deformation.inertia([]).shape == (0, 3, 3)
     assert deformation.internal_momentum([]).shape == (0, 3)
+    growing = sp.prescribed(lambda t: (1.0 + t)[:, None, None] * np.eye(3), None, 2.0)
+    assert growing.closure is None
+    assert growing.shape_gap == pytest.approx(2.0)
+    np.testing.assert_array_equal(growing.centre_of_mass([0.0, 1.0]), np.zeros((2, 3)))
+
+
+def test_a_rounding_of_asymmetry_is_taken_out():
+    """Up to 1e-9 of the largest entry; more is an error."""
+    rounded = np.diag([4.0, 3.0, 2.0])
+    rounded[0, 1], rounded[1, 0] = 0.5, 0.5 + 3e-9
+    inertia = sp.rigid(rounded, 1.0).inertia(0.5)
+    np.testing.assert_array_equal(inertia, inertia.T)
+    np.testing.assert_allclose(inertia[0, 1], 0.5 + 1.5e-9, rtol=1e-15)
+    rounded[1, 0] = 0.5 + 6e-9
+    with pytest.raises(UnphysicalInertiaError):
+        sp.rigid(rounded, 1.0)
 
 
 def test_prescribed_inertia_rate(rng):
@@ -334,6 +364,9 @@ def test_prescribed_inertia_rate(rng):
     t = np.array([0.0, 0.3, np.nextafter(0.7, 0), 0.7, 0.71, 1.0])
     found = sp.prescribed(kinked, None, 1.0, breaks=[0.7]).inertia_rate(t)[:, 0, 0]
     np.testing.assert_allclose(found, np.where(t < 0.7, -1.0, 1.0) + 0.8 * t**7, atol=1e-11)
+    late = sp.prescribed(lambda t: (1.0 + np.abs(t - 99.9))[:, None, None] * np.eye(3), None, 100.0, breaks=[99.9])
+    t = np.array([0.0, 50.0, 99.89, 99.91, 100.0])
+    np.testing.assert_allclose(late.inertia_rate(t)[:, 0, 0], np.where(t < 99.9, -1.0, 1.0), atol=1e-9)
 
 
 def test_prescribed_functions_are_checked():
@@ -402,6 +435,8 @@ def test_a_rigid_body():
     np.testing.assert_array_equal(deformation.inertia_rate(t), np.zeros((3, 3, 3)))
     np.testing.assert_array_equal(deformation.closure, np.eye(3))
     assert (deformation.duration, deformation.shape_gap) == (4.0, 0.0)
+    np.testing.assert_array_equal(deformation.breaks, [0.0, 4.0])
+    np.testing.assert_array_equal(deformation.centre_of_mass(t), np.zeros((3, 3)))
     for bad in (np.eye(2), np.full((3, 3), np.nan), "round", np.ones((3, 3)) * 1j):
         with pytest.raises(ShapeError, match="inertia"):
             sp.rigid(bad, 1.0)

@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from conftest import random_loop
 from shapephase.errors import GaugeError, ShapeError
+from shapephase.gauge import lift_frames
+from shapephase.stepping import stepped_rotation
 
 FIRST, SECOND = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0])
 
@@ -202,6 +204,15 @@ def test_with_zero_momentum_the_body_is_at_rest_in_the_horizontal_gauge(loop):
     np.testing.assert_allclose(motion.attitude(T), sp.horizontal_gauge(loop).frame(T), atol=1e-10)
 
 
+def test_frames_of_an_integrated_lift(loop):
+    """The same U and rates as the horizontal gauge, from the interpolant alone."""
+    lift = lift_frames(stepped_rotation(loop.sampler(), np.zeros((1, 3)), 1e-12))
+    frame, omega = lift(T)
+    np.testing.assert_allclose(frame, sp.horizontal_gauge(loop).frame(T), atol=3e-12)
+    drift = np.linalg.solve(loop.inertia(T), loop.internal_momentum(T)[..., None])[..., 0]
+    np.testing.assert_allclose(omega, -drift, atol=1e-10)
+
+
 def test_the_horizontal_gauge_of_a_horizontal_gauge_turns_no_more(loop):
     once = sp.horizontal_gauge(loop)
     twice = sp.horizontal_gauge(once)
@@ -249,6 +260,20 @@ def test_the_first_principal_frame_is_fixed_by_rule(loop):
     for column in (0, 1):
         assert axes[np.argmax(np.abs(axes[:, column])), column] > 0.0
     np.testing.assert_allclose(np.cross(axes[:, 0], axes[:, 1]), axes[:, 2], atol=1e-13)
+
+
+@pytest.mark.parametrize("count", [2, 32, 33])
+def test_the_principal_gauge_of_a_loop_gone_round_many_times(count, rng):
+    """The axes at a phase of the loop are those of the first round, up to sign; U is continuous all along."""
+    cat = sp.load_body("cat")
+    path = random_loop(cat, rng, duration=1.0, amplitude=0.8)
+    once = sp.principal_gauge(sp.articulated(cat, path))
+    many = sp.principal_gauge(sp.articulated(cat, path.repeated(count)))
+    t = np.linspace(0.0, 1.0, 50, endpoint=False)
+    np.testing.assert_allclose(many.frame(t), once.frame(t), atol=1e-11)
+    for loop in (1, count - 1):
+        np.testing.assert_allclose(np.abs(many.frame(loop + t)), np.abs(once.frame(t)), atol=1e-10)
+    np.testing.assert_allclose(many.closure, np.linalg.matrix_power(once.closure, count), atol=1e-10)
 
 
 def rotating(speed, moments=(1.0, 2.0, 3.0)):

@@ -79,6 +79,22 @@ def test_what_no_body_can_divide_by_is_refused_with_its_time(moments):
         inverse_inertia(tensors[1])
 
 
+@pytest.mark.parametrize("moments", [(1, 1, -1), (1, -1, -1), (-1, -1, -1), (3, -1, -1), (1, 1, -1000), (-1, -2, 0.1)])
+def test_indefinite_tensors_are_refused_in_any_axes(moments):
+    for seed in range(20):
+        with pytest.raises(SingularInertiaError):
+            inverse_inertia(turned(np.array(moments, dtype=float), seed))
+
+
+def test_the_bound_of_what_is_singular():
+    """The least moment must be above 1e-12 of the largest."""
+    np.testing.assert_allclose(
+        inverse_inertia(np.diag([1.0, 1.0, 1.5e-12])), np.diag([1.0, 1.0, 1 / 1.5e-12]), rtol=1e-14
+    )
+    with pytest.raises(SingularInertiaError):
+        inverse_inertia(np.diag([1.0, 1.0, 0.9e-12]))
+
+
 @laws
 @given(arrays(np.float64, 3, elements=st.floats(-50.0, 50.0)), st.integers(0, 50))
 def test_only_positive_definite_tensors_pass(moments, seed):

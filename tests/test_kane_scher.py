@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from independent import apart, body_of, turn
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
+from independent import apart, body_of, turn
 from shapephase.errors import TrajectoryError
 
 RIGHTING = [(0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222), (60, 77.132402)]
@@ -120,7 +120,9 @@ def test_another_cone_turns_by_what_the_paper_s_equation_gives(path_of):
     assert np.degrees(apart(motion.final_attitude, turn(-axis, np.radians(100.487503224)))) < 2e-8
 
 
-@pytest.mark.parametrize(("alpha", "beta"), [(0, 20.0), (0, 59.426458741516), (0, 80.0), (5, 30.0), (20, 61.8), (60, 77.0)])
+@pytest.mark.parametrize(
+    ("alpha", "beta"), [(0, 20.0), (0, 59.426458741516), (0, 80.0), (5, 30.0), (20, 61.8), (60, 77.0)]
+)
 def test_any_cone_turns_as_the_paper_s_equation_says(alpha: float, beta: float):
     """Equation (5): dpsi/dtheta = j S/{(1 - T)[1 - T + j (1 + T)] sqrt(1 + T)}, j = J/I, by quadrature."""
     a, b, j = np.radians(alpha), np.radians(beta), 0.25

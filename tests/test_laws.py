@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from independent import BODIES, MujocoBody, apart, body_of, random_loop, random_rotation, random_vector
 
 import shapephase as sp
+from independent import BODIES, MujocoBody, apart, body_of, random_loop, random_rotation, random_vector
 
 TIMES = np.linspace(0.0, 2.0, 33)
 LAW = settings(derandomize=True, deadline=None, max_examples=50)

@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+import shapephase as sp
 from independent import (
     BODIES,
     apart,
@@ -17,8 +19,6 @@ from independent import (
     random_vector,
     turn,
 )
-
-import shapephase as sp
 from shapephase.errors import ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
 
 TIMES = np.linspace(0.0, 2.0, 41)
@@ -45,7 +45,9 @@ def test_axisymmetric_rigid_body(across: float, along: float, seed: int):
 def test_axisymmetric_rigid_body_in_turned_axes():
     times, tilt = np.linspace(0.0, 3.0, 20), random_rotation(4)
     momentum, attitude = random_vector(5, 2.0), random_rotation(6)
-    motion = sp.reconstruct(sp.rigid(tilt @ np.diag([1.0, 1.0, 1.7]) @ tilt.T, 3.0), momentum, attitude, tolerance=1e-12)
+    motion = sp.reconstruct(
+        sp.rigid(tilt @ np.diag([1.0, 1.0, 1.7]) @ tilt.T, 3.0), momentum, attitude, tolerance=1e-12
+    )
     own_axes = axisymmetric_attitude(1.0, 1.7, momentum, attitude @ tilt, times)
     assert apart(motion.attitude(times), own_axes @ tilt.T) < 1e-11
 

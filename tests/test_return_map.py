@@ -6,9 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from independent import BODIES, apart, body_of, pinocchio_motion, random_loop, turn
 
 import shapephase as sp
+from independent import BODIES, apart, body_of, pinocchio_motion, random_loop, turn
 from shapephase.errors import OpenPathError, ShapeError
 
 

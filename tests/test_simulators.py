@@ -9,6 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+import shapephase as sp
 from independent import (
     BODIES,
     MujocoBody,
@@ -20,8 +22,6 @@ from independent import (
     random_rotation,
     random_vector,
 )
-
-import shapephase as sp
 
 TIMES = np.linspace(0.0, 2.0, 41)
 

@@ -200,6 +200,13 @@ def test_a_users_rotation_is_checked_and_made_orthogonal(rng):
     np.testing.assert_allclose(made @ made.T, np.eye(3), atol=1e-15)
     left, _, right = np.linalg.svd(rough)
     np.testing.assert_allclose(made, left @ right, atol=1e-13)
+    many = Rotation.random(50, rng=rng).as_matrix()
+    np.testing.assert_allclose(so3.rotation_argument(many, "attitude"), many, atol=1e-15)
+    off = np.zeros((3, 3))
+    off[0, 0] = 1.0  # R^T R is off by twice this
+    so3.rotation_argument(np.eye(3) + 0.45e-6 * off, "attitude")
+    with pytest.raises(ShapeError, match="differs from the identity by 1.4e-06"):
+        so3.rotation_argument(np.eye(3) + 0.7e-6 * off, "attitude")
 
 
 @pytest.mark.parametrize(
@@ -226,6 +233,7 @@ def test_a_users_quaternion(rng):
     want = Rotation.from_quat(quat).as_matrix()
     np.testing.assert_allclose(so3.quat_argument(1.0000005 * quat, "attitude"), want, atol=1e-14)
     np.testing.assert_allclose(so3.quat_argument(-quat, "attitude"), want, atol=1e-14)
-    for bad in (np.zeros(4), 1.1 * quat, np.full(4, np.nan), np.eye(3)):
+    np.testing.assert_allclose(so3.quat_argument(1.0009 * quat, "attitude"), want, atol=1e-14)
+    for bad in (np.zeros(4), 1.0015 * quat, 1.1 * quat, np.full(4, np.nan), np.eye(3)):
         with pytest.raises(ShapeError, match="attitude"):
             so3.quat_argument(bad, "attitude")

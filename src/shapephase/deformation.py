@@ -13,7 +13,7 @@ from . import so3
 from .arrays import Array, finite_array
 from .body import Body
 from .connection import path_gap, path_sampler
-from .errors import ShapeError, TrajectoryError, UnphysicalInertiaError
+from .errors import ShapeError, SingularInertiaError, TrajectoryError, UnphysicalInertiaError
 from .inertia_tensor import inverse_inertia
 from .sampling import Interpolant, Sampler, chebyshev, inside, sampler, unit_nodes, values_to_coefficients
 from .shape_path import ShapePath, positive_argument, times_argument
@@ -60,6 +60,7 @@ class Deformation:
         joint path seen from the base), else None
     shape_gap : how far the end shape is from the start shape [largest joint difference, or relative change]
     label : what it is, for people
+    loops : the deformation is its first `duration / loops` seconds, this many times
     """
 
     source: Source
@@ -68,6 +69,7 @@ class Deformation:
     closure: Array | None
     shape_gap: float
     label: str
+    loops: int = 1
 
     def inertia(self, t: ArrayLike) -> Array:
         """Locked inertia: times (...) -> (..., 3, 3), base axes, about the centre of mass [kg m^2]."""
@@ -113,7 +115,7 @@ def articulated(body: Body, path: ShapePath) -> Deformation:
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= _CLOSED else None
     source = _Articulated(body, route)
-    return Deformation(source, route.duration, route.breaks, closure, gap, f"{body.name} along a path")
+    return Deformation(source, route.duration, route.breaks, closure, gap, f"{body.name} along a path", route.loops)
 
 
 def rigid(inertia: ArrayLike, duration: float) -> Deformation:
@@ -190,6 +192,8 @@ def particles(
     ends, _ = source.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
     size = float(np.max(np.linalg.norm(ends[0], axis=-1)))
+    if size == 0.0:
+        raise SingularInertiaError("all particles are in one place: there is no inertia that could turn")
     gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / size
     closure = turn if gap <= _CLOSED else None
     return Deformation(source, length, _edges(breaks, length), closure, gap, f"{len(weights)} particles")

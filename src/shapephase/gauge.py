@@ -121,7 +121,8 @@ def principal_frames(deformation: Deformation) -> Frames:
 
 def _principal_track(deformation: Deformation) -> tuple[Array, Array]:
     """Times and continuous principal frames, close enough that each tells its neighbours' axes apart."""
-    times = np.unique(np.concatenate([np.linspace(a, b, 33) for a, b in pairwise(deformation.breaks)]))
+    count = 32 * deformation.loops + 1
+    times = np.unique(np.concatenate([np.linspace(a, b, count) for a, b in pairwise(deformation.breaks)]))
     while True:
         moments, axes = np.linalg.eigh(deformation.inertia(times))
         _check_apart(moments, times)

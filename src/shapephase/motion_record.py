@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +36,8 @@ _STEPS = (
 )
 _SAMPLES = ("edges", "coefficients")
 _CENTRE_DEGREE = 24
+# What a damaged archive raises: its directory, checksums, compression, headers of arrays, or text.
+_UNREADABLE = (OSError, ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,19 +105,26 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
     if not where.is_file():
         raise InputFileNotFoundError(f"{where}: there is no such file")
     try:
-        with np.load(where, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
+        with zipfile.ZipFile(where) as archive:
+            arrays = {
+                name.removesuffix(".npy"): np.lib.format.read_array(BytesIO(archive.read(name)), allow_pickle=False)
+                for name in archive.namelist()
+            }
         header = json.loads(str(arrays["header"]))
-    except (OSError, ValueError, KeyError, EOFError, AttributeError, zipfile.BadZipFile) as error:
+    except (*_UNREADABLE, KeyError) as error:
         raise ResultFileError(f"{where}: no motion that can be read ({error})") from None
-    if header.get("format") != _FORMAT:
+    if not isinstance(header, dict) or "format" not in header:
+        raise ResultFileError(f"{where}: no motion; its header says {str(header)[:80]!r}")
+    if header["format"] != _FORMAT:
         raise ResultFileError(
-            f"{where}: holds {header.get('format')!r}, this version reads {_FORMAT!r}; compute the motion anew"
+            f"{where}: holds {header['format']!r}, this version reads {_FORMAT!r}; compute the motion anew"
         )
     try:
         return _record(header, arrays)
     except KeyError as error:
         raise ResultFileError(f"{where}: the motion lacks {error}; compute it anew") from None
+    except (TypeError, ValueError) as error:
+        raise ResultFileError(f"{where}: the motion's numbers cannot be used ({error}); compute it anew") from None
 
 
 def write_table(path: str | os.PathLike[str], columns: Mapping[str, Array]) -> None:

@@ -27,8 +27,22 @@ def tableau() -> tuple[Array, Array, Array]:
     return DOP853.A[:STAGES, :STAGES], DOP853.B[:STAGES], DOP853.C[:STAGES]
 
 
+@lru_cache(maxsize=1)
+def fifth_order_difference() -> Array:
+    """Weights (12,) of the difference to the fifth-order formula on the same stages."""
+    from scipy.integrate import DOP853
+
+    return DOP853.E5[:STAGES]
+
+
 def step(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> list[Any]:
-    """The quaternion after one step, normalised.
+    """The quaternion after one step, normalised. Parameters as `judged_step`."""
+    a, b, _ = tableau()
+    return _normalised(_combination(quat_xyzw, b, _slopes(quat_xyzw, size, channels, a)))
+
+
+def judged_step(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> tuple[list[Any], Any]:
+    """The quaternion after one step, normalised, and the square of its distance to a fifth-order step.
 
     Parameters
     ----------
@@ -38,11 +52,21 @@ def step(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> list[Any]:
         entries; without momentum just the last three
     """
     a, b, _ = tableau()
+    slopes = _slopes(quat_xyzw, size, channels, a)
+    x, y, z, w = _combination([0.0] * 4, fifth_order_difference(), slopes)
+    return _normalised(_combination(quat_xyzw, b, slopes)), x * x + y * y + z * z + w * w
+
+
+def _slopes(quat_xyzw: Scalars, size: Any | None, channels: Scalars, a: Array) -> list[list[Any]]:
     slopes: list[list[Any]] = []
     for stage in range(STAGES):
         inner = _combination(quat_xyzw, a[stage, :stage], slopes)
         slopes.append(_slope(inner, size, channels[stage]))
-    x, y, z, w = _combination(quat_xyzw, b, slopes)
+    return slopes
+
+
+def _normalised(quat_xyzw: Scalars) -> list[Any]:
+    x, y, z, w = quat_xyzw
     scale = 1.0 / (x * x + y * y + z * z + w * w) ** 0.5
     return [x * scale, y * scale, z * scale, w * scale]
 
@@ -109,6 +133,15 @@ def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
 
 def steps_in_numpy(quat_xyzw: Array, size: Array | None, channels: Array) -> Array:
     """`step` on arrays: quaternions (..., 4), sizes (...), channels (..., 12, 9 or 3) -> (..., 4)."""
-    quaternion = [quat_xyzw[..., i] for i in range(4)]
+    return np.stack(np.broadcast_arrays(*step(*_parts(quat_xyzw, channels, size))), axis=-1)
+
+
+def judged_steps_in_numpy(quat_xyzw: Array, size: Array | None, channels: Array) -> tuple[Array, Array]:
+    """`judged_step` on arrays: as `steps_in_numpy`, and the squared distances (...)."""
+    quaternion, square = judged_step(*_parts(quat_xyzw, channels, size))
+    return np.stack(np.broadcast_arrays(*quaternion), axis=-1), square
+
+
+def _parts(quat_xyzw: Array, channels: Array, size: Array | None) -> tuple[Scalars, Array | None, Scalars]:
     stages = [[channels[..., s, i] for i in range(channels.shape[-1])] for s in range(STAGES)]
-    return np.stack(np.broadcast_arrays(*step(quaternion, size, stages)), axis=-1)
+    return [quat_xyzw[..., i] for i in range(4)], size, stages

@@ -9,7 +9,7 @@ only ever added until the tail of the spectrum is small enough.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Protocol
@@ -28,7 +28,8 @@ _MOST_PANELS = 4000
 _LEAST_WIDTH = 1e-13
 _FIRST_HARMONICS, _LAST_EVEN = 4, 768
 _EVEN_A_PANEL, _PANEL_DEGREE = 16, 32
-_ROUNDING = 30.0 * np.finfo(float).eps
+_EPS = np.finfo(float).eps
+_ROUNDING = 30.0 * _EPS
 _VOIGT = np.array([0, 4, 8, 5, 2, 1])
 _MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # off-diagonal channels stand for two entries of I^-1
@@ -115,8 +116,8 @@ def sampler(
         None: unknown, then the samples are vetted between the nodes
     loops : the interval is its first part, this many times
     smooth_loop : that part goes smoothly over into its start and has no breaks
-    probe : a cheap stand-in for the deformation, times (N,) -> (N, k), to vet a black box; None: the deformation
-        itself is asked
+    probe : a cheap stand-in for the deformation to vet a black box, times (N,) -> (N, 2 n), shapes and then their
+        rates; None: the deformation itself is asked
     """
     asked = _Asked(evaluate)
     ends = breaks[breaks <= breaks[-1] / loops * (1.0 + 1e-12)] if loops > 1 else breaks
@@ -152,31 +153,50 @@ class _Judgement:
     inverse: Array  # error estimate of I^-1
     drift: Array  # error estimate of I^-1 L_o
     decay: Array  # of the spectrum, per degree; the slower one
+    converging: Mask
     at_rounding: Mask
     inverse_size: Array
     drift_size: Array
+    floor: Array  # (G, 2) what rounding alone leaves
 
     def error(self, momentum: float, width: Array, phase: float) -> Array:
         """Attitude error that the interpolation error feeds in: (G,) [rad].
 
-        What is missing runs through `phase` or more in a panel [rad], so most of it averages out, as long as
-        the body itself turns less; half of that is relied on.
+        What a converging series lacks runs through `phase` or more in a panel [rad], so most of it averages out, as
+        long as the body itself turns less; half of that is relied on. The error of a kink does not average out.
         """
         rate = momentum * self.inverse + self.drift
         turn = width * (momentum * self.inverse_size + self.drift_size)
-        return 0.5 * width * rate * np.minimum(1.0, 4.0 / np.maximum(phase - turn, 4.0))
+        left = np.where(self.converging, np.minimum(1.0, 4.0 / np.maximum(phase - turn, 4.0)), 1.0)
+        return 0.5 * width * rate * left
+
+    def raised(self, gaps: Array, seen: Mask) -> _Judgement:
+        """The same with errors at least as large as those seen (G, 2), which are not expected to average out."""
+        return replace(
+            self,
+            inverse=np.maximum(self.inverse, gaps[:, 0]),
+            drift=np.maximum(self.drift, gaps[:, 1]),
+            converging=self.converging & ~seen,
+            at_rounding=self.at_rounding & np.all(gaps <= 4.0 * self.floor, axis=1),
+        )
 
 
-def _judged(size: Array, degree: int) -> _Judgement:
-    """Error estimates from the tails of spectra; size (G, degree + 1, 2) of I^-1 and of I^-1 L_o."""
+def _judged(size: Array, degree: int, time_rounding: Array | float) -> _Judgement:
+    """Error estimates from the tails of spectra; size (G, degree + 1, 2) of I^-1 and of I^-1 L_o.
+
+    `time_rounding` is the rounding of the sample times in units of half a panel (or of a radian): it limits what
+    samples of a fast motion can tell.
+    """
     if degree == 0:
         zero = np.zeros(len(size))
-        return _Judgement(zero, zero, zero + np.inf, zero == 0.0, size[:, 0, 0], size[:, 0, 1])
+        sure = zero == 0.0
+        return _Judgement(zero, zero, zero + np.inf, sure, sure, size[:, 0, 0], size[:, 0, 1], size[:, 0] * _EPS)
     top = size.max(axis=1)
     late = size[:, -max(2, degree // 10) :].max(axis=1)
     centre = degree // 2
     middle = size[:, centre - 1 : centre + 2].max(axis=1)
-    floor = _ROUNDING * top
+    slope = np.arange(degree + 1) @ size
+    floor = _ROUNDING * top + 4.0 * np.reshape(time_rounding, (-1, 1)) * slope
     with np.errstate(divide="ignore", invalid="ignore"):
         decay = np.where((late > 0.0) & (middle > late), np.log(middle / late) * (2.0 / degree), 0.0)
         # A geometric series with this decay leaves this much beyond its last term; twice, for aliasing.
@@ -187,9 +207,11 @@ def _judged(size: Array, degree: int) -> _Judgement:
         error[:, 0],
         error[:, 1],
         np.where(calm, np.inf, decay).min(axis=1),
+        (calm | (late < 1e-2 * middle)).all(axis=1),
         calm.all(axis=1),
         top[:, 0],
         top[:, 1],
+        floor,
     )
 
 
@@ -249,7 +271,7 @@ class EvenSampler:
     def _judge(self) -> None:
         count = len(self._values)
         spectrum = np.fft.rfft(self._values, axis=0) * (2.0 / count)
-        self._judgement = _judged(_sizes(spectrum)[None], count // 2)
+        self._judgement = _judged(_sizes(spectrum)[None], count // 2, 2.0 * np.pi * _EPS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +282,7 @@ class _Group:
     left: Array
     right: Array
     values: Array  # (G, degree + 1, 9) at the ascending Chebyshev points
-    vetted: Mask
+    gaps: Array  # (G, 2) errors seen between the nodes; NaN: not looked for
     judgement: _Judgement
 
     @property
@@ -268,12 +290,23 @@ class _Group:
         return self.right - self.left
 
     def kept(self, rows: Mask) -> _Group:
-        return _group(self.degree, self.left[rows], self.right[rows], self.values[rows], self.vetted[rows])
+        return _group(self.degree, self.left[rows], self.right[rows], self.values[rows], self.gaps[rows])
 
 
-def _group(degree: int, left: Array, right: Array, values: Array, vetted: Mask) -> _Group:
-    judgement = _judged(_sizes(values_to_coefficients(degree) @ values), degree)
-    return _Group(degree, left, right, values, vetted, judgement)
+def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
+    rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
+    judgement = _judged(_sizes(values_to_coefficients(degree) @ values), degree, rounding)
+    if gaps is None:
+        return _Group(degree, left, right, values, np.full((len(left), 2), np.nan), judgement)
+    seen = ~np.isnan(gaps[:, 0])
+    return _Group(
+        degree,
+        left,
+        right,
+        values,
+        gaps,
+        judgement.raised(2.0 * np.nan_to_num(gaps), seen) if seen.any() else judgement,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,18 +319,34 @@ class _Wanted:
     known: Array | None
 
     def new_points(self) -> Array:
-        """(G, m) times."""
+        """(G, m) times; the ends are moved a little inwards, to this side of a break."""
         nodes = _nodes_in(self.left, self.right, self.degree)
-        return nodes if self.known is None else nodes[:, ~self._old()]
+        if self.known is not None:
+            return nodes[:, ~self._old()]
+        if self.degree:
+            nodes[:, 0], nodes[:, -1] = inside(self.left, self.right)
+        return nodes
 
     def with_values(self, fresh: Array) -> Array:
         """(G, degree + 1, 9)."""
         if self.known is None:
-            return fresh
+            return self._with_true_ends(fresh) if self.degree else fresh
         whole = np.empty((len(self.left), self.degree + 1, 9))
         old = self._old()
         whole[:, old], whole[:, ~old] = self.known, fresh
         return whole
+
+    def _with_true_ends(self, values: Array) -> Array:
+        """Values at the very ends from those a little inwards, along the polynomial's slope there."""
+        degrees = np.arange(self.degree + 1.0)
+        slopes = np.stack([(-1.0) ** (degrees + 1.0), np.ones_like(degrees)]) * degrees**2
+        at_ends = slopes @ (values_to_coefficients(self.degree) @ values)
+        first, _ = inside(self.left, self.right)
+        shift = (2.0 * (first - self.left) / (self.right - self.left))[:, None]
+        values = values.copy()
+        values[:, 0] -= shift * at_ends[:, 0]
+        values[:, -1] += shift * at_ends[:, 1]
+        return values
 
     def _old(self) -> Mask:
         count = 1 if self.known is None else self.known.shape[1] - 1
@@ -332,10 +381,11 @@ class PanelSampler:
             errors = {d: g.judgement.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
             total = self._loops * sum(float(e.sum()) for e in errors.values())
             if total <= tolerance:
-                rough = {} if self._known else self._missing_between(momentum, tolerance)
-            else:
-                share = tolerance / (self._span * self._loops)
-                rough = {d: (errors[d] > share * g.width) & ~g.judgement.at_rounding for d, g in self._groups.items()}
+                if self._known or not self._look_between():
+                    return
+                continue
+            share = tolerance / (self._span * self._loops)
+            rough = {d: (errors[d] > share * g.width) & ~g.judgement.at_rounding for d, g in self._groups.items()}
             if not any(rows.any() for rows in rough.values()):
                 return
             self._sharpen(rough, errors, tolerance, total)
@@ -366,6 +416,7 @@ class PanelSampler:
     def _sharpen(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
         wanted: list[_Wanted] = []
+        crowded = self._panel_count > self._most
         for degree, rows in rough.items():
             if not rows.any():
                 continue
@@ -373,11 +424,12 @@ class PanelSampler:
             share = tolerance / (self._span * self._loops) * g.width
             with np.errstate(divide="ignore", invalid="ignore"):
                 missing = np.log(np.maximum(errors[degree] / share, 1.0)) / g.judgement.decay
-            factor = np.clip(np.ceil(missing / degree + 0.9), 2, 4)
+            # A panel without a decay that is still small enough was found wanting between its nodes.
+            factor = np.clip(np.ceil(np.nan_to_num(missing, nan=0.0, posinf=9.9 * degree) / degree + 0.9), 2, 4)
             factor[(missing > 3.1 * degree) | (factor * degree > _LAST_DEGREE)] = 0
             halves = rows & (factor == 0)
-            if (g.width[halves] < _LEAST_WIDTH * self._span).any() or self._panel_count > self._most:
-                where = float(g.left[halves][0] if halves.any() else g.left[0])
+            if (g.width[halves] < _LEAST_WIDTH * self._span).any() or (crowded and halves.any()):
+                where = float(g.left[halves][np.argmin(g.width[halves])])
                 raise AccuracyNotReached(
                     f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left where "
                     f"{tolerance:.3g} was asked; declare the times of its jumps as breaks, smooth the data, or loosen "
@@ -408,38 +460,44 @@ class PanelSampler:
         for panels, points in zip(wanted, times, strict=True):
             whole = panels.with_values(values[start : start + points.size].reshape(*points.shape, 9))
             start += points.size
-            left, right, vetted = panels.left, panels.right, np.zeros(len(panels.left), dtype=bool)
+            left, right, gaps = panels.left, panels.right, None
             if panels.degree in self._groups:
                 g = self._groups[panels.degree]
+                gaps = np.concatenate([g.gaps, np.full((len(left), 2), np.nan)])
                 left, right = np.concatenate([g.left, left]), np.concatenate([g.right, right])
-                whole, vetted = np.concatenate([g.values, whole]), np.concatenate([g.vetted, vetted])
-            self._groups[panels.degree] = _group(panels.degree, left, right, whole, vetted)
+                whole = np.concatenate([g.values, whole])
+            gaps = None if self._known else gaps
+            self._groups[panels.degree] = _group(panels.degree, left, right, whole, gaps)
 
-    def _missing_between(self, momentum: float, tolerance: float) -> dict[int, Mask]:
-        """Panels of a black box that look resolved at their nodes but miss something between them."""
-        missed = {}
-        for degree, g in self._groups.items():
-            rows = np.flatnonzero(~g.vetted)
-            missed[degree] = np.zeros(len(g.left), dtype=bool)
+    def _look_between(self) -> bool:
+        """Look at new panels of a black box between their nodes; errors seen there count. False: nothing was new."""
+        found = False
+        for degree, g in list(self._groups.items()):
+            rows = np.flatnonzero(np.isnan(g.gaps[:, 0]))
             if not len(rows):
                 continue
-            points = _BETWEEN if self._probe else _BETWEEN[::16]
+            found = True
+            points = self._suspicious_points(g, rows)
             there = chebyshev(2.0 * points - 1.0, degree + 1) @ values_to_coefficients(degree)
             between = g.left[rows, None] + g.width[rows, None] * points
-            if self._probe is None:
-                truth = self._asked(between.ravel()).reshape(len(rows), len(points), 9)
-                gap = _sizes(there @ g.values[rows] - truth).max(axis=1)
-                rate = momentum * gap[:, 0] + gap[:, 1]
-                bound = g.judgement.error(momentum, g.width, 2.0 * degree)[rows]
-                wrong = 0.5 * g.width[rows] * rate > np.maximum(10.0 * bound, 0.1 * tolerance) * max(degree, 1)
-            else:
-                nodes = _nodes_in(g.left[rows], g.right[rows], degree)
-                seen, truth = (self._probe(t.ravel()).reshape(*t.shape, -1) for t in (nodes, between))
-                spread = np.ptp(np.concatenate([seen, truth], axis=1), axis=1, keepdims=True)
-                wrong = (np.abs(there @ seen - truth) > np.sqrt(tolerance) * spread + 1e-10).any(axis=(1, 2))
-            missed[degree][rows[wrong]] = True
-            g.vetted[rows[~wrong]] = True
-        return missed
+            truth = self._asked(between.ravel()).reshape(*points.shape, 9)
+            gaps = g.gaps.copy()
+            gaps[rows] = _sizes(there @ g.values[rows] - truth).max(axis=1)
+            self._groups[degree] = _group(degree, g.left, g.right, g.values, gaps)
+        return found
+
+    def _suspicious_points(self, g: _Group, rows: Integers) -> Array:
+        """Where in its panels (in [0, 1]) the probe is farthest from its own interpolant: (R, k)."""
+        if self._probe is None:
+            return np.broadcast_to(_BETWEEN[::16], (len(rows), 4))
+        there = chebyshev(2.0 * _BETWEEN - 1.0, g.degree + 1) @ values_to_coefficients(g.degree)
+        nodes = _nodes_in(*inside(g.left[rows], g.right[rows]), g.degree)
+        between = g.left[rows, None] + g.width[rows, None] * _BETWEEN
+        seen, truth = (self._probe(t.ravel()).reshape(*t.shape, -1) for t in (nodes, between))
+        gap = np.abs(there @ seen - truth)
+        half = gap.shape[-1] // 2
+        worst = [np.argmax(part.max(axis=-1), axis=1) for part in (gap[..., :half], gap[..., half:])]
+        return _BETWEEN[np.stack(worst, axis=-1)]
 
 
 def chebyshev(x: Array, count: int) -> Array:
@@ -448,12 +506,8 @@ def chebyshev(x: Array, count: int) -> Array:
 
 
 def _nodes_in(left: Array, right: Array, degree: int) -> Array:
-    """Ascending Chebyshev points of panels (G, degree + 1); the ends moved inwards, to this side of a break."""
-    if degree == 0:
-        return 0.5 * (left + right)[:, None]
-    nodes = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)
-    nodes[:, 0], nodes[:, -1] = inside(left, right)
-    return nodes
+    """Ascending Chebyshev points of panels (G, degree + 1), ends included."""
+    return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)
 
 
 def inside(left: Array, right: Array) -> tuple[Array, Array]:

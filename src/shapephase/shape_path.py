@@ -481,7 +481,7 @@ def _check_rates(path: ShapePath) -> None:
     a, b, _, d, e = shapes.reshape(5, len(middle), -1)
     slope = (a - 8 * b + 8 * d - e) / (12 * step[:, None])
     rate = rates.reshape(5, len(middle), -1)
-    scale = np.max(np.abs(rate), axis=0) + np.ptp(shapes, axis=0) / path.duration
+    scale = np.max(np.abs(rate), axis=0) + np.maximum(np.ptp(shapes, axis=0), 1e-9) / path.duration
     wrong = np.abs(slope - rate[2]) > 1e-3 * scale
     if wrong.any():
         where, joint = (int(i) for i in np.argwhere(wrong)[0])

@@ -20,8 +20,9 @@ from .errors import AccuracyNotReached
 from .rotation_step import (
     STAGES,
     body_momentum,
+    judged_step,
+    judged_steps_in_numpy,
     relative_angle,
-    step,
     steps_in_numpy,
     tableau,
     variation,
@@ -29,7 +30,6 @@ from .rotation_step import (
 from .sampling import Evaluate, Interpolant, Sampler, chebyshev, inside
 
 _EPS = np.finfo(float).eps
-_SHARE = 128.0  # two half steps of order 8 err 255 times less than the whole one; half of that is relied on
 _BLOCK = 256
 _SYMBOLIC_BATCH = 24
 _LATER, _EARLIER = np.tril_indices(10, -1)
@@ -138,21 +138,38 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         bound = replace(
             solution,
             sampling_error=growth * sampler.error(size),
-            stepping_error=growth * local.sum(axis=1) / _SHARE,
+            stepping_error=growth * local.sum(axis=1),
         )
         if np.all(bound.error_estimate <= tolerance):
             return _for_all(bound, momentum)
         last = bound
-        room = 0.6 * tolerance / float(np.max(growth))
+        # Steps that are still far too long tell nothing about how errors grow.
+        telling = local.sum(axis=1).max() < 1e-2
+        worst = float(np.max(growth)) if telling else 1.0
+        room = 0.6 * tolerance / worst
         by_loop = local.reshape(len(local), interpolant.loops, -1).sum(axis=1)
-        sums = np.max(np.add.reduceat(by_loop, _starts(doubles), axis=1), axis=0) / _SHARE
+        sums = np.max(np.add.reduceat(by_loop, _starts(doubles), axis=1), axis=0)
         if sums.sum() > room:
             doubles = _finer(doubles, sums, room)
         sampling_target = min(sampling_target, 0.5 * room)
         plan = _Plan(interpolant.edges[: len(doubles) + 1], doubles)
-        if doubles.sum() * interpolant.loops > _MOST_STEPS or np.any(bound.rounding_error > 0.9 * tolerance):
+        if doubles.sum() * interpolant.loops > _MOST_STEPS or (
+            telling and np.any(bound.rounding_error > 0.9 * tolerance)
+        ):
             break
     raise _not_reached(tolerance, last)
+
+
+def _local_errors(differences: Array, coarse: Array, fine: Array) -> Array:
+    """Error estimates of double steps [rad], from their differences to steps of twice the length.
+
+    Once the steps are small, two half steps of order eight err 255 times less than the whole one; an eighth of that is
+    relied on. Whether they are small shows in the distances to a fifth-order formula on the same stages, of the
+    whole step (`coarse`) and of its halves (`fine`): these fall by 32 then, and hardly at all where a step jumps over
+    what happens inside it.
+    """
+    fall = np.maximum(coarse, 1e-300) / np.maximum(fine, 1e-16)
+    return differences / np.clip(30.0 * (fall / 24.0) ** 3, 0.7, 30.0)
 
 
 def _not_reached(tolerance: float, last: SteppedRotation | None) -> AccuracyNotReached:
@@ -185,7 +202,14 @@ def _first_plan(interpolant: Interpolant, size: float, tolerance: float) -> Inte
     rates = size * sizes[:, :, :6].sum(axis=2) + sizes[:, :, 6:].sum(axis=2)
     turn = widths * rates.sum(axis=1)
     swing = (widths * (rates @ np.arange(rates.shape[1]) ** 4.0)) ** 0.25
-    return np.maximum(1, np.ceil(tolerance**-0.125 * (0.012 * turn + 0.15 * swing))).astype(int)
+    # A step must not jump over what happens inside a panel: two degrees that carry the motion for each double step,
+    # four of those that matter at all.
+    least = np.ones(len(rates))
+    for share, threshold in ((0.5, 0.1 * rates.max(axis=1)), (0.25, 0.1 * tolerance / widths)):
+        matters = rates > threshold[:, None]
+        degree = np.where(matters.any(axis=1), rates.shape[1] - 1 - np.argmax(matters[:, ::-1], axis=1), 0)
+        least = np.maximum(least, share * degree)
+    return np.ceil(np.maximum(tolerance**-0.125 * (0.012 * turn + 0.15 * swing), least)).astype(int)
 
 
 def _plan_for(interpolant: Interpolant, plan: _Plan) -> Integers:
@@ -209,15 +233,15 @@ def _starts(doubles: Integers) -> Integers:
 
 
 def _run(interpolant: Interpolant, momentum: Array, doubles: Integers) -> tuple[SteppedRotation, Array]:
-    """All double steps: the solution and the (B, D) differences between double and half steps [rad]."""
+    """All double steps: the solution and the estimates of their local errors (B, D) [rad]."""
     size = np.linalg.norm(momentum, axis=-1)
     start = _frame_along(momentum, size)
     channels = _stage_channels(interpolant, doubles)
     march = _march_symbolic if len(momentum) <= _SYMBOLIC_BATCH else _march_numpy
     if size.any():
-        quaternions, differences, growth = march(channels, start, size, interpolant.loops)
+        quaternions, judged, growth = march(channels, start, size, interpolant.loops)
     else:
-        quaternions, differences, growth = march(channels[:, :, 6:], start, None, interpolant.loops)
+        quaternions, judged, growth = march(channels[:, :, 6:], start, None, interpolant.loops)
     edges = interpolant.edges
     each = np.tile(2 * doubles, interpolant.loops)
     panel = np.repeat(np.arange(len(each)), each)
@@ -228,7 +252,7 @@ def _run(interpolant: Interpolant, momentum: Array, doubles: Integers) -> tuple[
     solution = SteppedRotation(
         interpolant, momentum, times, panel, quaternions, unknown, unknown, _amplification(growth), last
     )
-    return solution, differences
+    return solution, _local_errors(*np.moveaxis(judged, -1, 0))
 
 
 def _frame_along(momentum: Array, size: Array) -> Array:
@@ -288,14 +312,15 @@ def _stage_matrix(degree_count: int, count: int) -> Array:
 def _amplification(growth: Array | None) -> Array:
     """Largest growth of an error from one time to a later one, from the propagators (B, D + 1, 3, 3).
 
-    Between ten times; the largest singular value is bounded by the sixteenth root of the sum of the sixteenth
+    Between ten times. The flow has determinant one (I^-1 hat(Pi) - hat(omega) has no trace), so the adjugate is
+    the inverse; the largest singular value is bounded by the sixteenth root of the sum of the sixteenth
     powers of all three, at most 7 % above it.
     """
     if growth is None:
         return np.ones(1)
     count = growth.shape[1]
     chosen = growth[:, np.arange(10) * (count - 1) // 9]
-    between = chosen[:, _LATER] @ np.linalg.inv(chosen)[:, _EARLIER]
+    between = chosen[:, _LATER] @ _adjugate(chosen)[:, _EARLIER]
     square = np.swapaxes(between, -1, -2) @ between
     scale = np.trace(square, axis1=-2, axis2=-1)
     power = square / scale[..., None, None]
@@ -305,34 +330,44 @@ def _amplification(growth: Array | None) -> Array:
     return np.maximum(1.0, top.max(axis=1))
 
 
+def _adjugate(matrix: Array) -> Array:
+    """Adjugates of 3 x 3 matrices (..., 3, 3)."""
+    result = np.empty_like(matrix)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            n, o = (m + 1) % 3, (m + 2) % 3
+            result[..., m, i] = matrix[..., j, n] * matrix[..., k, o] - matrix[..., j, o] * matrix[..., k, n]
+    return result
+
+
 def _march_numpy(channels: Array, start: Array, size: Array | None, loops: int) -> tuple[Array, Array, Array | None]:
     """All double steps for a large batch, each formula on whole arrays of the batch."""
     quaternion = start
     track = [quaternion]
-    differences = np.empty((len(start), loops * len(channels)))
+    judged = np.empty((len(start), loops * len(channels), 3))
     growth = None if size is None else [np.tile(np.eye(3), (len(start), 1, 1))]
     for number in range(loops * len(channels)):
         block = channels[number % len(channels)]
         whole, first, second = block[:STAGES], block[STAGES : 2 * STAGES], block[2 * STAGES :]
-        coarse = steps_in_numpy(quaternion, size, whole)
-        middle = steps_in_numpy(quaternion, size, first)
-        quaternion = steps_in_numpy(middle, size, second)
-        differences[:, number] = relative_angle(quaternion.T, coarse.T)
+        coarse, far = judged_steps_in_numpy(quaternion, size, whole)
+        middle, near = judged_steps_in_numpy(quaternion, size, first)
+        quaternion, next_near = judged_steps_in_numpy(middle, size, second)
+        judged[:, number, 0] = relative_angle(quaternion.T, coarse.T)
+        judged[:, number, 1], judged[:, number, 2] = np.sqrt(far), np.sqrt(near) + np.sqrt(next_near)
         track += [middle, quaternion]
         if growth is not None:
             rows = variation(body_momentum(middle.T, size), 4.0 * second[0])
             matrix = np.moveaxis(np.array([np.broadcast_arrays(*row) for row in rows]), -1, 0)
             growth.append(_exponential(matrix) @ growth[-1])
     propagators = None if growth is None else np.stack(growth, axis=1)
-    return np.stack(track, axis=1), differences, propagators
+    return np.stack(track, axis=1), judged, propagators
 
 
 def _exponential(matrix: Array) -> Array:
-    """exp to fourth order, enough to tell how errors grow."""
-    total = np.eye(3)
-    for order in (4.0, 3.0, 2.0, 1.0):
-        total = np.eye(3) + matrix @ total / order
-    return total
+    """exp by its (2, 2) Pade approximant: of fourth order, and a rotation where the matrix is antisymmetric."""
+    even, odd = np.eye(3) + matrix @ matrix / 12.0, 0.5 * matrix
+    return np.linalg.solve(even - odd, even + odd)
 
 
 def _march_symbolic(channels: Array, start: Array, size: Array | None, loops: int) -> tuple[Array, Array, Array | None]:
@@ -341,7 +376,7 @@ def _march_symbolic(channels: Array, start: Array, size: Array | None, loops: in
     total = loops * count
     quaternions = np.empty((batch, 2 * total + 1, 4))
     quaternions[:, 0] = start
-    differences = np.empty((batch, total))
+    judged = np.empty((batch, total, 3))
     growth = None if size is None else np.empty((batch, total + 1, 3, 3))
     blocks = [_Block(channels[k : k + _BLOCK], size is not None) for k in range(0, count, _BLOCK)]
     for row in range(batch):
@@ -358,11 +393,11 @@ def _march_symbolic(channels: Array, start: Array, size: Array | None, loops: in
                 stop = done + block.count
                 quaternions[row, 2 * done + 1 : 2 * stop : 2] = sides[:, :4]
                 quaternions[row, 2 * done + 2 : 2 * stop + 1 : 2] = states[:, :4]
-                differences[row, done:stop] = sides[:, 4]
+                judged[row, done:stop] = sides[:, 4:]
                 if growth is not None:
                     growth[row, done + 1 : stop + 1] = states[:, 4:13].reshape(-1, 3, 3)
                 state, done = states[-1], stop
-    return quaternions, differences, growth
+    return quaternions, judged, growth
 
 
 class _Block:
@@ -387,7 +422,7 @@ class _Block:
             self._buffer.set_res(place, result.data)
 
     def __call__(self, state: Array) -> tuple[Array, Array]:
-        """States after each double step, and beside: the quaternion after its first half, the difference."""
+        """States after each double step, and beside: the quaternion after its first half and what judges the step."""
         self._state[:] = state
         self._evaluate()
         states, sides = self._results
@@ -420,18 +455,17 @@ def _double_step_function(with_momentum: bool) -> Any:
     parts = casadi.vertsplit(state)
     quaternion = parts[:4]
     size = parts[13] if with_momentum else None
-    coarse = step(quaternion, size, stages[:STAGES])
-    middle = step(quaternion, size, stages[STAGES : 2 * STAGES])
-    end = step(middle, size, stages[2 * STAGES :])
-    side = casadi.vertcat(*middle, relative_angle(end, coarse))
+    coarse, far = judged_step(quaternion, size, stages[:STAGES])
+    middle, near = judged_step(quaternion, size, stages[STAGES : 2 * STAGES])
+    end, next_near = judged_step(middle, size, stages[2 * STAGES :])
+    side = casadi.vertcat(*middle, relative_angle(end, coarse), far**0.5, near**0.5 + next_near**0.5)
     if size is None:
         return casadi.Function("double_step", [state, data], [casadi.vertcat(*end), side])
     doubled = [4.0 * channel for channel in stages[2 * STAGES]]
     matrix = casadi.vertcat(*(casadi.horzcat(*row) for row in variation(body_momentum(middle, size), doubled)))
     propagator = casadi.reshape(casadi.vertcat(*parts[4:13]), 3, 3).T
-    total = propagator
-    for order in (4.0, 3.0, 2.0, 1.0):
-        total = propagator + casadi.mtimes(matrix, total) / order
+    even, odd = casadi.SX.eye(3) + casadi.mtimes(matrix, matrix) / 12.0, 0.5 * matrix
+    total = casadi.mtimes(casadi.inv_minor(even - odd), casadi.mtimes(even + odd, propagator))
     following = casadi.vertcat(*end, casadi.reshape(total.T, 9, 1), size)
     return casadi.Function("double_step", [state, data], [following, side])
 

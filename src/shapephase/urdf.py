@@ -22,6 +22,7 @@ from .errors import InputFileNotFoundError, ModelFileError
 Element = ElementTree.Element
 
 _MAX_BYTES = 16 * 2**20
+_MOST_LINKS, _MOST_JOINTS, _MOST_DEPTH = 2000, 300, 200
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
@@ -98,6 +99,10 @@ def check_urdf(text: str, where: str) -> UrdfText:
     name = root.get("name") or "robot"
     written = ElementTree.Element("robot", name=name)
     links, joints = _named(root, "link", where), _named(root, "joint", where)
+    moving = sum(joint.get("type") != "fixed" for joint in joints.values())
+    for count, most, kind in ((len(links), _MOST_LINKS, "links"), (moving, _MOST_JOINTS, "moving joints")):
+        if count > most:
+            raise ModelFileError(f"{where}: {count} {kind}; up to {most} are supported")
     inertias = [_write_link(written, key, link, where) for key, link in links.items()]
     for key, joint in joints.items():
         _write_joint(written, key, joint, where)
@@ -209,8 +214,11 @@ def _check_tree(links: dict[str, Element], joints: dict[str, Element], where: st
     roots = [name for name in links if name not in parent_joint]
     if len(roots) > 1:
         raise ModelFileError(f"{where}: {len(roots)} links have no parent, one is allowed: {', '.join(roots)}")
-    reached, waiting = set(roots), list(roots)
+    reached, waiting, depth = set(roots), list(roots), 0
     while waiting:
+        depth += 1
+        if depth > _MOST_DEPTH:
+            raise ModelFileError(f"{where}: a chain of more than {_MOST_DEPTH} links, at {waiting[0]!r}")
         waiting = [child for parent in waiting for child in children[parent]]
         reached.update(waiting)
     lost = [name for name in links if name not in reached]
