@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -88,7 +89,8 @@ def solve_ivp_attitude(case: Case, rtol: float, atol: float | None = None) -> tu
         h = data.hg.angular.tolist()
         pi = (a - w * s + y * p - z * u - h[0], b - w * u + z * s - x * p - h[1], c - w * p + x * u - y * s - h[2])
         (i, f, e), (_, g, d), (_, _, k) = data.Ig.inertia.tolist()
-        aa, bb, cc, dd, ee, ff = g * k - d * d, i * k - e * e, i * g - f * f, e * f - i * d, f * d - g * e, e * d - f * k
+        aa, bb, cc = g * k - d * d, i * k - e * e, i * g - f * f
+        dd, ee, ff = e * f - i * d, f * d - g * e, e * d - f * k
         det = i * aa + f * ff + e * ee
         o = (aa * pi[0] + ff * pi[1] + ee * pi[2]) / det
         r = (ff * pi[0] + bb * pi[1] + dd * pi[2]) / det
@@ -102,7 +104,7 @@ def solve_ivp_attitude(case: Case, rtol: float, atol: float | None = None) -> tu
 
     state, count = np.array([0.0, 0.0, 0.0, 1.0]), 0
     edges = case.path.breaks
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         run = solve_ivp(slope, (a, b), state, "DOP853", rtol=rtol, atol=1e-2 * rtol if atol is None else atol)
         state = run.y[:, -1] / np.linalg.norm(run.y[:, -1])
         count += run.nfev

@@ -395,12 +395,19 @@ def test_there_and_back_again_is_nothing(rng):
     )
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9, 1e-12])
 def test_the_tolerance_is_kept(tolerance, rng):
     cat = sp.load_body("cat")
     path = random_loop(cat, rng, harmonics=4, amplitude=1.0)
     want = lift(cat, path, 0.0, path.duration)
     assert angle_of(sp.holonomy(cat, path, tolerance) @ want.T) < tolerance + 1e-11
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, np.nan, np.inf, "tight", None, [1e-9, 1e-6]])
+def test_a_tolerance_is_a_positive_number(tolerance):
+    path = sp.ShapePath.waypoints([0, 1, 2], [[0.0, 0.0], [1.0, 0.3], [0.0, 0.0]])
+    with pytest.raises(ValueError, match="tolerance"):
+        sp.holonomy(sp.load_body("diver"), path, tolerance)
 
 
 def test_an_open_path_has_no_holonomy():

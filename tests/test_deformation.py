@@ -414,7 +414,7 @@ def test_a_duration_is_a_positive_number(duration):
 
 
 def test_breaks_lie_inside():
-    for breaks in ([1.5], [-0.1, 0.3], [np.nan]):
+    for breaks in ([1.5], [-0.1, 0.3], [np.nan], [[0.1, 0.2]], ["soon"]):
         with pytest.raises(ValueError, match="breaks"):
             sp.prescribed(swelling, None, 1.0, breaks)
         with pytest.raises(ValueError, match="breaks"):

@@ -74,6 +74,20 @@ def test_a_loose_tolerance_is_reached_where_a_tight_one_is():
             assert apart(motion.attitude(TIMES), truth.attitude(TIMES)) <= motion.error_estimate + truth.error_estimate
 
 
+def test_steps_so_long_that_they_overflow_are_made_shorter():
+    """Arms all but at rest, forty radians of turning in each move: the first plan's steps are far too long."""
+    body = body_of("diver")
+    shapes = [[-0.173, -0.0892], [0.1376, -0.1192], [0.0419, 0.025], [-0.1517, 0.0536]]
+    deformation = sp.articulated(body, sp.ShapePath.waypoints([0.0, 0.5, 0.8, 2.0], shapes))
+    momentum = [-34.0, 23.0, 34.5]
+    attitudes = np.stack([random_rotation(seed) for seed in range(20)])
+    truth = sp.reconstruct(deformation, momentum, attitudes, tolerance=1e-8).attitude(TIMES)
+    for tolerance in (1e-4, 1e-5, 1e-6):
+        for attitude, true in zip(attitudes, truth):
+            motion = sp.reconstruct(deformation, momentum, attitude, tolerance=tolerance)
+            assert apart(motion.attitude(TIMES), true) <= motion.error_estimate + 1e-8
+
+
 @pytest.mark.parametrize("name", ["cat", "cat_two_halves", "satellite", "astronaut"])
 def test_twelve_digits_are_reached_and_true(name: str):
     body, loop = body_of(name), random_loop(1, body_of(name).n_shape)
@@ -267,6 +281,14 @@ def test_a_path_at_rest_but_for_one_burst_is_accepted():
         edges = np.clip(centre + np.array([-0.04, 0.0, 0.04]), 0.0, 2.0)
         truth = pinocchio_motion("cat_two_halves", body.joint_names, path, np.zeros(3), None, TIMES, edges).attitude
         assert apart(motion.attitude(TIMES), truth) < 1e-9
+
+
+@pytest.mark.parametrize("background", [0.0, 0.01, 0.5])
+def test_true_rates_are_accepted_wherever_the_burst_is(background: float):
+    """The check of rates by differences must not refuse a steep flank, nor the all but flat foot of a burst."""
+    for width in (0.02, 0.008, 0.004):
+        for centre in np.linspace(0.7, 0.82, 121):
+            sp.ShapePath.function(burst(float(centre), width, 1.0, background, "gaussian"), 2.0)
 
 
 # ---- Other deformations --------------------------------------------------------------------------------------------

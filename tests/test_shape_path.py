@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import shapephase as sp
 from conftest import joint, link, random_loop, urdf
 from shapephase.errors import OpenPathError, ShapeError, TrajectoryError, UnknownNameError
-from shapephase.sampling import inside
+from shapephase.interpolant import inside
 
 laws = settings(derandomize=True, max_examples=40, deadline=None)
 ShapePath = sp.ShapePath
@@ -285,6 +285,35 @@ def test_faulty_functions_are_refused():
     np.testing.assert_array_equal(ShapePath.function(good, 1.0, [0.7, 0.2, 0.7, 0.0]).breaks, [0, 0.2, 0.7, 1.0])
 
 
+@pytest.mark.parametrize("which", ["shapes", "rates"])
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda x: x + 1j,
+        lambda x: np.ma.masked_less(x, 1.0),
+        lambda x: x.astype(str),
+        lambda x: x.astype(object),
+        lambda x: [[0.0], [0.0, 1.0]],  # noqa: ARG005
+    ],
+    ids=["complex", "masked", "text", "objects", "ragged"],
+)
+def test_a_function_that_returns_no_real_numbers_is_refused(which, spoil):
+    """Not silently stripped of imaginary parts and masks."""
+
+    def f(t):
+        good = np.zeros((len(t), 1))
+        return (spoil(good), good) if which == "shapes" else (good, spoil(good))
+
+    with pytest.raises(ShapeError, match=which):
+        ShapePath.function(f, 1.0)
+
+
+def test_breaks_are_a_list_of_times():
+    for breaks in ([[0.1, 0.2]], 0.5, ["soon"], [np.nan]):
+        with pytest.raises(ValueError, match="breaks"):
+            ShapePath.function(lambda t: (np.zeros((len(t), 1)),) * 2, 1.0, breaks)
+
+
 @pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf, "long", [1.0, 2.0], None])
 def test_a_duration_is_a_positive_number(duration):
     with pytest.raises(ValueError, match="duration"):
@@ -420,7 +449,7 @@ def test_gaps_are_refused_with_the_joint():
         half_turn.repeated(2)
 
 
-@pytest.mark.parametrize("count", [0, -1, 1.5, np.nan])
+@pytest.mark.parametrize("count", [0, -1, 1.5, np.nan, np.inf, "3", None])
 def test_only_whole_numbers_of_times(count):
     loop = ShapePath.fourier([0.0], [[1.0]], [[0.0]], 1.0)
     with pytest.raises(TrajectoryError, match="whole number"):

@@ -23,7 +23,7 @@ def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] =
         For text, objects, complex numbers, masked entries, a wrong shape, NaN or infinity; the message
         names the argument, the shape that came and the first bad entry.
     """
-    array = _real_array(value, name, unit)
+    array = real_array(value, name, unit)
     wanted = _shape_text(trailing)
     if array.ndim < len(trailing) or any(
         want is not None and have != want
@@ -41,7 +41,8 @@ def check_finite(array: Array, name: str) -> None:
         raise ShapeError(f"{name}: entry {list(where)} is {array[where]}; every entry must be a finite number")
 
 
-def _real_array(value: Any, name: str, unit: str) -> Array:
+def real_array(value: Any, name: str, unit: str = "") -> Array:
+    """A float64 array in native byte order of any shape. Raises ShapeError for what holds no real numbers."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         raise ShapeError(f"{name}: masked entries cannot be used; fill or drop them first")
     try:

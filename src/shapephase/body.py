@@ -100,6 +100,8 @@ class Body:
         UnknownNameError
             If a name is not one of `joint_names`.
         """
+        if joints is not None and not isinstance(joints, Mapping):
+            raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {joints!r}")
         shape = np.zeros(self.n_shape)
         for name, value in (joints or {}).items():
             coordinate = finite_array(value, f"joint {name}")

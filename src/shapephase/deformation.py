@@ -13,10 +13,11 @@ from . import so3
 from .arrays import Array, finite_array
 from .body import Body
 from .connection import path_gap, path_sampler
-from .errors import ShapeError, SingularInertiaError, TrajectoryError, UnphysicalInertiaError
+from .errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
 from .inertia_tensor import inverse_inertia
-from .sampling import Interpolant, Sampler, chebyshev, inside, sampler, unit_nodes, values_to_coefficients
-from .shape_path import ShapePath, positive_argument, times_argument
+from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
+from .sampling import Sampler, sampler
+from .shape_path import ShapePath, breaks_argument, positive_argument, times_argument
 
 _CLOSED = 1e-9
 
@@ -151,7 +152,7 @@ def prescribed(
         If a function returns the wrong shape, or a tensor that is not symmetric.
     """
     length = positive_argument(duration)
-    edges = _edges(breaks, length)
+    edges = breaks_argument(breaks, length)
     source = _Prescribed(inertia, internal_momentum, edges)
     ends = source.sample(np.array([0.0, length]))[0]
     gap = float(np.max(np.abs(ends[1] - ends[0])) / np.max(np.abs(ends[0])))
@@ -196,7 +197,7 @@ def particles(
         raise SingularInertiaError("all particles are in one place: there is no inertia that could turn")
     gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / size
     closure = turn if gap <= _CLOSED else None
-    return Deformation(source, length, _edges(breaks, length), closure, gap, f"{len(weights)} particles")
+    return Deformation(source, length, breaks_argument(breaks, length), closure, gap, f"{len(weights)} particles")
 
 
 def sampled_deformation(
@@ -362,13 +363,6 @@ def _returned(value: ArrayLike, name: str, wanted: tuple[int, ...]) -> Array:
     if array.shape != wanted:
         raise ShapeError(f"the function of the {name} must return {wanted} for these times, got {array.shape}")
     return array
-
-
-def _edges(breaks: ArrayLike, duration: float) -> Array:
-    inner = finite_array(breaks, "breaks", (None,), unit="s")
-    if np.any((inner < 0.0) | (inner > duration)):
-        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {inner}")
-    return np.unique(np.concatenate([[0.0], inner, [duration]]))
 
 
 def _best_turn(masses: Array, start: Array, end: Array) -> Array:

@@ -58,7 +58,23 @@ def in_gauge(deformation: Deformation, u: Callable[[Array], tuple[ArrayLike, Arr
             )
         return turned, rate
 
+    _check_rates(frames, deformation.breaks)
     return _seen_from(deformation, frames, "turned")
+
+
+def _check_rates(frames: Frames, breaks: Array) -> None:
+    """Compare body rates with differences of U inside the breaks."""
+    left, width = breaks[:-1], np.diff(breaks)
+    middle, step = left + 0.381 * width, 1e-4 * width
+    before, at, after = (frames(t) for t in (middle - step, middle, middle + step))
+    slope = so3.vee(so3.transpose(at[0]) @ (after[0] - before[0])) / (2.0 * step[:, None])
+    wrong = np.linalg.norm(slope - at[1], axis=-1) > 1e-3 * (np.linalg.norm(at[1], axis=-1) + 1.0 / breaks[-1])
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ShapeError(
+            f"u gives the body rate {at[1][row]} rad/s at {middle[row]:.6g} s, but its U turns at {slope[row]}; "
+            "the body rate is the vector of U^T U'"
+        )
 
 
 def horizontal_gauge(deformation: Deformation) -> Deformation:

@@ -21,9 +21,9 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
         adjugate, determinant = _adjugate(inertia)
     a = inertia[..., 0, 0]
     trace = np.trace(inertia, axis1=-2, axis2=-1)
-    # least/largest eigenvalue lies between det/trace^3 and 4 times 27 of it: above 1e-5 no tensor is near-singular,
-    # the leading minors say whether it is positive, and the adjugate loses no digits.
-    safe = (determinant > 1e-5 * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
+    # Above this no tensor is near-singular (the condition number is at most some hundred, and so are the digits that
+    # the adjugate loses), and the leading minors say whether it is positive.
+    safe = (determinant > 1e-3 * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
     if safe.all():
         return adjugate / determinant[..., None, None]
     return _careful_inverse(inertia, times)

@@ -20,7 +20,7 @@ from .arrays import Array
 from .deformation import Deformation, sampled_deformation
 from .errors import InputFileNotFoundError, ResultFileError
 from .files import write_whole
-from .sampling import Interpolant, unit_nodes, values_to_coefficients
+from .interpolant import Interpolant, unit_nodes, values_to_coefficients
 from .stepping import SteppedRotation
 
 _FORMAT = "shapephase motion 1"

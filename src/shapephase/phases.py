@@ -10,8 +10,8 @@ from . import so3, sphere
 from .arrays import Array
 from .errors import GaugeError, unknown_name
 from .gauge import Frames, lift_frames, principal_frames
+from .interpolant import Interpolant
 from .reconstruction import Motion
-from .sampling import Interpolant
 from .stepping import SteppedRotation, stepped_rotation
 
 GAUGES = ("horizontal", "base", "principal")

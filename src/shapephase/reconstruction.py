@@ -16,10 +16,10 @@ from .arrays import Array, finite_array
 from .deformation import Deformation
 from .errors import AccuracyNotReached, ShapeError, unknown_name
 from .inertia_tensor import inverse_inertia
+from .interpolant import Interpolant
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
-from .sampling import Interpolant
 from .shape_path import times_argument
-from .stepping import SteppedRotation, dop853_rotation, stepped_rotation
+from .stepping import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
 
 METHODS = ("auto", "collocation", "dop853")
 _COLUMNS = (
@@ -28,7 +28,6 @@ _COLUMNS = (
     *("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s"),
     *("base_x_m", "base_y_m", "base_z_m"),
 )
-_TIGHTEST, _LOOSEST = 1e-13, 1e-4
 
 
 class Solution(Protocol):
@@ -257,17 +256,15 @@ def reconstruct(
     """
     if method not in METHODS:
         raise unknown_name("method", method, METHODS)
-    goal = finite_array(tolerance, "tolerance", unit="rad")
-    if goal.ndim or not _TIGHTEST <= goal <= _LOOSEST:
-        raise ShapeError(f"tolerance: a number from {_TIGHTEST:g} to {_LOOSEST:g} rad is needed, got {tolerance!r}")
+    goal = tolerance_argument(tolerance)
     spatial, start = _broadcast(momentum, attitude)
     at_start = so3.apply(so3.transpose(start), spatial).reshape(-1, 3)
     if method == "dop853":
-        solution = _dop853(deformation, at_start, float(goal))
-        return Motion(deformation, spatial, start, float(goal), method, solution.evaluations, solution)
-    solution = stepped_rotation(deformation.sampler(), at_start, float(goal))
+        solution = _dop853(deformation, at_start, goal)
+        return Motion(deformation, spatial, start, goal, method, solution.evaluations, solution)
+    solution = stepped_rotation(deformation.sampler(), at_start, goal)
     evaluations = solution.interpolant.evaluations
-    return Motion(deformation, spatial, start, float(goal), "collocation", evaluations, solution)
+    return Motion(deformation, spatial, start, goal, "collocation", evaluations, solution)
 
 
 def load_motion(path: str | os.PathLike[str]) -> Motion:

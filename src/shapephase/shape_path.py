@@ -5,23 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, Integers, check_finite, finite_array
+from .arrays import Array, check_finite, finite_array
+from .curves import (
+    Curve,
+    Fourier,
+    Function,
+    Joined,
+    PiecewisePolynomial,
+    Reordered,
+    Repeated,
+    Reversed,
+    Stretched,
+    returned_pair,
+)
 from .errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 
 _WHOLE_TURN = 2.0 * np.pi
-
-
-class Curve(Protocol):
-    """Shapes and rates at times of [0, duration]: (N,) -> (N, n), (N, n)."""
-
-    def __call__(self, times: Array, /) -> tuple[Array, Array]:
-        """Shapes and their rates."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +79,7 @@ class ShapePath:
         period = positive_argument(duration)
         breaks = np.array([0.0, period])
         names = _names(joint_names, len(middle))
-        curve = _Fourier(middle, a, b, period)
+        curve = Fourier(middle, a, b, period)
         return ShapePath(curve, period, breaks, len(middle), names, float(a.shape[1]), smooth_loop=True)
 
     @staticmethod
@@ -146,14 +149,11 @@ class ShapePath:
             If the rates are not the derivatives of the shapes (checked at a few times).
         """
         period = positive_argument(duration)
-        inner = finite_array(breaks, "breaks", (None,))
-        if np.any((inner < 0.0) | (inner > period)):
-            raise TrajectoryError(f"breaks must lie in [0, {period:.9g}] s, got {inner}")
-        edges = np.unique(np.concatenate([[0.0], inner, [period]]))
-        start = np.asarray(f(np.zeros(1))[0], dtype=float)
+        edges = breaks_argument(breaks, period)
+        start, _ = returned_pair(f(np.zeros(1)))
         if start.ndim != 2 or start.shape[0] != 1:
             raise ShapeError(f"the function must return shapes (N, n) for times (N,); for N = 1 it gave {start.shape}")
-        curve = _Function(f, start.shape[1])
+        curve = Function(f, start.shape[1])
         path = ShapePath(curve, period, edges, start.shape[1], _names(joint_names, start.shape[1]))
         _check_rates(path)
         return path
@@ -176,7 +176,7 @@ class ShapePath:
         """The same shapes in the opposite order of time."""
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
-        return replace(self, curve=_Reversed(self.curve, self.duration), breaks=breaks)
+        return replace(self, curve=Reversed(self.curve, self.duration), breaks=breaks)
 
     def stretched(self, factor: float) -> ShapePath:
         """The same shapes, `factor` times as slowly."""
@@ -184,7 +184,7 @@ class ShapePath:
         duration = self.duration * scale
         breaks = self.breaks * scale
         breaks[-1] = duration
-        return replace(self, curve=_Stretched(self.curve, scale, self.duration), duration=duration, breaks=breaks)
+        return replace(self, curve=Stretched(self.curve, scale, self.duration), duration=duration, breaks=breaks)
 
     def then(self, other: ShapePath) -> ShapePath:
         """This path, and after it another.
@@ -209,7 +209,7 @@ class ShapePath:
         duration = self.duration + other.duration
         breaks = np.concatenate([self.breaks, self.duration + other.breaks[1:]])
         breaks[-1] = duration
-        curve = _Sequence(self.curve, self.duration, other.curve, other.duration, offset)
+        curve = Joined(self.curve, self.duration, other.curve, other.duration, offset)
         return ShapePath(curve, duration, breaks, self.n_shape, names, _larger(self.oscillations, other.oscillations))
 
     def repeated(self, count: int) -> ShapePath:
@@ -220,7 +220,7 @@ class ShapePath:
         OpenPathError
             If the path does not end where it begins (to whole turns of joints).
         """
-        if not np.isfinite(count) or count < 1 or count != int(count):
+        if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
             raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {count}")
         gap = self.gap
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
@@ -231,14 +231,14 @@ class ShapePath:
         breaks = np.concatenate([*(start + self.breaks[:-1] for start in starts), [count * self.duration]])
         if self.smooth_loop:
             breaks = breaks[[0, -1]]
-        curve = _Repeated(self.curve, self.duration, int(count), turns)
+        curve = Repeated(self.curve, self.duration, int(count), turns)
         loops = self.loops * int(count)
         return replace(self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops)
 
     @property
     def sample_times(self) -> Array:
         """Times whose samples tell the path: a spline's knots, which tell it exactly, or some 400: (N,) [s]."""
-        if isinstance(self.curve, _PiecewisePolynomial) and len(self.curve.coefficients) == 4:
+        if isinstance(self.curve, PiecewisePolynomial) and len(self.curve.coefficients) == 4:
             return self.breaks
         pieces = [np.linspace(a, b, 400 // (len(self.breaks) - 1) + 2) for a, b in pairwise(self.breaks)]
         return np.unique(np.concatenate(pieces))
@@ -270,7 +270,7 @@ class ShapePath:
         if self.joint_names == wanted:
             return self
         order = np.array([self.joint_names.index(name) for name in wanted])
-        return replace(self, curve=_Reordered(self.curve, order), joint_names=wanted)
+        return replace(self, curve=Reordered(self.curve, order), joint_names=wanted)
 
     def _joint(self, column: int) -> str:
         return self.joint_names[column] if self.joint_names else f"number {column}"
@@ -292,123 +292,19 @@ def times_argument(t: ArrayLike, duration: float) -> Array:
     return np.clip(times, 0.0, duration)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fourier:
-    mean: Array
-    cosines: Array
-    sines: Array
-    period: float
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        harmonics = _WHOLE_TURN / self.period * np.arange(1, self.cosines.shape[1] + 1)
-        phase = times[:, None] * harmonics
-        c, s = np.cos(phase), np.sin(phase)
-        shapes = self.mean + c @ self.cosines.T + s @ self.sines.T
-        return shapes, c @ (self.sines * harmonics).T - s @ (self.cosines * harmonics).T
-
-
-@dataclass(frozen=True, eq=False)
-class _PiecewisePolynomial:
-    """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n)."""
-
-    knots: Array
-    coefficients: Array
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        piece = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
-        local = (times - self.knots[piece])[:, None]
-        of_piece = self.coefficients[:, piece]
-        shapes, rates = of_piece[-1], np.zeros_like(of_piece[-1])
-        for coefficient in of_piece[-2::-1]:
-            rates = rates * local + shapes
-            shapes = shapes * local + coefficient
-        return shapes, rates
-
-
-@dataclass(frozen=True, eq=False)
-class _Function:
-    f: Callable[[Array], tuple[ArrayLike, ArrayLike]]
-    n_shape: int
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        shapes, rates = (np.asarray(part, dtype=float) for part in self.f(times))
-        wanted = (len(times), self.n_shape)
-        for name, part in (("shapes", shapes), ("rates", rates)):
-            if part.shape != wanted:
-                raise ShapeError(f"the path's function must return {name} {wanted} for these times, got {part.shape}")
-            if not np.isfinite(part).all():
-                row = int(np.argwhere(~np.isfinite(part))[0, 0])
-                raise TrajectoryError(f"the path's function returned {name} that are not finite at {times[row]:.9g} s")
-        return shapes, rates
-
-
-@dataclass(frozen=True, eq=False)
-class _Reversed:
-    curve: Curve
-    duration: float
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        shapes, rates = self.curve(self.duration - times)
-        return shapes, -rates
-
-
-@dataclass(frozen=True, eq=False)
-class _Stretched:
-    curve: Curve
-    factor: float
-    duration: float
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        shapes, rates = self.curve(np.minimum(times / self.factor, self.duration))
-        return shapes, rates / self.factor
-
-
-@dataclass(frozen=True, eq=False)
-class _Reordered:
-    curve: Curve
-    order: Integers
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        shapes, rates = self.curve(times)
-        return shapes[:, self.order], rates[:, self.order]
-
-
-@dataclass(frozen=True, eq=False)
-class _Sequence:
-    first: Curve
-    first_duration: float
-    second: Curve
-    second_duration: float
-    offset: Array
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        late = times >= self.first_duration
-        shapes, rates = (np.empty((len(times), len(self.offset))) for _ in range(2))
-        shapes[~late], rates[~late] = self.first(times[~late])
-        inside = np.minimum(times[late] - self.first_duration, self.second_duration)
-        shapes[late], rates[late] = self.second(inside)
-        shapes[late] += self.offset
-        return shapes, rates
-
-
-@dataclass(frozen=True, eq=False)
-class _Repeated:
-    curve: Curve
-    period: float
-    count: int
-    turns: Array
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        # Compared with the very numbers that stand in the breaks, so that a time just before one stays in its loop.
-        starts = self.period * np.arange(self.count)
-        loop = np.searchsorted(starts, times, side="right") - 1
-        shapes, rates = self.curve(np.minimum(times - starts[loop], self.period))
-        return shapes + loop[:, None] * self.turns, rates
+def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
+    """A user's interior breaks with the two ends added: (M,) -> (M + 2,) ascending [s]. Raises TrajectoryError."""
+    inner = finite_array(breaks, "breaks", (None,), unit="s")
+    if inner.ndim != 1:
+        raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
+    if np.any((inner < 0.0) | (inner > duration)):
+        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {inner}")
+    return np.unique(np.concatenate([[0.0], inner, [duration]]))
 
 
 def _piecewise(times: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
     n_shape = coefficients.shape[2]
-    curve = _PiecewisePolynomial(times, coefficients)
+    curve = PiecewisePolynomial(times, coefficients)
     return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape), 0.5)
 
 
