@@ -11,7 +11,6 @@ import shapephase as sp
 from independent import BODIES, apart, body_of, pinocchio_motion, random_loop, turn
 from shapephase.errors import OpenPathError, ShapeError
 
-
 # Less for the diver, who at his usual momentum turns so fast that the map mixes the sphere.
 SIZES = {**BODIES, "diver": 2.0}
 
