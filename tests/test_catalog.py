@@ -358,3 +358,31 @@ def test_a_fixed_joint_that_mimics_does_not_move(load_urdf):
         '<joint name="j1" type="revolute">', '<joint name="j1" type="fixed"><mimic joint="j0"/>'
     )
     assert load_urdf(text).joint_names == ("j0",)
+
+
+# ---- Loading in a process of its own --------------------------------------------------------------------------------
+
+
+def test_isolated_loading_gives_the_same_body(tmp_path):
+    plain, isolated = sp.load_body("diver"), sp.load_body("diver", isolate=True)
+    np.testing.assert_array_equal(isolated.locked_inertia([0.3, 0.4]), plain.locked_inertia([0.3, 0.4]))
+    with pytest.raises(InputFileNotFoundError):
+        sp.load_body(tmp_path / "nowhere.urdf", isolate=True)
+
+
+def test_a_crash_or_a_hang_of_the_parser_is_an_error(monkeypatch):
+    real = subprocess.run
+
+    def crashing(command, **options):
+        return real([command[0], "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"], **options)
+
+    monkeypatch.setattr(subprocess, "run", crashing)
+    with pytest.raises(ModelFileError, match=r"crashed on it \(signal 11\)"):
+        sp.load_body("diver", isolate=True)
+
+    def hanging(command, **options):
+        return real([command[0], "-c", "import time; time.sleep(60)"], **{**options, "timeout": 0.2})
+
+    monkeypatch.setattr(subprocess, "run", hanging)
+    with pytest.raises(ModelFileError, match="was stopped"):
+        sp.load_body("diver", isolate=True)

@@ -288,7 +288,8 @@ def test_true_rates_are_accepted_wherever_the_burst_is(background: float):
     """The check of rates by differences must not refuse a steep flank, nor the all but flat foot of a burst."""
     for width in (0.02, 0.008, 0.004):
         for centre in np.linspace(0.7, 0.82, 121):
-            sp.ShapePath.function(burst(float(centre), width, 1.0, background, "gaussian"), 2.0)
+            for kind in ("gaussian", "bounded"):
+                sp.ShapePath.function(burst(float(centre), width, 1.0, background, kind), 2.0)
 
 
 # ---- Other deformations --------------------------------------------------------------------------------------------

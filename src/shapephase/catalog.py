@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,10 @@ from .errors import MissingExtraError, ModelFileError, unknown_name
 from .urdf import read_urdf
 
 _EXAMPLE = "example:"
+_CHILD_SECONDS = 60
 
 
-def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "error") -> Body:
+def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "error", isolate: bool = False) -> Body:
     """Load a free-floating body.
 
     Parameters
@@ -22,6 +24,7 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     source : a path to a URDF file; a name from `robot_names()` such as "cat"; "example:human", a body of the
         installed example-robot-data; or a `pinocchio.Model` whose root joint is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
+    isolate : load a file in a process of its own first, so that even a crash of the parser is an error
 
     Raises
     ------
@@ -35,6 +38,8 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     if not isinstance(source, str | os.PathLike):
         return _from_model(source, on_unphysical)
     text = os.fspath(source)
+    if isolate:
+        _try_in_child(text, on_unphysical)
     if text.startswith(_EXAMPLE):
         return _from_file(example_file(text.removeprefix(_EXAMPLE)), on_unphysical)
     names = robot_names()
@@ -79,6 +84,19 @@ def _example_files() -> dict[str, Path]:
         if folder.is_dir():
             return {path.stem: path for path in sorted(folder.rglob("*.urdf"), reverse=True)}
     return {}
+
+
+def _try_in_child(source: str, on_unphysical: str) -> None:
+    """Load in a child process; what it raises is raised again by the parent, what kills it is named here."""
+    code = "import sys, shapephase; shapephase.load_body(sys.argv[1], on_unphysical=sys.argv[2])"
+    try:
+        child = subprocess.run(
+            [sys.executable, "-c", code, source, on_unphysical], capture_output=True, timeout=_CHILD_SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        raise ModelFileError(f"{source}: loading it took more than {_CHILD_SECONDS} s and was stopped") from None
+    if child.returncode < 0:
+        raise ModelFileError(f"{source}: the parser crashed on it (signal {-child.returncode})")
 
 
 def _from_file(path: Path, on_unphysical: str) -> Body:
