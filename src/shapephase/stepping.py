@@ -145,7 +145,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
             return _for_all(bound, momentum)
         last = bound
         # Steps that are still far too long tell nothing about how errors grow.
-        telling = local.sum(axis=1).max() < 1e-2
+        telling = local.sum(axis=1).max() < 1e-2 and bool(np.isfinite(growth).all())
         worst = float(np.max(growth)) if telling else 1.0
         room = 0.6 * tolerance / worst
         by_loop = local.reshape(len(local), interpolant.loops, -1).sum(axis=1)
@@ -167,8 +167,10 @@ def _local_errors(differences: Array, coarse: Array, fine: Array) -> Array:
     Once the steps are small, two half steps of order eight err 255 times less than the whole one; an eighth of that is
     relied on. Whether they are small shows in the distances to a fifth-order formula on the same stages, of the
     whole step (`coarse`) and of its halves (`fine`): these fall by 32 then, and hardly at all where a step jumps over
-    what happens inside it.
+    what happens inside it. Where a step is so long that it overflows, half a turn may be wrong.
     """
+    finite = np.isfinite(differences) & np.isfinite(coarse) & np.isfinite(fine)
+    differences, coarse, fine = (np.where(finite, part, np.pi) for part in (differences, coarse, fine))
     fall = np.maximum(coarse, 1e-300) / np.maximum(fine, 1e-16)
     return differences / np.clip(30.0 * (fall / 24.0) ** 3, 0.7, 30.0)
 
