@@ -26,8 +26,7 @@ from .stepping import SteppedRotation
 _FORMAT = "shapephase motion 1"
 _STEPS = (
     "momentum",
-    "times",
-    "panel",
+    "doubles",
     "quaternions",
     "sampling_error",
     "stepping_error",

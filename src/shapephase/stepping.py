@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from itertools import groupby
 
 import numpy as np
 
@@ -38,8 +39,7 @@ class SteppedRotation:
     ----------
     interpolant : the sampled deformation
     momentum : (B, 3) body angular momentum at the start [kg m^2/s]
-    times : (K + 1,) ends of the steps [s]
-    panel : (K,) the interpolant's panel of each step
+    doubles : (P,) double steps on each of the interpolant's panels, the same in every loop
     quaternions : (B, K + 1, 4) xyzw at the step ends, of the frame whose z axis is the momentum's direction
     sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
@@ -49,13 +49,30 @@ class SteppedRotation:
 
     interpolant: Interpolant
     momentum: Array
-    times: Array
-    panel: Integers
+    doubles: Integers
     quaternions: Array
     sampling_error: Array
     stepping_error: Array
     amplification: Array
     propagator: Array
+
+    @cached_property
+    def panel(self) -> Integers:
+        """The interpolant's panel of each step: (K,)."""
+        each = np.tile(2 * self.doubles, self.interpolant.loops)
+        return np.repeat(np.arange(len(each)), each)
+
+    @property
+    def times(self) -> Array:
+        """The ends of the steps: (K + 1,) [s]."""
+        return self._times
+
+    @cached_property
+    def _times(self) -> Array:
+        edges, panel = self.interpolant.edges, self.panel
+        each = np.tile(2 * self.doubles, self.interpolant.loops)
+        within = np.arange(len(panel)) - np.repeat(np.cumsum(each) - each, each)
+        return np.append(edges[panel] + (edges[panel + 1] - edges[panel]) * (within / each[panel]), edges[-1])
 
     @property
     def error_estimate(self) -> Array:
@@ -66,7 +83,7 @@ class SteppedRotation:
     def rounding_error(self) -> Array:
         """What rounding alone contributes: (B,) [rad]."""
         turned = 2.0 * np.linalg.norm(np.diff(self.quaternions, axis=1), axis=-1).sum(axis=1)
-        return self.amplification * _EPS * (8.0 + 2.0 * np.sqrt(len(self.times)) + turned)
+        return self.amplification * _EPS * (8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + turned)
 
     def rotation(self, t: Array) -> Array:
         """S(t): (N,) -> (B, N, 3, 3)."""
@@ -245,15 +262,10 @@ def _run(interpolant: Interpolant, momentum: Array, doubles: Integers) -> tuple[
         quaternions, judged, growth = march(channels, start, size, interpolant.loops)
     else:
         quaternions, judged, growth = march(channels[:, :, 6:], start, None, interpolant.loops)
-    edges = interpolant.edges
-    each = np.tile(2 * doubles, interpolant.loops)
-    panel = np.repeat(np.arange(len(each)), each)
-    within = np.arange(len(panel)) - np.repeat(np.cumsum(each) - each, each)
-    times = np.append(edges[panel] + (edges[panel + 1] - edges[panel]) * (within / each[panel]), edges[-1])
     unknown = np.full(len(momentum), np.nan)
     last = so3.transpose(so3.matrix_from_quat(quaternions[:, -1])) if growth is None else growth[:, -1]
     solution = SteppedRotation(
-        interpolant, momentum, times, panel, quaternions, unknown, unknown, _amplification(growth), last
+        interpolant, momentum, doubles, quaternions, unknown, unknown, _amplification(growth), last
     )
     return solution, _local_errors(*np.moveaxis(judged, -1, 0))
 
@@ -289,27 +301,30 @@ def _stage_channels(interpolant: Interpolant, doubles: Integers) -> Array:
 
     First the 12 stages of the whole step, then those of its two halves.
     """
-    degree_count = interpolant.coefficients.shape[1]
+    half_widths = 0.5 * np.diff(interpolant.edges[: len(doubles) + 1])
+    coefficients = interpolant.coefficients * half_widths[:, None, None]
     channels = np.empty((int(doubles.sum()), 3 * STAGES, 9))
-    widths = 0.5 * np.diff(interpolant.edges[: len(doubles) + 1])
-    starts = _starts(doubles)
-    for count in np.unique(doubles):
-        panels = np.flatnonzero(doubles == count)
-        values = _stage_matrix(degree_count, int(count)) @ interpolant.coefficients[panels]
-        values = values.reshape(len(panels), count, 3 * STAGES, 9) * (widths[panels] / count)[:, None, None, None]
-        rows = (starts[panels, None] + np.arange(count)).ravel()
-        channels[rows] = values.reshape(-1, 3 * STAGES, 9)
-    channels[:, STAGES:] *= 0.5
+    panel = row = 0
+    for count, run in groupby(doubles.tolist()):
+        panels = len(list(run))
+        stages = _stage_matrix(coefficients.shape[1], count) @ coefficients[panel : panel + panels]
+        channels[row : row + panels * count] = stages.reshape(-1, 3 * STAGES, 9)
+        panel, row = panel + panels, row + panels * count
     return channels
 
 
 @lru_cache(maxsize=256)
 def _stage_matrix(degree_count: int, count: int) -> Array:
-    """Chebyshev coefficients of a panel -> values at all stages of its double steps: (36 count, degrees)."""
+    """Chebyshev coefficients of a panel -> values at all stages of its double steps, times the step's share of it.
+
+    (36 count, degrees)
+    """
     _, _, c = tableau()
     inside = np.concatenate([c, 0.5 * c, 0.5 + 0.5 * c])
     x = 2.0 * (np.arange(count)[:, None] + inside) / count - 1.0
-    return chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(3 * STAGES * count, degree_count)
+    share = np.repeat([1.0, 0.5, 0.5], STAGES) / count
+    values = chebyshev(np.clip(x, -1.0, 1.0), degree_count) * share[:, None]
+    return values.reshape(3 * STAGES * count, degree_count)
 
 
 def _amplification(growth: Array | None) -> Array:
