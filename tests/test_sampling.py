@@ -336,3 +336,17 @@ def test_particles_turn_as_newton_says():
     run = solve_ivp(slope, (0.0, 2.0), np.eye(3).ravel(), "DOP853", rtol=1e-12, atol=1e-14, t_eval=TIMES)
     motion = sp.reconstruct(sp.particles(masses, positions, 2.0), momentum, tolerance=1e-11)
     assert apart(motion.attitude(TIMES), run.y.T.reshape(-1, 3, 3)) < 2e-11
+
+
+def test_a_loop_too_wild_for_even_samples_is_sampled_on_panels():
+    """An arm that swings by a hundred radians each way, against the same swing known only by its values."""
+    body = body_of("satellite")
+    cosines = np.zeros((body.n_shape, 1))
+    cosines[body.joint_index("arm_2")] = 100.0
+    loop = sp.ShapePath.fourier(np.zeros(body.n_shape), cosines, 0.0 * cosines, 2.0)
+    black_box = sp.ShapePath.function(loop.curve, 2.0, np.linspace(0.1, 1.9, 19))
+    motion, truth = (
+        sp.reconstruct(sp.articulated(body, path), [1.0, 2.0, 3.0], tolerance=1e-8) for path in (loop, black_box)
+    )
+    assert motion.evaluations > 768
+    assert apart(motion.attitude(TIMES), truth.attitude(TIMES)) < 1e-8

@@ -7,7 +7,6 @@ from functools import lru_cache
 import numpy as np
 
 from .arrays import Array, Integers
-from .errors import AccuracyNotReached
 from .interpolant import Interpolant, unit_nodes, values_to_coefficients
 from .spectrum import EPS, Channels, judged, spectral_sizes
 
@@ -24,8 +23,8 @@ class EvenSampler:
         self._values = asked(self._times(np.arange(count), count))
         self._judge()
 
-    def refine(self, momentum: float, tolerance: float) -> None:
-        """As `Sampler.refine`."""
+    def refine(self, momentum: float, tolerance: float) -> bool:
+        """As `Sampler.refine`; False where that would take too many samples."""
         while (error := self.error(momentum)) > tolerance and not self._judgement.at_rounding[0]:
             count = len(self._values)
             decay = float(self._judgement.decay[0])
@@ -33,10 +32,7 @@ class EvenSampler:
             # Twice, three or four times as many samples, whichever is enough for this decay.
             factor = 2 if missing <= 0.55 * count else 3 if missing <= 1.1 * count else 4
             if factor * count > _LAST_EVEN:
-                raise AccuracyNotReached(
-                    f"the loop is too rough to be sampled at even times: an error of {error:.3g} rad is left where "
-                    f"{tolerance:.3g} was asked; loosen the tolerance, or give the path breaks"
-                )
+                return False
             index = np.arange(factor * count)
             fresh = index[index % factor != 0]
             values = np.empty((factor * count, 9))
@@ -44,6 +40,7 @@ class EvenSampler:
             values[fresh] = self._asked(self._times(fresh, factor * count))
             self._values = values
             self._judge()
+        return True
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""

@@ -10,11 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
+import numpy as np
+
 from .arrays import Array
 from .even_sampling import EvenSampler
 from .interpolant import Interpolant
 from .panel_sampling import PanelSampler
 from .spectrum import Channels, Evaluate
+
+_PANELS_OF_A_WILD_LOOP = 32
 
 
 class Sampler(Protocol):
@@ -64,5 +68,29 @@ def sampler(
     asked = Channels(evaluate)
     ends = breaks[breaks <= breaks[-1] / loops * (1.0 + 1e-12)] if loops > 1 else breaks
     if smooth_loop and oscillations is not None:
-        return EvenSampler(asked, breaks[-1] / loops, loops, oscillations)
+        return LoopSampler(asked, float(breaks[-1]) / loops, loops, oscillations)
     return PanelSampler(asked, ends, loops, oscillations, probe)
+
+
+class LoopSampler:
+    """Samples a smooth loop at even times, and on panels where that would take too many."""
+
+    def __init__(self, asked: Channels, period: float, loops: int, oscillations: float) -> None:
+        self._asked, self._period, self._loops, self._oscillations = asked, period, loops, oscillations
+        self._way: EvenSampler | PanelSampler = EvenSampler(asked, period, loops, oscillations)
+
+    def refine(self, momentum: float, tolerance: float) -> None:
+        """As `Sampler.refine`."""
+        if isinstance(self._way, EvenSampler) and not self._way.refine(momentum, tolerance):
+            edges = np.linspace(0.0, self._period, _PANELS_OF_A_WILD_LOOP + 1)
+            self._way = PanelSampler(self._asked, edges, self._loops, self._oscillations, None)
+        if isinstance(self._way, PanelSampler):
+            self._way.refine(momentum, tolerance)
+
+    def error(self, momentum: float) -> float:
+        """As `Sampler.error`."""
+        return self._way.error(momentum)
+
+    def interpolant(self) -> Interpolant:
+        """As `Sampler.interpolant`."""
+        return self._way.interpolant()
