@@ -58,11 +58,11 @@ class Judgement:
         """Attitude error that the interpolation error feeds in: (G,) [rad].
 
         What a converging series lacks runs through `phase` or more in a panel [rad], so most of it averages out, as
-        long as the body itself turns less; half of that is relied on. The error of a kink does not average out.
+        long as the body itself turns less; a third of that is relied on. The error of a kink does not average out.
         """
         rate = momentum * self.inverse + self.drift
         turn = width * (momentum * self.inverse_size + self.drift_size)
-        left = np.where(self.converging, np.minimum(1.0, 4.0 / np.maximum(phase - turn, 4.0)), 1.0)
+        left = np.where(self.converging, np.minimum(1.0, 6.0 / np.maximum(phase - turn, 6.0)), 1.0)
         return 0.5 * width * rate * left
 
     def raised(self, gaps: Array, seen: Mask) -> Judgement:
@@ -96,8 +96,9 @@ def judged(size: Array, degree: int, time_rounding: Array | float) -> Judgement:
         decay = np.where((late > 0.0) & (middle > late), np.log(middle / late) * (2.0 / degree), 0.0)
         # A geometric series with this decay leaves this much beyond its last term; twice, for aliasing.
         left_over = np.where(decay > 0.0, 2.0 * late / np.expm1(decay), np.inf)
-    error = np.maximum(np.minimum(left_over, late * degree), 0.02 * floor)
     calm = late <= floor
+    # A tail that has sunk into rounding says nothing of its decay any more; what lies beyond it is less than it.
+    error = np.maximum(np.minimum(left_over, np.where(calm, 2.0, degree) * late), 0.02 * floor)
     return Judgement(
         error[:, 0],
         error[:, 1],
