@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -66,7 +67,26 @@ def main() -> None:
             f"estimate over error {np.median([r.estimate / r.error for r in rows]):.0f}, below it in "
             f"{sum(r.error > r.estimate for r in rows)} cases"
         )
+    print_scaling()
     print(f"\nimport shapephase: {import_seconds():.2f} s (target 0.6)")
+
+
+def print_scaling() -> None:
+    """Many attitudes of one loop, and one loop many times, against once."""
+    case = next(c for c in cases() if c.name == "example:human loop")
+    deformation = sp.articulated(case.body, case.path)
+    for tolerance in (1e-6, 1e-9):
+        once = partial(sp.reconstruct, deformation, case.momentum, tolerance=tolerance)
+        single = float(np.median([seconds(once) for _ in range(9)]))
+        print(f"\nscaling of {case.name} at {tolerance:g} rad, once {1e3 * single:.2f} ms")
+        for count in (100, 1000, 10_000):
+            attitudes = so3.exp(np.random.default_rng(0).normal(size=(count, 3)))
+            taken = seconds(partial(once, attitude=attitudes))
+            print(f"  {count:6d} attitudes {taken:8.3f} s, {taken / single:7.0f} times once")
+    for count in (10, 100, 1000):
+        often = sp.articulated(case.body, case.path.repeated(count))
+        taken = seconds(partial(sp.reconstruct, often, case.momentum, tolerance=1e-6))
+        print(f"  {count:6d} loops at 1e-6 rad over all {taken:8.3f} s")
 
 
 def compared(case: Case, truth: np.ndarray, tolerance: float) -> Row:

@@ -350,3 +350,20 @@ def test_a_loop_too_wild_for_even_samples_is_sampled_on_panels():
     )
     assert motion.evaluations > 768
     assert apart(motion.attitude(TIMES), truth.attitude(TIMES)) < 1e-8
+
+
+def test_a_thousand_loops_cost_the_samples_of_one():
+    """And stay orthogonal and true to the momentum; the end is that of ten times a hundred loops."""
+    body, loop = body_of("cat"), random_loop(1, body_of("cat").n_shape)
+    momentum = random_vector(3, BODIES["cat"])
+    once = sp.reconstruct(sp.articulated(body, loop.path), momentum, tolerance=1e-6)
+    deformation = sp.articulated(body, loop.path.repeated(1000))
+    motion = sp.reconstruct(deformation, momentum, tolerance=1e-6)
+    assert motion.evaluations <= 4 * once.evaluations
+    end = motion.final_attitude
+    assert np.abs(end.T @ end - np.eye(3)).max() < 1e-14
+    assert np.abs(end @ motion.body_momentum(motion.duration) - momentum).max() < 1e-13 * np.linalg.norm(momentum)
+    hundred, attitude = sp.articulated(body, loop.path.repeated(100)), np.eye(3)
+    for _ in range(10):
+        attitude = sp.reconstruct(hundred, momentum, attitude, tolerance=1e-9).final_attitude
+    assert apart(end, attitude) <= motion.error_estimate + 1e-6
