@@ -116,7 +116,10 @@ def test_phases_of_closed_orbits_are_those_of_parallel_transport(name: str, gaug
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_any_attitude(name: str, seed: int):
-    """Delta R = exp(theta_M mu^) tilt R_G, the tilt a turn across mu by the gap; exp(theta_M mu^) tilt in the base."""
+    """U5, lift, holonomy and split: Delta R = exp(theta_M mu^) tilt R_G, without R_G in the base gauge.
+
+    The tilt is a turn across mu by the gap.
+    """
     motion = some_motion(name, seed)
     axis = motion.momentum / np.linalg.norm(motion.momentum)
     total = motion.final_attitude @ motion.initial_attitude.T

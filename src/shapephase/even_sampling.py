@@ -15,7 +15,7 @@ _EVEN_A_PANEL, _PANEL_DEGREE = 16, 32
 
 
 class EvenSampler:
-    """Samples a smooth loop at even times; the counts double or triple."""
+    """Samples a smooth loop at even times; each new count is two, three or four times the last."""
 
     def __init__(self, asked: Channels, period: float, loops: int, oscillations: float) -> None:
         self._asked, self._period, self._loops = asked, period, loops

@@ -41,14 +41,9 @@ _UNREADABLE = (OSError, ValueError, EOFError, NotImplementedError, RuntimeError,
 
 @dataclass(frozen=True, eq=False)
 class MotionRecord:
-    """What is kept of a motion: the sampled deformation, the rotations, and how they were made.
+    """What is kept of a motion; its fields are those of `reconstruction.Motion`.
 
-    Attributes
-    ----------
-    deformation : for reading, one made of the samples; it needs neither body nor path
-    momentum, initial_attitude : batch + (3,), batch + (3, 3)
-    tolerance, method, evaluations : as in Motion
-    steps : S(t)
+    When read, the deformation is one made of the samples: it needs neither body nor path.
     """
 
     deformation: Deformation
@@ -57,12 +52,12 @@ class MotionRecord:
     tolerance: float
     method: str
     evaluations: int
-    steps: SteppedRotation
+    solution: SteppedRotation
 
 
 def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> None:
     """Write a motion whole, with versions and units."""
-    interpolant, deformation = record.steps.interpolant, record.deformation
+    interpolant, deformation = record.solution.interpolant, record.deformation
     header = {
         "format": _FORMAT,
         "shapephase": version("shapephase"),
@@ -83,7 +78,7 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "breaks": deformation.breaks,
         "centre": _centre_coefficients(deformation, interpolant),
         **{name: getattr(interpolant, name) for name in _SAMPLES},
-        **{f"step_{name}": getattr(record.steps, name) for name in _STEPS},
+        **{f"step_{name}": getattr(record.solution, name) for name in _STEPS},
     }
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure

@@ -108,11 +108,11 @@ def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
         frames = principal_frames(motion.deformation)
     dynamic, area, ends = _phase_integrals(motion, axis, frames, refine=gauge == "principal")
     dynamic, area = np.where(has_phase, dynamic, 0.0), np.where(has_phase, area, 0.0)
-    turned = _rotation_in_gauge(start, end, frames, duration)
+    first, last = _in_gauge(start, end, frames, duration)
     closing = so3.between(ends[:, 1], ends[:, 0])
-    tilt = np.where(has_phase[:, None, None], turned.start @ closing @ so3.transpose(turned.start), np.eye(3))
+    tilt = np.where(has_phase[:, None, None], first @ closing @ so3.transpose(first), np.eye(3))
     phase = dynamic - area
-    read_off = so3.angle_about(turned.end @ so3.transpose(turned.start) @ so3.transpose(tilt), axis) * has_phase
+    read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), axis) * has_phase
     batch = motion.batch
     matrix = (*batch, 3, 3)
     return PhaseSplit(
@@ -132,12 +132,6 @@ def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
         is_loop=motion.deformation.closure is not None,
         has_phase=has_phase.reshape(batch)[()],
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Ends:
-    start: Array
-    end: Array
 
 
 class _Resolved:
@@ -161,11 +155,12 @@ def _lift(interpolant: Interpolant, tolerance: float) -> SteppedRotation:
     return stepped_rotation(_Resolved(interpolant), np.zeros((1, 3)), min(tolerance, 1e-11))
 
 
-def _rotation_in_gauge(start: Array, end: Array, frames: Frames | None, duration: float) -> _Ends:
+def _in_gauge(start: Array, end: Array, frames: Frames | None, duration: float) -> tuple[Array, Array]:
+    """Attitudes at the start and the end, of the gauge's frame."""
     if frames is None:
-        return _Ends(start, end)
+        return start, end
     turns, _ = frames(np.array([0.0, duration]))
-    return _Ends(start @ turns[0].T, end @ turns[1].T)
+    return start @ turns[0].T, end @ turns[1].T
 
 
 def _phase_integrals(motion: Motion, axis: Array, frames: Frames | None, *, refine: bool) -> tuple[Array, Array, Array]:

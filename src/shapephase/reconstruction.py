@@ -277,16 +277,7 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
     ResultFileError
         If the file is no motion, is damaged, or was written by a version with another format.
     """
-    record = read_motion_record(path)
-    return Motion(
-        record.deformation,
-        record.momentum,
-        record.initial_attitude,
-        record.tolerance,
-        record.method,
-        record.evaluations,
-        record.steps,
-    )
+    return Motion(**vars(read_motion_record(path)))
 
 
 def momentum_from_rate(

@@ -146,8 +146,9 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     moving = momentum if size > 0.0 else np.zeros((1, 3))
     sampling_target = 0.3 * tolerance
     plan: _Plan | None = None
-    last: SteppedRotation | None = None
-    for _ in range(_ROUNDS):
+    rounds = 0
+    while True:
+        rounds += 1
         sampler.refine(size, sampling_target)
         interpolant = sampler.interpolant()
         doubles = _first_plan(interpolant, size, tolerance) if plan is None else _plan_for(interpolant, plan)
@@ -160,7 +161,6 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         )
         if np.all(bound.error_estimate <= tolerance):
             return _for_all(bound, momentum)
-        last = bound
         # Steps that are still far too long tell nothing about how errors grow.
         telling = local.sum(axis=1).max() < 1e-2 and bool(np.isfinite(growth).all())
         worst = float(np.max(growth)) if telling else 1.0
@@ -171,11 +171,9 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
             doubles = _finer(doubles, sums, room)
         sampling_target = min(sampling_target, 0.5 * room)
         plan = _Plan(interpolant.edges[: len(doubles) + 1], doubles)
-        if doubles.sum() * interpolant.loops > _MOST_STEPS or (
-            telling and np.any(bound.rounding_error > 0.9 * tolerance)
-        ):
-            break
-    raise _not_reached(tolerance, last)
+        too_many = rounds == _ROUNDS or doubles.sum() * interpolant.loops > _MOST_STEPS
+        if too_many or (telling and np.any(bound.rounding_error > 0.9 * tolerance)):
+            raise _not_reached(tolerance, bound)
 
 
 def _local_errors(differences: Array, coarse: Array, fine: Array) -> Array:
@@ -192,9 +190,7 @@ def _local_errors(differences: Array, coarse: Array, fine: Array) -> Array:
     return differences / np.clip(30.0 * (fall / 24.0) ** 3, 0.7, 30.0)
 
 
-def _not_reached(tolerance: float, last: SteppedRotation | None) -> AccuracyNotReached:
-    if last is None:
-        return AccuracyNotReached(f"the tolerance {tolerance:.3g} rad was not reached")
+def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
     parts = [float(np.max(part)) for part in (last.sampling_error, last.stepping_error, last.rounding_error)]
     return AccuracyNotReached(
         f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {np.max(last.error_estimate):.3g} rad, of "
