@@ -83,7 +83,7 @@ def test_times_may_have_any_shape(rng):
     assert path.shape(t).shape == (2, 3, 2)
     assert path.shape(0.5).shape == (2,)
     assert path.rate([]).shape == (0, 2)
-    np.testing.assert_array_equal(path.rate(t)[1, 2], path.rate(t[1, 2]))
+    np.testing.assert_allclose(path.rate(t)[1, 2], path.rate(t[1, 2]), rtol=0.0, atol=2e-14)
 
 
 # ---- Splines --------------------------------------------------------------------------------------------------------

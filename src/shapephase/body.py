@@ -59,6 +59,7 @@ class Body:
         self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
         self._velocity_index = np.array([kind.idx_v for kind in kinds], dtype=int) - _BASE
         self._turning = turning
+        self._any_turning = bool(turning.any())
         self._neutral = pin.neutral(model)
         independent = [list(moving).index(n) for n in self.joint_names]
         self.continuous = turning[independent]
@@ -236,8 +237,8 @@ class Body:
 
         Unchecked and in one pass: the library's own hot path.
         """
-        whole = self._angular_map(shape)
-        return whole[:, :, :3], (whole[:, :, 3:] @ rate[:, :, None])[..., 0]
+        whole = self._full_map(shape)
+        return whole[:, :, :3], (whole[:, :, 3:] @ self._velocities(rate)[:, _BASE:, None])[..., 0]
 
     def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
         array = finite_array(shape, name)
@@ -254,6 +255,10 @@ class Body:
 
     def _angular_map(self, shapes: Array) -> Array:
         """[I, J] for each shape: (N, n) -> (N, 3, 3 + n)."""
+        return self._independent(self._full_map(shapes))
+
+    def _full_map(self, shapes: Array) -> Array:
+        """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
         model, data = self._model, self._data()
         centroidal_map = pin.computeCentroidalMap
         # data.Ag is a view, refreshed by each call (what the call returns is a copy): one copy a sample.
@@ -262,7 +267,7 @@ class Body:
         for row, q in enumerate(self._configurations(shapes)):
             centroidal_map(model, data, q)
             whole[row] = rows
-        return self._independent(whole)
+        return whole
 
     def _angular_map_rate(self, shapes: Array, rates: Array) -> Array:
         """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""
@@ -292,7 +297,7 @@ class Body:
         full = shapes if self._plain else shapes @ self._map.T + self._offset
         q = np.empty((len(shapes), self._model.nq))
         q[:] = self._neutral
-        if self._turning.any():
+        if self._any_turning:
             turning = self._configuration_index[self._turning]
             fixed = self._configuration_index[~self._turning]
             q[:, fixed] = full[:, ~self._turning]

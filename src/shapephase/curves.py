@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -34,11 +35,19 @@ class Fourier:
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
-        harmonics = _WHOLE_TURN / self.period * np.arange(1, self.cosines.shape[1] + 1)
+        harmonics, weights = self._weights
         phase = times[:, None] * harmonics
-        c, s = np.cos(phase), np.sin(phase)
-        shapes = self.mean + c @ self.cosines.T + s @ self.sines.T
-        return shapes, c @ (self.sines * harmonics).T - s @ (self.cosines * harmonics).T
+        both = np.concatenate([np.cos(phase), np.sin(phase)], axis=1) @ weights
+        n_shape = len(self.mean)
+        return both[:, :n_shape] + self.mean, both[:, n_shape:]
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """Angular frequencies (k,) [rad/s]; of the cosines and sines in the shapes and in the rates (2 k, 2 n)."""
+        harmonics = _WHOLE_TURN / self.period * np.arange(1, self.cosines.shape[1] + 1)
+        of_cosines = np.concatenate([self.cosines, self.sines * harmonics]).T
+        of_sines = np.concatenate([self.sines, -self.cosines * harmonics]).T
+        return harmonics, np.concatenate([of_cosines, of_sines])
 
 
 @dataclass(frozen=True, eq=False)

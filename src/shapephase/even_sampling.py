@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import ceil, inf, log, pi
 
 import numpy as np
 
 from .arrays import Array, Integers
 from .interpolant import Interpolant, unit_nodes, values_to_coefficients
-from .spectrum import EPS, Channels, judged, spectral_sizes
+from .spectrum import EPS, Channels, Tail, averaged, fourier_sizes
 
-_FIRST_HARMONICS, _LAST_EVEN = 4, 768
+_LAST_EVEN = 768
+# Samples to begin with for every four harmonics, by tolerance: what most bodies need, since a second helping costs as
+# much as thirty samples more.
+_HARMONICS = 4
+_FIRST_COUNTS = ((1e-8, 64), (1e-11, 96), (0.0, 128))
 _EVEN_A_PANEL, _PANEL_DEGREE = 16, 32
 
 
@@ -18,17 +23,17 @@ class EvenSampler:
     """Samples a smooth loop at even times; each new count is two, three or four times the last."""
 
     def __init__(self, asked: Channels, period: float, loops: int, oscillations: float) -> None:
-        self._asked, self._period, self._loops = asked, period, loops
-        count = 8 * _FIRST_HARMONICS * max(1, int(np.ceil(oscillations / _FIRST_HARMONICS))) if oscillations else 1
-        self._values = asked(self._times(np.arange(count), count))
-        self._judge()
+        self._asked, self._period, self._loops, self._oscillations = asked, period, loops, oscillations
+        self._values = np.empty((0, 9))
 
     def refine(self, momentum: float, tolerance: float) -> bool:
         """As `Sampler.refine`; False where that would take too many samples."""
-        while (error := self.error(momentum)) > tolerance and not self._judgement.at_rounding[0]:
+        if not len(self._values):
+            count = self._first_count(tolerance)
+            self._judge(self._asked(self._times(np.arange(count), count)))
+        while (error := self.error(momentum)) > tolerance and not self._at_rounding:
             count = len(self._values)
-            decay = float(self._judgement.decay[0])
-            missing = np.log(error / tolerance) / decay if decay > 0.0 else np.inf
+            missing = log(error / tolerance) / self._decay if self._decay > 0.0 else inf
             # Twice, three or four times as many samples, whichever is enough for this decay.
             factor = 2 if missing <= 0.55 * count else 3 if missing <= 1.1 * count else 4
             if factor * count > _LAST_EVEN:
@@ -38,14 +43,21 @@ class EvenSampler:
             values = np.empty((factor * count, 9))
             values[::factor] = self._values
             values[fresh] = self._asked(self._times(fresh, factor * count))
-            self._values = values
-            self._judge()
+            self._judge(values)
         return True
+
+    def _first_count(self, tolerance: float) -> int:
+        if not self._oscillations:
+            return 1
+        each = next(count for least, count in _FIRST_COUNTS if tolerance > least)
+        return each * max(1, ceil(self._oscillations / _HARMONICS))
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
-        phase = np.pi * len(self._values)
-        return self._loops * float(self._judgement.error(momentum, np.array([self._period]), phase)[0])
+        inverse, drift = self._tails
+        turn = self._period * (momentum * inverse.top + drift.top)
+        share = averaged(inverse.converging and drift.converging, pi * len(self._values), turn)
+        return self._loops * 0.5 * self._period * (momentum * inverse.error + drift.error) * share
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
@@ -59,10 +71,17 @@ class EvenSampler:
     def _times(self, index: Integers, count: int) -> Array:
         return (self._period / count) * index.astype(np.float64)
 
-    def _judge(self) -> None:
-        count = len(self._values)
-        spectrum = np.fft.rfft(self._values, axis=0) * (2.0 / count)
-        self._judgement = judged(spectral_sizes(spectrum)[None], count // 2, 2.0 * np.pi * EPS)
+    def _judge(self, values: Array) -> None:
+        self._values = values
+        self._tails = [Tail.of(sizes, 2.0 * pi * EPS) for sizes in fourier_sizes(values)]
+
+    @property
+    def _decay(self) -> float:
+        return min(tail.decay for tail in self._tails)
+
+    @property
+    def _at_rounding(self) -> bool:
+        return all(tail.at_rounding for tail in self._tails)
 
 
 @lru_cache(maxsize=32)

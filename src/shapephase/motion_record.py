@@ -23,15 +23,17 @@ from .files import write_whole
 from .interpolant import Interpolant, unit_nodes, values_to_coefficients
 from .stepping import SteppedRotation
 
-_FORMAT = "shapephase motion 1"
+_FORMAT = "shapephase motion 2"
 _STEPS = (
     "momentum",
-    "doubles",
+    "steps",
     "quaternions",
+    "directions",
+    "turns",
+    "dynamics",
     "sampling_error",
     "stepping_error",
     "amplification",
-    "propagator",
 )
 _SAMPLES = ("edges", "coefficients")
 _CENTRE_DEGREE = 24

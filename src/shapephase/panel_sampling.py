@@ -13,7 +13,9 @@ from .errors import AccuracyNotReached
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
 from .spectrum import Channels, Judgement, judged, spectral_sizes
 
-_FIRST_DEGREE, _LAST_DEGREE = 5, 80
+# Degrees to begin with, by tolerance: for a few panels twice as high.
+_FIRST_DEGREES = ((1e-11, 5), (0.0, 15))
+_HALF_DEGREE, _LAST_DEGREE = 10, 80
 _MOST_PANELS = 4000
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
@@ -41,7 +43,7 @@ class _Group:
 
 def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
     rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
-    judgement = judged(spectral_sizes(values_to_coefficients(degree) @ values), degree, rounding)
+    judgement = judged(spectral_sizes(values_to_coefficients(degree) @ values), rounding)
     if gaps is None:
         return _Group(degree, left, right, values, np.full((len(left), 2), np.nan), judgement)
     seen = ~np.isnan(gaps[:, 0])
@@ -116,13 +118,16 @@ class PanelSampler:
         self._most = _MOST_PANELS + 40 * len(breaks)
         pieces = 4 if oscillations is None else max(1, int(np.ceil(oscillations / 2.0)))
         ends = [np.linspace(left, right, pieces + 1) for left, right in pairwise(breaks)]
-        left, right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
-        degree = 0 if oscillations == 0.0 else _FIRST_DEGREE * (1 if len(left) > 4 else 2)
+        self._left, self._right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
+        self._still = oscillations == 0.0
         self._groups: dict[int, _Group] = {}
-        self._add([_Wanted(degree, left, right, None)])
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
+        if not self._groups:
+            each = next(degree for least, degree in _FIRST_DEGREES if tolerance > least)
+            degree = 0 if self._still else each if len(self._left) > 4 else 2 * each
+            self._add([_Wanted(degree, self._left, self._right, None)])
         while True:
             errors = {d: g.judgement.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
             total = self._loops * sum(float(e.sum()) for e in errors.values())
@@ -191,7 +196,7 @@ class PanelSampler:
                 left, right = g.left[halves], g.right[halves]
                 middle = 0.5 * (left + right)
                 ends = np.concatenate([left, middle]), np.concatenate([middle, right])
-                wanted.append(_Wanted(2 * _FIRST_DEGREE, *ends, None))
+                wanted.append(_Wanted(_HALF_DEGREE, *ends, None))
         self._add(wanted)
 
     @property

@@ -49,6 +49,23 @@ class Solution(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """How the attitude at the end of a motion answers to small changes, to first order.
+
+    A change dmu of the momentum and a turn of the start to R(0) exp(hat(delta)) turn the end to R(T) exp(hat(e)) with
+    e = by_momentum dmu + by_attitude delta: the derivative of the steps that were taken.
+
+    Attributes
+    ----------
+    by_momentum : batch + (3, 3) [rad per kg m^2/s], from inertial axes to base axes
+    by_attitude : batch + (3, 3), base axes at the start to base axes at the end
+    """
+
+    by_momentum: Array
+    by_attitude: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Motion:
     """How a free body turns: attitude, body angular momentum and angular velocity at any time of [0, T].
 
@@ -165,9 +182,43 @@ class Motion:
         return _stepped(self).interpolant
 
     @property
-    def end_variation(self) -> Array:
-        """How a small turn of the start, R(0) exp(hat(delta)), reaches the end: batch + (3, 3), to about 1e-4."""
-        return _stepped(self).propagator.reshape(*self.batch, 3, 3)
+    def amplification(self) -> Array:
+        """The largest growth of a small error of the attitude from one time to a later one: batch."""
+        return _stepped(self).amplification.reshape(self.batch)[()]
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""
+        stepped = _stepped(self)
+        slope = stepped.momentum_slope
+        start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
+        attitude = so3.transpose(stepped.end) + slope @ so3.hat(start)
+        matrix = (*self.batch, 3, 3)
+        return Sensitivity(
+            (slope @ so3.transpose(self._flat_attitude)).reshape(matrix),
+            attitude.reshape(matrix),
+        )
+
+    def dynamic_phase(self, t: ArrayLike) -> Array:
+        """The integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
+
+        Source: Cabrera 2006, equation (12); theory.md B9.
+        """
+        times = times_argument(t, self.duration)
+        return _stepped(self).dynamic_phase(times.ravel()).reshape(*self.batch, *times.shape)
+
+    def solid_angle(self, t: ArrayLike) -> Array:
+        """The signed area that Pi has gone round from 0 to t, closed by the great circle, seen from the base frame.
+
+        Times (...) -> batch + (...) [sr]; zero without momentum. It grows continuously from zero as long as Pi keeps
+        away from the point opposite its start, where it jumps by 4 pi: at the end of the motion it is that of
+        `split(motion, "base")` up to multiples of 4 pi, and dynamic_phase - solid_angle turns the start into the
+        attitude, up to the transport along the great circle.
+
+        Source: theory.md D; numerics.md section 3.
+        """
+        times = times_argument(t, self.duration)
+        return _stepped(self).solid_angle(times.ravel()).reshape(*self.batch, *times.shape)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
@@ -258,7 +309,8 @@ def reconstruct(
         raise unknown_name("method", method, METHODS)
     goal = tolerance_argument(tolerance)
     spatial, start = _broadcast(momentum, attitude)
-    at_start = so3.apply(so3.transpose(start), spatial).reshape(-1, 3)
+    at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
+    at_start = at_start.reshape(-1, 3)
     if method == "dop853":
         solution = _dop853(deformation, at_start, goal)
         return Motion(deformation, spatial, start, goal, method, solution.evaluations, solution)
@@ -352,12 +404,14 @@ def _stepped(motion: Motion) -> SteppedRotation:
 
 
 def _broadcast(momentum: ArrayLike, attitude: ArrayLike | None) -> tuple[Array, Array]:
-    spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
+    spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
+    if attitude is None:
+        return spatial, np.zeros((*spatial.shape[:-1], 3, 3)) + np.eye(3)
+    start = so3.rotation_argument(attitude, "attitude")
     try:
         batch = np.broadcast_shapes(spatial.shape[:-1], start.shape[:-2])
     except ValueError:
         raise ShapeError(
             f"momentum {spatial.shape} and attitude {start.shape}: their leading axes must broadcast"
         ) from None
-    return np.broadcast_to(spatial, (*batch, 3)).copy(), np.broadcast_to(start, (*batch, 3, 3)).copy()
+    return np.broadcast_to(spatial, (*batch, 3)), np.broadcast_to(start, (*batch, 3, 3))

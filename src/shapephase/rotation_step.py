@@ -1,9 +1,11 @@
 """One explicit eighth-order step of the attitude equation, written once for numbers, arrays and symbols.
 
-The attitude is carried as the quaternion of a frame that shares the momentum's direction as its z axis, so that
-Pi is the momentum's size times the third row of the rotation matrix: R' = R hat(omega),
-omega = I^-1 Pi - I^-1 L_o (Cabrera 2006, equation 10). The coefficients are those of Dormand and Prince 8(5,3)
-(Hairer, Norsett and Wanner, Solving ODEs I), as SciPy holds them.
+With momentum, the unit vector p = Pi/|Pi| is stepped, p' = p x omega with omega = I^-1 Pi - I^-1 L_o (Cabrera 2006,
+equation 10), and two integrals along it: the dynamic phase, and the turn about p that is left when the shortest
+rotation between the step's ends is taken off. Both need no stages of their own, so a step costs three equations, not
+nine. Without momentum the equation is linear, and a step is a rotation that does not depend on where it starts.
+The coefficients are those of Dormand and Prince 8(5,3) (Hairer, Norsett and Wanner, Solving ODEs I), as SciPy
+holds them.
 """
 
 from __future__ import annotations
@@ -11,12 +13,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
 from .arrays import Array
 
 Scalars = Any  # numbers, arrays or symbols, one for each component
 STAGES = 12
+_TINY = 1e-200
 
 
 @lru_cache(maxsize=1)
@@ -28,54 +29,106 @@ def tableau() -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=1)
-def fifth_order_difference() -> Array:
-    """Weights (12,) of the difference to the fifth-order formula on the same stages."""
+def _differences() -> tuple[Array, Array]:
+    """Weights (12,) of the differences to the formulas of fifth and third order on the same stages."""
     from scipy.integrate import DOP853
 
-    return DOP853.E5[:STAGES]
+    return DOP853.E5[:STAGES], DOP853.E3[:STAGES]
 
 
-def step(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> list[Any]:
-    """The quaternion after one step, normalised. Parameters as `judged_step`."""
-    a, b, _ = tableau()
-    return _normalised(_combination(quat_xyzw, b, _slopes(quat_xyzw, size, channels, a)))
-
-
-def judged_step(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> tuple[list[Any], Any]:
-    """The quaternion after one step, normalised, and the square of its distance to a fifth-order step.
+def momentum_step(direction: Scalars, size: Any, channels: Scalars) -> tuple[list[Any], Any, Any, list[Any]]:
+    """A step with momentum.
 
     Parameters
     ----------
-    quat_xyzw : four components at the start of the step; numbers, arrays or symbols
-    size : of the momentum [kg m^2/s], or None where it is zero
-    channels : for each of the 12 stage times half the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
-        entries; without momentum just the last three
+    direction : three components of the unit vector Pi/|Pi| at the start of the step; numbers, arrays or symbols
+    size : of the momentum [kg m^2/s]
+    channels : for each of the 12 stage times the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
+        entries
+
+    Returns
+    -------
+    direction : at the end of the step, of length one
+    turn : angle about the starting direction, to be followed by the shortest rotation between the directions [rad]
+    dynamic : the step's dynamic phase, the integral of omega . Pi/|Pi| [rad]
+    differences : to formulas of order five and three, three components and the turn each
     """
     a, b, _ = tableau()
-    slopes = _slopes(quat_xyzw, size, channels, a)
-    x, y, z, w = _combination([0.0] * 4, fifth_order_difference(), slopes)
-    return _normalised(_combination(quat_xyzw, b, slopes)), x * x + y * y + z * z + w * w
+    fifth, third = _differences()
+    slopes: list[list[Any]] = []
+    turns: list[list[Any]] = []
+    dynamics: list[list[Any]] = []
+    for stage in range(STAGES):
+        p = _combination(direction, a[stage, :stage], slopes)
+        omega = turn_rate([size * component for component in p], channels[stage])
+        slopes.append(_cross(p, omega))
+        if b[stage] == 0.0 and fifth[stage] == 0.0 and third[stage] == 0.0:
+            turns.append([0.0])
+            dynamics.append([0.0])
+            continue
+        along = _dot(p, omega)
+        turns.append([(along + _dot(direction, omega)) / (1.0 + _dot(direction, p))])
+        dynamics.append([along])
+    end = unit(_combination(direction, b, slopes))
+    (turn,), (dynamic,) = _combination([0.0], b, turns), _combination([0.0], b, dynamics)
+    nothing = [0.0, 0.0, 0.0, 0.0]
+    both = [[*slope, *turn_slope] for slope, turn_slope in zip(slopes, turns, strict=True)]
+    differences = _combination(nothing, fifth, both) + _combination(nothing, third, both)
+    return end, turn, dynamic, differences
 
 
-def _slopes(quat_xyzw: Scalars, size: Any | None, channels: Scalars, a: Array) -> list[list[Any]]:
+def rest_step(drifts: Scalars) -> tuple[list[Any], list[Any]]:
+    """A step without momentum: the quaternion of its rotation, and its differences to orders five and three.
+
+    Parameters
+    ----------
+    drifts : for each of the 12 stage times the step length times I^-1 L_o, three entries
+    """
+    a, b, _ = tableau()
+    fifth, third = _differences()
     slopes: list[list[Any]] = []
     for stage in range(STAGES):
-        inner = _combination(quat_xyzw, a[stage, :stage], slopes)
-        slopes.append(_slope(inner, size, channels[stage]))
-    return slopes
+        x, y, z, w = _combination([0.0, 0.0, 0.0, 1.0], a[stage, :stage], slopes)
+        p, q, r = (-0.5 * drift for drift in drifts[stage])
+        slopes.append([w * p + y * r - z * q, w * q + z * p - x * r, w * r + x * q - y * p, -(x * p + y * q + z * r)])
+    nothing = [0.0, 0.0, 0.0, 0.0]
+    differences = _combination(nothing, fifth, slopes) + _combination(nothing, third, slopes)
+    return unit(_combination([0.0, 0.0, 0.0, 1.0], b, slopes)), [2.0 * part for part in differences]
 
 
-def _normalised(quat_xyzw: Scalars) -> list[Any]:
-    x, y, z, w = quat_xyzw
-    scale = 1.0 / (x * x + y * y + z * z + w * w) ** 0.5
-    return [x * scale, y * scale, z * scale, w * scale]
+def local_error(differences: Scalars) -> Any:
+    """Error estimate of a step from its differences to orders five and three [rad].
+
+    Hairer's combination of the two falls with the eighth power of the step, like the error itself, and is large
+    where the step is too long for either to mean anything.
+    """
+    fifth = sum(part * part for part in differences[:4])
+    third = sum(part * part for part in differences[4:])
+    return fifth * (fifth + 0.01 * third + _TINY) ** -0.5
 
 
-def body_momentum(quat_xyzw: Scalars, size: Any) -> list[Any]:
-    """R^T (0, 0, size) for the unit quaternion of R."""
-    x, y, z, w = quat_xyzw
-    double = 2.0 * size
-    return [double * (x * z - y * w), double * (y * z + x * w), double * (w * w + z * z) - size]
+def turned(quat_xyzw: Scalars, start: Scalars, end: Scalars, half_turn: tuple[Any, Any]) -> list[Any]:
+    """The attitude after a step: `quat_xyzw`, then the turn about `start`, then the shortest rotation.
+
+    `start` and `end` are the momentum's directions seen from the body, `half_turn` sine and cosine of half the turn.
+    """
+    sine, cosine = half_turn
+    scalar = 1.0 + _dot(start, end)
+    shortest = [*_cross(end, start), scalar]
+    about = [sine * component for component in start] + [cosine]
+    return unit(product(quat_xyzw, product(about, shortest)))
+
+
+def product(first: Scalars, second: Scalars) -> list[Any]:
+    """Product of two quaternions x y z w."""
+    a, b, c, d = first
+    x, y, z, w = second
+    return [
+        d * x + a * w + b * z - c * y,
+        d * y - a * z + b * w + c * x,
+        d * z + a * y - b * x + c * w,
+        d * w - a * x - b * y - c * z,
+    ]
 
 
 def turn_rate(momentum: Scalars, channels: Scalars) -> list[Any]:
@@ -87,33 +140,6 @@ def turn_rate(momentum: Scalars, channels: Scalars) -> list[Any]:
         xy * p + yy * q + yz * r - drift[1],
         xz * p + yz * q + zz * r - drift[2],
     ]
-
-
-def _slope(quat_xyzw: Scalars, size: Any | None, channels: Scalars) -> list[Any]:
-    x, y, z, w = quat_xyzw
-    if size is None:
-        a, b, c = (-drift for drift in channels)
-    else:
-        a, b, c = turn_rate(body_momentum(quat_xyzw, size), channels)
-    return [w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a, -(x * a + y * b + z * c)]
-
-
-def _combination(start: Scalars, weights: Array, slopes: list[list[Any]]) -> list[Any]:
-    total = list(start)
-    for weight, slope in zip(weights, slopes, strict=True):
-        if weight != 0.0:
-            total = [t + float(weight) * s for t, s in zip(total, slope, strict=True)]
-    return total
-
-
-def relative_angle(first: Scalars, second: Scalars) -> Any:
-    """The angle between two nearby rotations given as unit quaternions, to first order [rad]."""
-    a, b, c, d = first
-    x, y, z, w = second
-    u = d * x - a * w - b * z + c * y
-    v = d * y - b * w - c * x + a * z
-    s = d * z - c * w - a * y + b * x
-    return 2.0 * (u * u + v * v + s * s) ** 0.5
 
 
 def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
@@ -131,17 +157,26 @@ def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
     ]
 
 
-def steps_in_numpy(quat_xyzw: Array, size: Array | None, channels: Array) -> Array:
-    """`step` on arrays: quaternions (..., 4), sizes (...), channels (..., 12, 9 or 3) -> (..., 4)."""
-    return np.stack(np.broadcast_arrays(*step(*_parts(quat_xyzw, channels, size))), axis=-1)
+def unit(vector: Scalars) -> list[Any]:
+    """A vector made one of length one."""
+    scale = _dot(vector, vector) ** -0.5
+    return [component * scale for component in vector]
 
 
-def judged_steps_in_numpy(quat_xyzw: Array, size: Array | None, channels: Array) -> tuple[Array, Array]:
-    """`judged_step` on arrays: as `steps_in_numpy`, and the squared distances (...)."""
-    quaternion, square = judged_step(*_parts(quat_xyzw, channels, size))
-    return np.stack(np.broadcast_arrays(*quaternion), axis=-1), square
+def _combination(start: Scalars, weights: Array, slopes: list[list[Any]]) -> list[Any]:
+    total = list(start)
+    for weight, slope in zip(weights, slopes, strict=False):
+        if weight != 0.0:
+            total = [t + float(weight) * s for t, s in zip(total, slope, strict=True)]
+    return total
 
 
-def _parts(quat_xyzw: Array, channels: Array, size: Array | None) -> tuple[Scalars, Array | None, Scalars]:
-    stages = [[channels[..., s, i] for i in range(channels.shape[-1])] for s in range(STAGES)]
-    return [quat_xyzw[..., i] for i in range(4)], size, stages
+def _dot(a: Scalars, b: Scalars) -> Any:
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total
+
+
+def _cross(a: Scalars, b: Scalars) -> list[Any]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

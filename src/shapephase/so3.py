@@ -166,6 +166,12 @@ def matrix_from_quat(quat_xyzw: Array) -> Array:
     return matrix
 
 
+def turn_of(quat_xyzw: Array, rate: Array) -> Array:
+    """The angular velocity, in body axes, of a unit quaternion with this rate: (..., 4), (..., 4) -> (..., 3)."""
+    vector, scalar = quat_xyzw[..., :3], quat_xyzw[..., 3:]
+    return 2.0 * (scalar * rate[..., :3] - rate[..., 3:] * vector - np.cross(vector, rate[..., :3]))
+
+
 def rotation_argument(value: object, name: str) -> Array:
     """A user's rotation matrices, checked and made orthogonal to rounding: (..., 3, 3).
 

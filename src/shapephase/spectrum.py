@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from math import expm1, inf, isfinite, log
+from operator import mul
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .arrays import Array, Mask
+from .compiled import for_rows
 from .errors import ShapeError
 from .inertia_tensor import inverse_inertia
 
@@ -16,8 +19,11 @@ Evaluate = Callable[[Array], tuple[Array, Array]]
 
 EPS = float(np.finfo(float).eps)
 _ROUNDING = 30.0 * EPS
+_TINY = 1e-300
 _VOIGT = np.array([0, 4, 8, 5, 2, 1])
-_TWICE = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # off-diagonal channels stand for two entries of I^-1
+# Off-diagonal channels stand for two entries of I^-1.
+_SQUARES = np.array([[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T
+_SQUARES_OF_PAIRS = np.repeat(_SQUARES, 2, axis=0)
 
 
 class Channels:
@@ -31,14 +37,66 @@ class Channels:
         """I^-1 (xx yy zz yz xz xy) and I^-1 L_o: (N,) -> (N, 9)."""
         inertia, momentum = self._evaluate(times)
         self.count += len(times)
-        inverse = inverse_inertia(inertia, times)
-        channels = np.empty((len(times), 9))
-        channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
-        channels[:, 6:] = (inverse @ momentum[:, :, None])[:, :, 0]
-        if not np.isfinite(channels).all():
-            row = int(np.argwhere(~np.isfinite(channels))[0, 0])
+        flat = np.empty((len(times), 12))
+        flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
+        channels = for_rows(_channels, 12, flat)
+        if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
+            inverse = inverse_inertia(inertia, times)
+            channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
+            channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
+        if not isfinite(channels[:, :9].sum()):
+            row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
             raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
-        return channels
+        return channels[:, :9]
+
+
+def _channels(entries: list[Any]) -> list[Any]:
+    """I^-1, I^-1 L_o and a number above zero where the tensor is far from singular, from the nine of I and L_o.
+
+    Far from singular: the condition number is at most some hundred, and so are the digits that the adjugate loses.
+    """
+    import casadi
+
+    a, f, e, _, b, d, _, _, c, x, y, z = entries
+    adjugate = [b * c - d * d, a * c - e * e, a * b - f * f, e * f - a * d, f * d - b * e, d * e - c * f]
+    determinant = a * adjugate[0] + f * adjugate[5] + e * adjugate[4]
+    trace = a + b + c
+    safe = casadi.fmin(determinant - 1e-3 * trace * trace * trace, casadi.fmin(adjugate[2], a))
+    xx, yy, zz, yz, xz, xy = inverse = [entry / determinant for entry in adjugate]
+    return [*inverse, xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z, safe]
+
+
+class Tail(NamedTuple):
+    """What the tail of one spectrum says, in plain numbers: arrays of a few entries cost more than they hold."""
+
+    error: float
+    decay: float  # per degree
+    converging: bool
+    at_rounding: bool
+    top: float
+
+    @classmethod
+    def of(cls, sizes: list[float], time_rounding: float) -> Tail:
+        """As `judged`, of the sizes of one series at degrees 0, 1, 2 ..."""
+        degree = len(sizes) - 1
+        top = max(sizes)
+        if degree == 0:
+            return cls(0.0, inf, True, True, top)
+        late, middle = max(sizes[-max(2, degree // 10) :]), max(sizes[degree // 2 - 1 : degree // 2 + 2])
+        floor = _ROUNDING * top + 4.0 * time_rounding * sum(map(mul, sizes, range(degree + 1)))
+        decay = log(middle / late) * 2.0 / degree if middle > late > 0.0 else 0.0
+        left_over = 2.0 * late / expm1(decay) if decay > 0.0 else inf
+        calm = late <= floor
+        error = max(min(left_over, (2.0 if calm else degree) * late), 0.02 * floor)
+        return cls(error, inf if calm else decay, calm or late < 1e-2 * middle, calm, top)
+
+
+def averaged(converging: bool, phase: float, turn: float) -> float:
+    """The share of an error of the interpolant that does not average out, of a series whose lacking terms run through
+    `phase` or more [rad] while the body turns by `turn`: a third of what averages out is relied on. The error of a
+    kink does not average out.
+    """
+    return min(1.0, 6.0 / max(phase - turn, 6.0)) if converging else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +113,7 @@ class Judgement:
     floor: Array  # (G, 2) what rounding alone leaves
 
     def error(self, momentum: float, width: Array, phase: float) -> Array:
-        """Attitude error that the interpolation error feeds in: (G,) [rad].
-
-        What a converging series lacks runs through `phase` or more in a panel [rad], so most of it averages out, as
-        long as the body itself turns less; a third of that is relied on. The error of a kink does not average out.
-        """
+        """Attitude error that the interpolation error feeds in: (G,) [rad]; averages as `averaged`."""
         rate = momentum * self.inverse + self.drift
         turn = width * (momentum * self.inverse_size + self.drift_size)
         left = np.where(self.converging, np.minimum(1.0, 6.0 / np.maximum(phase - turn, 6.0)), 1.0)
@@ -76,33 +130,31 @@ class Judgement:
         )
 
 
-def judged(size: Array, degree: int, time_rounding: Array | float) -> Judgement:
+def judged(size: Array, time_rounding: Array | float) -> Judgement:
     """Error estimates from the tails of spectra; size (G, degree + 1, 2) of I^-1 and of I^-1 L_o.
 
     `time_rounding` is the rounding of the sample times in units of half a panel (or of a radian): it limits what
     samples of a fast motion can tell.
     """
+    degree = size.shape[1] - 1
     if degree == 0:
         zero = np.zeros(len(size))
         sure = zero == 0.0
         return Judgement(zero, zero, zero + np.inf, sure, sure, size[:, 0, 0], size[:, 0, 1], size[:, 0] * EPS)
-    top = size.max(axis=1)
-    late = size[:, -max(2, degree // 10) :].max(axis=1)
-    centre = degree // 2
-    middle = size[:, centre - 1 : centre + 2].max(axis=1)
-    slope = np.arange(degree + 1) @ size
-    floor = _ROUNDING * top + 4.0 * np.reshape(time_rounding, (-1, 1)) * slope
-    with np.errstate(divide="ignore", invalid="ignore"):
-        decay = np.where((late > 0.0) & (middle > late), np.log(middle / late) * (2.0 / degree), 0.0)
-        # A geometric series with this decay leaves this much beyond its last term; twice, for aliasing.
-        left_over = np.where(decay > 0.0, 2.0 * late / np.expm1(decay), np.inf)
+    centre, tail = degree // 2, degree + 1 - max(2, degree // 10)
+    parts = np.maximum.reduceat(size, (0, centre - 1, centre + 2, tail), axis=1)
+    top, middle, late = parts.max(axis=1), parts[:, 1], parts[:, 3]
+    floor = _ROUNDING * top + (4.0 * np.reshape(time_rounding, (-1, 1))) * (np.arange(degree + 1) @ size)
+    decay = np.log(np.maximum(middle, _TINY) / np.maximum(late, _TINY)) * (2.0 / degree)
+    # A geometric series with this decay leaves this much beyond its last term; twice, for aliasing.
+    left_over = 2.0 * late / np.expm1(np.maximum(decay, _TINY))
     calm = late <= floor
     # A tail that has sunk into rounding says nothing of its decay any more; what lies beyond it is less than it.
     error = np.maximum(np.minimum(left_over, np.where(calm, 2.0, degree) * late), 0.02 * floor)
     return Judgement(
         error[:, 0],
         error[:, 1],
-        np.where(calm, np.inf, decay).min(axis=1),
+        np.where(calm, np.inf, np.maximum(decay, 0.0)).min(axis=1),
         (calm | (late < 1e-2 * middle)).all(axis=1),
         calm.all(axis=1),
         top[:, 0],
@@ -111,7 +163,12 @@ def judged(size: Array, degree: int, time_rounding: Array | float) -> Judgement:
     )
 
 
-def spectral_sizes(coefficients: Array | NDArray[np.complex128]) -> Array:
+def spectral_sizes(coefficients: Array) -> Array:
     """Frobenius norm of I^-1 and norm of I^-1 L_o in spectra: (..., 9) -> (..., 2)."""
-    squares = coefficients.real**2 + coefficients.imag**2
-    return np.sqrt(np.stack([squares[..., :6] @ _TWICE, squares[..., 6:].sum(axis=-1)], axis=-1))
+    return np.sqrt((coefficients * coefficients) @ _SQUARES)
+
+
+def fourier_sizes(values: Array) -> list[list[float]]:
+    """The same of the Fourier series through even samples: (N, 9) -> two lists of N // 2 + 1."""
+    pairs = np.fft.rfft(values, axis=0).view(np.float64)
+    return (np.sqrt((pairs * pairs) @ _SQUARES_OF_PAIRS) * (2.0 / len(values))).T.tolist()
