@@ -37,7 +37,7 @@ class EvenSampler:
             # Twice, three or four times as many samples, whichever is enough for this decay.
             factor = 2 if missing <= 0.55 * count else 3 if missing <= 1.1 * count else 4
             if factor * count > _LAST_EVEN:
-                return False
+                return self._decay == inf
             index = np.arange(factor * count)
             fresh = index[index % factor != 0]
             values = np.empty((factor * count, 9))

@@ -88,15 +88,16 @@ class Tail(NamedTuple):
         left_over = 2.0 * late / expm1(decay) if decay > 0.0 else inf
         calm = late <= floor
         error = max(min(left_over, (2.0 if calm else degree) * late), 0.02 * floor)
-        return cls(error, inf if calm else decay, calm or late < 1e-2 * middle, calm, top)
+        # More samples of a loop cost little, and show what is rounding indeed.
+        return cls(error, inf if calm else decay, calm or late < 1e-2 * middle, late <= 0.05 * floor, top)
 
 
 def averaged(converging: bool, phase: float, turn: float) -> float:
     """The share of an error of the interpolant that does not average out, of a series whose lacking terms run through
-    `phase` or more [rad] while the body turns by `turn`: a third of what averages out is relied on. The error of a
+    `phase` or more [rad] while the body turns by `turn`: a quarter of what averages out is relied on. The error of a
     kink does not average out.
     """
-    return min(1.0, 6.0 / max(phase - turn, 6.0)) if converging else 1.0
+    return min(1.0, 8.0 / max(phase - turn, 8.0)) if converging else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +117,7 @@ class Judgement:
         """Attitude error that the interpolation error feeds in: (G,) [rad]; averages as `averaged`."""
         rate = momentum * self.inverse + self.drift
         turn = width * (momentum * self.inverse_size + self.drift_size)
-        left = np.where(self.converging, np.minimum(1.0, 6.0 / np.maximum(phase - turn, 6.0)), 1.0)
+        left = np.where(self.converging, np.minimum(1.0, 8.0 / np.maximum(phase - turn, 8.0)), 1.0)
         return 0.5 * width * rate * left
 
     def raised(self, gaps: Array, seen: Mask) -> Judgement:

@@ -30,7 +30,7 @@ _ROUNDS = 12
 # the step spanned at most one degree of the panel that matters, less than a tenth with two, and in most less
 # than a hundredth; with more degrees than that the estimate is worth nothing. Nor is the growth of errors known where
 # the body turns by more than half a radian in a step (the bound at hand is two or three times as large).
-_DEGREES_A_STEP, _TURN_A_STEP, _CAUTION = 2.0, 1.2, 0.06
+_DEGREES_A_STEP, _TURN_A_STEP, _CAUTION = 2.0, 1.0, 0.06
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NO_DIRECTIONS = np.empty((1, 0, 3))
@@ -259,7 +259,9 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         # Steps that are still far too long tell nothing about how errors grow.
         telling = total.max() < 1e-2 and bool(np.isfinite(growth).all())
         worst = float(growth.max()) if telling else 1.0
-        room = 0.6 * max(tolerance - float(bound.rounding_error.max()), 0.1 * tolerance) / worst
+        # Less in every round: where one of the errors is at its floor, the others must make room for it.
+        left = max(tolerance - float(bound.rounding_error.max()), 0.1 * tolerance)
+        room = 0.6 * 0.8 ** (rounds - 1) * left / worst
         by_loop = local.reshape(len(local), interpolant.loops, -1).sum(axis=1)
         sums = np.add.reduceat(by_loop, np.cumsum(steps) - steps, axis=1).max(axis=0)
         if sums.sum() > room:
