@@ -187,6 +187,35 @@ class Body:
         flat = self._angular_map_rate(self._rows(r), self._rows(v))
         return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
+    def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
+        """How the angular momentum I w + J rate changes with each joint while w and the rates stay the same, exact.
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]
+        base_rate : (..., 3) w, angular velocity of the base, base axes [rad/s]
+
+        Returns
+        -------
+        (..., n, 3) dI/dr_k w + dJ/dr_k rate, base axes [kg m^2/s per unit of joint]
+
+        One call of Pinocchio for all joints (its derivatives of the centroidal momentum), where `inertia_gradient`
+        and `momentum_matrix_gradient` take one for each.
+        """
+        w = finite_array(base_rate, "base_rate", (3,), unit="rad/s")
+        r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
+        w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
+        model, data = self._model, self._data()
+        velocities = self._velocities(self._rows(v))
+        velocities[:, 3:6] = w
+        none = np.zeros(model.nv)
+        gradients = np.empty((len(velocities), 3, model.nv))
+        for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), velocities, strict=True)):
+            gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
+        joints = gradients[:, :, _BASE + self._velocity_index]
+        joints = joints if self._plain else joints @ self._map
+        return np.swapaxes(joints, -1, -2).reshape(*r.shape, 3)
+
     def centre_of_mass(self, shape: ArrayLike) -> Array:
         """Centre of mass of the whole body from the base origin, base axes: (..., n) -> (..., 3) [m]."""
         r = self._checked(shape)
@@ -239,6 +268,11 @@ class Body:
         """
         whole = self._full_map(shape)
         return whole[:, :, :3], (whole[:, :, 3:] @ self._velocities(rate)[:, _BASE:, None])[..., 0]
+
+    def sample_rates(self, shape: Array, rate: Array) -> tuple[Array, Array, Array, Array]:
+        """I, J, dI/dt and dJ/dt along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3, n) and once more. Unchecked."""
+        whole, slope = self._angular_map(shape), self._angular_map_rate(shape, rate)
+        return whole[:, :, :3], whole[:, :, 3:], slope[:, :, :3], slope[:, :, 3:]
 
     def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
         array = finite_array(shape, name)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import so3
-from .arrays import Array
+from .arrays import Array, finite_array
 from .body import Body
-from .errors import OpenPathError
+from .errors import AccuracyNotReached, OpenPathError, ShapeError
 from .inertia_tensor import inverse_inertia
 from .sampling import Sampler, sampler
 from .shape_path import ShapePath
-from .stepping import stepped_rotation, tolerance_argument
+from .stepping import SteppedRotation, stepped_rotation, tolerance_argument
 
 _CLOSED = 1e-9
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_PIECES = (2, 4, 8, 16, 32, 64)
 
 
 def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
@@ -88,6 +93,11 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     """
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
+    return _lift(body, route, goal).end[0]
+
+
+def _lift(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
+    """The horizontal lift of a closed path."""
     gap = path_gap(body, route)
     worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
     if len(gap) and abs(gap[worst]) > _CLOSED:
@@ -95,8 +105,94 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
             f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from "
             "its start; close the path, or split a reconstructed motion with zero momentum for the lift of an open one"
         )
-    lift = stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), goal)
-    return lift.end[0]
+    return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
+
+
+def holonomy_derivative(
+    body: Body, path: ShapePath, variation: Callable[[Array], ArrayLike], tolerance: float = 1e-9
+) -> tuple[Array, Array]:
+    """The holonomy of a loop, and its exact derivative by parameters that the loop may depend on.
+
+    Seen from the start, the loop path + c variation_k turns the body by exp(c hat(d_k)) holonomy to first order in c:
+    d_k is the integral of the curvature F(rate, variation_k), carried along by the lift, plus what moving the loop's
+    own start does.
+
+    Parameters
+    ----------
+    path : a closed path, as for `holonomy`
+    variation : times (N,) -> (N, m, n), the derivatives of the shape by m parameters, joints in the body's order;
+        smooth between the path's breaks, the same at the end as at the start
+    tolerance : of the holonomy, and of its derivative relative to the integral of the curvature's size
+
+    Returns
+    -------
+    holonomy : (3, 3)
+    derivative : (m, 3) d_k, inertial axes [rad per unit of the parameter]
+
+    Raises
+    ------
+    OpenPathError
+        If the path does not close, or a variation opens it.
+    ShapeError
+        If `variation` returns another shape, or what is not finite.
+    AccuracyNotReached
+        If the tolerance cannot be met.
+
+    Source: theory.md B6; numerics.md section 4 (curvature of the connection).
+    """
+    goal = tolerance_argument(tolerance)
+    route = path.matched(body.joint_names, body.name)
+    lift = _lift(body, route, goal)
+    ends = np.array([0.0, route.duration])
+    at_ends = _variation_at(variation, ends, body.n_shape)
+    if np.abs(at_ends[1] - at_ends[0]).max(initial=0.0) > _CLOSED * (1.0 + np.abs(at_ends).max(initial=0.0)):
+        raise OpenPathError("a variation opens the loop: it must be the same at the end as at the start")
+    turned = lift.end[0]
+    connection = mechanical_connection(body, route.shape(0.0))
+    moved_start = -(at_ends[0] @ connection.T) @ (turned - np.eye(3)).T
+
+    def carried_curvature(times: Array) -> Array:
+        shapes, rates = route.curve(times)
+        inertia, matrix, inertia_rate, matrix_rate = body.sample_rates(shapes, rates)
+        inverse = inverse_inertia(inertia, times)
+        columns = inverse @ matrix
+        turning = -so3.apply(columns, rates)
+        along = inverse @ (matrix_rate - inertia_rate @ columns)
+        across = inverse @ np.swapaxes(body.angular_momentum_gradient(shapes, rates, turning), -1, -2)
+        density = lift.rotation(times)[0] @ (along - across + so3.hat(turning) @ columns)
+        return np.einsum("nak,nmk->nma", density, _variation_at(variation, times, body.n_shape))
+
+    return turned, moved_start + _integral(carried_curvature, route.breaks, goal)
+
+
+def _variation_at(variation: Callable[[Array], ArrayLike], times: Array, n_shape: int) -> Array:
+    values = finite_array(variation(times), "variation")
+    if values.ndim != 3 or values.shape[0] != len(times) or values.shape[2] != n_shape:
+        raise ShapeError(f"variation: expected ({len(times)}, m, {n_shape}) at {len(times)} times, got {values.shape}")
+    return values
+
+
+def _integral(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
+    """The integral of a function smooth between breaks, (N,) -> (N, m, 3), by Gauss on ever shorter panels."""
+    last, change, goal = None, np.inf, 0.0
+    for pieces in _PIECES:
+        edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(breaks)] + [breaks[-1:]])
+        half = 0.5 * np.diff(edges)
+        times = edges[:-1, None] + half[:, None] * (_NODES + 1.0)
+        weights = (half[:, None] * _WEIGHTS).ravel()
+        values = function(times.ravel())
+        total = np.einsum("n,nma->ma", weights, values)
+        goal = tolerance * float(np.einsum("n,nma->ma", weights, np.abs(values)).max(initial=0.0))
+        if last is not None:
+            change = float(np.abs(total - last).max(initial=0.0))
+        # Halving sixteen-point panels gains many digits: the change is the error of the coarser ones.
+        if change <= goal or goal == 0.0:
+            return total
+        last = total
+    raise AccuracyNotReached(
+        f"the derivative of the holonomy still changes by {change:.3g} rad where {goal:.3g} was asked; declare the "
+        "times where the variation jumps as breaks of the path, or loosen the tolerance"
+    )
 
 
 def path_gap(body: Body, path: ShapePath) -> Array:

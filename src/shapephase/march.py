@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from . import so3
 from .arrays import Array
-from .compiled import called, for_rows
+from .compiled import called
 from .rotation_step import (
     STAGES,
     local_error,
@@ -23,9 +22,8 @@ from .rotation_step import (
 )
 
 _BLOCK = 256
-_FEW, _MANY = 24, 400
+_FEW = 24
 _ROWS_AT_ONCE = 2048
-_CHECKPOINTS = 8
 # The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
 _INNER = (5, 8)
 
@@ -42,7 +40,6 @@ class March:
     dynamics : (B, K) dynamic phase of each step [rad]
     errors : (B, K) estimates of the steps' errors [rad]
     growth : (B, K + 1, 3, 3) how a small error of the start has grown; without momentum (B, 0, 3, 3)
-    slope : (B, 3, 3) turn of the end, in body axes, by a change of Pi at the start; known only where it is exact
     """
 
     quaternions: Array
@@ -51,39 +48,33 @@ class March:
     dynamics: Array
     errors: Array
     growth: Array
-    slope: Array
 
 
-def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, exact: bool | None = None) -> March:
+def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, with_growth: bool = True) -> March:
     """All steps of all loops, from the identity.
 
     Parameters
     ----------
     channels : (K, 108) of one loop; for each step, at its 12 stages, the step's length times I^-1 (6) and I^-1 L_o (3)
     directions : (B, 3) Pi/|Pi| at the start
-    sizes : (B,) of the momentum [kg m^2/s]; all positive if `exact`
-    exact : whether the growth of errors is the derivative of the steps themselves, which takes three times as long, or
-        good to a few thousandths for every ten radians turned; None: exact where many steps follow each other
+    sizes : (B,) of the momentum [kg m^2/s]
+    with_growth : whether to carry along how errors grow, to a few thousandths for every ten radians turned
     """
     total = loops * len(channels)
-    if exact is None:
-        exact = total > _MANY
     march = March(
         quaternions=np.empty((len(sizes), total + 1, 4)),
         directions=np.empty((len(sizes), total + 1, 3)),
         turns=np.empty((len(sizes), total)),
         dynamics=np.empty((len(sizes), total)),
         errors=np.empty((len(sizes), total)),
-        growth=np.empty((len(sizes), total + 1, 3, 3)),
-        slope=np.full((len(sizes), 3, 3), np.nan),
+        growth=np.empty((len(sizes), total + 1 if with_growth else 0, 3, 3)),
     )
     march.quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0]
     march.directions[:, 0] = directions
-    march.growth[:, 0] = np.eye(3)
-    if exact or len(sizes) <= _FEW:
-        one = _march_exactly if exact else _march_one
+    march.growth[:, :1] = np.eye(3)
+    if len(sizes) <= _FEW:
         for row, size in enumerate(sizes):
-            one(march, row, float(size), channels, loops)
+            _march_one(march, row, float(size), channels, loops)
         return march
     for first in range(0, len(sizes), _ROWS_AT_ONCE):
         _march_many(march, slice(first, first + _ROWS_AT_ONCE), sizes, channels, loops)
@@ -113,7 +104,6 @@ def marched_at_rest(channels: Array, loops: int) -> March:
         dynamics=nothing,
         errors=np.tile(errors, loops)[None],
         growth=np.empty((1, 0, 3, 3)),
-        slope=np.full((1, 3, 3), np.nan),
     )
 
 
@@ -129,47 +119,22 @@ def _repeated(quaternions: Array, loops: int) -> Array:
 
 
 def _march_one(march: March, row: int, size: float, channels: Array, loops: int) -> None:
-    count = len(channels)
-    state = np.zeros(17)
-    state[:3], state[6], state[16] = march.directions[row, 0], 1.0, size
-    state[7:16:4] = 1.0
+    count, with_growth = len(channels), bool(march.growth.shape[1])
+    state = np.concatenate([march.directions[row, 0], [0.0, 0.0, 0.0, 1.0, size], np.eye(3).ravel()])
+    state = state if with_growth else state[:8]
     done = 0
     for _ in range(loops):
         for first in range(0, count, _BLOCK):
             block = channels[first : first + _BLOCK]
-            states, sides = called(_momentum_function(len(block)), len(block), state, block)
+            states, sides = called(_momentum_function(len(block), with_growth), len(block), state, block)
             after = slice(done + 1, done + len(block) + 1)
             march.directions[row, after] = states[:, :3]
             march.quaternions[row, after] = states[:, 3:7]
-            march.growth[row, after] = states[:, 7:16].reshape(-1, 3, 3)
+            if with_growth:
+                march.growth[row, after] = states[:, 8:].reshape(-1, 3, 3)
             part = slice(done, done + len(block))
             march.turns[row, part], march.dynamics[row, part], march.errors[row, part] = sides.T
             state, done = states[-1], done + len(block)
-
-
-def _march_exactly(march: March, row: int, size: float, channels: Array, loops: int) -> None:
-    """As `_march_one`, with the derivatives of direction and quaternion by Pi at the start carried along."""
-    count, start = len(channels), march.directions[row, 0]
-    state = np.zeros(32)
-    state[:3], state[6], state[7] = start, 1.0, size
-    across = (np.eye(3) - np.outer(start, start)) / size if size > 0.0 else np.zeros((3, 3))
-    # One column for each component of Pi: direction, quaternion, size.
-    state[8:] = np.concatenate([across, np.zeros((4, 3)), start[None]]).T.ravel()
-    done, turning = 0, so3.hat(size * start)
-    for _ in range(loops):
-        for first in range(0, count, _BLOCK):
-            block = channels[first : first + _BLOCK]
-            states, sides = called(_exact_function(len(block)), len(block), state, block)
-            after = slice(done + 1, done + len(block) + 1)
-            march.directions[row, after] = states[:, :3]
-            march.quaternions[row, after] = states[:, 3:7]
-            slope = so3.turn_of(states[:, None, 3:7], states[:, 8:].reshape(-1, 3, 8)[:, :, 3:7])
-            rotation = so3.matrix_from_quat(states[:, 3:7])
-            march.growth[row, after] = so3.transpose(rotation) + so3.transpose(slope) @ turning
-            part = slice(done, done + len(block))
-            march.turns[row, part], march.dynamics[row, part], march.errors[row, part] = sides.T
-            state, done = states[-1], done + len(block)
-            march.slope[row] = slope[-1].T
 
 
 def _march_many(march: March, rows: slice, sizes: Array, channels: Array, loops: int) -> None:
@@ -183,49 +148,22 @@ def _march_many(march: March, rows: slice, sizes: Array, channels: Array, loops:
         end, turn, dynamic, differences = momentum_step(direction, size, step)
         half = 0.5 * turn
         quaternion = turned(quaternion, direction, end, (np.sin(half), np.cos(half)))
-        growth = _grown(growth, direction, end, size, step)
         march.turns[rows, number], march.dynamics[rows, number] = turn, dynamic
         march.errors[rows, number] = local_error(differences)
         for column, part in enumerate(end):
             march.directions[rows, number + 1, column] = part
         for column, part in enumerate(quaternion):
             march.quaternions[rows, number + 1, column] = part
-        for i, line in enumerate(growth):
-            for j, part in enumerate(line):
-                march.growth[rows, number + 1, i, j] = part
+        if march.growth.shape[1]:
+            growth = _grown(growth, direction, end, size, step)
+            for i, line in enumerate(growth):
+                for j, part in enumerate(line):
+                    march.growth[rows, number + 1, i, j] = part
         direction = end
 
 
-def amplification(growth: Array) -> Array:
-    """Largest growth of an error from one time to a later one, from the growth matrices: (B, K + 1, 3, 3) -> (B,).
-
-    Between eight times. A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
-    values as s, 1, 1/s, the sum of their squares gives the largest.
-    """
-    count = growth.shape[1]
-    if count == 0:
-        return np.ones(1)
-    chosen = growth[:, np.arange(_CHECKPOINTS) * (count - 1) // (_CHECKPOINTS - 1)].reshape(len(growth), -1)
-    largest = for_rows(_largest_growth, 9 * _CHECKPOINTS, chosen)[:, 0]
-    # Where steps were so long that they overflowed, nothing is known.
-    return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
-
-
-def _largest_growth(entries: Any) -> list[Any]:
-    """From the growth matrices at the checkpoints, row by row."""
-    import casadi
-
-    matrices = [[entries[9 * k + 3 * i : 9 * k + 3 * i + 3] for i in range(3)] for k in range(_CHECKPOINTS)]
-    rest: Any = 1.0
-    for later in range(1, _CHECKPOINTS):
-        for earlier in range(later):
-            between = _product(matrices[later], _adjugate(matrices[earlier])) if earlier else matrices[later]
-            squares = sum(entry * entry for row in between for entry in row)
-            rest = casadi.fmax(rest, 0.5 * (squares - 1.0))
-    return [(rest + (rest * rest - 1.0) ** 0.5) ** 0.5]
-
-
-def _adjugate(matrix: Any) -> list[list[Any]]:
+def adjugate_of(matrix: Any) -> list[list[Any]]:
+    """Of a 3 x 3 matrix of numbers, arrays or symbols."""
     (a, b, c), (d, e, f), (g, h, i) = matrix
     return [
         [e * i - f * h, c * h - b * i, b * f - c * e],
@@ -243,21 +181,24 @@ def _grown(growth: Any, start: Any, end: Any, size: Any, channels: Any) -> list[
     first, second = (channels[stage] for stage in _INNER)
     inner = [0.5 * (a + b) for a, b in zip(first[:6], second[:6], strict=True)]
     half = variation(middle, [*inner, *(0.25 * (a + b) for a, b in zip(first[6:], second[6:], strict=True))])
-    moved = [[g + h for g, h in zip(*rows, strict=True)] for rows in zip(growth, _product(half, growth), strict=True)]
+    moved = [
+        [g + h for g, h in zip(*rows, strict=True)] for rows in zip(growth, matrix_product(half, growth), strict=True)
+    ]
     back = [[float(i == j) - half[i][j] for j in range(3)] for i in range(3)]
-    adjugate = _adjugate(back)
+    adjugate = adjugate_of(back)
     scale = 1.0 / (back[0][0] * adjugate[0][0] + back[0][1] * adjugate[1][0] + back[0][2] * adjugate[2][0])
-    return _product([[scale * entry for entry in row] for row in adjugate], moved)
+    return matrix_product([[scale * entry for entry in row] for row in adjugate], moved)
 
 
-def _product(a: Any, b: Any) -> list[list[Any]]:
+def matrix_product(a: Any, b: Any) -> list[list[Any]]:
+    """Of two 3 x 3 matrices of numbers, arrays or symbols."""
     return [[row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j] for j in range(3)] for row in a]
 
 
-@lru_cache(maxsize=512)
-def _momentum_function(length: int) -> Any:
-    """`length` steps as one CasADi function of the state (direction, quaternion, growth, size) and the channels."""
-    return _momentum_step_function().mapaccum("steps", length)
+@lru_cache(maxsize=1024)
+def _momentum_function(length: int, with_growth: bool) -> Any:
+    """`length` steps as one CasADi function of the state (direction, quaternion, size, growth) and the channels."""
+    return momentum_step_function(with_growth).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=512)
@@ -266,45 +207,23 @@ def _rest_function(length: int) -> Any:
     return _rest_step_function().mapaccum("steps", length)
 
 
-@lru_cache(maxsize=512)
-def _exact_function(length: int) -> Any:
-    """`length` steps as one CasADi function of the state, its derivatives and the channels."""
-    return _exact_step_function().mapaccum("steps", length)
-
-
-@lru_cache(maxsize=1)
-def _exact_step_function() -> Any:
+@lru_cache(maxsize=2)
+def momentum_step_function(with_growth: bool) -> Any:
+    """One step as a CasADi function: state and channels -> the next state; turn, dynamic phase and error estimate."""
     import casadi
 
-    state, slopes = casadi.SX.sym("state", 8), casadi.SX.sym("slopes", 8, 3)
-    data = casadi.SX.sym("channels", 9 * STAGES)
+    state, data = casadi.SX.sym("state", 17 if with_growth else 8), casadi.SX.sym("channels", 9 * STAGES)
     parts, components = casadi.vertsplit(state), casadi.vertsplit(data)
     channels = [components[9 * s : 9 * s + 9] for s in range(STAGES)]
     direction, quaternion, size = parts[:3], parts[3:7], parts[7]
     end, turn, dynamic, differences = momentum_step(direction, size, channels)
     attitude = turned(quaternion, direction, end, (casadi.sin(0.5 * turn), casadi.cos(0.5 * turn)))
-    following = casadi.vertcat(*end, *attitude, size)
-    further = casadi.jtimes(following, state, slopes)
+    following = [*end, *attitude, size]
+    if with_growth:
+        growth = [parts[8 + 3 * i : 11 + 3 * i] for i in range(3)]
+        following += [part for row in _grown(growth, direction, end, size, channels) for part in row]
     side = casadi.vertcat(turn, dynamic, local_error(differences))
-    whole = casadi.vertcat(state, casadi.reshape(slopes, 24, 1))
-    return casadi.Function("step", [whole, data], [casadi.vertcat(following, casadi.reshape(further, 24, 1)), side])
-
-
-@lru_cache(maxsize=1)
-def _momentum_step_function() -> Any:
-    import casadi
-
-    state, data = casadi.SX.sym("state", 17), casadi.SX.sym("channels", 9 * STAGES)
-    parts, components = casadi.vertsplit(state), casadi.vertsplit(data)
-    channels = [components[9 * s : 9 * s + 9] for s in range(STAGES)]
-    direction, quaternion, size = parts[:3], parts[3:7], parts[16]
-    growth = [parts[7 + 3 * i : 10 + 3 * i] for i in range(3)]
-    end, turn, dynamic, differences = momentum_step(direction, size, channels)
-    attitude = turned(quaternion, direction, end, (casadi.sin(0.5 * turn), casadi.cos(0.5 * turn)))
-    grown = _grown(growth, direction, end, size, channels)
-    following = casadi.vertcat(*end, *attitude, *(part for row in grown for part in row), size)
-    side = casadi.vertcat(turn, dynamic, local_error(differences))
-    return casadi.Function("step", [state, data], [following, side])
+    return casadi.Function("step", [state, data], [casadi.vertcat(*following), side])
 
 
 @lru_cache(maxsize=1)

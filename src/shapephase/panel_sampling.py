@@ -126,8 +126,9 @@ class PanelSampler:
         """As `Sampler.refine`."""
         if not self._groups:
             each = next(degree for least, degree in _FIRST_DEGREES if tolerance > least)
-            degree = 0 if self._still else each if len(self._left) > 4 else 2 * each
-            self._add([_Wanted(degree, self._left, self._right, None)])
+            still = self._standing()
+            parts = ((0, still), (each if len(self._left) > 4 else 2 * each, ~still))
+            self._add([_Wanted(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()])
         while True:
             errors = {d: g.judgement.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
             total = self._loops * sum(float(e.sum()) for e in errors.values())
@@ -199,6 +200,20 @@ class PanelSampler:
                 wanted.append(_Wanted(_HALF_DEGREE, *ends, None))
         self._add(wanted)
 
+    def _standing(self) -> Mask:
+        """Panels on which nothing moves: one sample each will do."""
+        standing = np.full(len(self._left), self._still)
+        if self._still or self._probe is None:
+            return standing
+        for fractions in (_BETWEEN[31:32], _BETWEEN):
+            rows = np.flatnonzero(~standing) if len(fractions) == 1 else np.flatnonzero(standing)
+            times = self._left[rows, None] + (self._right - self._left)[rows, None] * fractions
+            seen = self._probe(times.ravel()).reshape(len(rows), len(fractions), -1)
+            standing[rows] = ~seen[:, :, seen.shape[-1] // 2 :].any(axis=(1, 2))
+            if not standing.any():
+                break
+        return standing
+
     @property
     def _panel_count(self) -> int:
         return sum(len(g.left) for g in self._groups.values())
@@ -225,7 +240,7 @@ class PanelSampler:
         found = False
         for degree, g in list(self._groups.items()):
             rows = np.flatnonzero(np.isnan(g.gaps[:, 0]))
-            if not len(rows):
+            if not len(rows) or not degree:
                 continue
             found = True
             points = self._suspicious_points(g, rows)
