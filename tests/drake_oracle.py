@@ -23,7 +23,7 @@ _KEPT = {"link": ("inertial",), "joint": ("parent", "child", "origin", "axis", "
 
 
 def mechanical_urdf(name: str) -> str:
-    """The links of a body's URDF with their inertia, and its joints, without all that Drake would look up or warn of."""
+    """The links of a body's URDF with their inertia, and its joints: no meshes to look up, no tags to warn of."""
     root = ElementTree.parse(urdf_file(name)).getroot()
     for element in list(root):
         if element.tag not in _KEPT:

@@ -151,7 +151,7 @@ def holonomy_derivative(
     connection = mechanical_connection(body, route.shape(0.0))
     moved_start = -(at_ends[0] @ connection.T) @ (turned - np.eye(3)).T
 
-    def carried_curvature(times: Array) -> Array:
+    def carried_curvature(times: Array) -> tuple[Array, Array]:
         shapes, rates = route.curve(times)
         inertia, matrix, inertia_rate, matrix_rate = body.sample_rates(shapes, rates)
         inverse = inverse_inertia(inertia, times)
@@ -159,8 +159,11 @@ def holonomy_derivative(
         turning = -so3.apply(columns, rates)
         along = inverse @ (matrix_rate - inertia_rate @ columns)
         across = inverse @ np.swapaxes(body.angular_momentum_gradient(shapes, rates, turning), -1, -2)
-        density = lift.rotation(times)[0] @ (along - across + so3.hat(turning) @ columns)
-        return np.einsum("nak,nmk->nma", density, _variation_at(variation, times, body.n_shape))
+        bracket = so3.hat(turning) @ columns
+        by_joint = lift.rotation(times)[0] @ (along - across + bracket)
+        changes = _variation_at(variation, times, body.n_shape)
+        size = np.einsum("nak,nmk->n", np.abs(along) + np.abs(across) + np.abs(bracket), np.abs(changes))
+        return np.einsum("nak,nmk->nma", by_joint, changes), size
 
     return turned, moved_start + _integral(carried_curvature, route.breaks, goal)
 
@@ -172,17 +175,21 @@ def _variation_at(variation: Callable[[Array], ArrayLike], times: Array, n_shape
     return values
 
 
-def _integral(function: Callable[[Array], Array], breaks: Array, tolerance: float) -> Array:
-    """The integral of a function smooth between breaks, (N,) -> (N, m, 3), by Gauss on ever shorter panels."""
+def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, tolerance: float) -> Array:
+    """The integral of a function smooth between breaks, by Gauss on ever shorter panels.
+
+    The function returns its values (N, m, 3), and the size of what they are differences of (N,): the tolerance is
+    relative to the integral of that.
+    """
     last, change, goal = None, np.inf, 0.0
     for pieces in _PIECES:
         edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(breaks)] + [breaks[-1:]])
         half = 0.5 * np.diff(edges)
         times = edges[:-1, None] + half[:, None] * (_NODES + 1.0)
         weights = (half[:, None] * _WEIGHTS).ravel()
-        values = function(times.ravel())
+        values, sizes = function(times.ravel())
         total = np.einsum("n,nma->ma", weights, values)
-        goal = tolerance * float(np.einsum("n,nma->ma", weights, np.abs(values)).max(initial=0.0))
+        goal = tolerance * float(weights @ sizes)
         if last is not None:
             change = float(np.abs(total - last).max(initial=0.0))
         # Halving sixteen-point panels gains many digits: the change is the error of the coarser ones.

@@ -28,11 +28,13 @@ _EPS = np.finfo(float).eps
 _MOST_STEPS = 4_000_000
 _ROUNDS = 12
 _MANY_STEPS = 4000
-# The true error of a step was less than a twenty-fifth of the formula's own estimate in all of 45,000 random runs where
-# the step spanned at most one degree of the panel that matters, less than a tenth with two, and in most less
-# than a hundredth; with more degrees than that the estimate is worth nothing. Nor is the growth of errors known where
-# the body turns by more than half a radian in a step (the bound at hand is two or three times as large).
-_DEGREES_A_STEP, _TURN_A_STEP, _CAUTION = 2.0, 1.0, 0.06
+_FEW = 24
+# In 60,000 random motions the true error of a step was less than a fourteenth of the formula's own estimate where the
+# step spanned at most one degree of the panel that matters, and in most less than a hundredth; with more degrees the
+# estimate is worth less in proportion. Nor is the growth of errors known where the body turns by more than half a
+# radian in a step (the bound at hand is two or three times as large).
+_CAUTION = 0.07
+_DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST, _TURN_A_STEP = 3.0, 2.0, 1.0
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NO_DIRECTIONS = np.empty((1, 0, 3))
@@ -97,7 +99,7 @@ class SteppedRotation:
         """What rounding alone contributes: (B,) [rad]."""
         chords = np.diff(self.quaternions, axis=1)
         turned_by = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords)).sum(axis=1)
-        return self.amplification * _EPS * (8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + turned_by)
+        return self.amplification * _EPS * (8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + 3.0 * turned_by)
 
     def rotation(self, t: Array) -> Array:
         """S(t): (N,) -> (B, N, 3, 3)."""
@@ -229,6 +231,8 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     # Errors grow with momentum, nobody knows yet how much; samples are cheaper than a second attempt.
     sampling_target = (0.05 if size > 0.0 else 0.3) * tolerance
     steps: Integers | None = None
+    # Among many there are some that need more steps than most; a second attempt takes them all along.
+    ease = 1.0 if len(momentum) <= _FEW else 0.1
     known: Array | None = None
     edges = np.empty(0)
     rounds = 0
@@ -237,8 +241,8 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         sampler.refine(size, sampling_target)
         interpolant = sampler.interpolant()
         turn, swing, degree = _features(interpolant, size, tolerance)
-        least = np.maximum(degree / _DEGREES_A_STEP, turn / _TURN_A_STEP)
-        planned = _first_plan(turn, swing, tolerance) if steps is None else _plan_for(interpolant, edges, steps)
+        least = _least_steps(turn, degree, size)
+        planned = _first_plan(turn, swing, ease * tolerance) if steps is None else _plan_for(interpolant, edges, steps)
         if size > 0.0 and known is None and np.maximum(planned, least).sum() * interpolant.loops > _MANY_STEPS:
             known = _growth_of_long(interpolant, momentum, sizes)
             # So many steps, each in need of that much more accuracy.
@@ -297,7 +301,12 @@ def _first_plan(turn: Array, swing: Array, tolerance: float) -> Array:
     The three numbers were fitted to the steps that 137 motions of twelve bodies needed at three tolerances; in six of
     seven the first plan does.
     """
-    return np.maximum(tolerance**-0.1376 * (0.033 * turn + 0.148 * swing), 1.0)
+    return np.maximum(tolerance**-0.1376 * (0.0365 * turn + 0.163 * swing), 1.0)
+
+
+def _least_steps(turn: Array, degree: Array, size: float) -> Array:
+    """Steps per panel, not yet whole, without which the estimates would mean nothing."""
+    return np.maximum(degree / (_DEGREES_A_STEP if size > 0.0 else _DEGREES_A_STEP_AT_REST), turn / _TURN_A_STEP)
 
 
 def _features(interpolant: Interpolant, size: float, tolerance: float) -> tuple[Array, Array, Array]:
@@ -337,7 +346,7 @@ def _finer(steps: Integers, sums: Array, room: float) -> Integers:
 def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> Array:
     """How errors grow along many steps: (B,), by the derivative of coarse ones: what is but nearly right drifts off."""
     turn, _, degree = _features(interpolant, float(sizes.max()), _LOOSEST)
-    steps = np.ceil(np.maximum(np.maximum(degree / _DEGREES_A_STEP, turn / _TURN_A_STEP), 1.0)).astype(int)
+    steps = np.ceil(np.maximum(_least_steps(turn, degree, 1.0), 1.0)).astype(int)
     channels, directions = _stage_channels(interpolant, steps), _directions(momentum, sizes)
     rows = zip(directions[:, None], sizes[:, None], strict=True)
     with np.errstate(all="ignore"):
