@@ -59,14 +59,19 @@ class PiecewisePolynomial:
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
-        piece = np.clip(np.searchsorted(self.knots, times, side="right") - 1, 0, len(self.knots) - 2)
-        local = (times - self.knots[piece])[:, None]
-        of_piece = self.coefficients[:, piece]
-        shapes, rates = of_piece[-1], np.zeros_like(of_piece[-1])
-        for coefficient in of_piece[-2::-1]:
-            rates = rates * local + shapes
-            shapes = shapes * local + coefficient
-        return shapes, rates
+        piece = np.searchsorted(self.knots[1:-1], times, side="right")
+        powers = (times - self.knots[piece])[:, None] ** np.arange(len(self.coefficients))
+        both = (powers[:, None] @ self._by_piece[piece])[:, 0]
+        n_shape = self.coefficients.shape[2]
+        return both[:, :n_shape], both[:, n_shape:]
+
+    @cached_property
+    def _by_piece(self) -> Array:
+        """Coefficients of the shapes and of the rates, side by side: (pieces, order, 2 n)."""
+        shapes = np.moveaxis(self.coefficients, 0, 1)
+        rates = np.zeros_like(shapes)
+        rates[:, :-1] = shapes[:, 1:] * np.arange(1.0, shapes.shape[1])[:, None]
+        return np.concatenate([shapes, rates], axis=2)
 
 
 def returned_pair(returned: object) -> tuple[Array, Array]:

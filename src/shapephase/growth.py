@@ -11,7 +11,7 @@ from . import so3
 from .arrays import Array
 from .compiled import called, for_rows
 from .march import adjugate_of, matrix_product, momentum_step_function
-from .rotation_step import STAGES
+from .rotation_step import STAGES, attitude_step
 
 _BLOCK = 256
 _CHECKPOINTS = 8
@@ -64,15 +64,21 @@ def exact_growth(channels: Array, directions: Array, sizes: Array, loops: int) -
     return growth
 
 
-def momentum_slope(channels: Array, directions: Array, sizes: Array, loops: int) -> Array:
-    """The turn of the end, body axes, by a change of Pi at the start: (B, 3, 3). Parameters as `march.marched`."""
-    result = np.empty((len(sizes), 3, 3))
-    for row, (direction, size) in enumerate(zip(directions, sizes, strict=True)):
-        seeds = np.zeros((3, 8))
-        seeds[:, :3] = (np.eye(3) - np.outer(direction, direction)) / size
-        seeds[:, 7] = direction
-        for _, _, slopes in _derivatives(channels, direction, float(size), loops, seeds):
-            result[row] = slopes[-1].T
+def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
+    """The turn of the end, body axes, by a change of Pi at the start: (B, 3, 3) for Pi (B, 3), zero or not.
+
+    Here the steps are taken on the quaternion itself: with hardly any momentum its direction tells nothing any more.
+    """
+    count = len(channels)
+    result = np.empty((len(momenta), 3, 3))
+    for row, momentum in enumerate(momenta):
+        state = np.concatenate([[0.0, 0.0, 0.0, 1.0], momentum, np.zeros(12)])
+        for _ in range(loops):
+            for first in range(0, count, _BLOCK):
+                block = channels[first : first + _BLOCK]
+                (states,) = called(_slope_function(len(block)), len(block), state, block)
+                state = states[-1]
+        result[row] = so3.turn_of(state[:4], state[7:].reshape(3, 4)).T
     return result
 
 
@@ -95,12 +101,33 @@ def _derivatives(channels: Array, direction: Array, size: float, loops: int, see
 
 
 @lru_cache(maxsize=512)
+def _slope_function(length: int) -> Any:
+    """`length` steps as one CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
+    return _slope_step_function().mapaccum("steps", length)
+
+
+@lru_cache(maxsize=1)
+def _slope_step_function() -> Any:
+    import casadi
+
+    quaternion, momentum = casadi.SX.sym("quaternion", 4), casadi.SX.sym("momentum", 3)
+    slopes, data = casadi.SX.sym("slopes", 4, 3), casadi.SX.sym("channels", 9 * STAGES)
+    components = casadi.vertsplit(data)
+    channels = [components[9 * s : 9 * s + 9] for s in range(STAGES)]
+    following = casadi.vertcat(*attitude_step(casadi.vertsplit(quaternion), casadi.vertsplit(momentum), channels))
+    further = casadi.jtimes(following, quaternion, slopes) + casadi.jacobian(following, momentum)
+    state = casadi.vertcat(quaternion, momentum, casadi.reshape(slopes, 12, 1))
+    onward = casadi.vertcat(following, momentum, casadi.reshape(further, 12, 1))
+    return casadi.Function("step", [state, data], [onward])
+
+
+@lru_cache(maxsize=512)
 def _derivative_function(length: int, columns: int) -> Any:
     """`length` steps as one CasADi function of the state with its derivatives, and the channels."""
     return _derivative_step_function(columns).mapaccum("steps", length)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)
 def _derivative_step_function(columns: int) -> Any:
     import casadi
 

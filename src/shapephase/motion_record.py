@@ -34,6 +34,7 @@ _STEPS = (
     "sampling_error",
     "stepping_error",
     "amplification",
+    "propagator",
 )
 _SAMPLES = ("edges", "coefficients")
 _CENTRE_DEGREE = 24

@@ -13,8 +13,8 @@ from .errors import AccuracyNotReached
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
 from .spectrum import Channels, Judgement, judged, spectral_sizes
 
-# Degrees to begin with, by tolerance: for a few panels twice as high.
-_FIRST_DEGREES = ((1e-11, 5), (0.0, 15))
+# Degrees to begin with, by tolerance, on many panels and on a few.
+_FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
 _HALF_DEGREE, _LAST_DEGREE = 10, 80
 _MOST_PANELS = 4000
 _LEAST_WIDTH = 1e-13
@@ -125,9 +125,9 @@ class PanelSampler:
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
         if not self._groups:
-            each = next(degree for least, degree in _FIRST_DEGREES if tolerance > least)
+            of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
             still = self._standing()
-            parts = ((0, still), (each if len(self._left) > 4 else 2 * each, ~still))
+            parts = ((0, still), (of_many if len(self._left) > 4 else of_few, ~still))
             self._add([_Wanted(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()])
         while True:
             errors = {d: g.judgement.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}

@@ -53,7 +53,7 @@ class Sensitivity:
     """How the attitude at the end of a motion answers to small changes, to first order.
 
     A change dmu of the momentum and a turn of the start to R(0) exp(hat(delta)) turn the end to R(T) exp(hat(e)) with
-    e = by_momentum dmu + by_attitude delta: the derivative of the steps that were taken.
+    e = by_momentum dmu + by_attitude delta: the derivative of the steps, not a difference.
 
     Attributes
     ----------
@@ -186,6 +186,11 @@ class Motion:
         """The largest growth of a small error of the attitude from one time to a later one: batch."""
         return _stepped(self).amplification.reshape(self.batch)[()]
 
+    @property
+    def propagator(self) -> Array:
+        """`sensitivity.by_attitude` to a few thousandths, at no cost: batch + (3, 3)."""
+        return _stepped(self).propagator.reshape(*self.batch, 3, 3)
+
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""
@@ -205,7 +210,7 @@ class Motion:
         Source: Cabrera 2006, equation (12); theory.md B9.
         """
         times = times_argument(t, self.duration)
-        return _stepped(self).dynamic_phase(times.ravel()).reshape(*self.batch, *times.shape)
+        return _stepped(self).dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def solid_angle(self, t: ArrayLike) -> Array:
         """The signed area that Pi has gone round from 0 to t, closed by the great circle, seen from the base frame.
@@ -218,7 +223,7 @@ class Motion:
         Source: theory.md D; numerics.md section 3.
         """
         times = times_argument(t, self.duration)
-        return _stepped(self).solid_angle(times.ravel()).reshape(*self.batch, *times.shape)
+        return _stepped(self).solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""

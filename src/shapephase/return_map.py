@@ -60,14 +60,14 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
 def _newton_step(deformation: Deformation, size: float, points: Array, tolerance: float) -> tuple[Array, Array]:
     """One Newton step on u(T) = u(0) in the tangent planes: the new points and how far each moved.
 
-    A small turn delta of the start moves u by u x delta, and reaches the end as the sensitivity says.
+    A small turn delta of the start moves u by u x delta, and reaches the end as the propagator says.
     """
     motion = reconstruct(deformation, [0.0, 0.0, size], _attitude_of(points), tolerance=tolerance)
     ends = motion.body_momentum(deformation.duration) / size
     first = so3.perpendicular(points)
     basis = np.stack([first, np.cross(points, first)], axis=1)
     turns = np.cross(basis, points[:, None])
-    arriving = np.einsum("nij,nkj->nki", motion.sensitivity.by_attitude, turns)
+    arriving = np.einsum("nij,nkj->nki", motion.propagator, turns)
     slope = np.cross(ends[:, None], arriving)
     derivative = np.einsum("nic,njc->nij", basis, slope) - np.eye(2)
     gap = np.einsum("nic,nc->ni", basis, ends - points)

@@ -96,6 +96,22 @@ def rest_step(drifts: Scalars) -> tuple[list[Any], list[Any]]:
     return unit(_combination([0.0, 0.0, 0.0, 1.0], b, slopes)), [2.0 * part for part in differences]
 
 
+def attitude_step(quat_xyzw: Scalars, momentum: Scalars, channels: Scalars) -> list[Any]:
+    """A step of the same formula on the quaternion of S, for a momentum Pi at the start of the motion.
+
+    `channels` as in `momentum_step`.
+    """
+    a, b, _ = tableau()
+    slopes: list[list[Any]] = []
+    for stage in range(STAGES):
+        q = _combination(quat_xyzw, a[stage, :stage], slopes)
+        conjugate = [-q[0], -q[1], -q[2], q[3]]
+        seen = product(product(conjugate, [*momentum, 0.0]), q)[:3]
+        half = [0.5 * rate for rate in turn_rate(seen, channels[stage])]
+        slopes.append(product(q, [*half, 0.0]))
+    return unit(_combination(quat_xyzw, b, slopes))
+
+
 def local_error(differences: Scalars) -> Any:
     """Error estimate of a step from its differences to orders five and three [rad].
 
@@ -104,7 +120,7 @@ def local_error(differences: Scalars) -> Any:
     """
     fifth = sum(part * part for part in differences[:4])
     third = sum(part * part for part in differences[4:])
-    return fifth * (fifth + 0.01 * third + _TINY) ** -0.5
+    return fifth / (fifth + 0.01 * third + _TINY) ** 0.5
 
 
 def turned(quat_xyzw: Scalars, start: Scalars, end: Scalars, half_turn: tuple[Any, Any]) -> list[Any]:
@@ -159,7 +175,7 @@ def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
 
 def unit(vector: Scalars) -> list[Any]:
     """A vector made one of length one."""
-    scale = _dot(vector, vector) ** -0.5
+    scale = 1.0 / _dot(vector, vector) ** 0.5
     return [component * scale for component in vector]
 
 

@@ -36,10 +36,9 @@ _FEW = 24
 _CAUTION = 0.07
 _DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST, _TURN_A_STEP = 3.0, 2.0, 1.0
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
-_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
-_NO_DIRECTIONS = np.empty((1, 0, 3))
 _BATCHED = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
+    "propagator",
 )  # fmt: skip
 
 
@@ -58,6 +57,8 @@ class SteppedRotation:
     dynamics : (B, K) dynamic phase of each step [rad]
     sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
+    propagator : (B, 3, 3) how a small turn of the start, S exp(hat(delta)) in base axes, reaches the end; to a few
+        thousandths, enough to judge errors and to steer a search
     """
 
     interpolant: Interpolant
@@ -70,6 +71,7 @@ class SteppedRotation:
     sampling_error: Array
     stepping_error: Array
     amplification: Array
+    propagator: Array
 
     @cached_property
     def panel(self) -> Integers:
@@ -99,7 +101,9 @@ class SteppedRotation:
         """What rounding alone contributes: (B,) [rad]."""
         chords = np.diff(self.quaternions, axis=1)
         turned_by = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords)).sum(axis=1)
-        return self.amplification * _EPS * (8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + 3.0 * turned_by)
+        # The rate of turning itself is known to a few units of rounding only, which is felt as the body turns on.
+        committed = 8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + turned_by
+        return _EPS * (self.amplification * committed + 4.0 * turned_by)
 
     def rotation(self, t: Array) -> Array:
         """S(t): (N,) -> (B, N, 3, 3)."""
@@ -114,7 +118,7 @@ class SteppedRotation:
         """The integral of omega . Pi/|Pi| from 0 to t: (N,) -> (B, N) [rad]; zero without momentum."""
         index = self._step_of(t)
         before = np.cumsum(self.dynamics, axis=1) - self.dynamics
-        return before[:, index] + self._at(t)[3]
+        return (before[:, index] + self._at(t)[3]) * self._moving
 
     def solid_angle(self, t: Array) -> Array:
         """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
@@ -130,36 +134,22 @@ class SteppedRotation:
         fans = sphere.triangle_area(start, corners[:, :-1], corners[:, 1:]) + self.dynamics - self.turns
         before = np.cumsum(fans, axis=1) - fans
         _, there, turn, dynamic = self._at(t)
-        return before[:, index] + sphere.triangle_area(start, corners[:, index], there) + dynamic - turn
+        return (
+            before[:, index] + sphere.triangle_area(start, corners[:, index], there) + dynamic - turn
+        ) * self._moving
+
+    @property
+    def _moving(self) -> Array:
+        """One where there is momentum, else zero: (B, 1)."""
+        return np.any(self.momentum != 0.0, axis=1, keepdims=True).astype(np.float64)
 
     @cached_property
     def momentum_slope(self) -> Array:
         """How the end turns, S exp(hat(slope dPi)), by a change dPi of the body momentum at the start: (B, 3, 3).
 
-        The derivative of the very steps that were taken; without momentum an integral along them.
+        The derivative of steps like those that were taken.
         """
-        sizes = np.linalg.norm(self.momentum, axis=-1)
-        moving = sizes > 0.0
-        slope = np.empty((len(sizes), 3, 3))
-        if moving.any():
-            channels = _stage_channels(self.interpolant, self.steps)
-            directions = self.momentum[moving] / sizes[moving, None]
-            slope[moving] = momentum_slope(channels, directions, sizes[moving], self.interpolant.loops)
-        if not moving.all():
-            slope[~moving] = self._slope_at_rest(int(np.argmin(moving)))
-        return slope
-
-    def _slope_at_rest(self, row: int) -> Array:
-        """S(T)^T times the integral of S I^-1 S^T, of a row of the batch: (3, 3)."""
-        lengths = np.diff(self.times)
-        nodes = self.times[:-1, None] + 0.5 * lengths[:, None] * (_GAUSS_NODES + 1.0)
-        quaternions = self.quaternions[row : row + 1]
-        rest = replace(self, momentum=np.zeros((1, 3)), quaternions=quaternions, directions=_NO_DIRECTIONS)
-        turned_by = rest.rotation(nodes.ravel())[0]
-        inverse, _ = self.interpolant.inverse_and_drift(nodes.ravel())
-        weights = (0.5 * lengths[:, None] * _GAUSS_WEIGHTS).ravel()
-        total = np.einsum("n,nij,njk,nlk->il", weights, turned_by, inverse, turned_by, optimize=True)
-        return rest.end[0].T @ total
+        return momentum_slope(_stage_channels(self.interpolant, self.steps), self.momentum, self.interpolant.loops)
 
     def _step_of(self, t: Array) -> Integers:
         return np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
@@ -181,7 +171,7 @@ class SteppedRotation:
         end, turn, dynamic, _ = momentum_step(start, size, stages)
         half = 0.5 * turn
         there = turned(before, start, end, (np.sin(half), np.cos(half)))
-        return _stacked(there), _stacked(end), turn, dynamic * (size > 0.0)
+        return _stacked(there), _stacked(end), turn, dynamic
 
     def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:
         """The same steps with the rotations at their ends (B, K + 1, 3, 3) found by another method."""
@@ -233,7 +223,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     steps: Integers | None = None
     # Among many there are some that need more steps than most; a second attempt takes them all along.
     ease = 1.0 if len(momentum) <= _FEW else 0.1
-    known: Array | None = None
+    known: tuple[Array, Array] | None = None
     edges = np.empty(0)
     rounds = 0
     while True:
@@ -246,14 +236,14 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         if size > 0.0 and known is None and np.maximum(planned, least).sum() * interpolant.loops > _MANY_STEPS:
             known = _growth_of_long(interpolant, momentum, sizes)
             # So many steps, each in need of that much more accuracy.
-            share = 0.01 * planned.sum() * interpolant.loops * max(1.0, float(np.nan_to_num(known).max()))
+            share = 0.01 * planned.sum() * interpolant.loops * max(1.0, float(np.nan_to_num(known[0]).max()))
             planned = _first_plan(turn, swing, max(tolerance / share, 1e-18))
         steps = np.ceil(np.maximum(planned, least)).astype(int)
         march = _run(interpolant, momentum, sizes, steps, with_growth=known is None)
         caution = _CAUTION * max(1.0, float((np.maximum(degree, 2.0 * turn) / steps).max()))
         local = np.where(np.isfinite(march.errors), caution * march.errors, np.pi)
         total = local.sum(axis=1)
-        growth = amplification(march.growth) if known is None else known
+        growth, last = known if known is not None else (amplification(march.growth), _last(march))
         bound = SteppedRotation(
             interpolant,
             momentum,
@@ -266,6 +256,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
             # What the plan took for too small to be resolved counts too.
             growth * total + 1e-4 * tolerance,
             growth,
+            last,
         )
         if (bound.error_estimate <= tolerance).all():
             return _for_all(bound, momentum)
@@ -343,15 +334,28 @@ def _finer(steps: Integers, sums: Array, room: float) -> Integers:
     return np.ceil(steps * factor).astype(int)
 
 
-def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> Array:
-    """How errors grow along many steps: (B,), by the derivative of coarse ones: what is but nearly right drifts off."""
+def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> tuple[Array, Array]:
+    """Amplification (B,) and propagator (B, 3, 3) of many steps, by the derivative of coarse ones.
+
+    What is but nearly right drifts off in the end.
+    """
     turn, _, degree = _features(interpolant, float(sizes.max()), _LOOSEST)
     steps = np.ceil(np.maximum(_least_steps(turn, degree, 1.0), 1.0)).astype(int)
     channels, directions = _stage_channels(interpolant, steps), _directions(momentum, sizes)
-    rows = zip(directions[:, None], sizes[:, None], strict=True)
+    amplified, last = np.empty(len(sizes)), np.empty((len(sizes), 3, 3))
     with np.errstate(all="ignore"):
-        growth = [amplification(exact_growth(channels, *row, interpolant.loops)) for row in rows]
-    return np.concatenate(growth)
+        for row in range(len(sizes)):
+            part = slice(row, row + 1)
+            growth = exact_growth(channels, directions[part], sizes[part], interpolant.loops)
+            amplified[part], last[part] = amplification(growth), growth[:, -1]
+    return amplified, last
+
+
+def _last(march: March) -> Array:
+    """How a small turn of the start reaches the end."""
+    if march.growth.shape[1]:
+        return march.growth[:, -1]
+    return so3.transpose(so3.matrix_from_quat(march.quaternions[:, -1]))
 
 
 def _run(
