@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import shapephase as sp
@@ -98,7 +98,7 @@ class Range:
 
     @property
     def cases(self) -> st.SearchStrategy[Case]:
-        """By the number alone, of which Hypothesis repeats none: of many values it would choose most again and again."""
+        """By the number alone, which Hypothesis does not repeat; of many values it chooses most again and again."""
         return st.integers(0, 1_000_000).map(self.case)
 
 
@@ -134,7 +134,17 @@ def check(motion: sp.Motion, truth: sp.Motion) -> None:
 
 @settings(max_examples=500, derandomize=True, deadline=None)
 @given(Range().cases)
+@example(Range().case(2009))
+@example(Range().case(4046))
+@example(Range().case(11345))
+@example(
+    Case("diver", "repeated", 4319, 4, 0.051742078865647474, 8, 5, 1.5781177810630576, 19.663476077058913, 5.63647)
+)
+@example(
+    Case("diver", "repeated", 6848, 5, 0.04120684415832721, 8, 5, 2.3670358092177786, 13.157593559319206, 4.330044)
+)
 def test_no_motion_is_farther_from_the_truth_than_it_says(case: Case):
+    """The examples are fast spins through hundreds of radians, in which errors grow fastest."""
     deformation = case.deformation
     motion, truth = attempt(case, deformation, case.tolerance), truth_of(case, deformation)
     assume(motion is not None and truth is not None)
@@ -142,7 +152,7 @@ def test_no_motion_is_farther_from_the_truth_than_it_says(case: Case):
 
 
 @settings(max_examples=40, derandomize=True, deadline=None)
-@given(Range(samples=(5, 8), loops=(2, 2), duration=(0.5, 1.0), spin=(0.5, 6.0), digits=(4.0, 8.0)).cases)
+@given(Range(samples=(5, 5), loops=(2, 2), duration=(0.5, 0.6), spin=(0.5, 4.0), digits=(4.0, 8.0)).cases)
 def test_nor_from_the_truth_of_another_code(case: Case):
     """Slow spins, short paths and tolerances from 1e-8: the other code takes a hundred times as long, and where the
     library at 1e-12 can be compared it was in error by up to 1e-11, grown like the motion's.

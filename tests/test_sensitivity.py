@@ -146,6 +146,16 @@ def test_sensitivity_without_momentum(case: str):
     np.testing.assert_allclose(motion.sensitivity.by_attitude, there.T, rtol=0, atol=1e-14)
 
 
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("case", CASES)
+def test_sensitivity_is_as_good_as_the_motion(case: str, tolerance: float):
+    tight = motion_of(case)
+    loose = sp.reconstruct(tight.deformation, tight.momentum, tight.initial_attitude, tolerance=tolerance)
+    for field in ("by_momentum", "by_attitude"):
+        truth = getattr(tight.sensitivity, field)
+        assert np.linalg.norm(getattr(loose.sensitivity, field) - truth) < tolerance * np.linalg.norm(truth)
+
+
 @pytest.mark.parametrize("share", [1e-3, 1e-5, 1e-9, 1e-12, 1e-100, 1e-300])
 def test_a_vanishing_momentum_answers_like_none(share: float):
     """From the steps of a moving body to the integral at rest there is no jump: two opposite momenta together are at
@@ -216,8 +226,8 @@ def test_sensitivity_and_amplification_of_the_symmetric_top(across: float, along
     assert apart(motion.final_attitude, truth) < TIGHT
     by_momentum, by_attitude = symmetric_top(across, along, momentum, attitude, time)
     size = np.linalg.norm(by_attitude)
-    assert np.linalg.norm(motion.sensitivity.by_attitude - by_attitude) < EXACT * size
-    assert np.linalg.norm(motion.sensitivity.by_momentum - by_momentum) < EXACT * np.linalg.norm(by_momentum)
+    assert np.linalg.norm(motion.sensitivity.by_attitude - by_attitude) < 10.0 * TIGHT * size
+    assert np.linalg.norm(motion.sensitivity.by_momentum - by_momentum) < 10.0 * TIGHT * np.linalg.norm(by_momentum)
     shear = abs(1.0 / along - 1.0 / across) * np.linalg.norm(np.cross(attitude.T @ momentum, UP)) * time
     assert motion.amplification == pytest.approx(0.5 * (shear + np.hypot(shear, 2.0)), rel=0.01)
 
@@ -305,6 +315,19 @@ def test_amplification_of_a_batch_covers_the_growth_to_the_end():
     assert batch.amplification.shape == (30,)
     assert np.all(batch.amplification >= 1.0)
     assert np.all(batch.amplification >= 0.95 * largest_growth(batch))
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-6])
+@pytest.mark.parametrize("name", BODIES)
+def test_amplification_of_fast_spins_covers_the_growth_to_the_end(name: str, tolerance: float):
+    """Hundreds of radians, at loose tolerances most of one in a step: what a step's growth lacks adds up."""
+    loop = random_loop(1, body_of(name).n_shape, size=0.2).path
+    deformation = sp.articulated(body_of(name), loop.repeated(4))
+    moment = float(np.trace(deformation.inertia(0.0))) / 3.0
+    for seed in range(4):
+        momentum = random_vector(seed, 15.0 * moment)
+        motion = sp.reconstruct(deformation, momentum, tolerance=tolerance)
+        assert motion.amplification >= 0.95 * largest_growth(motion)
 
 
 def test_amplification_remembers_growth_that_has_gone_again():

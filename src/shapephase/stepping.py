@@ -28,11 +28,12 @@ _EPS = np.finfo(float).eps
 _MOST_STEPS = 4_000_000
 _ROUNDS = 12
 _MANY_STEPS = 4000
+_FAR = 80.0
 _FEW = 24
 # In 60,000 random motions the true error of a step was less than a fourteenth of the formula's own estimate where the
 # step spanned at most one degree of the panel that matters, and in most less than a hundredth; with more degrees the
 # estimate is worth less in proportion. Nor is the growth of errors known where the body turns by more than half a
-# radian in a step (the bound at hand is two or three times as large).
+# radian in a step (the bound at hand is two or three times as large), nor in the end where it turns by some thirty.
 _CAUTION = 0.07
 _DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST, _TURN_A_STEP = 3.0, 2.0, 1.0
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
@@ -197,6 +198,8 @@ def _stacked(parts: list[Array]) -> Array:
 
 def tolerance_argument(tolerance: float) -> float:
     """A user's tolerance of an attitude [rad]. Raises ShapeError outside 1e-13 to 1e-4."""
+    if type(tolerance) is float and _TIGHTEST <= tolerance <= _LOOSEST:
+        return tolerance
     goal = finite_array(tolerance, "tolerance", unit="rad")
     if goal.ndim or not _TIGHTEST <= goal <= _LOOSEST:
         raise ShapeError(f"tolerance: a number from {_TIGHTEST:g} to {_LOOSEST:g} rad is needed, got {tolerance!r}")
@@ -233,7 +236,9 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         turn, swing, degree = _features(interpolant, size, tolerance)
         least = _least_steps(turn, degree, size)
         planned = _first_plan(turn, swing, ease * tolerance) if steps is None else _plan_for(interpolant, edges, steps)
-        if size > 0.0 and known is None and np.maximum(planned, least).sum() * interpolant.loops > _MANY_STEPS:
+        far = interpolant.loops * turn.sum() > _FAR
+        many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
+        if size > 0.0 and known is None and (far or many):
             known = _growth_of_long(interpolant, momentum, sizes)
             # So many steps, each in need of that much more accuracy.
             share = 0.01 * planned.sum() * interpolant.loops * max(1.0, float(np.nan_to_num(known[0]).max()))
@@ -241,8 +246,11 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         steps = np.ceil(np.maximum(planned, least)).astype(int)
         march = _run(interpolant, momentum, sizes, steps, with_growth=known is None)
         caution = _CAUTION * max(1.0, float((np.maximum(degree, 2.0 * turn) / steps).max()))
-        local = np.where(np.isfinite(march.errors), caution * march.errors, np.pi)
+        local = caution * march.errors
         total = local.sum(axis=1)
+        if not np.isfinite(total).all():
+            local = np.where(np.isfinite(local), local, np.pi)
+            total = local.sum(axis=1)
         growth, last = known if known is not None else (amplification(march.growth), _last(march))
         bound = SteppedRotation(
             interpolant,
