@@ -35,7 +35,7 @@ _FEW = 24
 # estimate is worth less in proportion. Nor is the growth of errors known where the body turns by more than half a
 # radian in a step (the bound at hand is two or three times as large), nor in the end where it turns by some thirty.
 _CAUTION = 0.07
-_DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST, _TURN_A_STEP = 3.0, 2.0, 1.0
+_DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST, _TURN_A_STEP, _TURN_A_STEP_OF_MANY = 3.0, 2.0, 1.0, 0.3
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
 _BATCHED = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
@@ -237,6 +237,9 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         least = _least_steps(turn, degree, size)
         planned = _first_plan(turn, swing, ease * tolerance) if steps is None else _plan_for(interpolant, edges, steps)
         far = interpolant.loops * turn.sum() > _FAR
+        if far and len(momentum) > _FEW:
+            # For each of many the derivative would take too long: steps so short that it is not needed.
+            far, least = False, np.maximum(least, turn / _TURN_A_STEP_OF_MANY)
         many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
         if size > 0.0 and known is None and (far or many):
             known = _growth_of_long(interpolant, momentum, sizes)
