@@ -107,18 +107,6 @@ def times_of(deformation: sp.Deformation) -> np.ndarray:
     return np.union1d(np.linspace(0.0, deformation.duration, 25), deformation.breaks)
 
 
-def truth_of(case: Case, deformation: sp.Deformation) -> sp.Motion | None:
-    """The motion to 1e-12, else to 1e-10; None where that is not ten times as tight as the case, or out of reach."""
-    for tolerance in (1e-12, 1e-10):
-        if case.tolerance < 10.0 * tolerance:
-            break
-        try:
-            return case.motion(deformation, tolerance)
-        except AccuracyNotReached:
-            continue
-    return None
-
-
 def attempt(case: Case, deformation: sp.Deformation, tolerance: float) -> sp.Motion | None:
     try:
         return case.motion(deformation, tolerance)
@@ -126,10 +114,24 @@ def attempt(case: Case, deformation: sp.Deformation, tolerance: float) -> sp.Mot
         return None
 
 
-def check(motion: sp.Motion, truth: sp.Motion) -> None:
+def motion_and_truth(case: Case) -> tuple[sp.Motion, sp.Motion] | None:
+    """The motion and the same one to 1e-12, else to 1e-10; None where that is out of reach, or less than ten times as
+    tight. Where errors grow fiftyfold, rounding puts 1e-12 out of reach, and it is not tried.
+    """
+    deformation = case.deformation
+    motion = attempt(case, deformation, case.tolerance)
+    if motion is None:
+        return None
+    for tolerance in (1e-12, 1e-10) if motion.amplification < 50.0 else (1e-10,):
+        truth = attempt(case, deformation, tolerance) if case.tolerance >= 10.0 * tolerance else None
+        if truth is not None:
+            return motion, truth
+    return None
+
+
+def distance(motion: sp.Motion, truth: sp.Motion) -> float:
     times = times_of(motion.deformation)
-    assert motion.error_estimate <= motion.tolerance
-    assert apart(motion.attitude(times), truth.attitude(times)) <= motion.error_estimate + truth.error_estimate
+    return apart(motion.attitude(times), truth.attitude(times))
 
 
 @settings(max_examples=500, derandomize=True, deadline=None)
@@ -145,14 +147,15 @@ def check(motion: sp.Motion, truth: sp.Motion) -> None:
 )
 def test_no_motion_is_farther_from_the_truth_than_it_says(case: Case):
     """The examples are fast spins through hundreds of radians, in which errors grow fastest."""
-    deformation = case.deformation
-    motion, truth = attempt(case, deformation, case.tolerance), truth_of(case, deformation)
-    assume(motion is not None and truth is not None)
-    check(motion, truth)
+    pair = motion_and_truth(case)
+    assume(pair is not None)
+    motion, truth = pair
+    assert motion.error_estimate <= case.tolerance
+    assert distance(motion, truth) <= motion.error_estimate + truth.error_estimate
 
 
 @settings(max_examples=40, derandomize=True, deadline=None)
-@given(Range(samples=(5, 5), loops=(2, 2), duration=(0.5, 0.6), spin=(0.5, 4.0), digits=(4.0, 8.0)).cases)
+@given(Range(samples=(5, 5), loops=(2, 2), duration=(0.5, 0.5), spin=(0.5, 3.0), digits=(4.0, 8.0)).cases)
 def test_nor_from_the_truth_of_another_code(case: Case):
     """Slow spins, short paths and tolerances from 1e-8: the other code takes a hundred times as long, and where the
     library at 1e-12 can be compared it was in error by up to 1e-11, grown like the motion's.
@@ -178,14 +181,7 @@ def test_estimates_are_of_use():
 
     An error too small to be seen counts as 1e-13.
     """
-    ratios = []
-    for number in range(150):
-        case = Range(digits=(9.0, 9.0)).case(number)
-        deformation = case.deformation
-        motion, truth = attempt(case, deformation, case.tolerance), truth_of(case, deformation)
-        if motion is not None and truth is not None:
-            times = times_of(deformation)
-            error = apart(motion.attitude(times), truth.attitude(times))
-            ratios.append(float(motion.error_estimate) / max(error, 1e-13))
+    pairs = [motion_and_truth(Range(digits=(9.0, 9.0)).case(number)) for number in range(150)]
+    ratios = [pair[0].error_estimate / max(distance(*pair), 1e-13) for pair in pairs if pair is not None]
     assert len(ratios) > 120
     assert np.median(ratios) < 1000.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from independent import BODIES, apart, body_of, random_loop, random_rotation, random_vector
+from independent import BODIES, apart, body_of, pinocchio_motion, random_loop, random_rotation, random_vector
 
 
 def loops(name: str, count: int) -> Iterator[sp.ShapePath]:
@@ -101,3 +101,21 @@ def test_a_pause_of_a_black_box_is_seen_as_one_when_it_is_declared():
     without, paused = (sp.reconstruct(sp.articulated(body, path(p)), momentum).evaluations for p in (0.0, 1.0))
     # A black box is cut into four panels between breaks: one evaluation for each of those.
     assert paused <= without + 4
+
+
+def test_a_black_box_that_moves_late_in_a_panel_does_not_stand_still():
+    """At rest at the start and the middle of its first panel, a quarter of the path, and moving in its last fifth."""
+    body = body_of("cat_two_halves")
+    reach = np.full(body.n_shape, 0.8)
+
+    def curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        x = np.clip((t - 0.8) / 0.2, 0.0, 1.0)[:, None]
+        return reach * (x * (1.0 - x)) ** 4, reach * 4.0 * (x * (1.0 - x)) ** 3 * (1.0 - 2.0 * x) / 0.2
+
+    deformation = sp.articulated(body, sp.ShapePath.function(curve, 4.0))
+    momentum = random_vector(1, BODIES["cat_two_halves"])
+    motion = sp.reconstruct(deformation, momentum, tolerance=1e-8)
+    path, times = sp.ShapePath.function(curve, 4.0, breaks=[0.8, 1.0]), np.array([0.0, 0.85, 0.95, 4.0])
+    truth = pinocchio_motion("cat_two_halves", body.joint_names, path, momentum, None, times, [0.8, 1.0])
+    assert apart(motion.attitude(times), truth.attitude) < 1e-8
+    assert motion.evaluations > 20

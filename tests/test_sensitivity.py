@@ -307,11 +307,12 @@ def test_amplification_covers_the_growth_to_the_end(case: str):
     assert motion_of(case, moving=False).amplification == 1.0
 
 
-def test_amplification_of_a_batch_covers_the_growth_to_the_end():
-    """As many as are stepped on whole arrays, all but at rest to fast."""
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-9])
+def test_amplification_of_a_batch_covers_the_growth_to_the_end(tolerance: float):
+    """As many as are stepped on whole arrays, all but at rest to fast, also when a step may turn far."""
     random = np.random.default_rng(1)
-    momenta = random.normal(size=(30, 3)) * BODIES["cat"] * np.geomspace(1e-3, 3.0, 30)[:, None]
-    batch = sp.reconstruct(deformation_of("cat"), momenta, random_rotation(3), tolerance=1e-10)
+    momenta = random.normal(size=(30, 3)) * BODIES["cat"] * np.geomspace(1e-3, 10.0, 30)[:, None]
+    batch = sp.reconstruct(deformation_of("cat"), momenta, random_rotation(3), tolerance=tolerance)
     assert batch.amplification.shape == (30,)
     assert np.all(batch.amplification >= 1.0)
     assert np.all(batch.amplification >= 0.95 * largest_growth(batch))
