@@ -23,19 +23,13 @@ from .march import March, marched, marched_at_rest
 from .rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
 from .sampling import Sampler
 from .spectrum import Evaluate
+from .step_plan import Needs, carried_over, finer
 
 _EPS = np.finfo(float).eps
 _MOST_STEPS = 4_000_000
 _ROUNDS = 12
 _MANY_STEPS = 4000
-_FAR = 80.0
 _FEW = 24
-# In 60,000 random motions the true error of a step was less than a fourteenth of the formula's own estimate where the
-# step spanned at most one degree of the panel that matters, and in most less than a hundredth; with more degrees the
-# estimate is worth less in proportion. Nor is the growth of errors known where the body turns by more than half a
-# radian in a step (the bound at hand is two or three times as large), nor in the end where it turns by some thirty.
-_CAUTION = 0.07
-_DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST, _TURN_A_STEP, _TURN_A_STEP_OF_MANY = 3.0, 2.0, 1.0, 0.3
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
 _BATCHED = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
@@ -233,23 +227,20 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         rounds += 1
         sampler.refine(size, sampling_target)
         interpolant = sampler.interpolant()
-        turn, swing, degree = _features(interpolant, size, tolerance)
-        least = _least_steps(turn, degree, size)
-        planned = _first_plan(turn, swing, ease * tolerance) if steps is None else _plan_for(interpolant, edges, steps)
-        far = interpolant.loops * turn.sum() > _FAR
-        if far and len(momentum) > _FEW:
-            # For each of many the derivative would take too long: steps so short that it is not needed.
-            far, least = False, np.maximum(least, turn / _TURN_A_STEP_OF_MANY)
+        needs = Needs.of(interpolant, size, tolerance)
+        # For each of many the derivative would take too long: steps so short that it is not needed.
+        short = needs.far and len(momentum) > _FEW
+        least = needs.least_steps(short=short)
+        planned = needs.first_plan(ease * tolerance) if steps is None else carried_over(interpolant, edges, steps)
         many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
-        if size > 0.0 and known is None and (far or many):
+        if size > 0.0 and known is None and (many or (needs.far and not short)):
             known = _growth_of_long(interpolant, momentum, sizes)
             # So many steps, each in need of that much more accuracy.
             share = 0.01 * planned.sum() * interpolant.loops * max(1.0, float(np.nan_to_num(known[0]).max()))
-            planned = _first_plan(turn, swing, max(tolerance / share, 1e-18))
+            planned = needs.first_plan(max(tolerance / share, 1e-18))
         steps = np.ceil(np.maximum(planned, least)).astype(int)
         march = _run(interpolant, momentum, sizes, steps, with_growth=known is None)
-        caution = _CAUTION * max(1.0, float((np.maximum(degree, 2.0 * turn) / steps).max()))
-        local = caution * march.errors
+        local = needs.caution(steps) * march.errors
         total = local.sum(axis=1)
         if not np.isfinite(total).all():
             local = np.where(np.isfinite(local), local, np.pi)
@@ -280,7 +271,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         by_loop = local.reshape(len(local), interpolant.loops, -1).sum(axis=1)
         sums = np.add.reduceat(by_loop, np.cumsum(steps) - steps, axis=1).max(axis=0)
         if sums.sum() > room:
-            steps = _finer(steps, sums, room)
+            steps = finer(steps, sums, room)
         sampling_target = min(sampling_target, 0.5 * room)
         edges = interpolant.edges[: len(steps) + 1]
         too_many = rounds == _ROUNDS or steps.sum() * interpolant.loops > _MOST_STEPS
@@ -297,61 +288,13 @@ def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
     )
 
 
-def _first_plan(turn: Array, swing: Array, tolerance: float) -> Array:
-    """Steps per panel, not yet whole.
-
-    The three numbers were fitted to the steps that 137 motions of twelve bodies needed at three tolerances; in six of
-    seven the first plan does.
-    """
-    return np.maximum(tolerance**-0.1376 * (0.0365 * turn + 0.163 * swing), 1.0)
-
-
-def _least_steps(turn: Array, degree: Array, size: float) -> Array:
-    """Steps per panel, not yet whole, without which the estimates would mean nothing."""
-    return np.maximum(degree / (_DEGREES_A_STEP if size > 0.0 else _DEGREES_A_STEP_AT_REST), turn / _TURN_A_STEP)
-
-
-def _features(interpolant: Interpolant, size: float, tolerance: float) -> tuple[Array, Array, Array]:
-    """Of each panel: how far the body may turn [rad], how much its rate of turning swings, and the last degree
-    that matters.
-    """
-    count, degrees, _ = interpolant.coefficients.shape
-    edges = interpolant.edges[: count + 1]
-    rates = np.abs(interpolant.coefficients) @ np.array([size] * 6 + [1.0] * 3) * (edges[1:] - edges[:-1])[:, None]
-    powers = _degree_powers(degrees)
-    turn, _, swing = (rates @ powers).T
-    return turn, swing ** (1.0 / 7.0), ((rates > 0.004 * tolerance) * powers[:, 1]).max(axis=1)
-
-
-@lru_cache(maxsize=64)
-def _degree_powers(degrees: int) -> Array:
-    """(n, 3): ones, the degrees and their sixth powers."""
-    return np.arange(degrees, dtype=np.float64)[:, None] ** np.array([0.0, 1.0, 6.0])
-
-
-def _plan_for(interpolant: Interpolant, old_edges: Array, old_steps: Integers) -> Array:
-    """The plan carried over to an interpolant whose panels may have been bisected since."""
-    edges = interpolant.edges[: len(interpolant.coefficients) + 1]
-    widths = np.diff(edges)
-    middle = 0.5 * (edges[:-1] + edges[1:])
-    old = np.clip(np.searchsorted(old_edges, middle) - 1, 0, len(old_steps) - 1)
-    return np.maximum(1.0, old_steps[old] * widths / np.diff(old_edges)[old] - 1e-9)
-
-
-def _finer(steps: Integers, sums: Array, room: float) -> Integers:
-    """More steps where the local errors are above their share."""
-    shares = np.maximum(room * steps / steps.sum(), 0.1 * room / len(steps))
-    factor = np.clip((sums / shares) ** 0.125 * 1.05, 1.0, 8.0)
-    return np.ceil(steps * factor).astype(int)
-
-
 def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> tuple[Array, Array]:
     """Amplification (B,) and propagator (B, 3, 3) of many steps, by the derivative of coarse ones.
 
     What is but nearly right drifts off in the end.
     """
-    turn, _, degree = _features(interpolant, float(sizes.max()), _LOOSEST)
-    steps = np.ceil(np.maximum(_least_steps(turn, degree, 1.0), 1.0)).astype(int)
+    least = Needs.of(interpolant, float(sizes.max()), _LOOSEST).least_steps()
+    steps = np.ceil(np.maximum(least, 1.0)).astype(int)
     channels, directions = _stage_channels(interpolant, steps), _directions(momentum, sizes)
     amplified, last = np.empty(len(sizes)), np.empty((len(sizes), 3, 3))
     with np.errstate(all="ignore"):
