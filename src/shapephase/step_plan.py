@@ -27,14 +27,14 @@ class Needs(NamedTuple):
     turn : (P,) a bound of how far the body turns on a panel [rad]
     swing : (P,) how much its rate of turning swings there
     degree : (P,) the last degree that matters there
-    far : whether it may turn far in all
+    whole_turn : the bound for all panels and loops [rad]
     moving : whether there is momentum
     """
 
     turn: Array
     swing: Array
     degree: Array
-    far: bool
+    whole_turn: float
     moving: bool
 
     @classmethod
@@ -47,7 +47,12 @@ class Needs(NamedTuple):
         powers = _degree_powers(degrees)
         turn, _, swing = (rates @ powers).T
         degree = ((rates > 0.004 * tolerance) * powers[:, 1]).max(axis=1)
-        return cls(turn, swing ** (1.0 / 7.0), degree, bool(interpolant.loops * turn.sum() > _FAR), size > 0.0)
+        return cls(turn, swing ** (1.0 / 7.0), degree, interpolant.loops * float(turn.sum()), size > 0.0)
+
+    @property
+    def far(self) -> bool:
+        """Whether the body may turn so far that the growth of errors must be exact."""
+        return self.whole_turn > _FAR
 
     def first_plan(self, tolerance: float) -> Array:
         """Steps per panel, not yet whole, that will probably do: (P,).
@@ -63,7 +68,11 @@ class Needs(NamedTuple):
         `short`: so many that the growth of errors is known without the steps' derivative however far the body turns.
         """
         degrees = _DEGREES_A_STEP if self.moving else _DEGREES_A_STEP_AT_REST
-        return np.maximum(self.degree / degrees, self.turn / (_SHORT_TURN_A_STEP if short else _TURN_A_STEP))
+        turn = _SHORT_TURN_A_STEP if short else _TURN_A_STEP
+        if not self.far:
+            # What the growth of errors lacks in each step adds up until it is taken from the derivative.
+            turn = min(turn, 0.85 / (1.0 + self.whole_turn / _FAR))
+        return np.maximum(self.degree / degrees, self.turn / turn)
 
     def caution(self, steps: Integers) -> float:
         """The part of the formula's own estimate that the error of a step may have."""

@@ -245,7 +245,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         if not np.isfinite(total).all():
             local = np.where(np.isfinite(local), local, np.pi)
             total = local.sum(axis=1)
-        growth, last = known if known is not None else (amplification(march.growth), _last(march))
+        growth, last = known or (amplification(march.growth), _last(march))
         bound = SteppedRotation(
             interpolant,
             momentum,
@@ -256,7 +256,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
             march.dynamics,
             growth * sampler.error(size),
             # What the plan took for too small to be resolved counts too.
-            growth * total + 1e-4 * tolerance,
+            growth * total + 1e-3 * tolerance,
             growth,
             last,
         )
