@@ -10,10 +10,9 @@ import numpy as np
 from . import so3
 from .arrays import Array
 from .compiled import called, for_rows
-from .march import adjugate_of, matrix_product, momentum_step_function
+from .march import BLOCK, adjugate_of, matrix_product, momentum_step_function
 from .rotation_step import STAGES, attitude_step
 
-_BLOCK = 256
 _CHECKPOINTS = 8
 
 
@@ -74,8 +73,8 @@ def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
     for row, momentum in enumerate(momenta):
         state = np.concatenate([[0.0, 0.0, 0.0, 1.0], momentum, np.zeros(12)])
         for _ in range(loops):
-            for first in range(0, count, _BLOCK):
-                block = channels[first : first + _BLOCK]
+            for first in range(0, count, BLOCK):
+                block = channels[first : first + BLOCK]
                 (states,) = called(_slope_function(len(block)), len(block), state, block)
                 state = states[-1]
         result[row] = so3.turn_of(state[:4], state[7:].reshape(3, 4)).T
@@ -91,8 +90,8 @@ def _derivatives(channels: Array, direction: Array, size: float, loops: int, see
     state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0, size], seeds.ravel()])
     done = 0
     for _ in range(loops):
-        for first in range(0, count, _BLOCK):
-            block = channels[first : first + _BLOCK]
+        for first in range(0, count, BLOCK):
+            block = channels[first : first + BLOCK]
             (states,) = called(_derivative_function(len(block), columns), len(block), state, block)
             quaternions = states[:, 3:7]
             slopes = so3.turn_of(quaternions[:, None], states[:, 8:].reshape(-1, columns, 8)[:, :, 3:7])

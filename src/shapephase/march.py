@@ -21,8 +21,8 @@ from .rotation_step import (
     variation,
 )
 
-_BLOCK = 256
-_FEW = 24
+BLOCK = 256
+FEW = 24
 _ROWS_AT_ONCE = 2048
 # The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
 _INNER = (5, 8)
@@ -72,7 +72,7 @@ def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, wit
     march.quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0]
     march.directions[:, 0] = directions
     march.growth[:, :1] = np.eye(3)
-    if len(sizes) <= _FEW:
+    if len(sizes) <= FEW:
         for row, size in enumerate(sizes):
             _march_one(march, row, float(size), channels, loops)
         return march
@@ -91,10 +91,10 @@ def marched_at_rest(channels: Array, loops: int) -> March:
     quaternions, errors = np.empty((count + 1, 4)), np.empty(count)
     quaternions[0] = [0.0, 0.0, 0.0, 1.0]
     drifts = np.ascontiguousarray(channels.reshape(count, STAGES, 9)[:, :, 6:]).reshape(count, -1)
-    for first in range(0, count, _BLOCK):
-        part = slice(first, first + _BLOCK)
+    for first in range(0, count, BLOCK):
+        part = slice(first, first + BLOCK)
         states, sides = called(_rest_function(len(drifts[part])), len(drifts[part]), quaternions[first], drifts[part])
-        quaternions[first + 1 : first + _BLOCK + 1], errors[part] = states, sides[:, 0]
+        quaternions[first + 1 : first + BLOCK + 1], errors[part] = states, sides[:, 0]
     whole = _repeated(quaternions, loops) if loops > 1 else quaternions
     nothing = np.zeros((1, loops * count))
     return March(
@@ -124,8 +124,8 @@ def _march_one(march: March, row: int, size: float, channels: Array, loops: int)
     state = state if with_growth else state[:8]
     done = 0
     for _ in range(loops):
-        for first in range(0, count, _BLOCK):
-            block = channels[first : first + _BLOCK]
+        for first in range(0, count, BLOCK):
+            block = channels[first : first + BLOCK]
             states, sides = called(_momentum_function(len(block), with_growth), len(block), state, block)
             after = slice(done + 1, done + len(block) + 1)
             march.directions[row, after] = states[:, :3]

@@ -19,7 +19,7 @@ from .arrays import Array, Integers, finite_array
 from .errors import AccuracyNotReached, ShapeError
 from .growth import amplification, exact_growth, momentum_slope
 from .interpolant import Interpolant, chebyshev, inside
-from .march import March, marched, marched_at_rest
+from .march import FEW, March, marched, marched_at_rest
 from .rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
 from .sampling import Sampler
 from .spectrum import Evaluate
@@ -29,7 +29,6 @@ _EPS = np.finfo(float).eps
 _MOST_STEPS = 4_000_000
 _ROUNDS = 12
 _MANY_STEPS = 4000
-_FEW = 24
 _TIGHTEST, _LOOSEST = 1e-13, 1e-4
 _BATCHED = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
@@ -219,7 +218,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     sampling_target = (0.05 if size > 0.0 else 0.3) * tolerance
     steps: Integers | None = None
     # Among many there are some that need more steps than most; a second attempt takes them all along.
-    ease = 1.0 if len(momentum) <= _FEW else 0.1
+    ease = 1.0 if len(momentum) <= FEW else 0.1
     known: tuple[Array, Array] | None = None
     edges = np.empty(0)
     rounds = 0
@@ -229,7 +228,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         interpolant = sampler.interpolant()
         needs = Needs.of(interpolant, size, tolerance)
         # For each of many the derivative would take too long: steps so short that it is not needed.
-        short = needs.far and len(momentum) > _FEW
+        short = needs.far and len(momentum) > FEW
         least = needs.least_steps(short=short)
         planned = needs.first_plan(ease * tolerance) if steps is None else carried_over(interpolant, edges, steps)
         many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
