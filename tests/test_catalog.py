@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+import warnings
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from shapephase.errors import (
     ShapePhaseError,
     UnknownNameError,
 )
+from shapephase.link_tree import IgnoredElementWarning
 
 BASE = link("base", 3.0, [0.3, 0.5, 0.6])
 ARM = link("arm", 1.0, [0.02, 0.03, 0.04], (0.2, 0.1, 0.0))
@@ -137,6 +140,20 @@ def test_a_file_that_is_not_there(name):
     assert Path(name).name.replace("\0", "\\x00") in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["/dev/null", "/dev/zero"])
+def test_a_device_is_no_file(name):
+    with pytest.raises(InputFileNotFoundError, match="regular file"):
+        sp.load_body(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "error"), [("x" * 5000, UnknownNameError), ("x" * 5000 + ".urdf", InputFileNotFoundError)]
+)
+def test_a_name_longer_than_any_file_has(name, error):
+    with pytest.raises(error):
+        sp.load_body(name)
+
+
 def test_a_folder_is_no_file(tmp_path):
     with pytest.raises(InputFileNotFoundError, match="folder"):
         sp.load_body(tmp_path)
@@ -150,7 +167,7 @@ GIBBERISH = {
     "json": (b'{"robot": 1}', "XML"),
     "latin-1": ('<robot name="é"/>'.encode("latin-1"), "UTF-8.*byte 13"),
     "utf-16": (GOOD.encode("utf-16"), "UTF-8"),
-    "mjcf": (b"<mujoco/>", "MJCF"),
+    "mjcf": (b"<mujoco/>", "<mujoco> has no <worldbody>"),
     "sdf": (b"<sdf/>", "SDF"),
     "html": (b"<html/>", "HTML"),
     "doctype": (b'<!DOCTYPE robot [<!ENTITY m "1">]>' + GOOD.encode(), "DOCTYPE"),
@@ -250,7 +267,7 @@ def test_an_origin_must_be_three_numbers(xyz, whose, load_urdf):
     [
         ('mass value="1.0"', 'mass value="-1.0"', "negative mass -1"),
         ('<mass value="1.0"/>', "", "no <mass>"),
-        ('mass value="1.0"', "mass", "<mass> value"),
+        ('mass value="1.0"', "mass", "<mass> has no value"),
         (' iyz="0.0" izz="0.04"', ' izz="0.04"', "iyz"),
         ('<inertia ixx="0.02" ixy="0.0" ixz="0.0" iyy="0.03" iyz="0.0" izz="0.04"/>', "", "no <inertia>"),
         ("</inertial></link><joint", "</inertial><inertial/></link><joint", "2 <inertial>"),
@@ -343,7 +360,7 @@ def chain(*rules):
         (('<mimic joint="j1"/>', '<mimic joint="j2"/>', '<mimic joint="j0"/>'), "j[012].*circle"),
         (('<mimic joint="j1"/>', '<mimic joint="j2"/>', '<mimic joint="j1"/>'), "j[012].*circle"),
         (('<mimic joint="nobody"/>', ""), "j0.*'nobody'"),
-        (("<mimic/>", ""), "j0"),
+        (("<mimic/>", ""), "<mimic>: has no joint"),
         (('<mimic joint="j1" multiplier="two"/>', ""), "j0.*multiplier"),
         (('<mimic joint="j1" offset="nan"/>', ""), "j0.*offset"),
     ],
@@ -357,32 +374,143 @@ def test_a_fixed_joint_that_mimics_does_not_move(load_urdf):
     text = chain("", "").replace(
         '<joint name="j1" type="revolute">', '<joint name="j1" type="fixed"><mimic joint="j0"/>'
     )
-    assert load_urdf(text).joint_names == ("j0",)
+    with pytest.warns(IgnoredElementWarning, match="joint 'j1': <mimic> of a fixed joint is ignored"):
+        assert load_urdf(text).joint_names == ("j0",)
+
+
+def test_a_joint_follows_one_of_its_own_kind(load_urdf):
+    text = chain("", '<mimic joint="j0"/>').replace('name="j0" type="revolute"', 'name="j0" type="prismatic"')
+    with pytest.raises(ModelFileError, match="joint 'j1': is revolute and mimics joint 'j0', which is prismatic"):
+        load_urdf(text)
 
 
 # ---- Loading in a process of its own --------------------------------------------------------------------------------
 
 
-def test_isolated_loading_gives_the_same_body(tmp_path):
-    plain, isolated = sp.load_body("diver"), sp.load_body("diver", isolate=True)
-    np.testing.assert_array_equal(isolated.locked_inertia([0.3, 0.4]), plain.locked_inertia([0.3, 0.4]))
+def isolated(tmp_path, text=GOOD, **options):
+    path = tmp_path / "body.urdf"
+    path.write_text(text)
+    return sp.load_body(path, isolate=True, **options)
+
+
+def test_isolated_loading_gives_the_same_body_and_the_same_errors(tmp_path, load_urdf):
+    plain, alone = load_urdf(GOOD), isolated(tmp_path)
+    np.testing.assert_array_equal(alone.locked_inertia([0.3]), plain.locked_inertia([0.3]))
     with pytest.raises(InputFileNotFoundError):
         sp.load_body(tmp_path / "nowhere.urdf", isolate=True)
+    with pytest.raises(ModelFileError, match=r"body\.urdf:1: link 'arm': negative mass"):
+        isolated(tmp_path, GOOD.replace('mass value="1.0"', 'mass value="-1.0"'))
+    negative = GOOD.replace('izz="0.04"', 'izz="-0.04"')
+    with pytest.raises(ModelFileError, match="negative"):
+        isolated(tmp_path, negative)
+    with pytest.warns(sp.UnphysicalInertiaWarning, match="negative") as caught:
+        isolated(tmp_path, negative, on_unphysical="warn")
+    assert len(caught) == 1
 
 
-def test_a_crash_or_a_hang_of_the_parser_is_an_error(monkeypatch):
+def in_child(monkeypatch, code, **changed):
+    """Let the child run something else."""
     real = subprocess.run
+    monkeypatch.setattr(
+        subprocess,
+        "run",
+        lambda command, **options: real([command[0], "-c", code, *command[4:]], **{**options, **changed}),
+    )
 
-    def crashing(command, **options):
-        return real([command[0], "-c", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"], **options)
 
-    monkeypatch.setattr(subprocess, "run", crashing)
-    with pytest.raises(ModelFileError, match=r"crashed on it \(signal 11\)"):
-        sp.load_body("diver", isolate=True)
+def test_a_crash_of_the_parser_is_an_error(monkeypatch, tmp_path):
+    in_child(monkeypatch, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    with pytest.raises(ModelFileError, match=r"body\.urdf:1: the parser crashed on it, signal 11"):
+        isolated(tmp_path)
 
-    def hanging(command, **options):
-        return real([command[0], "-c", "import time; time.sleep(60)"], **{**options, "timeout": 0.2})
 
-    monkeypatch.setattr(subprocess, "run", hanging)
-    with pytest.raises(ModelFileError, match="was stopped"):
-        sp.load_body("diver", isolate=True)
+def test_a_hang_of_the_parser_is_an_error(monkeypatch, tmp_path):
+    in_child(monkeypatch, "import time; time.sleep(60)", timeout=0.2)
+    with pytest.raises(ModelFileError, match=r"body\.urdf:1: .*was stopped"):
+        isolated(tmp_path)
+
+
+def test_a_parser_that_eats_memory_is_an_error(monkeypatch, tmp_path):
+    """The child limits itself; the parent lives on."""
+    greedy = (
+        "from shapephase import catalog; catalog._from_file = lambda *_: bytearray(2**30); catalog.load_from_input()"
+    )
+    in_child(monkeypatch, greedy)
+    with pytest.raises(ModelFileError, match=r"body\.urdf:1: loading it took more than 640 MiB"):
+        isolated(tmp_path)
+
+
+def test_a_child_that_fails_otherwise_is_no_success(monkeypatch, tmp_path):
+    in_child(monkeypatch, "import no_such_module")
+    with pytest.raises(ModelFileError, match=r"process of its own failed: .*no_such_module"):
+        isolated(tmp_path)
+
+
+def test_the_largest_body_loads_within_the_limits(tmp_path):
+    links = [link(f"l{i}", 1.0, [0.1, 0.1, 0.1]) for i in range(201)]
+    joints = [joint(f"j{i}", "revolute", "l0", f"l{i + 1}") for i in range(200)]
+    assert isolated(tmp_path, urdf(*links, *joints)).n_shape == 200
+
+
+def test_installed_bodies_are_trusted(monkeypatch):
+    """No process is started for a name."""
+    monkeypatch.setattr(subprocess, "run", None)
+    assert sp.load_body("diver", isolate=True).name == "diver"
+    assert sp.load_body("example:human", isolate=True).name == "human"
+
+
+def test_a_module_beside_the_file_is_not_imported(tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").write_text("raise SystemExit(7)")
+    monkeypatch.chdir(tmp_path)
+    assert isolated(tmp_path).joint_names == ("hip",)
+
+
+# ---- Lines, and warnings --------------------------------------------------------------------------------------------
+
+
+def test_a_message_begins_with_file_and_line_and_names_the_element(tmp_path):
+    path = tmp_path / "cat.urdf"
+    lines = (catalog.robots_folder() / "cat.urdf").read_text().splitlines()
+    number = next(i for i, line in enumerate(lines) if "<mass" in line and i > 60)
+    lines[number] = '<mass value="1,5"/>'
+    path.write_text("\n".join(lines))
+    with pytest.raises(ModelFileError) as caught:
+        sp.load_body(path)
+    assert re.match(
+        rf"{re.escape(str(path))}:{number + 1}: link '\w+': <mass> value='1,5': a finite number", str(caught.value)
+    )
+
+
+def test_one_warning_for_each_kind_names_all_its_links(load_urdf):
+    broken = [link(f"l{i}", 1.0, [0.01, 0.01, 0.05]) for i in range(3)]
+    joints = [joint(f"j{i}", "revolute", "base", f"l{i}") for i in range(3)]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        load_urdf(urdf(BASE, *broken, *joints))
+    (warning,) = caught
+    assert re.findall("'(l.)'", str(warning.message)) == ["l0", "l1", "l2"]
+    assert warning.filename == str(Path(__file__).parent / "conftest.py"), "it points to who loads"
+
+
+def test_the_rounding_of_an_inertia_is_no_fault(load_urdf):
+    """As in example:icub: a point mass whose inertia has been moved about, 1e-20 of the body's."""
+    for izz in ("0", "5e-20", "-5e-20"):
+        moments = f'ixx="5e-21" ixy="0" ixz="0" iyy="3e-20" iyz="0" izz="{izz}"'
+        text = re.sub('ixx="0.02".*?izz="0.04"', moments, GOOD)
+        assert text != GOOD
+        load_urdf(text)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_doubts_do_not_depend_on_the_unit_of_mass(scale, load_urdf):
+    """But for those about units."""
+    good, bad = ([0.02, 0.03, 0.04], [0.02, 0.03, 0.06])
+    for moments, doubted in ((good, False), (bad, True)):
+        base, arm = (
+            link("base", 3.0 * scale, np.multiply(scale, [0.3, 0.5, 0.6])),
+            link("arm", scale, np.multiply(scale, moments)),
+        )
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            load_urdf(urdf(base, arm, joint("hip", "revolute", "base", "arm")))
+        assert any("triangle" in str(warning.message) for warning in caught) == doubted

@@ -6,7 +6,6 @@ from __future__ import annotations
 # pyright: reportAttributeAccessIssue=false
 import math
 import threading
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,16 +13,14 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from . import so3
 from .arrays import Array, finite_array
-from .errors import ModelFileError, ShapeError, UnphysicalInertiaError, unknown_name
-from .inertia_tensor import triangle_defect
-from .urdf import Mimic, UrdfText
+from .errors import ShapeError, unknown_name
+from .inertia_tensor import second_moment
+from .link_tree import Mimic
+from .model_tree import mimic_map, moving_joints
 
 _BASE = 6  # velocities of the free-flyer in Pinocchio's order
-
-
-class UnphysicalInertiaWarning(UserWarning):
-    """A link's inertia that no distribution of mass has, accepted because the caller asked so or it is harmless."""
 
 
 class Body:
@@ -36,6 +33,7 @@ class Body:
     Attributes
     ----------
     name : str
+    sha256 : of the file it was loaded from; None without a file
     joint_names : tuple of the independent joints, in the order of the shape vector
     n_shape : number of independent joints
     mass : [kg]
@@ -48,11 +46,12 @@ class Body:
         self._model = model
         self._local = threading.local()
         self.name = name
+        self.sha256: str | None = None
         self.mass = float(pin.computeTotalMass(model))
-        moving = _moving_joints(model)
+        moving = moving_joints(model)
         mimics = dict(mimics or {})
         self.joint_names = tuple(n for n in moving if n not in mimics)
-        self._map, self._offset = _mimic_map(list(moving), self.joint_names, mimics)
+        self._map, self._offset = mimic_map(list(moving), self.joint_names, mimics)
         self._plain = len(self.joint_names) == len(moving)
         kinds = [model.joints[i] for i in moving.values()]
         turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
@@ -78,7 +77,7 @@ class Body:
     @property
     def link_names(self) -> tuple[str, ...]:
         """The names of all links, those fixed to others included."""
-        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY and f.name != "universe")
+        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
 
     def __repr__(self) -> str:
         """One line for people."""
@@ -167,8 +166,9 @@ class Body:
 
         Raises as `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
         """
-        v = self._checked(rate, "rate")
-        return (self.momentum_matrix(shape) @ v[..., None])[..., 0]
+        r, v = self._checked(shape), self._checked(rate, "rate")
+        self._batch(r.shape[:-1], v.shape[:-1])
+        return (self.momentum_matrix(r) @ v[..., None])[..., 0]
 
     def inertia_gradient(self, shape: ArrayLike) -> Array:
         """dI/dr_k, exact: (..., n) -> (..., n, 3, 3) [kg m^2 per unit of joint].
@@ -183,7 +183,7 @@ class Body:
 
     def inertia_rate(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """dI/dt along a joint motion, exact: (..., n), (..., n) -> (..., 3, 3) [kg m^2/s]."""
-        r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
+        r, v = self._pair(shape, rate)
         flat = self._angular_map_rate(self._rows(r), self._rows(v))
         return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
@@ -203,7 +203,9 @@ class Body:
         and `momentum_matrix_gradient` take one for each.
         """
         w = finite_array(base_rate, "base_rate", (3,), unit="rad/s")
-        r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
+        r, v = self._pair(shape, rate)
+        if self._batch(r.shape[:-1], w.shape[:-1]) != r.shape[:-1]:
+            raise ShapeError(f"base_rate: (3,) or one for each shape {r.shape} is needed, got {w.shape}")
         w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
         model, data = self._model, self._data()
         velocities = self._velocities(self._rows(v))
@@ -234,11 +236,9 @@ class Body:
         UnknownNameError
             If there is no such link.
         """
-        if link not in self.link_names:
-            raise unknown_name(f"link of {self.name}", link, self.link_names)
+        frame = self._link_frame(link)
         r = self._checked(shape)
         model, data = self._model, self._data()
-        frame = model.getFrameId(link, pin.FrameType.BODY)
         configurations = self._configurations(self._rows(r))
         poses = np.empty((len(configurations), 4, 4))
         for row, q in enumerate(configurations):
@@ -246,20 +246,73 @@ class Body:
             poses[row] = pin.updateFramePlacement(model, data, frame).homogeneous
         return poses.reshape(*r.shape[:-1], 4, 4)
 
-    def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike) -> Array:
-        """T_0: kinetic energy of a joint motion about the centre of mass with the base at rest: -> (...) [J].
+    def link_angular_velocity(self, shape: ArrayLike, rate: ArrayLike, link: str) -> Array:
+        """How a link turns as seen from the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
+
+        Raises as `link_pose`.
+        """
+        frame = self._link_frame(link)
+        r, v = self._pair(shape, rate)
+        model, data = self._model, self._data()
+        velocities = self._velocities(self._rows(v))
+        turning = np.empty((len(velocities), 3))
+        for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), velocities, strict=True)):
+            pin.forwardKinematics(model, data, q, full)
+            turning[row] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).angular
+        return turning.reshape(*r.shape[:-1], 3)
+
+    def mass_correlation(self, shape: ArrayLike, rate: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
+        """The second moment of the mass between a shape and a reference shape, and its rate.
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]
+        reference : (n,)
+
+        Returns
+        -------
+        correlation, its rate : (..., 3, 3) integral of r r_reference^T dm, each r from its own centre of mass, base
+            axes [kg m^2], [kg m^2/s]
+        """
+        r, v = self._pair(shape, rate)
+        still = self._checked(reference, "reference")
+        if still.ndim != 1:
+            raise ShapeError(f"reference: one shape ({self.n_shape},) is needed, got {still.shape}")
+        links = self._model.inertias.tolist()[1:]
+        masses = np.array([link.mass for link in links])
+        moments = second_moment(np.array([link.inertia for link in links]))
+        (turns0,), (centres0,), _, _ = self._links(still[None], np.zeros((1, self.n_shape)))
+        turns, centres, turning, speeds = self._links(self._rows(r), self._rows(v))
+        there = moments @ np.swapaxes(turns0, -1, -2)
+        weighted = masses[:, None] * centres0
+        correlation = np.swapaxes(centres, -1, -2) @ weighted + (turns @ there).sum(axis=1)
+        slope = np.swapaxes(speeds, -1, -2) @ weighted + (so3.hat(turning) @ turns @ there).sum(axis=1)
+        matrix = (*r.shape[:-1], 3, 3)
+        return correlation.reshape(matrix), slope.reshape(matrix)
+
+    def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """Kinetic energy of a joint motion and a turn of the base, about the centre of mass: -> (...) [J].
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]
+        angular_velocity : (..., 3) of the base, base axes [rad/s]; at rest it is T_0
 
         Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
         """
-        r, v = np.broadcast_arrays(self._checked(shape), self._checked(rate, "rate"))
+        r, v = self._pair(shape, rate)
+        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
+        batch = self._batch(r.shape[:-1], omega.shape[:-1])
+        r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
         model, data = self._model, self._data()
         rates = self._velocities(self._rows(v))
+        rates[:, 3:6] = np.broadcast_to(omega, (*batch, 3)).reshape(-1, 3)
         energies = np.empty(len(rates))
         for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), rates, strict=True)):
             pin.ccrba(model, data, q, full)
             whole = pin.computeKineticEnergy(model, data, q, full)
             energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / self.mass
-        return energies.reshape(r.shape[:-1])
+        return energies.reshape(batch)
 
     def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
         """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3).
@@ -274,6 +327,36 @@ class Body:
         whole, slope = self._angular_map(shape), self._angular_map_rate(shape, rate)
         return whole[:, :, :3], whole[:, :, 3:], slope[:, :, :3], slope[:, :, 3:]
 
+    def _links(self, shapes: Array, rates: Array) -> tuple[Array, Array, Array, Array]:
+        """Of each link that carries mass: orientation (N, k, 3, 3), centre of mass from that of the whole (N, k, 3),
+        angular velocity and speed of that centre (N, k, 3), base axes."""
+        model, data = self._model, self._data()
+        levers = np.array([link.lever for link in model.inertias.tolist()[1:]])
+        masses = np.array([link.mass for link in model.inertias.tolist()[1:]]) / self.mass
+        count = model.njoints - 1
+        turns, places = np.empty((len(shapes), count, 3, 3)), np.empty((len(shapes), count, 3))
+        motions = np.empty((len(shapes), count, 6))
+        for row, (q, v) in enumerate(zip(self._configurations(shapes), self._velocities(rates), strict=True)):
+            pin.forwardKinematics(model, data, q, v)
+            for link in range(count):
+                place = data.oMi[link + 1]
+                turns[row, link], places[row, link] = place.rotation, place.translation
+                motions[row, link] = data.v[link + 1].vector
+        centres = places + so3.apply(turns, levers)
+        turning = so3.apply(turns, motions[..., 3:])
+        speeds = so3.apply(turns, motions[..., :3] + np.cross(motions[..., 3:], levers))
+        return (
+            turns,
+            centres - (masses @ centres)[:, None],
+            turning,
+            speeds - (masses @ speeds)[:, None],
+        )
+
+    def _link_frame(self, link: str) -> int:
+        if link not in self.link_names:
+            raise unknown_name(f"link of {self.name}", link, self.link_names)
+        return self._model.getFrameId(link, pin.FrameType.BODY)
+
     def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
         array = finite_array(shape, name)
         if array.ndim == 0 or array.shape[-1] != self.n_shape:
@@ -282,6 +365,18 @@ class Body:
                 f"({', '.join(self.joint_names)}), got shape {array.shape}"
             )
         return array
+
+    def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
+        """Shape and rate with the same leading axes."""
+        r, v = self._checked(shape), self._checked(rate, "rate")
+        batch = self._batch(r.shape[:-1], v.shape[:-1])
+        return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+
+    def _batch(self, *shapes: tuple[int, ...]) -> tuple[int, ...]:
+        try:
+            return np.broadcast_shapes(*shapes)
+        except ValueError:
+            raise ShapeError(f"leading axes {' and '.join(map(str, shapes))} do not go together") from None
 
     def _rows(self, array: Array) -> Array:
         """(..., n) -> (N, n); a body without joints has rows too."""
@@ -352,95 +447,3 @@ class Body:
         except AttributeError:
             self._local.data = self._model.createData()
             return self._local.data
-
-
-def body_from_urdf(urdf: UrdfText, name: str, where: str, on_unphysical: str) -> Body:
-    """A Body from a checked URDF.
-
-    Raises
-    ------
-    ModelFileError
-        If Pinocchio cannot build a model from it.
-    UnphysicalInertiaError
-        If a link's inertia is not positive semidefinite and `on_unphysical` is "error".
-    """
-    for link in urdf.inertias:
-        _check_inertia(f"{where}: link {link.link!r}", link.mass, link.inertia, on_unphysical)
-    root = "shapephase_free_flyer"
-    while root in urdf.text:
-        root += "_"
-    try:
-        model = pin.buildModelFromXML(urdf.text, pin.JointModelFreeFlyer(), root)
-    except ValueError as error:
-        raise ModelFileError(f"{where}: Pinocchio does not accept it: {str(error).strip()}") from None
-    return Body(model, name, urdf.mimics)
-
-
-def body_from_model(model: pin.Model, name: str, where: str, on_unphysical: str) -> Body:
-    """A Body from a copy of a Pinocchio model whose root joint is a free-flyer. Raises as `body_from_urdf`."""
-    if model.njoints < 2 or model.joints[1].shortname() != "JointModelFreeFlyer":
-        raise ModelFileError(
-            f"{where}: the model's root joint is no free-flyer, so the mass of its root link is lost; build it with "
-            "pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())"
-        )
-    for number in range(1, model.njoints):
-        moved = f"{where}: what joint {model.names[number]!r} moves"
-        inertia = model.inertias[number]
-        _check_inertia(moved, inertia.mass, inertia.inertia, on_unphysical)
-    return Body(model.copy(), name)
-
-
-def _moving_joints(model: pin.Model) -> dict[str, int]:
-    """Names and numbers of the joints below the free-flyer, in Pinocchio's order."""
-    moving = {}
-    for number in range(2, model.njoints):
-        joint = model.joints[number]
-        kind = joint.shortname()
-        single = joint.nv == 1 and (joint.nq == 1 or kind.startswith("JointModelRUB") or "Unbounded" in kind)
-        if not single or "Mimic" in kind:
-            raise ModelFileError(
-                f"joint {model.names[number]!r} is a {kind}; joints of one axis are supported (revolute, continuous, "
-                "prismatic): replace it by a chain of those"
-            )
-        moving[model.names[number]] = number
-    return moving
-
-
-def _mimic_map(moving: list[str], independent: tuple[str, ...], mimics: Mapping[str, Mimic]) -> tuple[Array, Array]:
-    """S and q0 of full = S independent + q0, followers of followers resolved."""
-    place = {name: column for column, name in enumerate(independent)}
-    matrix = np.zeros((len(moving), len(independent)))
-    offset = np.zeros(len(moving))
-    for row, name in enumerate(moving):
-        factor, leader = 1.0, name
-        while leader in mimics:
-            rule = mimics[leader]
-            offset[row] += factor * rule.offset
-            factor *= rule.multiplier
-            leader = rule.leader
-        if leader in place:
-            matrix[row, place[leader]] = factor
-        elif leader != name:
-            raise ModelFileError(f"joint {name!r} mimics {leader!r}, which is fixed or not part of the body")
-    return matrix, offset
-
-
-def _check_inertia(place: str, mass: float, tensor: Array, on_unphysical: str) -> None:
-    if on_unphysical not in ("error", "warn"):
-        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
-    if not (np.isfinite(mass) and np.isfinite(tensor).all() and mass >= 0.0):
-        raise UnphysicalInertiaError(f"{place} has mass {mass} kg and inertia {tensor.tolist()} kg m^2")
-    moments = np.linalg.eigvalsh(tensor)
-    # What is left of an inertia by the rounding of moving it about is no fault of the file.
-    if moments[0] < -1e-9 * max(moments[2], 0.0) - 1e-12 * mass:
-        message = f"{place} has principal moments {moments} kg m^2, one of them negative"
-        if on_unphysical == "error":
-            raise UnphysicalInertiaError(message + "; mend the file, or load it with on_unphysical='warn'")
-        warnings.warn(message, UnphysicalInertiaWarning, stacklevel=5)
-    elif moments[2] > 0.0 and triangle_defect(tensor) > 1e-3:
-        warnings.warn(
-            f"{place} has principal moments {moments} kg m^2, which break the triangle inequality: no distribution "
-            "of mass has them",
-            UnphysicalInertiaWarning,
-            stacklevel=5,
-        )

@@ -15,51 +15,84 @@ class ShapePhaseError(Exception):
 
 
 class ShapeError(ShapePhaseError, ValueError):
-    """An array has the wrong shape or type, or an entry that is no finite number."""
+    """An array has the wrong shape or type, or an entry that is no finite number.
+
+    Remedy: the message names the argument, what came and what was expected; arrays of text, objects, complex numbers
+    or with masked entries are refused, never converted.
+    """
 
 
 class UnknownNameError(ShapePhaseError, ValueError):
-    """A joint, body, motion, gauge or method that does not exist."""
+    """A joint, body, motion, gauge or method that does not exist.
+
+    Remedy: the message lists the names there are, and the nearest.
+    """
 
 
 class ModelFileError(ShapePhaseError, ValueError):
-    """A body's file or model cannot be used as it is."""
+    """A body's file or model cannot be used as it is.
+
+    Causes: no or broken XML, numbers that are none, links that hang on nothing or twice, joints of several axes, macros
+    not yet expanded, or a model that came out of the parser other than the file says. Remedy: the message begins with
+    file, line and element, and says how to mend it.
+    """
 
 
 class UnphysicalInertiaError(ModelFileError):
-    """A link has a mass or an inertia that no body can have."""
+    """A link has a mass or an inertia that no body can have.
+
+    Remedy: mend the file; where only principal moments are negative, `load_body(..., on_unphysical="warn")` takes it.
+    """
 
 
 class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
-    """A file named by the user is not there or cannot be opened."""
+    """A file named by the user is not there or cannot be opened. Remedy: look at the path and its permissions."""
 
 
 class TrajectoryError(ShapePhaseError, ValueError):
-    """A trajectory that is no usable function of time: its times, joints, values or ends."""
+    """A trajectory that is no usable function of time: its times, joints, values or ends.
+
+    Remedy: the message names file, row and joint; times must ascend, every joint of the body must be there, angles
+    are in radians unless the file says degrees.
+    """
 
 
 class OpenPathError(TrajectoryError):
-    """A closed loop of shapes was needed, and the path ends elsewhere than it begins."""
+    """A closed loop of shapes was needed, and the path ends elsewhere than it begins.
+
+    Remedy: close the path (the message names the joint and its gap), or use what open paths have: `horizontal_lift`,
+    `split`, `arc_phases`.
+    """
 
 
 class SingularInertiaError(ShapePhaseError, ArithmeticError):
-    """The locked inertia is not positive definite: some axis has no inertia, so the rotation is undefined."""
+    """The locked inertia is not positive definite: some axis has no inertia, so the rotation is undefined.
+
+    Cause: masses all on one line, or links without mass. Remedy: the message names the time; give mass to the links.
+    """
 
 
 class AccuracyNotReached(ShapePhaseError, ArithmeticError):
-    """The requested tolerance was not met; the best estimate is in the message."""
+    """The requested tolerance was not met; the best estimate is in the message.
+
+    Causes: a motion that is rough between its breaks, errors that grow along a long unstable motion, a tolerance near
+    rounding. Remedy: declare the times of kinks as breaks, loosen the tolerance, or shorten the motion.
+    """
 
 
 class GaugeError(ShapePhaseError, ArithmeticError):
-    """The frame asked for does not exist continuously along the motion."""
+    """The frame asked for does not exist continuously along the motion, or not for this kind of deformation.
+
+    Remedy: the message names the time; the horizontal and the base gauge always exist.
+    """
 
 
 class MissingExtraError(ShapePhaseError, ImportError):
-    """An optional dependency is not installed; the message names the extra."""
+    """An optional dependency is not installed. Remedy: the message names the extra to install."""
 
 
 class ResultFileError(ShapePhaseError, ValueError):
-    """A result file that this version cannot read."""
+    """A result file that this version cannot read: another format, or damaged. Remedy: compute it anew."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:

@@ -1,4 +1,4 @@
-"""The text of a URDF file, read once and checked before Pinocchio sees it.
+"""URDF: every element checked before Pinocchio sees it.
 
 Pinocchio drops what it cannot read (a mass with a unit behind it, an inertia without all six entries, links that hang
 on nothing) without a word. So every number is read here first, and Pinocchio gets a text written anew from what
@@ -8,265 +8,240 @@ was read: links with their inertia and joints, nothing else.
 from __future__ import annotations
 
 import math
-import os
-import re
-import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from .arrays import Array
-from .errors import InputFileNotFoundError, ModelFileError
+from .errors import ModelFileError
+from .link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, Mimic, from_the_root
+from .xml_text import (
+    Node,
+    child_of,
+    known_attributes,
+    name_of,
+    needed_child,
+    no_misspelt_children,
+    number,
+    quoted,
+    vector,
+)
 
-Element = ElementTree.Element
-
-_MAX_BYTES = 16 * 2**20
-_MOST_LINKS, _MOST_JOINTS, _MOST_DEPTH = 2000, 300, 200
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
+_ROBOT_PARTS = ("link", "joint")
+_LINK_PARTS = ("inertial", "visual", "collision")
+_JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+_NONE = np.zeros(3)
+_FORMATS = {
+    "sdf": "an SDF model; convert it to URDF first (sdf2urdf of the ROS package pysdf)",
+    "html": "an HTML page, not the file itself; download the raw file",
+    "mujocoinclude": "a part of an MJCF model; load the file that includes it",
+    "COLLADA": "a mesh; load the robot's URDF",
+}
 
 
-@dataclass(frozen=True)
-class Mimic:
-    """A joint that follows another: angle = multiplier * (angle of `leader`) + offset."""
+@dataclass
+class _Reading:
+    """What is found on the way through the file."""
 
-    leader: str
-    multiplier: float
-    offset: float
-
-
-@dataclass(frozen=True)
-class LinkInertia:
-    """Mass [kg] and inertia about the centre of mass [kg m^2] as written for one link."""
-
-    link: str
-    mass: float
-    inertia: Array
+    text: list[str] = field(default_factory=list)
+    mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
 
 
-@dataclass(frozen=True)
-class UrdfText:
-    """A checked URDF: text for Pinocchio, the robot's name, the joints that follow others, the links' inertias."""
-
-    text: str
-    name: str
-    mimics: dict[str, Mimic]
-    inertias: tuple[LinkInertia, ...]
-
-
-def read_urdf(path: str | os.PathLike[str]) -> UrdfText:
-    """Read and check a URDF file.
+def urdf_tree(root: Node) -> LinkTree:
+    """Check a URDF from its root element.
 
     Raises
     ------
-    InputFileNotFoundError
-        If there is no readable file at `path`.
     ModelFileError
-        If it is too large, no UTF-8, no XML, no URDF, needs xacro, or a link or joint is faulty.
+        If it is no URDF, needs xacro, or a link or joint is faulty.
     """
-    where = Path(path)
-    if "\0" in str(where):
-        raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes")
-    if not where.is_file():
-        kind = "is a folder, not a file" if where.is_dir() else "there is no such file"
-        raise InputFileNotFoundError(f"{where}: {kind}")
-    if where.stat().st_size > _MAX_BYTES:
-        raise ModelFileError(f"{where}: larger than {_MAX_BYTES >> 20} MiB, which no URDF is")
-    try:
-        text = where.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ModelFileError(f"{where}: not UTF-8 text, byte {error.start} cannot be read") from None
-    except OSError as error:
-        raise InputFileNotFoundError(f"{where}: cannot be read ({error.strerror})") from None
-    return check_urdf(text, str(where))
-
-
-def check_urdf(text: str, where: str) -> UrdfText:
-    """Check the text of a URDF; `where` names it in messages. Raises as `read_urdf`."""
-    if "<!DOCTYPE" in text:
-        raise ModelFileError(f"{where}: a document type (DTD) is not allowed in a URDF; remove the <!DOCTYPE>")
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise ModelFileError(f"{where}: not well-formed XML: {error}") from None
     if root.tag != "robot":
-        known = {"mujoco": "an MJCF model", "sdf": "an SDF model", "html": "an HTML page"}
-        raise ModelFileError(f"{where}: expected <robot>, found <{root.tag}>: {known.get(root.tag, 'not a URDF')}")
-    if _needs_xacro(root):
-        raise ModelFileError(f"{where}: an unprocessed xacro file; run `xacro {where} > robot.urdf` first")
-    name = root.get("name") or "robot"
-    written = ElementTree.Element("robot", name=name)
-    links, joints = _named(root, "link", where), _named(root, "joint", where)
-    moving = sum(joint.get("type") != "fixed" for joint in joints.values())
-    for count, most, kind in ((len(links), _MOST_LINKS, "links"), (moving, _MOST_JOINTS, "moving joints")):
-        if count > most:
-            raise ModelFileError(f"{where}: {count} {kind}; up to {most} are supported")
-    inertias = [_write_link(written, key, link, where) for key, link in links.items()]
-    for key, joint in joints.items():
-        _write_joint(written, key, joint, where)
-    _check_tree(links, joints, where)
-    masses = tuple(inertia for inertia in inertias if inertia is not None)
-    return UrdfText(ElementTree.tostring(written, encoding="unicode"), name, _mimics(joints, where), masses)
+        tag = root.tag.rpartition("}")[2]
+        said = _FORMATS.get(tag, "neither a URDF nor an MJCF model")
+        raise root.fault(f"<{quoted(tag)}>", f"expected <robot>: this is {said}")
+    _check_xacro(root)
+    no_misspelt_children(root, _ROBOT_PARTS, "<robot>")
+    name = name_of(root) if root.get("name") else "robot"
+    reading = _Reading()
+    links = {key: _link(key, node, reading) for key, node in _named(root, "link").items()}
+    if not links:
+        raise root.fault(f"robot {name!r}", "has no links; a body needs at least one <link>")
+    joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint").items()}
+    first, ordered = from_the_root(links, joints.values(), root.file)
+    _check_mimics(reading.mimics, joints)
+    found = {first: links[first]} | {joint.child: links[joint.child] for joint in ordered}
+    text = f"<robot name={quoteattr(name)}>{''.join(reading.text)}</robot>"
+    mimics = {key: rule for key, (_, rule) in reading.mimics.items()}
+    return LinkTree(name, found, ordered, mimics, notes=tuple(reading.notes), text=text)
 
 
-def _needs_xacro(root: Element) -> bool:
-    """Whether macros or expressions are left; an unused xacro namespace on <robot> is harmless."""
-    if any("wiki/xacro}" in element.tag for element in root.iter()):
-        return True
-    bodies = (element for kind in ("link", "joint") for top in root.findall(kind) for element in top.iter())
-    return any("${" in value or "$(" in value for element in bodies for value in element.attrib.values())
+def rpy_matrix(rpy: Array) -> Array:
+    """The rotation by fixed-axes angles: about x, then y, then z: (..., 3) -> (..., 3, 3)."""
+    (cx, cy, cz), (sx, sy, sz) = np.moveaxis(np.cos(rpy), -1, 0), np.moveaxis(np.sin(rpy), -1, 0)
+    rows = [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def _named(root: Element, kind: str, where: str) -> dict[str, Element]:
+def _check_xacro(root: Node) -> None:
+    """Macros or expressions that are left; an unused xacro namespace on <robot> is harmless."""
+    for top in root.children:
+        read = top.tag in _ROBOT_PARTS
+        for node in top.walk():
+            left = "wiki/xacro}" in node.tag or "xacro:" in node.tag
+            if left or (read and any("${" in value or "$(" in value for value in node.attributes.values())):
+                tag = quoted(node.tag.rpartition("}")[2])
+                raise node.fault(
+                    f"<{tag}>", f"an unprocessed xacro file; run `xacro {root.file} > robot.urdf` and load that"
+                )
+
+
+def _named(root: Node, kind: str) -> dict[str, Node]:
     """The links or joints by name."""
-    found: dict[str, Element] = {}
-    for element in root.findall(kind):
-        name = element.get("name")
-        if not name:
-            raise ModelFileError(f"{where}: a <{kind}> has no name")
+    found: dict[str, Node] = {}
+    nodes = root.all(kind)
+    if len(nodes) > MOST_LINKS:
+        raise nodes[MOST_LINKS].fault(
+            f"<{kind}>", f"the body has {len(nodes)} {kind}s; up to {MOST_LINKS} are supported"
+        )
+    for node in nodes:
+        name = name_of(node)
         if name in found:
-            raise ModelFileError(f"{where}: two <{kind}> elements are called {name!r}; rename one")
-        found[name] = element
-    if kind == "link" and not found:
-        raise ModelFileError(f"{where}: the robot has no links")
+            raise node.fault(
+                f"{kind} {name!r}",
+                f"two <{kind}> elements are called so, the first in line {found[name].line}; rename one",
+            )
+        found[name] = node
     return found
 
 
-def _write_link(written: Element, name: str, link: Element, where: str) -> LinkInertia | None:
-    place = f"{where}: link {name!r}"
-    out = ElementTree.SubElement(written, "link", name=name)
-    inertials = link.findall("inertial")
-    if len(inertials) > 1:
-        raise ModelFileError(f"{place}: {len(inertials)} <inertial> elements, at most one is allowed")
-    if not inertials:
-        return None
-    inertial = inertials[0]
-    mass = _number(_child(inertial, "mass", place), "value", place)
+def _link(name: str, node: Node, reading: _Reading) -> Link:
+    owner, where = f"link {name!r}", f"{node.file}:{node.line}"
+    no_misspelt_children(node, _LINK_PARTS, owner)
+    inertial = child_of(node, "inertial", owner)
+    if inertial is None:
+        reading.text.append(f"<link name={quoteattr(name)}/>")
+        return Link(name, where)
+    for part in inertial.children:
+        if part.tag not in ("origin", "mass", "inertia"):
+            raise part.fault(owner, f"<inertial> holds <origin>, <mass> and <inertia>, not <{quoted(part.tag)}>")
+    written = needed_child(inertial, "mass", owner)
+    known_attributes(written, ("value",), owner)
+    mass = number(written, "value", owner, most=MOST_MASS)
     if mass < 0.0:
-        raise ModelFileError(f"{place}: negative mass {mass:g} kg")
-    inertia = _child(inertial, "inertia", place)
-    values = {key: _number(inertia, key, place) for key in _INERTIA}
-    out = ElementTree.SubElement(out, "inertial")
-    _write_origin(out, inertial, place)
-    ElementTree.SubElement(out, "mass", value=repr(mass))
-    ElementTree.SubElement(out, "inertia", {key: repr(value) for key, value in values.items()})
-    xx, xy, xz, yy, yz, zz = values.values()
-    return LinkInertia(name, mass, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+        raise written.fault(owner, f"negative mass {mass:g} kg; a mass is at least zero")
+    if 0.0 < mass < LEAST_MASS:
+        raise written.fault(owner, f"mass {mass:g} kg is too small to be summed; give {LEAST_MASS:g} kg or more, or 0")
+    written = needed_child(inertial, "inertia", owner)
+    known_attributes(written, _INERTIA, owner)
+    xx, xy, xz, yy, yz, zz = values = [number(written, key, owner, most=MOST_MASS) for key in _INERTIA]
+    place, turn, origin = _origin(inertial, owner)
+    entries = " ".join(f'{key}="{value!r}"' for key, value in zip(_INERTIA, values, strict=True))
+    reading.text.append(
+        f'<link name={quoteattr(name)}><inertial>{origin}<mass value="{mass!r}"/><inertia {entries}/></inertial></link>'
+    )
+    inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    return Link(name, where, mass, place, 0.5 * (inertia + inertia.T))
 
 
-def _write_joint(written: Element, name: str, joint: Element, where: str) -> None:
-    place = f"{where}: joint {name!r}"
-    kind = joint.get("type") or ""
+def _joint(name: str, node: Node, reading: _Reading) -> Joint:
+    owner = f"joint {name!r}"
+    no_misspelt_children(node, _JOINT_PARTS, owner)
+    kind = node.get("type") or ""
     if kind not in (*_AXIS_JOINTS, "fixed"):
-        raise ModelFileError(
-            f"{place}: type {kind!r} is not supported; use {', '.join(_AXIS_JOINTS)} or fixed, several in a row for "
-            "a joint of several axes"
+        raise node.fault(
+            owner,
+            f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)} or fixed, several in a row for "
+            "a joint of several axes",
         )
-    out = ElementTree.SubElement(written, "joint", name=name, type=kind)
-    _write_origin(out, joint, place)
-    for end in ("parent", "child"):
-        link = _child(joint, end, place).get("link")
-        if not link:
-            raise ModelFileError(f"{place}: <{end}> names no link")
-        ElementTree.SubElement(out, end, link=link)
-    if kind == "fixed":
-        return
-    axis = joint.find("axis")
-    direction = [1.0, 0.0, 0.0] if axis is None else _vector(axis, "xyz", place)
-    if math.hypot(*direction) < 1e-9:
-        raise ModelFileError(f"{place}: the axis {direction} points nowhere")
-    ElementTree.SubElement(out, "axis", xyz=" ".join(map(repr, direction)))
-    if kind != "continuous":
-        limit = joint.find("limit")
-        if limit is None:
-            raise ModelFileError(f"{place}: a {kind} joint needs <limit lower upper effort velocity>")
-        lower, upper = (_number(limit, key, place, default="0") for key in ("lower", "upper"))
-        if lower > upper:
-            raise ModelFileError(f"{place}: the lower limit {lower:g} is above the upper one, {upper:g}")
+    ends = {end: needed_child(node, end, owner) for end in ("parent", "child")}
+    for end in ends.values():
+        known_attributes(end, ("link",), owner)
+    parent, child = (name_of(end, "link") for end in ends.values())
+    place, turn, parts = _origin(node, owner)
+    parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
+    axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
+    if kind != "fixed":
+        written = child_of(node, "axis", owner)
+        if written is not None:
+            known_attributes(written, ("xyz",), owner)
+            axis = vector(written, "xyz", owner)
+            if math.hypot(*axis) < 1e-9:
+                raise written.fault(owner, f"the axis {axis} points nowhere; give it a length")
+        parts += f'<axis xyz="{_text(axis)}"/>'
+    if kind in ("revolute", "prismatic"):
+        limits = _limits(node, kind, owner)
         # Effort and velocity are for motors; Pinocchio insists on them, this library has no use for them.
-        ElementTree.SubElement(out, "limit", lower=repr(lower), upper=repr(upper), effort="0", velocity="0")
+        parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="0" velocity="0"/>'
+    reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
+    _mimic(name, kind, node, reading)
+    where = f"{node.file}:{node.line}"
+    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NONE, limits)
 
 
-def _write_origin(out: Element, source: Element, place: str) -> None:
-    origin = source.find("origin")
-    if origin is not None:
-        parts = {key: _vector(origin, key, place) for key in ("xyz", "rpy") if origin.get(key) is not None}
-        ElementTree.SubElement(out, "origin", {key: " ".join(map(repr, part)) for key, part in parts.items()})
+def _limits(node: Node, kind: str, owner: str) -> tuple[float, float]:
+    limit = child_of(node, "limit", owner)
+    if limit is None:
+        raise node.fault(owner, f"a {kind} joint needs <limit lower upper effort velocity>; add it")
+    lower, upper = (number(limit, key, owner, default="0", most=math.inf) for key in ("lower", "upper"))
+    if lower > upper:
+        raise limit.fault(owner, f"the lower limit {lower:g} is above the upper one, {upper:g}; exchange them")
+    return lower, upper
 
 
-def _check_tree(links: dict[str, Element], joints: dict[str, Element], where: str) -> None:
-    """One root, one parent for every other link, every link reachable."""
-    parent_joint: dict[str, str] = {}
-    children: dict[str, list[str]] = {name: [] for name in links}
-    for name, joint in joints.items():
-        parent, child = (_child(joint, end, where).get("link", "") for end in ("parent", "child"))
-        for end, link in (("parent", parent), ("child", child)):
-            if link not in links:
-                raise ModelFileError(f"{where}: joint {name!r}: its {end} link {link!r} does not exist")
-        if child in parent_joint:
-            raise ModelFileError(
-                f"{where}: link {child!r} has two parents, joints {parent_joint[child]!r} and {name!r}"
-            )
-        parent_joint[child] = name
-        children[parent].append(child)
-    roots = [name for name in links if name not in parent_joint]
-    if len(roots) > 1:
-        raise ModelFileError(f"{where}: {len(roots)} links have no parent, one is allowed: {', '.join(roots)}")
-    reached, waiting, depth = set(roots), list(roots), 0
-    while waiting:
-        depth += 1
-        if depth > _MOST_DEPTH:
-            raise ModelFileError(f"{where}: a chain of more than {_MOST_DEPTH} links, at {waiting[0]!r}")
-        waiting = [child for parent in waiting for child in children[parent]]
-        reached.update(waiting)
-    lost = [name for name in links if name not in reached]
-    if lost:
-        raise ModelFileError(f"{where}: links that hang on each other in a circle: {', '.join(lost)}")
+def _origin(node: Node, owner: str) -> tuple[Array, Array, str]:
+    """Place, rotation and the element written anew."""
+    origin = child_of(node, "origin", owner)
+    if origin is None:
+        return _NONE, np.eye(3), ""
+    known_attributes(origin, ("xyz", "rpy"), owner)
+    parts = {key: vector(origin, key, owner) for key in ("xyz", "rpy") if origin.get(key) is not None}
+    written = " ".join(f'{key}="{_text(values)}"' for key, values in parts.items())
+    rpy = parts.get("rpy")
+    turn = np.eye(3) if rpy is None or not any(rpy) else rpy_matrix(np.array(rpy))
+    return np.array(parts.get("xyz", _NONE)), turn, f"<origin {written}/>"
 
 
-def _mimics(joints: dict[str, Element], where: str) -> dict[str, Mimic]:
-    mimics: dict[str, Mimic] = {}
-    for name, joint in joints.items():
-        element = joint.find("mimic")
-        if element is None or joint.get("type") == "fixed":
-            continue
-        place = f"{where}: joint {name!r}"
-        leader = element.get("joint") or ""
-        if leader not in joints:
-            raise ModelFileError(f"{place}: mimics joint {leader!r}, which does not exist")
-        multiplier = _number(element, "multiplier", place, default="1")
-        mimics[name] = Mimic(leader, multiplier, _number(element, "offset", place, default="0"))
-    for name in mimics:
+def _text(values: list[float]) -> str:
+    return " ".join(map(repr, values))
+
+
+def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
+    owner = f"joint {name!r}"
+    element = child_of(node, "mimic", owner)
+    if element is None:
+        return
+    if kind == "fixed":
+        reading.notes.append(f"{element.file}:{element.line}: {owner}: <mimic> of a fixed joint is ignored")
+        return
+    known_attributes(element, ("joint", "multiplier", "offset"), owner)
+    multiplier, offset = (number(element, k, owner, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
+    reading.mimics[name] = (element, Mimic(name_of(element, "joint"), multiplier, offset))
+
+
+def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint]) -> None:
+    """Every leader exists and is of the follower's kind, and nobody follows itself."""
+    for name, (element, rule) in mimics.items():
+        owner, leader = f"joint {name!r}", joints.get(rule.leader)
+        if leader is None:
+            raise _mimic_fault(element, owner, f"mimics joint {rule.leader!r}, which does not exist")
+        kinds = joints[name].kind, leader.kind
+        if kinds[1] == "fixed" or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
+            raise _mimic_fault(element, owner, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
         seen, follower = {name}, name
         while follower in mimics:
-            follower = mimics[follower].leader
+            follower = mimics[follower][1].leader
             if follower in seen:
-                raise ModelFileError(f"{where}: joint {name!r}: mimic joints follow each other in a circle")
+                raise _mimic_fault(element, owner, "mimic joints follow each other in a circle")
             seen.add(follower)
-    return mimics
 
 
-def _child(element: Element, tag: str, place: str) -> Element:
-    found = element.find(tag)
-    if found is None:
-        raise ModelFileError(f"{place}: <{element.tag}> has no <{tag}>")
-    return found
-
-
-def _number(element: Element, name: str, place: str, default: str | None = None) -> float:
-    return _numbers(element, name, element.get(name, default), 1, place)[0]
-
-
-def _vector(element: Element, name: str, place: str) -> list[float]:
-    return _numbers(element, name, element.get(name, ""), 3, place)
-
-
-def _numbers(element: Element, name: str, text: str | None, count: int, place: str) -> list[float]:
-    words = (text or "").split()
-    values = [float(word) for word in words if _NUMBER.fullmatch(word)]
-    if len(words) != count or len(values) != count or not all(map(math.isfinite, values)):
-        wanted = "a finite number is" if count == 1 else f"{count} finite numbers are"
-        raise ModelFileError(f"{place}: <{element.tag}> {name}={text!r}: {wanted} needed")
-    return values
+def _mimic_fault(element: Node, owner: str, message: str) -> ModelFileError:
+    return element.fault(owner, f"{message}; remove the <mimic> or name another joint")
