@@ -44,6 +44,7 @@ class ShapePath:
     oscillations : how often the path can swing between two breaks, an upper bound; None: unknown
     loops : the path is its first `duration / loops` seconds, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    sha256 : of the file it was read from, whatever was done to it since; None without a file
     """
 
     curve: Curve
@@ -54,6 +55,7 @@ class ShapePath:
     oscillations: float | None = None
     loops: int = 1
     smooth_loop: bool = False
+    sha256: str | None = None
 
     @staticmethod
     def fourier(
@@ -76,6 +78,9 @@ class ShapePath:
         middle = finite_array(mean, "mean", (None,))
         a = finite_array(cosines, "cosines", (len(middle), None))
         b = finite_array(sines, "sines", a.shape)
+        if middle.ndim != 1 or a.ndim != 2 or b.ndim != 2:
+            shapes = f"{middle.shape}, {a.shape} and {b.shape}"
+            raise ShapeError(f"mean (n,), cosines (n, K) and sines (n, K) are needed, got {shapes}")
         period = positive_argument(duration)
         breaks = np.array([0.0, period])
         names = _names(joint_names, len(middle))
