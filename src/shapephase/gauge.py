@@ -9,31 +9,46 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import so3
-from .arrays import Array, finite_array
-from .deformation import Deformation, Source
-from .errors import GaugeError, ShapeError
+from .arrays import Array
+from .deformation import Deformation
+from .errors import ShapeError
+from .frames import (
+    Frames,
+    frames_argument,
+    integrated_frames,
+    link_frames,
+    mean_body_frames,
+    named_frames,
+    principal_frames,
+)
 from .inertia_tensor import inverse_inertia
 from .sampling import Sampler, sampler
-from .stepping import SteppedRotation, stepped_rotation
-
-Frames = Callable[[Array], tuple[Array, Array]]
+from .sources import Source
+from .stepping import stepped_rotation
 
 _LIFT_TOLERANCE = 1e-12
-_APART = 1e-6
 
 
-def in_gauge(deformation: Deformation, u: Callable[[Array], tuple[ArrayLike, ArrayLike]]) -> Deformation:
+def in_gauge(
+    deformation: Deformation,
+    u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None = None,
+    *,
+    rates: Callable[[Array], ArrayLike] | None = None,
+    start: ArrayLike | None = None,
+) -> Deformation:
     """The deformation seen from the frame turned by U(t).
 
     Parameters
     ----------
-    u : times (N,) -> U (N, 3, 3), body rates of U (N, 3) [rad/s], hat(rate) = U^T U'; smooth between breaks
+    u : times (N,) -> U (N, 3, 3), body rates of U (N, 3) [rad/s], hat(rate) = U^T U'; or U alone, which is then
+        differentiated (to about 1e-11 of its swings); smooth between breaks
+    rates : in the place of u: times (N,) -> body rates of U (N, 3) [rad/s]; U is integrated to 1e-12 rad
+    start : (3, 3) U(0) for `rates`; None: the identity
 
     Returns
     -------
@@ -42,39 +57,62 @@ def in_gauge(deformation: Deformation, u: Callable[[Array], tuple[ArrayLike, Arr
     Raises
     ------
     ShapeError
-        If `u` returns other shapes, or matrices that are not rotations.
+        If neither or both of `u` and `rates` are given, or they return other shapes, or matrices that are no
+        rotations, or rates that are not those of U.
+    GaugeError
+        If U alone is given and is too rough to be differentiated.
+    AccuracyNotReached
+        If the rates are too rough to be integrated.
 
     Source: theory.md B4.
     """
-
-    def frames(times: Array) -> tuple[Array, Array]:
-        turns, rates = u(times)
-        turned = so3.rotation_argument(turns, "U")
-        rate = finite_array(rates, "body rates of U", unit="rad/s")
-        if turned.shape != (len(times), 3, 3) or rate.shape != (len(times), 3):
-            raise ShapeError(
-                f"u must return U ({len(times)}, 3, 3) and body rates ({len(times)}, 3) for these times, got "
-                f"{turned.shape} and {rate.shape}"
-            )
-        return turned, rate
-
-    _check_rates(frames, deformation.breaks)
-    return _seen_from(deformation, frames, "turned")
+    if (u is None) == (rates is None) or (u is not None and start is not None):
+        raise ShapeError("a gauge is given either by u, or by its body rates and a start")
+    if rates is not None:
+        return _seen_from(deformation, integrated_frames(deformation.breaks, rates, start), "turned")
+    return _seen_from(deformation, frames_argument(u, deformation.breaks), "turned")
 
 
-def _check_rates(frames: Frames, breaks: Array) -> None:
-    """Compare body rates with differences of U inside the breaks."""
-    left, width = breaks[:-1], np.diff(breaks)
-    middle, step = left + 0.381 * width, 1e-4 * width
-    before, at, after = (frames(t) for t in (middle - step, middle, middle + step))
-    slope = so3.vee(so3.transpose(at[0]) @ (after[0] - before[0])) / (2.0 * step[:, None])
-    wrong = np.linalg.norm(slope - at[1], axis=-1) > 1e-3 * (np.linalg.norm(at[1], axis=-1) + 1.0 / breaks[-1])
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise ShapeError(
-            f"u gives the body rate {at[1][row]} rad/s at {middle[row]:.6g} s, but its U turns at {slope[row]}; "
-            "the body rate is the vector of U^T U'"
-        )
+def link_gauge(deformation: Deformation, link: str) -> Deformation:
+    """The deformation of an articulated body seen from a link's frame: another base.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such link.
+    GaugeError
+        If the deformation is not that of an articulated body.
+
+    Source: theory.md B4 with U = R_base_link^T.
+    """
+    return _seen_from(deformation, link_frames(deformation, link), f"link {link}")
+
+
+def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deformation:
+    """The deformation seen from the frame in which the masses are nearest to where they were at a reference time.
+
+    U(t) = argmin of the integral of |U r(t) - r(reference)|^2 dm, r from the centre of mass: the perturbation of the
+    body as a whole is the least. It depends on the shape alone, so it closes with the shape; near the reference
+    shape the internal momentum vanishes to first order, as in the horizontal gauge all along.
+
+    Raises
+    ------
+    GaugeError
+        If only the inertia is known, or the nearest orientation is not unique somewhere (a shape like a mirror
+        image of the reference).
+
+    Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
+    """
+    return _seen_from(deformation, mean_body_frames(deformation, reference), "mean body")
+
+
+def named_gauge(deformation: Deformation, name: str) -> Deformation:
+    """The deformation in one of `GAUGES` or "link:NAME". Raises UnknownNameError, and as the gauge itself."""
+    if name == "base":
+        return deformation
+    if name == "horizontal":
+        return horizontal_gauge(deformation)
+    return _seen_from(deformation, named_frames(deformation, name), name)
 
 
 def horizontal_gauge(deformation: Deformation) -> Deformation:
@@ -92,97 +130,22 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
     return _seen_from(deformation, frames, "horizontal")
 
 
-def lift_frames(lift: SteppedRotation) -> Frames:
-    """U(t) and its body rates of the horizontal gauge, from the integrated lift."""
-
-    def frames(times: Array) -> tuple[Array, Array]:
-        return lift.rotation(times)[0], -lift.inverse_and_drift(times)[1]
-
-    return frames
-
-
 def principal_gauge(deformation: Deformation) -> Deformation:
-    """The deformation seen from its principal axes of inertia, kept continuous in time.
+    """The deformation seen from its principal axes of inertia: the tensor is diagonal there, and the frame continuous.
 
-    At t = 0 the axes are sorted by ascending moments, each points along its largest base component, the third
-    completes a proper frame.
+    Moments that cross are followed through; where they only come close the axes turn. Moments equal over an interval
+    turn the frame least. At t = 0 the moments ascend, the first two axes point along their largest base components,
+    and the third completes a proper frame. The closure of a loop, U(T) closure U(0)^T, is one of the 24 turns of an
+    octahedron: how the axes have changed places.
 
     Raises
     ------
     GaugeError
-        If two principal moments come within 1e-6 of each other, relative: there the axes are not determined.
+        If the inertia has no continuous frame of principal axes.
 
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
     return _seen_from(deformation, principal_frames(deformation), "principal")
-
-
-def principal_frames(deformation: Deformation) -> Frames:
-    """U(t) and its body rates of the principal gauge. Raises GaugeError."""
-    track_times, track = _principal_track(deformation)
-
-    def frames(times: Array) -> tuple[Array, Array]:
-        nearest = np.clip(np.searchsorted(track_times, times), 1, len(track_times) - 1)
-        nearest -= times - track_times[nearest - 1] < track_times[nearest] - times
-        moments, axes = _following(deformation.inertia(times), track[nearest], times)
-        rate = so3.transpose(axes) @ deformation.inertia_rate(times) @ axes
-        spin = np.empty((len(times), 3))
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            spin[:, i] = rate[:, j, k] / (moments[:, j] - moments[:, k])
-        return so3.transpose(axes), -so3.apply(axes, spin)
-
-    return frames
-
-
-def _principal_track(deformation: Deformation) -> tuple[Array, Array]:
-    """Times and continuous principal frames, close enough that each tells its neighbours' axes apart."""
-    count = 32 * deformation.loops + 1
-    times = np.unique(np.concatenate([np.linspace(a, b, count) for a, b in pairwise(deformation.breaks)]))
-    while True:
-        moments, axes = np.linalg.eigh(deformation.inertia(times))
-        _check_apart(moments, times)
-        overlap = np.abs(np.sum(axes[:-1] * axes[1:], axis=-2))
-        clear = np.all(overlap > 0.9, axis=-1)
-        if clear.all():
-            break
-        if len(times) > 100_000:
-            raise GaugeError(f"the principal axes turn too fast to be followed near t = {times[:-1][~clear][0]:.9g} s")
-        times = np.sort(np.concatenate([times, 0.5 * (times[:-1] + times[1:])[~clear]]))
-    frame = axes[0] * np.sign(np.take_along_axis(axes[0], np.argmax(np.abs(axes[0]), axis=0)[None], axis=0))
-    frame[:, 2] *= np.linalg.det(frame)
-    track = [frame]
-    for following in axes[1:]:
-        track.append(_signed(following[None], track[-1][None])[0])
-    return times, np.array(track)
-
-
-def _following(inertia: Array, frames: Array, times: Array) -> tuple[Array, Array]:
-    """Principal moments, ascending, and axes with the signs of nearby frames."""
-    moments, axes = np.linalg.eigh(inertia)
-    _check_apart(moments, times)
-    overlap = np.abs(np.sum(axes * frames, axis=-2)).min(axis=-1)
-    if np.any(overlap < 0.5):
-        raise GaugeError(
-            f"two principal moments change places near t = {times[np.argmin(overlap)]:.9g} s, too briefly to follow: "
-            "declare that time as a break, or use the horizontal gauge"
-        )
-    return moments, _signed(axes, frames)
-
-
-def _signed(axes: Array, frames: Array) -> Array:
-    # Moments that stay apart keep their order, so only the signs of the axes are to be chosen.
-    return axes * np.sign(np.sum(axes * frames, axis=-2))[:, None, :]
-
-
-def _check_apart(moments: Array, times: Array) -> None:
-    gap = np.min(np.diff(moments, axis=-1), axis=-1) / moments[:, 2]
-    if np.any(gap < _APART):
-        row = int(np.argmin(gap))
-        raise GaugeError(
-            f"two principal moments meet at t = {times[row]:.9g} s ({moments[row]} kg m^2): the principal gauge has no "
-            "unique frame there; use the horizontal gauge, or a body without that symmetry"
-        )
 
 
 def _seen_from(deformation: Deformation, frames: Frames, name: str) -> Deformation:
@@ -191,7 +154,8 @@ def _seen_from(deformation: Deformation, frames: Frames, name: str) -> Deformati
         ends, _ = frames(np.array([0.0, deformation.duration]))
         closure = ends[1] @ closure @ ends[0].T
     source = _Gauged(deformation.source, frames)
-    return replace(deformation, source=source, closure=closure, label=f"{deformation.label}, {name} gauge")
+    # U(t) need not come back with the loops.
+    return replace(deformation, source=source, closure=closure, loops=1, label=f"{deformation.label}, {name} gauge")
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,6 +179,21 @@ class _Gauged:
 
     def centre_of_mass(self, times: Array) -> Array:
         return so3.apply(self.frames(times)[0], self.original.centre_of_mass(times))
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
+        correlation, slope = self.original.correlation(times, reference)
+        turn, rate = self.frames(times)
+        still = self.frames(np.array([reference]))[0][0].T
+        return turn @ correlation @ still, turn @ (so3.hat(rate) @ correlation + slope) @ still
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:
+        turn, rate = self.frames(times)
+        return self.original.kinetic_energy(times, so3.apply(so3.transpose(turn), turning) + rate)
+
+    def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
+        turned, turning = self.original.link_frames(times, link)
+        turn, rate = self.frames(times)
+        return turn @ turned, so3.apply(turn, turning + rate)
 
     def sampler(self, breaks: Array) -> Sampler:
         return sampler(self.sample, breaks)

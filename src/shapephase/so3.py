@@ -55,17 +55,17 @@ def log(matrix: Array) -> Array:
 
     Through the quaternion, so accurate at every angle, half turns included.
     """
-    quat_xyzw = quat_from_matrix(matrix)
-    sine = np.linalg.norm(quat_xyzw[..., :3], axis=-1)
-    cosine = quat_xyzw[..., 3]
-    small = sine < 1e-9
-    scale = np.where(small, 2.0, 2.0 * np.arctan2(sine, cosine) / np.where(small, 1.0, sine))
-    return scale[..., None] * quat_xyzw[..., :3]
+    return rotation_vector_from_quat(quat_from_matrix(matrix))
 
 
 def angle(matrix: Array) -> Array:
     """The angle of a rotation, in [0, pi]: (..., 3, 3) -> (...) [rad]."""
     return np.linalg.norm(log(matrix), axis=-1)
+
+
+def angle_between(a: Array, b: Array) -> Array:
+    """The angle between unit vectors, accurate for small and for straight angles: (..., 3), (..., 3) -> (...) [rad]."""
+    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
 
 
 def angle_about(matrix: Array, axis: Array) -> Array:
@@ -93,6 +93,12 @@ def between(start: Array, end: Array) -> Array:
     """
     start, end = np.broadcast_arrays(start, end)
     half = middle(start, end)
+    # In two turns of a quarter at most, so that ends nearly opposite do not leave the plane to rounding.
+    return _short_turn(half, end) @ _short_turn(start, half)
+
+
+def _short_turn(start: Array, end: Array) -> Array:
+    half = normalised(start + end)
     return matrix_from_quat(
         normalised(np.concatenate([np.cross(start, half), np.sum(start * half, axis=-1, keepdims=True)], axis=-1))
     )
@@ -119,6 +125,15 @@ def quat_from_rotation_vector(rotation_vector: Array) -> Array:
     return np.concatenate([0.5 * np.sinc(half / np.pi) * rotation_vector, np.cos(half)], axis=-1)
 
 
+def rotation_vector_from_quat(quat_xyzw: Array) -> Array:
+    """The rotation vector with angle in [0, pi] of unit quaternions: (..., 4) -> (..., 3) [rad]."""
+    quat = positive_scalar(quat_xyzw)
+    sine = np.linalg.norm(quat[..., :3], axis=-1)
+    small = sine < 1e-9
+    scale = np.where(small, 2.0, 2.0 * np.arctan2(sine, quat[..., 3]) / np.where(small, 1.0, sine))
+    return scale[..., None] * quat[..., :3]
+
+
 def quat_from_matrix(matrix: Array) -> Array:
     """xyzw with w >= 0 of a rotation matrix: (..., 3, 3) -> (..., 4).
 
@@ -138,6 +153,18 @@ def quat_from_matrix(matrix: Array) -> Array:
     rows[..., 3, 3] = 1.0 + trace
     chosen = np.take_along_axis(rows, largest[..., None, None], axis=-2)[..., 0, :]
     return positive_scalar(normalised(chosen))
+
+
+def quat_product(first: Array, second: Array) -> Array:
+    """The quaternion of a product of rotations, xyzw: (..., 4), (..., 4) -> (..., 4)."""
+    v, w, a, b = first[..., :3], second[..., :3], first[..., 3:], second[..., 3:]
+    vector = a * w + b * v + np.cross(v, w)
+    return np.concatenate([vector, a * b - np.sum(v * w, axis=-1, keepdims=True)], axis=-1)
+
+
+def quat_inverse(quat_xyzw: Array) -> Array:
+    """The inverse of unit quaternions xyzw: (..., 4) -> (..., 4)."""
+    return quat_xyzw * [-1.0, -1.0, -1.0, 1.0]
 
 
 def positive_scalar(quat_xyzw: Array) -> Array:
