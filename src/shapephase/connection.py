@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,10 +15,10 @@ from .body import Body
 from .errors import AccuracyNotReached, OpenPathError, ShapeError
 from .inertia_tensor import inverse_inertia
 from .sampling import Sampler, sampler
-from .shape_path import ShapePath
+from .shape_path import ShapePath, times_argument
 from .stepping import SteppedRotation, stepped_rotation, tolerance_argument
 
-_CLOSED = 1e-9
+CLOSED = 1e-9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PIECES = (2, 4, 8, 16, 32, 64)
 
@@ -60,16 +61,20 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
 
     Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
     """
+    columns, slopes = connection_slopes(body, shape)
+    bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
+    return slopes - np.swapaxes(slopes, -2, -3) - bracket
+
+
+def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
+    """Columns A_j of the connection and their exact derivatives d_i A_j: (..., n) -> (..., n, 3), (..., n, n, 3)."""
     inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     connection = mechanical_connection(body, shape)
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
     gradient = inverse @ (
         body.momentum_matrix_gradient(shape) - body.inertia_gradient(shape) @ connection[..., None, :, :]
     )
-    slopes = np.swapaxes(gradient, -1, -2)
-    columns = np.swapaxes(connection, -1, -2)
-    bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
-    return slopes - np.swapaxes(slopes, -2, -3) - bracket
+    return np.swapaxes(connection, -1, -2), np.swapaxes(gradient, -1, -2)
 
 
 def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
@@ -93,19 +98,91 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     """
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
-    return _lift(body, route, goal).end[0]
+    return _lift_of_loop(body, route, goal).end[0]
+
+
+@dataclass(frozen=True, eq=False)
+class HorizontalLift:
+    """The attitude of a body with zero angular momentum along a path of its joints.
+
+    Attributes
+    ----------
+    body : who moves
+    path : how the joints move, in the body's order
+    solution : the integrated rotation
+    """
+
+    body: Body
+    path: ShapePath
+    solution: SteppedRotation
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.path.duration
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimate of the largest attitude error along the path [rad]."""
+        return float(self.solution.error_estimate[0])
+
+    @property
+    def end(self) -> Array:
+        """The attitude at the end, (3, 3); of a loop its holonomy."""
+        return self.solution.end[0]
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """Base axes to the base axes at the start: times (...) -> (..., 3, 3). Raises TrajectoryError outside."""
+        times = times_argument(t, self.duration)
+        return self.solution.rotation(times.ravel())[0].reshape(*times.shape, 3, 3)
+
+    def angular_velocity(self, t: ArrayLike) -> Array:
+        """-A(r) rate: times (...) -> (..., 3), base axes [rad/s]. Raises TrajectoryError outside."""
+        times = times_argument(t, self.duration)
+        shapes, rates = self.path.curve(times.ravel())
+        return -so3.apply(mechanical_connection(self.body, shapes), rates).reshape(*times.shape, 3)
+
+
+def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> HorizontalLift:
+    """The attitude of a body with zero angular momentum along a path, open or closed: R' = R hat(-A rate), R(0) = 1.
+
+    Parameters
+    ----------
+    path : any path of the body's joints
+    tolerance : of the attitude at all times, between 1e-13 and 1e-4 [rad]
+
+    Raises
+    ------
+    UnknownNameError, TrajectoryError
+        If the path has other joints than the body.
+    AccuracyNotReached
+        If the tolerance cannot be met.
+
+    Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
+    """
+    goal = tolerance_argument(tolerance)
+    route = path.matched(body.joint_names, body.name)
+    return HorizontalLift(body, route, _lift(body, route, goal))
 
 
 def _lift(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
-    """The horizontal lift of a closed path."""
-    gap = path_gap(body, route)
+    return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
+
+
+def _lift_of_loop(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
+    check_closed(body, route)
+    return _lift(body, route, tolerance)
+
+
+def check_closed(body: Body, path: ShapePath) -> None:
+    """Raise `OpenPathError` where the path is no loop; continuous joints may end whole turns from their start."""
+    gap = path_gap(body, path)
     worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
-    if len(gap) and abs(gap[worst]) > _CLOSED:
+    if len(gap) and abs(gap[worst]) > CLOSED:
         raise OpenPathError(
             f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from "
-            "its start; close the path, or split a reconstructed motion with zero momentum for the lift of an open one"
+            "its start; close the path, or take the end of its horizontal_lift"
         )
-    return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
 
 
 def holonomy_derivative(
@@ -142,10 +219,10 @@ def holonomy_derivative(
     """
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
-    lift = _lift(body, route, goal)
+    lift = _lift_of_loop(body, route, goal)
     ends = np.array([0.0, route.duration])
     at_ends = _variation_at(variation, ends, body.n_shape)
-    if np.abs(at_ends[1] - at_ends[0]).max(initial=0.0) > _CLOSED * (1.0 + np.abs(at_ends).max(initial=0.0)):
+    if np.abs(at_ends[1] - at_ends[0]).max(initial=0.0) > CLOSED * (1.0 + np.abs(at_ends).max(initial=0.0)):
         raise OpenPathError("a variation opens the loop: it must be the same at the end as at the start")
     turned = lift.end[0]
     connection = mechanical_connection(body, route.shape(0.0))
