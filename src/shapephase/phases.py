@@ -5,18 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import so3, sphere
-from .arrays import Array
-from .errors import GaugeError, unknown_name
-from .gauge import Frames, lift_frames, principal_frames
-from .interpolant import Interpolant
+from .arrays import Array, finite_array
+from .errors import ShapeError
+from .inertia_tensor import inverse_inertia
+from .momentum_curve import Gauge, horizontal_lift_of, momentum_curve
 from .reconstruction import Motion
-from .stepping import SteppedRotation, stepped_rotation
-
-GAUGES = ("horizontal", "base", "principal")
-_MOST_STEPS = 20_000
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+from .shape_path import times_argument
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,56 +64,49 @@ class PhaseSplit:
     has_phase: Array
 
 
-def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
+def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
     """Split the rotation of a motion into shape holonomy and Montgomery phase.
 
     Parameters
     ----------
     gauge : "horizontal", the frame that the shape motion alone would carry along (the split people want);
         "base", the deformation's own frame, whose phase already holds the shape's part; "principal", the
-        principal axes of inertia
+        principal axes of inertia; "mean_body", the frame nearest to the start shape; "link:NAME", a link of an
+        articulated body; or U(t) itself, a function as for `in_gauge`
 
     Raises
     ------
     UnknownNameError
         For another gauge.
     GaugeError
-        If the principal axes are not continuous.
+        If the gauge's frame does not exist, or is not continuous.
 
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
     """
-    if gauge not in GAUGES:
-        raise unknown_name("gauge", gauge, GAUGES)
-    spatial = motion.momentum.reshape(-1, 3)
     start = motion.initial_attitude.reshape(-1, 3, 3)
-    size = np.linalg.norm(spatial, axis=-1)
-    has_phase = size > 0.0
-    # Without momentum any axis serves: what hangs on it is set to zero below.
-    axis = np.where(has_phase[:, None], spatial, [0.0, 0.0, 1.0]) / np.where(has_phase, size, 1.0)[:, None]
     duration = motion.duration
     closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
-    lift = _lift(motion.interpolant, motion.tolerance)
-    carried = start @ lift.rotation(np.array([duration]))[0, 0] @ closure
+    lift = horizontal_lift_of(motion)
+    curve = momentum_curve(motion, gauge, lift)
+    has_phase = curve.has_phase
+    carried = start @ lift.end[0] @ closure
     holonomy = carried @ so3.transpose(start)
     end = motion.final_attitude.reshape(-1, 3, 3)
     total = end @ closure @ so3.transpose(start)
     dynamical = np.where(has_phase[:, None, None], total @ so3.transpose(holonomy), np.eye(3))
-    frames: Frames | None = None
-    if gauge == "horizontal":
-        frames = lift_frames(lift)
-    elif gauge == "principal":
-        frames = principal_frames(motion.deformation)
-    dynamic, area, ends = _phase_integrals(motion, axis, frames, refine=gauge == "principal")
-    dynamic, area = np.where(has_phase, dynamic, 0.0), np.where(has_phase, area, 0.0)
-    first, last = _in_gauge(start, end, frames, duration)
-    closing = so3.between(ends[:, 1], ends[:, 0])
-    tilt = np.where(has_phase[:, None, None], first @ closing @ so3.transpose(first), np.eye(3))
+    dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
+    area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners), 0.0)
+    first, last = np.moveaxis(curve.attitudes(np.array([0.0, duration])), 1, 0)
+    departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
+    tilt = np.where(
+        has_phase[:, None, None], first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3)
+    )
     phase = dynamic - area
-    read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), axis) * has_phase
+    read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
     batch = motion.batch
     matrix = (*batch, 3, 3)
     return PhaseSplit(
-        gauge=gauge,
+        gauge=gauge if isinstance(gauge, str) else "given",
         total_rotation=total.reshape(matrix),
         holonomy=holonomy.reshape(matrix),
         dynamical_rotation=dynamical.reshape(matrix),
@@ -126,7 +116,7 @@ def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
         geometric_phase=(0.0 - area).reshape(batch)[()],
         solid_angle=area.reshape(batch)[()],
         tilt=tilt.reshape(matrix),
-        momentum_gap=(_angle_between(ends[:, 0], ends[:, 1]) * has_phase).reshape(batch)[()],
+        momentum_gap=(so3.angle_between(departing, arriving) * has_phase).reshape(batch)[()],
         shape_gap=motion.deformation.shape_gap,
         residual=np.abs(so3.wrap(phase - read_off)).reshape(batch)[()],
         is_loop=motion.deformation.closure is not None,
@@ -134,99 +124,216 @@ def split(motion: Motion, gauge: str = "horizontal") -> PhaseSplit:
     )
 
 
-class _Resolved:
-    """A finished interpolant in the place of a sampler: nothing is evaluated again."""
+@dataclass(frozen=True, eq=False)
+class RunningPhases:
+    """The phases of a motion in time, continuous and starting from zero; fields are batch + t.shape.
 
-    def __init__(self, interpolant: Interpolant) -> None:
-        self._interpolant = interpolant
+    Directions of the momentum are joined to `reference` by great circles: with B(u) the shortest turn from there to
+    u, and R the attitude of the gauge's frame,
 
-    def refine(self, momentum: float, tolerance: float) -> None:
-        """Nothing: the motion has already been sampled as finely as its own tolerance asked."""
+        R(t) B(u(t)) = exp(montgomery_phase(t) hat(mu)) R(0) B(u(0)),
 
-    def interpolant(self) -> Interpolant:
-        return self._interpolant
+    so that nothing jumps as long as the momentum keeps away from the point opposite the reference, which is chosen
+    for that. Whenever the momentum is back at its start, this is the phase of the closed curve.
 
-    def error(self, momentum: float) -> float:  # noqa: ARG002
-        return 0.0
-
-
-def _lift(interpolant: Interpolant, tolerance: float) -> SteppedRotation:
-    """The horizontal lift on the motion's own samples."""
-    return stepped_rotation(_Resolved(interpolant), np.zeros((1, 3)), min(tolerance, 1e-11))
-
-
-def _in_gauge(start: Array, end: Array, frames: Frames | None, duration: float) -> tuple[Array, Array]:
-    """Attitudes at the start and the end, of the gauge's frame."""
-    if frames is None:
-        return start, end
-    turns, _ = frames(np.array([0.0, duration]))
-    return start @ turns[0].T, end @ turns[1].T
-
-
-def _phase_integrals(motion: Motion, axis: Array, frames: Frames | None, *, refine: bool) -> tuple[Array, Array, Array]:
-    """Dynamic phase (B,), solid angle (B,), and the momentum directions in the gauge at both ends (B, 2, 3).
-
-    The curve is cut at the integrator's steps, and finer where the gauge's own frame turns faster than those
-    (`refine`). Between a step's arc and its chord the area is integrated with the chord's start as reference,
-    where the area form is smooth; the chords form a polygon whose area is exact. So no curve is near the
-    singularity of the area form, whatever it winds around.
+    Attributes
+    ----------
+    times : (...) [s]
+    gauge : the frame from which the momentum was seen
+    dynamic_phase, geometric_phase, montgomery_phase : unwrapped [rad]
+    montgomery_angle : the last in (-pi, pi] [rad]
+    solid_angle : swept about the reference, minus the geometric phase [sr]
+    reference : batch + (3,), in the gauge's frame
+    residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
     """
-    edges = motion.solution.times
-    dynamic, slivers, corners = _by_step(motion, axis, frames, edges)
-    while refine:
-        halved = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
-        fine_dynamic, _, fine_corners = _by_step(motion, axis, frames, halved)
-        change = np.abs(fine_dynamic[:, 0::2] + fine_dynamic[:, 1::2] - dynamic).max(axis=0)
-        bend = np.linalg.norm(fine_corners[:, 2::2] - fine_corners[:, :-2:2], axis=-1).max(axis=0)
-        rough = (change > 1e-13 * max(1.0, float(np.abs(dynamic).sum(axis=1).max()))) | (bend > 0.5)
-        if not rough.any():
-            break
-        if len(edges) > _MOST_STEPS:
-            raise GaugeError(f"the gauge's frame turns too fast to be followed near t = {edges[:-1][rough][0]:.9g} s")
-        edges = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[rough]]))
-        dynamic, slivers, corners = _by_step(motion, axis, frames, edges)
-    area = slivers.sum(axis=1)
-    for row, polygon in enumerate(corners):
-        reference = sphere.far_reference(polygon)
-        closing = np.stack([polygon[-1], so3.middle(polygon[-1], polygon[0]), polygon[0]])
-        corner = np.concatenate([polygon, closing[1:]])
-        area[row] += sphere.triangle_area(reference, corner[:-1], corner[1:]).sum()
-    return dynamic.sum(axis=1), area, corners[:, [0, -1]]
+
+    times: Array
+    gauge: str
+    dynamic_phase: Array
+    geometric_phase: Array
+    montgomery_phase: Array
+    montgomery_angle: Array
+    solid_angle: Array
+    reference: Array
+    residual: Array
 
 
-def _by_step(motion: Motion, axis: Array, frames: Frames | None, edges: Array) -> tuple[Array, Array, Array]:
-    """Dynamic phase and area between arc and chord for each step (B, K), directions at the edges (B, K + 1, 3)."""
-    steps = np.diff(edges)
-    nodes = (edges[:-1, None] + steps[:, None] * 0.5 * (_NODES + 1.0)).ravel()
-    weights = 0.5 * steps[:, None] * _WEIGHTS
-    direction, rate, corners = _momentum_curve(motion, axis, frames, nodes, edges)
-    shape = (len(axis), len(steps), len(_NODES), 3)
-    direction, rate = direction.reshape(shape), rate.reshape(shape)
-    dynamic = (np.sum(direction * rate, axis=-1) * weights).sum(axis=-1)
-    slope = np.cross(direction, rate)
-    slivers = sphere.area_rate(corners[:, :-1, None], direction, slope)
-    return dynamic, (slivers * weights).sum(axis=-1), corners
+def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") -> RunningPhases:
+    """The continuous lift of every phase in time.
+
+    Parameters
+    ----------
+    t : times (...) [s]
+    gauge : as for `split`
+
+    Raises as `split`. Source: Cabrera 2006, equation (12); theory.md D5, D9; numerics.md section 3 (branch).
+    """
+    times = times_argument(t, motion.duration)
+    flat = times.ravel()
+    curve = momentum_curve(motion, gauge, times=flat)
+    references = curve.references
+    dynamic, area = curve.swept(flat)
+    about = so3.between(references[:, None], curve.directions(flat))
+    frames = curve.attitudes(flat) @ about
+    begin = curve.attitudes(np.zeros(1)) @ so3.between(references, curve.corners[:, 0])[:, None]
+    seen = so3.angle_about(frames @ so3.transpose(begin), curve.axis[:, None]) * curve.has_phase[:, None]
+    phase = dynamic - area
+    shape = (*motion.batch, *times.shape)
+    return RunningPhases(
+        times=times,
+        gauge=gauge if isinstance(gauge, str) else "given",
+        dynamic_phase=dynamic.reshape(shape)[()],
+        geometric_phase=(0.0 - area).reshape(shape)[()],
+        montgomery_phase=phase.reshape(shape)[()],
+        montgomery_angle=so3.wrap(phase).reshape(shape)[()],
+        solid_angle=area.reshape(shape)[()],
+        reference=references.reshape(*motion.batch, 3),
+        residual=np.abs(so3.wrap(phase - seen)).max(axis=-1, initial=0.0).reshape(motion.batch)[()],
+    )
 
 
-def _momentum_curve(
-    motion: Motion, axis: Array, frames: Frames | None, nodes: Array, edges: Array
-) -> tuple[Array, Array, Array]:
-    """Unit momentum and angular velocity in the gauge at the nodes (B, N, 3), unit momentum at the edges."""
-    start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
+@dataclass(frozen=True, eq=False)
+class ArcPhases:
+    """A motion cut into arcs, each with a phase of its own; fields have the motion's batch axes in front.
+
+    With R the attitude of the gauge's frame, arc k of K from times[k] to times[k + 1] turns it by
+
+        R(times[k + 1]) R(times[k])^T = exp(montgomery_phase[k] hat(mu)) tilt[k],
+
+    and the arcs add up: total_phase = the sum of their Montgomery phases - polygon_angle is the phase of the whole,
+    and total_tilt its tilt.
+
+    Attributes
+    ----------
+    times : (K + 1,) [s]
+    gauge : the frame from which the momentum was seen
+    dynamic_phase, geometric_phase, montgomery_phase : (K,) each arc closed by its great circle [rad]
+    solid_angle : (K,) minus the geometric phase [sr]
+    tilt : (K, 3, 3) transport along the closing great circles, inertial axes
+    momentum_gap : (K,) angles between the ends of the arcs [rad]
+    polygon_angle : signed area of the closed polygon of those great circles [sr]
+    total_phase : of all arcs as one [rad]
+    total_tilt : (3, 3)
+    """
+
+    times: Array
+    gauge: str
+    dynamic_phase: Array
+    geometric_phase: Array
+    montgomery_phase: Array
+    solid_angle: Array
+    tilt: Array
+    momentum_gap: Array
+    polygon_angle: Array
+    total_phase: Array
+    total_tilt: Array
+
+
+def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") -> ArcPhases:
+    """The phases of the arcs of a motion between given times, and how they add up.
+
+    Parameters
+    ----------
+    times : (K + 1,) increasing [s]; for the loops of a repeated path, the multiples of its period
+    gauge : as for `split`
+
+    All areas are counted from one region, which no arc enters: the sum of the arcs is that of the whole, not only
+    modulo 4 pi.
+
+    Raises
+    ------
+    ShapeError
+        If the times do not increase.
+
+    Raises also as `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
+    """
+    cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
+    if cuts.ndim != 1 or len(cuts) < 2 or np.any(np.diff(cuts) <= 0.0):
+        raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {cuts}")
+    curve = momentum_curve(motion, gauge, times=cuts)
+    references = curve.references
+    swept_phase, swept_area = curve.swept(cuts)
+    ends = curve.directions(cuts)
+    attitudes = curve.attitudes(cuts)
+    moving = curve.has_phase[:, None]
+
+    def closed(start: Array, end: Array) -> Array:
+        half = so3.middle(end, start)
+        back = sphere.triangle_area(references[:, None], end, half)
+        return (back + sphere.triangle_area(references[:, None], half, start)) * moving
+
+    def tilted(frames: Array, start: Array, end: Array) -> Array:
+        tilts = frames @ so3.between(end, start) @ so3.transpose(frames)
+        return np.where(moving[..., None, None], tilts, np.eye(3))
+
+    closing = closed(ends[:, :-1], ends[:, 1:])
+    whole = closed(ends[:, :1], ends[:, -1:])[:, 0]
+    dynamic, area = np.diff(swept_phase, axis=1), np.diff(swept_area, axis=1) + closing
+    phase = dynamic - area
+    polygon = whole - closing.sum(axis=1)
+    batch, count = motion.batch, len(cuts) - 1
+    arcs = (*batch, count)
+    return ArcPhases(
+        times=cuts,
+        gauge=gauge if isinstance(gauge, str) else "given",
+        dynamic_phase=dynamic.reshape(arcs),
+        geometric_phase=(0.0 - area).reshape(arcs),
+        montgomery_phase=phase.reshape(arcs),
+        solid_angle=area.reshape(arcs),
+        tilt=tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:]).reshape(*arcs, 3, 3),
+        momentum_gap=(so3.angle_between(ends[:, :-1], ends[:, 1:]) * moving).reshape(arcs),
+        polygon_angle=polygon.reshape(batch)[()],
+        total_phase=(phase.sum(axis=1) - polygon).reshape(batch)[()],
+        total_tilt=tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:])[:, 0].reshape(*batch, 3, 3),
+    )
+
+
+def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> Array:
+    """Par(R(0)) along the momentum's curve: attitudes that roll with Pi without a turn about the momentum.
+
+    R(t) = exp(dynamic_phase(t) hat(mu)) Par(t): it turns at omega_h = Pi' x Pi / |Pi|^2 (gauge axes).
+
+    Parameters
+    ----------
+    t : times (...) [s]
+    gauge : as for `split`
+
+    Returns
+    -------
+    batch + (..., 3, 3), of the gauge's frame; the attitude itself without momentum
+
+    Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
+    """
+    times = times_argument(t, motion.duration)
+    flat = times.ravel()
+    curve = momentum_curve(motion, gauge, times=flat)
+    dynamic, _ = curve.swept(flat)
+    back = so3.exp(-dynamic[..., None] * curve.axis[:, None])
+    return (back @ curve.attitudes(flat)).reshape(*motion.batch, *times.shape, 3, 3)
+
+
+def dynamic_phase_from_energy(motion: Motion) -> Array:
+    """The dynamic phase of a motion in the base gauge, from kinetic energies: batch [rad].
+
+    The integral of 2 T - 2 T_0 + L_o . I^-1 L_o - I^-1 L_o . Pi over |Pi|, T the whole kinetic energy about the centre
+    of mass and T_0 that of the shape motion alone: a check of `dynamic_phase` that sums over the links.
+
+    Raises
+    ------
+    GaugeError
+        If the deformation is known by its inertia only.
+
+    Source: Cabrera 2006, remark 3.7; theory.md D11.
+    """
+    nodes, weights = sphere.gauss_nodes(motion.solution.times)
+    times = nodes.ravel()
+    source = motion.deformation.source
+    inertia, internal = source.sample(times)
+    drift = so3.apply(inverse_inertia(inertia, times), internal)
+    turning = motion.angular_velocity(times).reshape(-1, len(times), 3)
+    momentum = motion.body_momentum(times).reshape(-1, len(times), 3)
+    whole, shape_only = source.kinetic_energy(times, turning), source.kinetic_energy(times, 0.0 * turning)
+    along = 2.0 * (whole - shape_only) + np.sum(drift * (internal - momentum), axis=-1)
     size = np.linalg.norm(motion.momentum.reshape(-1, 3), axis=-1)
-
-    def unit(times: Array) -> Array:
-        return so3.apply(so3.transpose(motion.solution.rotation(times)), start[:, None, :])
-
-    inverse, drift = motion.interpolant.inverse_and_drift(nodes)
-    direction, corners = unit(nodes), unit(edges)
-    rate = so3.apply(inverse, size[:, None, None] * direction) - drift
-    if frames is None:
-        return direction, rate, corners
-    turn, spin = frames(nodes)
-    turn_at_edges, _ = frames(edges)
-    return so3.apply(turn, direction), so3.apply(turn, rate - spin), so3.apply(turn_at_edges, corners)
-
-
-def _angle_between(a: Array, b: Array) -> Array:
-    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    phase = along @ weights.ravel() / np.where(size > 0.0, size, 1.0)
+    return np.where(size > 0.0, phase, 0.0).reshape(motion.batch)[()]

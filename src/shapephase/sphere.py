@@ -1,4 +1,4 @@
-"""Signed area on the unit sphere: of a moving direction, closed by the great circle when it does not close.
+"""Curves of directions on the unit sphere: signed area, and parallel transport along them.
 
 Areas are positive by the right-hand rule, seen from outside. All functions are batched.
 
@@ -9,9 +9,20 @@ great-circle arc it has the closed form `triangle_area` (numerics.md section 3).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from . import so3
 from .arrays import Array
+from .errors import AccuracyNotReached
+
+Curve = Callable[[Array], tuple[Array, Array]]
+"""Times (N,) -> directions (..., N, 3) and a second vector along with them (..., N, 3)."""
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_THREE, _ = np.polynomial.legendre.leggauss(3)
+_HALVINGS = 12
 
 
 def area_rate(reference: Array, direction: Array, direction_rate: Array) -> Array:
@@ -29,6 +40,105 @@ def triangle_area(reference: Array, start: Array, end: Array) -> Array:
     volume = np.sum(reference * np.cross(start, end), axis=-1)
     denominator = 1.0 + np.sum(start * end + reference * start + reference * end, axis=-1)
     return 2.0 * np.arctan2(volume, denominator)
+
+
+def polygon_area(corners: Array) -> Array:
+    """Signed area of a closed polygon of great-circle arcs, the last corner joined to the first: (..., N, 3) -> (...).
+
+    Counted from the region that holds the direction farthest from the corners. Opposite ends are joined through
+    `so3.middle`.
+    """
+    flat = corners.reshape(-1, *corners.shape[-2:])
+    areas = np.empty(len(flat))
+    for row, polygon in enumerate(flat):
+        closing = np.stack([so3.middle(polygon[-1], polygon[0]), polygon[0]])
+        closed = np.concatenate([polygon, closing])
+        areas[row] = triangle_area(far_reference(polygon), closed[:-1], closed[1:]).sum()
+    return areas.reshape(corners.shape[:-2])[()]
+
+
+def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
+    """Signed area that curves enclose, closed by the great circle from their ends to their starts: (...) [sr].
+
+    Parameters
+    ----------
+    curve : times (N,) -> directions (..., N, 3) and their rates, smooth between the edges
+    edges : (K + 1,) times; the curve's kinks must be among them, others may go unnoticed
+    tolerance : of the area [sr]
+
+    Between an edge's arc and its chord the area is integrated with the chord's start as reference, where the area
+    form is smooth; the chords form a polygon whose area is exact. So no curve is near the singularity of the area
+    form, whatever it winds around.
+
+    Raises
+    ------
+    AccuracyNotReached
+        If halving the steps twelve times does not settle the area.
+    """
+    last = None
+    for _ in range(_HALVINGS):
+        nodes, weights = gauss_nodes(edges)
+        direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
+        corners, _ = curve(edges)
+        slivers = (area_rate(corners[..., :-1, None, :], direction, rate) * weights).sum(axis=(-1, -2))
+        area = slivers + polygon_area(corners)
+        if last is not None and np.max(np.abs(wrapped(area - last))) <= tolerance:
+            return area
+        last, edges = area, np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
+    raise AccuracyNotReached(
+        "the solid angle of a curve does not settle; give more edges, the times of its kinks among them"
+    )
+
+
+def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
+    """Parallel transport of the tangent plane along curves: the rotation F with F' = hat(u x u') F: (..., 3, 3).
+
+    It takes the curve's start to its end, and the sphere rolls along without twist; round a closed curve it is a turn
+    about the start by the enclosed area.
+
+    Parameters
+    ----------
+    curve : as for `curve_area`
+    edges : (K + 1,) times; the curve's kinks must be among them, others may go unnoticed
+    tolerance : of the rotation [rad]
+
+    Raises
+    ------
+    AccuracyNotReached
+        If halving the steps twelve times does not settle it.
+
+    Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
+    """
+    last = None
+    for _ in range(_HALVINGS):
+        steps = np.diff(edges)
+        nodes = edges[:-1, None] + 0.5 * steps[:, None] * (_THREE + 1.0)
+        direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
+        early, middle, late = np.moveaxis(np.cross(direction, rate) * steps[:, None, None], -2, 0)
+        slope, bend = np.sqrt(15.0) / 3.0 * (late - early), 10.0 / 3.0 * (late - 2.0 * middle + early)
+        first = np.cross(middle, slope)
+        second = -np.cross(middle, 2.0 * bend + first) / 60.0
+        turns = so3.exp(middle + bend / 12.0 + np.cross(-20.0 * middle - bend + first, slope + second) / 240.0)
+        whole = turns[..., 0, :, :]
+        for step in range(1, len(steps)):
+            whole = turns[..., step, :, :] @ whole
+        if last is not None and np.max(so3.angle(whole @ so3.transpose(last))) <= tolerance:
+            return whole
+        last, edges = whole, np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
+    raise AccuracyNotReached(
+        "the transport along a curve does not settle; give more edges, the times of its kinks among them"
+    )
+
+
+def wrapped(area: Array) -> Array:
+    """A signed area modulo 4 pi in (-2 pi, 2 pi] [sr]."""
+    return 2.0 * so3.wrap(0.5 * area)
+
+
+def gauss_nodes(edges: Array) -> tuple[Array, Array]:
+    """Eight Gauss nodes in each step and their weights: (K + 1,) -> (K, 8), (K, 8)."""
+    half = 0.5 * np.diff(edges)[:, None]
+    return edges[:-1, None] + half * (_NODES + 1.0), half * _WEIGHTS
 
 
 def far_reference(directions: Array) -> Array:
