@@ -205,7 +205,7 @@ def test_a_single_array_is_no_motion(tmp_path):
 
 def test_a_pickle_is_not_opened(tmp_path):
     where = tmp_path / "motion.npz"
-    np.savez(where, header=np.array([{"format": "shapephase motion 2"}], dtype=object))
+    np.savez(where, header=np.array([{"format": "shapephase motion 3"}], dtype=object))
     with pytest.raises(ResultFileError, match=r"motion\.npz"):
         sp.load_motion(where)
 
@@ -242,11 +242,11 @@ def test_any_damaged_byte_is_noticed_or_harmless(saved: Path, tmp_path):
 def test_another_format(saved: Path, tmp_path):
     header = {"format": "shapephase motion 99"}
     where = rewritten(saved, tmp_path / "new.npz", header=np.array(json.dumps(header)))
-    with pytest.raises(ResultFileError, match=r"'shapephase motion 99'.*'shapephase motion 2'.*compute"):
+    with pytest.raises(ResultFileError, match=r"'shapephase motion 99'.*'shapephase motion 3'.*compute"):
         sp.load_motion(where)
 
 
-@pytest.mark.parametrize("header", ["[]", "3", '"text"', "null", "{", "{}", '{"format": "shapephase motion 2"}'])
+@pytest.mark.parametrize("header", ["[]", "3", '"text"', "null", "{", "{}", '{"format": "shapephase motion 3"}'])
 def test_a_header_that_says_nothing(saved: Path, tmp_path, header: str):
     where = rewritten(saved, tmp_path / "odd.npz", header=np.array(header))
     with pytest.raises(ResultFileError, match=r"odd\.npz"):

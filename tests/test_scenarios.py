@@ -7,7 +7,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.catalog import robots_folder
 from shapephase.errors import TrajectoryError, UnknownNameError
-from shapephase.scenarios import MOTIONS, cat_righting, kane_scher, named_motion
+from shapephase.scenarios import CLOSED_ORBITS, MOTIONS, cat_righting, closed_orbit, kane_scher, named_motion
 
 FILES = {
     "cat_righting": 400,
@@ -23,12 +23,13 @@ def turned(name, path=None):
     return sp.reconstruct(sp.articulated(body, path or named_motion(name)), np.zeros(3), tolerance=1e-11).final_attitude
 
 
-# Found by DOP853 on Pinocchio's ccrba and again by fourth-order Magnus steps on kinematics written in NumPy.
+# Found by DOP853 on Pinocchio's ccrba and (all but the last) by fourth-order Magnus steps on kinematics in NumPy.
 KNOWN = {
     "cat_righting": np.diag([1.0, -1.0, -1.0]),
     "astronaut_arm_circles": so3.exp(np.array([0.0, 0.206999962449, 0.0])),
     "astronaut_leg_swing": so3.exp(np.array([0.0, 0.214629350843, 0.0])),
     "antenna_deployment": so3.exp(np.array([-0.003736510923, -0.085913209531, 0.048278938397])),
+    "satellite_sweep": so3.exp(np.array([-0.011417273673, 0.007584277655, -0.093342749251])),
 }
 
 
@@ -119,3 +120,25 @@ def test_left_and_right_are_mirror_images():
             image[body.joint_index(other)] = value if about_y else -value
         inertia = body.locked_inertia(shape)
         np.testing.assert_allclose(body.locked_inertia(image), mirror @ inertia @ mirror, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", CLOSED_ORBITS)
+def test_closed_orbits_have_nothing_but_phase_and_holonomy(name):
+    """theory.md section 2: Delta R = exp(theta_M mu^) R_G in the horizontal gauge, exp(theta_M mu^) in the base."""
+    motion = closed_orbit(name)
+    split = sp.split(motion)
+    total = motion.final_attitude @ motion.initial_attitude.T
+    about = so3.exp(np.array([0.0, 0.0, split.montgomery_phase]))
+    assert so3.angle(total.T @ about @ split.holonomy) < 1e-9
+    assert split.momentum_gap < 1e-9
+    based = closed_orbit(name, "base")
+    total = based.final_attitude @ based.initial_attitude.T
+    about = so3.exp(np.array([0.0, 0.0, sp.split(based, "base").montgomery_phase]))
+    assert so3.angle(total.T @ about) < 1e-9
+
+
+def test_closed_orbits_are_known_by_name():
+    with pytest.raises(UnknownNameError, match="astronaut"):
+        closed_orbit("dog")
+    with pytest.raises(UnknownNameError, match="horizontal, base"):
+        closed_orbit("cat", "principal")

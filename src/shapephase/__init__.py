@@ -3,51 +3,107 @@
 from __future__ import annotations
 
 from . import errors
-from .body import Body, UnphysicalInertiaWarning
+from .body import Body
+from .cards import ModelCard, PathCard, model_card, path_card
 from .catalog import load_body, robot_names
-from .connection import curvature, holonomy, holonomy_derivative, mechanical_connection
+from .connection import (
+    HorizontalLift,
+    curvature,
+    holonomy,
+    holonomy_derivative,
+    horizontal_lift,
+    mechanical_connection,
+)
+from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .deformation import Deformation, articulated, particles, prescribed, rigid
 from .errors import ShapePhaseError
-from .gauge import horizontal_gauge, in_gauge, principal_gauge
+from .gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
+from .link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
 from .many_paths import FinalAttitudes, final_attitudes
-from .motion_files import read_shape_path, write_shape_path
-from .phases import PhaseSplit, split
+from .motion_files import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
+from .orbit_branch import OrbitBranch, continued_orbits
+from .phases import (
+    ArcPhases,
+    PhaseSplit,
+    RunningPhases,
+    arc_phases,
+    dynamic_phase_from_energy,
+    parallel_transport,
+    running_phases,
+    split,
+)
 from .reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
-from .return_map import closed_orbits
+from .recorded_base import BaseDifference, base_difference
+from .recording import TrajectoryWarning
+from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
+from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .shape_path import ShapePath
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "ArcPhases",
+    "BaseDifference",
     "Body",
+    "Crossings",
     "Deformation",
     "FinalAttitudes",
+    "FixedPoints",
+    "HorizontalLift",
+    "IgnoredElementWarning",
+    "ModelCard",
     "Motion",
+    "OrbitBranch",
+    "PathCard",
     "PhaseSplit",
+    "RecordedMotion",
+    "ReturnMap",
+    "Returns",
+    "RunningPhases",
     "Sensitivity",
     "ShapePath",
     "ShapePhaseError",
+    "TrajectoryWarning",
     "UnphysicalInertiaWarning",
+    "arc_phases",
     "articulated",
+    "base_difference",
     "closed_orbits",
+    "continued_orbits",
     "curvature",
+    "curvature_on_plane",
+    "dynamic_phase_from_energy",
     "errors",
     "final_attitudes",
+    "fixed_points",
     "holonomy",
     "holonomy_derivative",
     "horizontal_gauge",
+    "horizontal_lift",
     "in_gauge",
+    "is_flat",
+    "link_gauge",
     "load_body",
     "load_motion",
+    "mean_body_gauge",
     "mechanical_connection",
+    "model_card",
+    "momentum_crossings",
     "momentum_from_rate",
+    "momentum_returns",
+    "parallel_transport",
     "particles",
+    "path_card",
     "prescribed",
     "principal_gauge",
+    "read_recorded_motion",
     "read_shape_path",
     "reconstruct",
     "rigid",
     "robot_names",
+    "running_phases",
     "split",
+    "stokes_holonomy",
+    "stroboscopic_map",
     "write_shape_path",
 ]

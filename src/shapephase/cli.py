@@ -1,11 +1,12 @@
-"""The command line: `shapephase split`, `shapephase robots`."""
+"""The command line: `shapephase split`, `shapephase check`, `shapephase orbits`, `shapephase robots`."""
 
 from __future__ import annotations
 
 import json
 import sys
+import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -13,9 +14,21 @@ import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
 from . import so3
-from .arrays import Array
 from .body import Body
+from .cards import model_card, path_card
 from .catalog import example_names, load_body, robot_names
+from .cli_text import (
+    base_said,
+    body_lines,
+    orbit_data,
+    orbit_lines,
+    path_lines,
+    plain,
+    record_data,
+    rotation_line,
+    split_data,
+    split_lines,
+)
 from .deformation import articulated
 from .errors import (
     InputFileNotFoundError,
@@ -24,9 +37,11 @@ from .errors import (
     TrajectoryError,
     UnknownNameError,
 )
-from .motion_files import read_shape_path
-from .phases import PhaseSplit, split
-from .reconstruction import Motion, reconstruct
+from .gauge import named_gauge
+from .motion_files import RecordedMotion, read_recorded_motion
+from .phases import split
+from .reconstruction import reconstruct
+from .return_map import fixed_points
 from .scenarios import MOTIONS, named_motion
 from .shape_path import ShapePath
 
@@ -45,20 +60,37 @@ class _Outcome:
 
     text: str
     data: dict[str, Any]
+    judged: bool = False
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0, or 2 usage, 3 body, 4 trajectory, 5 numerics, with one line on stderr."""
+    """Run the command line and exit: 0, or 2 usage, 3 body, 4 trajectory, 5 numerics, with one line on stderr.
+
+    Warnings are lines on stderr too, and a list in what `--json` prints.
+    """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     as_json = "--json" in tokens
-    try:
-        outcome = app(tokens, exit_on_error=False, print_error=False)
-    except CycloptsError as error:
-        _fail(_first_line(error), _USAGE, as_json, "usage")
-    except ShapePhaseError as error:
-        _fail(_first_line(error), _exit_code(error), as_json, type(error).__name__)
+    outcome, failure = None, None
+    with warnings.catch_warnings(record=True) as raised:
+        warnings.simplefilter("always")
+        try:
+            outcome = app(tokens, exit_on_error=False, print_error=False)
+        except CycloptsError as error:
+            failure = (_one_line(error), _USAGE, as_json, "usage")
+        except ShapePhaseError as error:
+            failure = (_one_line(error), _exit_code(error), as_json, type(error).__name__)
+    doubts = list(dict.fromkeys(_one_line(warning.message) for warning in raised))
+    for doubt in doubts:
+        print(f"shapephase: warning: {doubt}", file=sys.stderr)
+    if failure:
+        _fail(*failure)
     if isinstance(outcome, _Outcome):
-        print(json.dumps(outcome.data, indent=2) if as_json else outcome.text)
+        data, text = {**outcome.data, "warnings": doubts}, outcome.text
+        if outcome.judged:
+            many = "1 warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
+            verdict = f"usable, with {many}" if doubts else "no fault found"
+            data, text = data | {"verdict": verdict}, f"{text}\n\nverdict: {verdict}"
+        print(json.dumps(data, indent=2) if as_json else text)
 
 
 @app.command(name="split")
@@ -71,6 +103,8 @@ def split_command(
     attitude: Annotated[tuple[float, float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0, 1.0),
     gauge: str = "horizontal",
     tolerance: float = 1e-9,
+    smooth: float | None = None,
+    topic: str | None = None,
     out: Path | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
 ) -> _Outcome:
@@ -79,17 +113,22 @@ def split_command(
     Parameters
     ----------
     body
-        a URDF file, a name from `shapephase robots`, or example:NAME of example-robot-data
+        a URDF or MJCF file, a name from `shapephase robots`, or example:NAME of example-robot-data
     motion
-        a CSV or NPZ file of joint coordinates in time, or the name of a motion from `shapephase robots`
+        a file of joint coordinates in time (CSV, NPZ, OpenSim, ROS, MuJoCo qpos), or the name of a motion from
+        `shapephase robots`
     momentum
         angular momentum about the centre of mass, inertial axes [kg m^2/s]
     attitude
         of the base at the start, quaternion x y z w
     gauge
-        horizontal, base or principal
+        horizontal, base, principal, mean_body or link:NAME
     tolerance
         of the attitude [rad]
+    smooth
+        noise of recorded samples, rms [rad or m]; without it the path goes through all of them
+    topic
+        of a ROS bag with more than one motion
     out
         write the motion to this NPZ file
     json
@@ -97,14 +136,91 @@ def split_command(
     """
     if out is not None:
         _check_writable(out)
-    loaded = load_body(body)
-    path = _path(motion, loaded)
+    loaded = load_body(body, isolate=True)
+    path, recorded = _motion(motion, loaded, smooth, topic)
     start = so3.quat_argument(attitude, "attitude")
     moved = reconstruct(articulated(loaded, path), momentum, start, tolerance=tolerance)
     result = split(moved, gauge)
     if out is not None:
         moved.save(out)
-    return _Outcome(_split_text(loaded, motion, moved, result), _split_data(loaded, motion, moved, result))
+    lines, data = base_said(moved, recorded)
+    text = [*split_lines(loaded, motion, moved, result), *lines]
+    return _Outcome("\n".join(text), split_data(loaded, motion, moved, result) | data)
+
+
+@app.command(name="check")
+def check_command(
+    body: str,
+    motion: str | None = None,
+    /,
+    *,
+    smooth: float | None = None,
+    topic: str | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+) -> _Outcome:
+    """Check a body, and a joint motion for it: what was read, and whether it can be used.
+
+    Parameters
+    ----------
+    body
+        as for split
+    motion
+        as for split
+    smooth
+        noise of recorded samples, rms [rad or m]; without it the path goes through all of them
+    topic
+        of a ROS bag with more than one motion
+    json
+        print JSON
+    """
+    loaded = load_body(body, isolate=True)
+    card = model_card(loaded)
+    lines, data = body_lines(card), {"body": plain(card)}
+    if motion is not None:
+        path, recorded = _motion(motion, loaded, smooth, topic)
+        moved = path_card(loaded, path)
+        lines += ["", *path_lines(loaded, motion, moved, recorded)]
+        data["motion"] = plain(moved) | record_data(loaded, recorded)
+    return _Outcome("\n".join(lines), data, judged=True)
+
+
+@app.command(name="orbits")
+def orbits_command(
+    body: str,
+    motion: str,
+    magnitude: float,
+    /,
+    *,
+    gauge: str = "horizontal",
+    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+) -> _Outcome:
+    """Find the motions whose shape and momentum close together, and split each.
+
+    Parameters
+    ----------
+    body
+        as for split
+    motion
+        a closed one, as for split
+    magnitude
+        size of the angular momentum [kg m^2/s]
+    gauge
+        where the momentum closes: horizontal, base, principal, mean_body or link:NAME
+    json
+        print JSON
+    """
+    loaded = load_body(body, isolate=True)
+    path, _ = _motion(motion, loaded, None, None)
+    deformation = articulated(loaded, path)
+    seen = named_gauge(deformation, gauge)
+    found = fixed_points(seen, magnitude)
+    upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
+    moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=1e-11) for attitude in upright]
+    splits = [split(orbit, "base") for orbit in moved]
+    holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
+    said = (loaded, motion, gauge, found, found.directions @ seen.frame(0.0), splits)
+    lines = [*orbit_lines(*said), "", rotation_line("shape holonomy (base axes)", holonomy)]
+    return _Outcome("\n".join(lines), orbit_data(*said) | {"holonomy": holonomy.tolist()})
 
 
 @app.command(name="robots")
@@ -143,70 +259,16 @@ def _check_writable(out: Path) -> None:
         raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
 
 
-def _path(motion: str, body: Body) -> ShapePath:
+def _motion(
+    motion: str, body: Body, smooth: float | None, topic: str | None
+) -> tuple[ShapePath, RecordedMotion | None]:
+    """The path of a motion, and its record where it comes from a file."""
     if motion in MOTIONS and not Path(motion).is_file():
-        return named_motion(motion)
+        return named_motion(motion), None
     if not Path(motion).exists() and not Path(motion).suffix:
         raise UnknownNameError(f"unknown motion {motion!r}: neither a file nor one of {', '.join(MOTIONS)}")
-    return read_shape_path(motion, body)
-
-
-def _split_text(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> str:
-    momentum = " ".join(f"{v:g}" for v in motion.momentum)
-    lines = [
-        f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_shape} joints, {body.mass:.6g} kg, "
-        f"momentum ({momentum}) kg m^2/s",
-        "",
-        f"{'':24}{'angle [deg]':>16}   axis (inertial)",
-        _rotation_line("total rotation", result.total_rotation),
-        _rotation_line("  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy),
-        _rotation_line("  dynamical rotation", result.dynamical_rotation),
-        "",
-    ]
-    if result.has_phase:
-        lines += [
-            f"{f'seen in the {result.gauge} gauge':24}{'[deg]':>16}{'[rad]':>20}",
-            _phase_line("Montgomery phase", result.montgomery_phase),
-            _phase_line("  dynamic phase", result.dynamic_phase),
-            _phase_line("  geometric phase", result.geometric_phase),
-            _rotation_line("tilt", result.tilt),
-            f"{'momentum gap':24}{np.degrees(result.momentum_gap):16.6f} deg",
-            f"{'residual':24}{result.residual:16.2e} rad   (phase by formula against attitude)",
-        ]
-    else:
-        lines.append("no angular momentum: the shape alone turns the body, there is no Montgomery phase")
-    if not result.is_loop:
-        lines.append(f"{'shape gap':24}{result.shape_gap:16.6g}       (the shape does not return: no holonomy)")
-    lines += [
-        f"{'error estimate':24}{motion.error_estimate:16.2e} rad",
-        f"{'evaluations':24}{motion.evaluations:16d}",
-    ]
-    return "\n".join(lines)
-
-
-def _rotation_line(name: str, rotation: Array) -> str:
-    vector = so3.log(rotation)
-    turn = float(np.linalg.norm(vector))
-    axis = "" if turn < 1e-12 else "   (" + " ".join(f"{v + 0.0:9.6f}" for v in np.round(vector / turn, 6)) + ")"
-    return f"{name:24}{np.degrees(turn):16.6f}{axis}"
-
-
-def _phase_line(name: str, phase: Array) -> str:
-    return f"{name:24}{np.degrees(phase):16.6f}{phase:20.9f}"
-
-
-def _split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> dict[str, Any]:
-    data = {key: value.tolist() if hasattr(value, "tolist") else value for key, value in asdict(result).items()}
-    return {
-        "body": body.name,
-        "motion": motion_name,
-        "duration_s": motion.duration,
-        "momentum_kg_m2_s": motion.momentum.tolist(),
-        "final_attitude_quat_xyzw": motion.quat_xyzw(motion.duration).tolist(),
-        **data,
-        "error_estimate_rad": float(motion.error_estimate),
-        "evaluations": motion.evaluations,
-    }
+    recorded = read_recorded_motion(motion, body, smooth=smooth, topic=topic)
+    return recorded.path, recorded
 
 
 def _exit_code(error: ShapePhaseError) -> int:
@@ -217,7 +279,7 @@ def _exit_code(error: ShapePhaseError) -> int:
     return _USAGE if isinstance(error, ValueError | FileNotFoundError | ImportError) else _NUMERICS
 
 
-def _first_line(error: Exception) -> str:
+def _one_line(error: Warning | Exception | str) -> str:
     return " ".join(str(error).split())
 
 

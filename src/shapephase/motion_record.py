@@ -23,7 +23,7 @@ from .files import write_whole
 from .interpolant import Interpolant, unit_nodes, values_to_coefficients
 from .stepping import SteppedRotation
 
-_FORMAT = "shapephase motion 2"
+_FORMAT = "shapephase motion 3"
 _STEPS = (
     "momentum",
     "steps",
@@ -66,6 +66,7 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "shapephase": version("shapephase"),
         "numpy": np.__version__,
         "deformation": deformation.label,
+        "sha256": dict(deformation.inputs),
         "tolerance": record.tolerance,
         "method": record.method,
         "evaluations": record.evaluations,
@@ -120,7 +121,7 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
         return _record(header, arrays)
     except KeyError as error:
         raise ResultFileError(f"{where}: the motion lacks {error}; compute it anew") from None
-    except (TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError) as error:
         raise ResultFileError(f"{where}: the motion's numbers cannot be used ({error}); compute it anew") from None
 
 
@@ -145,6 +146,7 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         arrays.get("closure"),
         float(header["shape_gap"]),
         str(header["deformation"]),
+        {str(name): str(digest) for name, digest in header["sha256"].items()},
     )
     return MotionRecord(
         deformation,

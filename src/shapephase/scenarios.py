@@ -9,7 +9,11 @@ import numpy as np
 
 from .arrays import Array
 from .catalog import load_body
+from .deformation import articulated
 from .errors import TrajectoryError, unknown_name
+from .gauge import horizontal_gauge
+from .reconstruction import Motion, reconstruct
+from .return_map import closed_orbits
 from .shape_path import ShapePath, positive_argument
 
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
@@ -65,7 +69,8 @@ def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
     In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
     """
     abduction = (0.75, 0.0, -0.75)
-    return _pair_loop(
+    return _one_harmonic(
+        "astronaut",
         duration,
         {
             "left_shoulder_flexion": (-1.05, 2.05, 0.0),
@@ -82,7 +87,8 @@ def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
     The legs swing forward stretched and come back bent, the trunk bends along.
     In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
     """
-    return _pair_loop(
+    return _one_harmonic(
+        "astronaut",
         duration,
         {
             "left_hip_flexion": (-0.75, 1.2, 0.0),
@@ -102,6 +108,18 @@ def antenna_deployment(duration: float = 60.0) -> ShapePath:
     return ShapePath.waypoints([0.0, duration], ends, joint_names=body.joint_names)
 
 
+def satellite_sweep(duration: float = 60.0) -> ShapePath:
+    """One sweep of the `satellite`: the boom goes out and in while its arm swings to and fro, a quarter behind.
+
+    At zero momentum it turns by 5.405499 degrees, most of it about the z axis. The numbers are our own.
+    """
+    return _one_harmonic(
+        "satellite",
+        duration,
+        {"boom_extension": (0.9, -0.9, 0.0), "arm_1": (0.0, 0.0, 1.2), "arm_2": (0.9, 0.0, 0.0)},
+    )
+
+
 MOTIONS: Mapping[str, NamedMotion] = {
     "kane_scher": NamedMotion(
         "cat_two_halves",
@@ -112,7 +130,15 @@ MOTIONS: Mapping[str, NamedMotion] = {
     "astronaut_arm_circles": NamedMotion("astronaut", astronaut_arm_circles, "pitch turn by one circle of the arms"),
     "astronaut_leg_swing": NamedMotion("astronaut", astronaut_leg_swing, "pitch turn by one swing of legs and trunk"),
     "antenna_deployment": NamedMotion("satellite", antenna_deployment, "the boom antenna comes out, an open path"),
+    "satellite_sweep": NamedMotion("satellite", satellite_sweep, "boom out and in, arm to and fro: turn about z"),
 }
+
+CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
+    "cat": ("cat_righting", 0.02),
+    "astronaut": ("astronaut_leg_swing", 2.0),
+    "satellite": ("satellite_sweep", 1.0),
+}
+"""Ready motions whose shape and momentum close together: the loop of shapes, the size of the momentum [kg m^2/s]."""
 
 
 def named_motion(name: str) -> ShapePath:
@@ -120,6 +146,34 @@ def named_motion(name: str) -> ShapePath:
     if name not in MOTIONS:
         raise unknown_name("motion", name, MOTIONS)
     return MOTIONS[name].path()
+
+
+def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
+    """A motion of `CLOSED_ORBITS`: shape and momentum close together, so that all of its split is phase and holonomy.
+
+    Parameters
+    ----------
+    gauge : where the momentum closes: "horizontal", where total_rotation = exp(montgomery_phase hat(mu)) holonomy,
+        or "base", where total_rotation = exp(montgomery_phase hat(mu))
+
+    Returns
+    -------
+    the first of `closed_orbits`, seen from the base: `split(closed_orbit("cat"))` has no tilt
+
+    Raises
+    ------
+    UnknownNameError
+        For another name or gauge.
+    """
+    if name not in CLOSED_ORBITS:
+        raise unknown_name("closed orbit", name, CLOSED_ORBITS)
+    if gauge not in ("horizontal", "base"):
+        raise unknown_name("gauge of a closed orbit", gauge, ("horizontal", "base"))
+    motion, size = CLOSED_ORBITS[name]
+    deformation = articulated(load_body(MOTIONS[motion].body), named_motion(motion))
+    seen = horizontal_gauge(deformation) if gauge == "horizontal" else deformation
+    start = closed_orbits(seen, size)[0].initial_attitude
+    return reconstruct(deformation, [0.0, 0.0, size], start, tolerance=1e-11)
 
 
 @dataclass(frozen=True)
@@ -211,9 +265,9 @@ def _loop(curve: Callable[[Array], tuple[Array, Array]], duration: float, names:
     return ShapePath(curve, period, np.array([0.0, period]), len(names), names, oscillations=4.0)
 
 
-def _pair_loop(duration: float, joints: Mapping[str, tuple[float, ...]]) -> ShapePath:
-    """A loop of the astronaut with one harmonic: mean, cosine and sine for the joints that move."""
-    body = load_body("astronaut")
+def _one_harmonic(name: str, duration: float, joints: Mapping[str, tuple[float, ...]]) -> ShapePath:
+    """A loop of a body with one harmonic: mean, cosine and sine for the joints that move."""
+    body = load_body(name)
     mean, cosine, sine = np.zeros((3, body.n_shape))
     for joint, (a, b, c) in joints.items():
         place = body.joint_index(joint)
