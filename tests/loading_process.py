@@ -12,6 +12,7 @@ import selectors
 import subprocess
 import sys
 import time
+import traceback
 import warnings
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -116,12 +117,46 @@ def written_mass(path: str) -> float:
     return sum(float(mass.get("value", "nan")) for mass in root.findall("link/inertial/mass"))
 
 
+def commanded(arguments: list[str], folder: str) -> dict[str, Any]:
+    """The command line in a process of its own, forked from this one: how it ended and what it printed."""
+    import resource
+
+    printed, said = Path(folder) / "stdout.txt", Path(folder) / "stderr.txt"
+    child = os.fork()
+    if child == 0:
+        for number, file in ((1, printed), (2, said)):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        limit = int(time.process_time() + MOST_SECONDS) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+        code = 70
+        try:
+            from shapephase.cli import main
+
+            main(arguments)
+            code = 0
+        except SystemExit as stopped:
+            code = int(stopped.code or 0)
+        except BaseException:
+            traceback.print_exc()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    _, status, used = os.wait4(child, 0)
+    code = os.waitstatus_to_exitcode(status)
+    return {
+        "outcome": f"signal {-code}" if code < 0 else f"exit {code}",
+        "message": said.read_text(encoding="utf-8", errors="replace"),
+        "printed": printed.read_text(encoding="utf-8", errors="replace"),
+        "memory": used.ru_maxrss * 1024,
+    }
+
+
 def work(memory: int) -> None:
     import resource
 
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    import shapephase  # noqa: F401
+    import shapephase.cli  # noqa: F401
 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
@@ -132,6 +167,9 @@ def work(memory: int) -> None:
     say({"ready": True})
     for line in sys.stdin:
         request = json.loads(line)
+        if "command" in request:
+            say(commanded(request["command"], request["folder"]))
+            continue
         path = request["path"]
         if "seeds" not in request:
             say(timed_outcome(path, **request.get("options", {})))

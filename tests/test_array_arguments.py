@@ -103,10 +103,37 @@ ENTRIES: list[tuple[str, Callable[[Any], Any], np.ndarray]] = [
     ("running_phases", lambda a: sp.running_phases(motion(), a).montgomery_phase, TIMES),
     ("arc_phases", lambda a: sp.arc_phases(motion(), a).montgomery_phase, TIMES),
     ("parallel_transport", lambda a: sp.parallel_transport(motion(), a), TIMES),
+    ("is_flat", lambda a: sp.is_flat(body(), a), SHAPE),
+    ("curvature_on_plane first", lambda a: sp.curvature_on_plane(body(), ("arm_1", "arm_2"), a, [0.1]), TIMES),
+    ("curvature_on_plane shape", lambda a: sp.curvature_on_plane(body(), (0, 1), [0.0], [0.1], a), SHAPE[0]),
+    ("stokes_holonomy centre", lambda a: sp.stokes_holonomy(body(), path(), 1e-6, a), SHAPE[0]),
+    ("horizontal_lift.attitude", lambda a: sp.horizontal_lift(body(), path()).attitude(a), TIMES),
+    ("base_difference times", lambda a: sp.base_difference(motion(), a, np.stack([np.eye(3)] * 6)).angle, TIMES),
+    (
+        "base_difference attitudes",
+        lambda a: sp.base_difference(motion(), TIMES[:2], a).angle,
+        np.stack([np.eye(3), turned(0.0)]),
+    ),
+    (
+        "prescribed inertia",
+        lambda a: sp.prescribed(lambda _: a, None, 1.0).inertia([0.0, 1.0]),
+        np.stack([np.eye(3)] * 2),
+    ),
+    (
+        "prescribed momentum",
+        lambda a: sp.prescribed(lambda t: np.stack([np.eye(3)] * len(t)), lambda _: a, 1.0).internal_momentum(
+            [0.0, 1.0]
+        ),
+        VECTORS,
+    ),
     ("stroboscopic_map", lambda a: sp.stroboscopic_map(deformation(), 1.0, a).end, VECTORS),
     ("continued_orbits", lambda a: sp.continued_orbits(deformation(), a).directions, single([0.0, 0.1, 0.2])),
 ]
-(OPTIONAL,) = (function for name, function, _ in ENTRIES if name == "reconstruct attitude")
+OPTIONAL = [
+    function
+    for name, function, _ in ENTRIES
+    if name in ("reconstruct attitude", "is_flat", "curvature_on_plane shape", "stokes_holonomy centre")
+]
 IDS = [name for name, *_ in ENTRIES]
 
 
@@ -152,7 +179,7 @@ def test_wrong_arrays_are_refused(function, good):
         {"a": 1.0},
         good.astype("datetime64[s]") if good.dtype == int else np.array(["2020-01-01"], dtype="datetime64[s]"),
     ):
-        if wrong is None and function is OPTIONAL:
+        if wrong is None and function in OPTIONAL:
             continue
         with pytest.raises(ShapeError):
             function(wrong)
@@ -163,11 +190,22 @@ FIXED = [
     entry
     for entry in ENTRIES
     if not entry[0].startswith(("path.", "motion.attitude", "motion.body", "motion.ang", "motion.dyn", "motion.solid"))
-    and entry[0] not in ("deformation.inertia", "deformation.internal_momentum", "running_phases", "parallel_transport")
+    and entry[0]
+    not in (
+        "deformation.inertia",
+        "deformation.internal_momentum",
+        "running_phases",
+        "parallel_transport",
+        "horizontal_lift.attitude",
+    )
 ]
 
 # A path may have any number of joints, a series any number of terms.
-ANY_WIDTH = [function for name, function, _ in ENTRIES if name in ("spline shapes", "waypoints", "fourier cosines")]
+ANY_WIDTH = [
+    function
+    for name, function, _ in ENTRIES
+    if name in ("spline shapes", "waypoints", "fourier cosines", "curvature_on_plane first")
+]
 
 
 @pytest.mark.parametrize(("function", "good"), [entry[1:] for entry in FIXED], ids=[entry[0] for entry in FIXED])

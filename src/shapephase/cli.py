@@ -7,6 +7,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -85,11 +86,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if failure:
         _fail(*failure)
     if isinstance(outcome, _Outcome):
-        data, text = {**outcome.data, "warnings": doubts}, outcome.text
+        data, text = {"shapephase": version("shapephase"), **outcome.data, "warnings": doubts}, outcome.text
         if outcome.judged:
             many = "1 warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
             verdict = f"usable, with {many}" if doubts else "no fault found"
-            data, text = data | {"verdict": verdict}, f"{text}\n\nverdict: {verdict}"
+            listed = "".join(f"\nwarning: {doubt}" for doubt in doubts)
+            data, text = data | {"verdict": verdict}, f"{text}\n{listed}\nverdict: {verdict}"
         print(json.dumps(data, indent=2) if as_json else text)
 
 
