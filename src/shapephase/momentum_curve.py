@@ -110,16 +110,13 @@ def momentum_curve(
         turn, spin = frames(at)
         return so3.apply(turn, direction), so3.apply(turn, rate - spin)
 
-    def integrals(at: Array) -> tuple[Array, Array, Array]:
-        return _by_step(curve, at)
-
-    found = integrals(edges)
+    found = _by_step(curve, edges)
     if not follows:
-        edges, found = _refined(integrals, edges, found)
+        edges, found = _refined(curve, edges, found)
     references = np.array([sphere.far_reference(polygon) for polygon in found[2]])
     if times is not None:
         edges = np.union1d(edges, times)
-        edges, found = _clear(integrals, edges, references)
+        edges, found = _clear(curve, edges, references)
     return MomentumCurve(motion, frames, axis, edges, *found, references)
 
 
@@ -158,44 +155,57 @@ class _Resolved:
 
 def _by_step(curve: sphere.Curve, edges: Array) -> tuple[Array, Array, Array]:
     """Dynamic phase and area between arc and chord for each step (B, K), directions at the edges (B, K + 1, 3)."""
-    nodes, weights = sphere.gauss_nodes(edges)
-    direction, rate = curve(nodes.ravel())
     corners, _ = curve(edges)
-    shape = (len(direction), *nodes.shape, 3)
-    direction, rate = direction.reshape(shape), rate.reshape(shape)
+    return *_integrals(curve, edges[:-1], edges[1:], corners[:, :-1]), corners
+
+
+def _integrals(curve: sphere.Curve, left: Array, right: Array, start: Array) -> tuple[Array, Array]:
+    """Dynamic phase and area between arc and chord for steps that begin in the directions `start`: (B, K) each."""
+    nodes, weights = sphere.gauss_nodes(left, right)
+    direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
     dynamic = (np.sum(direction * rate, axis=-1) * weights).sum(axis=-1)
-    slivers = sphere.area_rate(corners[:, :-1, None], direction, np.cross(direction, rate))
-    return dynamic, (slivers * weights).sum(axis=-1), corners
+    slivers = sphere.area_rate(start[:, :, None], direction, np.cross(direction, rate))
+    return dynamic, (slivers * weights).sum(axis=-1)
 
 
 def _refined(
-    integrals: Callable[[Array], tuple[Array, Array, Array]], edges: Array, found: tuple[Array, Array, Array]
+    curve: sphere.Curve, edges: Array, found: tuple[Array, Array, Array]
 ) -> tuple[Array, tuple[Array, Array, Array]]:
-    """Shorter steps where the gauge's own frame turns faster than those of the integrator."""
-    while True:
-        dynamic, slivers, corners = found
-        halves = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
-        finer = integrals(halves)
-        change = np.abs(finer[0][:, 0::2] + finer[0][:, 1::2] - dynamic).max(axis=0)
-        middle, left, right = finer[2][:, 1::2], corners[:, :-1], corners[:, 1:]
-        cut = finer[1][:, 0::2] + finer[1][:, 1::2] + sphere.triangle_area(left, middle, right)
-        change = np.maximum(change, np.abs(cut - slivers).max(axis=0))
-        bend = np.linalg.norm(right - left, axis=-1).max(axis=0)
-        scale = max(1.0, float(np.abs(dynamic).sum(axis=1).max()))
-        rough = (change > 1e-13 * scale / len(change)) | (bend > 0.5)
-        if not rough.any():
-            return edges, found
-        if len(edges) > _MOST_STEPS:
-            raise GaugeError(f"the gauge's frame turns too fast to be followed near t = {edges[:-1][rough][0]:.9g} s")
-        edges = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[rough]]))
-        found = integrals(edges)
+    """Shorter steps where the gauge's own frame turns faster than those of the integrator: halved until that tells
+    nothing new."""
+    dynamic, slivers, corners = found
+    left, right, start, end = edges[:-1], edges[1:], corners[:, :-1], corners[:, 1:]
+    scale = max(1.0, float(np.abs(dynamic).sum(axis=1).max()))
+    done: list[tuple[Array, ...]] = []
+    count = len(left)
+    while len(left):
+        middle = 0.5 * (left + right)
+        between, _ = curve(middle)
+        first, early = _integrals(curve, left, middle, start)
+        second, late = _integrals(curve, middle, right, between)
+        cut = early + late + sphere.triangle_area(start, between, end)
+        change = np.maximum(np.abs(first + second - dynamic), np.abs(cut - slivers)).max(axis=0)
+        bend = np.linalg.norm(end - start, axis=-1).max(axis=0)
+        rough = (change > 1e-13 * scale / count) | (bend > 0.5)
+        done.append((left[~rough], dynamic[:, ~rough], slivers[:, ~rough], start[:, ~rough]))
+        count += int(rough.sum())
+        if count > _MOST_STEPS:
+            raise GaugeError(f"the gauge's frame turns too fast to be followed near t = {left[rough][0]:.9g} s")
+        left, right = (np.concatenate(pair) for pair in ((left[rough], middle[rough]), (middle[rough], right[rough])))
+        dynamic, slivers, start, end = (
+            np.concatenate([one[:, rough], other[:, rough]], axis=1)
+            for one, other in ((first, second), (early, late), (start, between), (between, end))
+        )
+    times = np.concatenate([part[0] for part in done])
+    dynamic, slivers, start = (np.concatenate([part[k] for part in done], axis=1) for k in (1, 2, 3))
+    order = np.argsort(times)
+    corners = np.concatenate([start[:, order], corners[:, -1:]], axis=1)
+    return np.append(times[order], edges[-1]), (dynamic[:, order], slivers[:, order], corners)
 
 
-def _clear(
-    integrals: Callable[[Array], tuple[Array, Array, Array]], edges: Array, references: Array
-) -> tuple[Array, tuple[Array, Array, Array]]:
+def _clear(curve: sphere.Curve, edges: Array, references: Array) -> tuple[Array, tuple[Array, Array, Array]]:
     """Steps so short that the point opposite the reference is never between an arc and its chord."""
-    found = integrals(edges)
+    found = _by_step(curve, edges)
     for _ in range(_HALVINGS):
         corners = found[2]
         away = np.linalg.norm(corners[:, :-1] + references[:, None], axis=-1)
@@ -203,5 +213,5 @@ def _clear(
         if not close.any():
             break
         edges = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[close]]))
-        found = integrals(edges)
+        found = _by_step(curve, edges)
     return edges, found

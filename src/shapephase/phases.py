@@ -325,7 +325,8 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
 
     Source: Cabrera 2006, remark 3.7; theory.md D11.
     """
-    nodes, weights = sphere.gauss_nodes(motion.solution.times)
+    edges = motion.solution.times
+    nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
     times = nodes.ravel()
     source = motion.deformation.source
     inertia, internal = source.sample(times)

@@ -77,7 +77,7 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
     """
     last = None
     for _ in range(_HALVINGS):
-        nodes, weights = gauss_nodes(edges)
+        nodes, weights = gauss_nodes(edges[:-1], edges[1:])
         direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
         corners, _ = curve(edges)
         slivers = (area_rate(corners[..., :-1, None, :], direction, rate) * weights).sum(axis=(-1, -2))
@@ -135,10 +135,10 @@ def wrapped(area: Array) -> Array:
     return 2.0 * so3.wrap(0.5 * area)
 
 
-def gauss_nodes(edges: Array) -> tuple[Array, Array]:
-    """Eight Gauss nodes in each step and their weights: (K + 1,) -> (K, 8), (K, 8)."""
-    half = 0.5 * np.diff(edges)[:, None]
-    return edges[:-1, None] + half * (_NODES + 1.0), half * _WEIGHTS
+def gauss_nodes(left: Array, right: Array) -> tuple[Array, Array]:
+    """Eight Gauss nodes in each step and their weights: (K,), (K,) -> (K, 8), (K, 8)."""
+    half = 0.5 * (right - left)[:, None]
+    return left[:, None] + half * (_NODES + 1.0), half * _WEIGHTS
 
 
 def far_reference(directions: Array) -> Array:
