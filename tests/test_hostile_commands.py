@@ -14,7 +14,7 @@ import shapephase as sp
 from hostile_files import cases
 from loading_process import MOST_MEMORY, Worker
 from shapephase.errors import TrajectoryError
-from test_motion_files import ODD_FILES, bomb, doubled_member
+from test_motion_files import ODD_FILES, odd_file
 
 CASES_OF_BODIES = cases()
 
@@ -53,16 +53,8 @@ def asked(worker: Worker, folder, *arguments: str) -> dict:
 
 @pytest.mark.parametrize("case", ODD_FILES)
 def test_an_odd_motion(case, worker: Worker, tmp_path):
-    name, content, outcome, words = ODD_FILES[case]
-    file = tmp_path / name
-    if isinstance(content, str):
-        file.write_text(content, encoding="utf-8", newline="")
-    elif isinstance(content, bytes):
-        file.write_bytes(content)
-    elif content in (bomb, doubled_member):
-        file.write_bytes(content())
-    else:
-        content(file)
+    _, _, outcome, words = ODD_FILES[case]
+    file = odd_file(case, tmp_path)
     answer = asked(worker, tmp_path, "check", "diver", file)
     if outcome is None or issubclass(outcome, Warning):
         assert answer["code"] == 0

@@ -580,10 +580,10 @@ ODD_FILES = {
 }
 
 
-@pytest.mark.parametrize("case", ODD_FILES)
-def test_an_odd_file_has_the_outcome_of_the_list(tmp_path, diver, case):
-    name, content, outcome, words = ODD_FILES[case]
-    file = tmp_path / name
+def odd_file(case, folder):
+    """One of `ODD_FILES`, written."""
+    name, content, _, _ = ODD_FILES[case]
+    file = folder / name
     if isinstance(content, str):
         file.write_text(content, encoding="utf-8", newline="")
     elif isinstance(content, bytes):
@@ -592,6 +592,13 @@ def test_an_odd_file_has_the_outcome_of_the_list(tmp_path, diver, case):
         file.write_bytes(content())
     else:
         content(file)
+    return file
+
+
+@pytest.mark.parametrize("case", ODD_FILES)
+def test_an_odd_file_has_the_outcome_of_the_list(tmp_path, diver, case):
+    name, _, outcome, words = ODD_FILES[case]
+    file = odd_file(case, tmp_path)
     message, started = "", time.perf_counter()
     if outcome is None:
         motion = read_recorded_motion(file, diver)
