@@ -589,3 +589,18 @@ def test_joints_that_do_not_match_are_named(load_urdf):
         sp.articulated(arms, path())
     with pytest.raises(UnknownNameError, match="middle"):
         sp.holonomy(arms, path("left", "right", "middle"))
+
+
+def test_joints_do_not_go_beyond_a_million():
+    """There an angle has lost six digits (hazards 4 C)."""
+    far = 1.1e6
+    for make in (
+        lambda: sp.ShapePath.fourier([far], [[0.0]], [[0.0]], 1.0),
+        lambda: sp.ShapePath.spline([0.0, 1.0], [[0.0], [far]]),
+        lambda: sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [-far]]),
+        lambda: sp.ShapePath.function(lambda t: (far + 0.0 * t[:, None], 0.0 * t[:, None]), 1.0),
+        lambda: sp.load_body("cat_two_halves").locked_inertia([0.0, far, 0.0]),
+    ):
+        with pytest.raises(sp.errors.ShapeError, match="up to 1e\\+06 rad"):
+            make()
+    assert sp.ShapePath.spline([0.0, 1.0], [[0.0], [9e5]]).shape(1.0) == 9e5

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+FARTHEST = 1e6
+
 
 def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] = (), *, unit: str = "") -> Array:
     """A float64 array in native byte order whose last axes are `trailing` (None: any length), all finite.
@@ -39,6 +41,13 @@ def check_finite(array: Array, name: str) -> None:
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ShapeError(f"{name}: entry {list(where)} is {array[where]}; every entry must be a finite number")
+
+
+def check_reach(array: Array, name: str) -> None:
+    """Raise `ShapeError` for joint coordinates or rates beyond 1e6: there the digits of an angle are lost."""
+    if array.size and np.abs(array).max() > FARTHEST:
+        where = tuple(int(i) for i in np.argwhere(np.abs(array) > FARTHEST)[0])
+        raise ShapeError(f"{name}: entry {list(where)} is {array[where]:.6g}; joints go up to {FARTHEST:g} rad, m (/s)")
 
 
 def real_array(value: Any, name: str, unit: str = "") -> Array:

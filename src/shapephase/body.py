@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from . import so3
-from .arrays import Array, finite_array
+from .arrays import Array, check_reach, finite_array
 from .errors import ShapeError, unknown_name
 from .inertia_tensor import second_moment
 from .link_tree import Mimic
@@ -364,6 +364,7 @@ class Body:
                 f"{name}: expected (..., {self.n_shape}), one entry per joint of {self.name} "
                 f"({', '.join(self.joint_names)}), got shape {array.shape}"
             )
+        check_reach(array, name)
         return array
 
     def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:

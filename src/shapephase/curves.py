@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, Integers, real_array
+from .arrays import Array, Integers, check_reach, real_array
 from .errors import ShapeError, TrajectoryError
 
 _WHOLE_TURN = 2.0 * np.pi
@@ -100,6 +100,7 @@ class Function:
             if not np.isfinite(part).all():
                 row = int(np.argwhere(~np.isfinite(part))[0, 0])
                 raise TrajectoryError(f"the path's function returned {name} that are not finite at {times[row]:.9g} s")
+        check_reach(shapes, "shapes of the path's function")
         return shapes, rates
 
 

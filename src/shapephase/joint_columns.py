@@ -8,13 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from . import so3
-from .arrays import Array
+from .arrays import FARTHEST, Array
 from .body import Body
 from .errors import TrajectoryError, unknown_name
 from .recording import Recording, warn
 
 _DEGREES = "_deg"
-_LARGEST = 1e6
 _LONGEST_NAME, _MOST_SHOWN = 256, 200
 _QUATERNIONS = (("qx", "qy", "qz", "qw"), ("base_qx", "base_qy", "base_qz", "base_qw"))
 _POSITION = ("base_x_m", "base_y_m", "base_z_m")
@@ -118,9 +117,9 @@ def _check_joint(values: Array, joint: int, body: Body, recording: Recording, de
     name, unit = body.joint_names[joint], body.joint_units[joint]
     lower, upper = body.joint_limits[joint]
     largest = int(np.argmax(np.abs(values)))
-    if abs(values[largest]) > _LARGEST:
+    if abs(values[largest]) > FARTHEST:
         raise TrajectoryError(
-            f"{recording.place(largest)}: joint {name} is at {values[largest]:.6g} {unit}; up to {_LARGEST:g} {unit} "
+            f"{recording.place(largest)}: joint {name} is at {values[largest]:.6g} {unit}; up to {FARTHEST:g} {unit} "
             "can be told to full accuracy"
         )
     beyond = np.maximum(lower - values, values - upper)

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, check_finite, finite_array
+from .arrays import Array, check_finite, check_reach, finite_array
 from .curves import (
     Curve,
     Fourier,
@@ -81,6 +81,8 @@ class ShapePath:
         if middle.ndim != 1 or a.ndim != 2 or b.ndim != 2:
             shapes = f"{middle.shape}, {a.shape} and {b.shape}"
             raise ShapeError(f"mean (n,), cosines (n, K) and sines (n, K) are needed, got {shapes}")
+        for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
+            check_reach(values, name)
         period = positive_argument(duration)
         breaks = np.array([0.0, period])
         names = _names(joint_names, len(middle))
@@ -326,6 +328,7 @@ def _samples(times: ArrayLike, shapes: ArrayLike) -> tuple[Array, Array]:
     r = finite_array(shapes, "shapes", (None, None))
     if t.ndim != 1 or r.ndim != 2 or len(t) != len(r):
         raise ShapeError(f"times (N,) and shapes (N, n) are needed, got {t.shape} and {r.shape}")
+    check_reach(r, "shapes")
     if len(t) < 2:
         raise TrajectoryError(f"a path needs two samples or more, got {len(t)}")
     late = np.flatnonzero(np.diff(t) <= 0.0)
