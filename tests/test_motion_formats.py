@@ -314,7 +314,7 @@ def test_smoothing_by_the_reader_reports_what_is_left(tmp_path):
     motion = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth={RIGHT: 0.01})
     np.testing.assert_allclose(motion.residual, [0.0, 0.01], atol=2e-5)
     both = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth=0.01)
-    np.testing.assert_allclose(both.residual, 0.01, rtol=1e-3)
+    np.testing.assert_allclose(both.residual, 0.01, rtol=5.1e-4)  # FITPACK meets its sum of squares to a thousandth
     assert np.sqrt(np.mean((both.path.shape(t) - clean) ** 2)) < 0.004
     with pytest.raises(UnknownNameError, match="unknown joint of diver"):
         read_recorded_motion(tmp_path / "m.csv", DIVER, smooth={"elbow": 0.01})

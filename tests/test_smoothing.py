@@ -48,7 +48,7 @@ def jumps(path, order):
 def test_the_residual_is_the_stated_noise(count, noise, periodic):
     t, shapes = noisy(noise, count)
     path, residual = smoothed_path(t, shapes, np.full(2, noise), periodic, NAMES)
-    np.testing.assert_allclose(residual, noise, rtol=1e-3)
+    np.testing.assert_allclose(residual, noise, rtol=5.1e-4)  # FITPACK meets its sum of squares to a thousandth
     off = shapes - path.shape(t)
     np.testing.assert_allclose(residual, np.sqrt((off**2).sum(axis=0) / count), rtol=1e-12)
     assert np.isin(path.breaks, t).all()
@@ -131,7 +131,7 @@ def test_a_gap_wider_than_the_noise_is_no_loop():
     with pytest.raises(TrajectoryError, match=r"joint knee ends 0\.08 from its start with a noise level of 0\.01"):
         smoothed_path(t, shapes, np.full(2, 0.01), True, NAMES)
     path, residual = smoothed_path(t, shapes, np.full(2, 0.02), True, NAMES)
-    np.testing.assert_allclose(residual, 0.02, rtol=1e-3)
+    np.testing.assert_allclose(residual, 0.02, rtol=5.1e-4)  # FITPACK meets its sum of squares to a thousandth
     np.testing.assert_allclose(path.gap, 0.0, atol=1e-14)
 
 
