@@ -48,6 +48,25 @@ def test_complete_integrals(m1):
         assert off(elliptic.complete_pi(n, m1), mpmath.ellippi(mp(n), m)) < 1e-13
 
 
+@pytest.mark.parametrize("m1", [1.0, 0.5, 1e-8, 1e-18, 1e-30, 0.0])
+def test_the_argument_of_sn_and_cn(m1):
+    for cosine in (1.0, 0.7, 1e-3, 1e-9, 1e-15, 1e-40):
+        sine = np.sqrt(1.0 - cosine * cosine)
+        square = mp(cosine) ** 2 / (mp(cosine) ** 2 + mp(sine) ** 2)
+        truth = mpmath.sqrt(1 - square) * mpmath.elliprf(square, square + mp(m1) * (1 - square), 1)
+        for factor in (1.0, 3.0, 1e-100):
+            found = elliptic.argument_of(factor * sine, factor * cosine, m1)
+            assert abs(float(mp(found) - truth)) < 2e-15 * max(1.0, float(truth))
+            assert elliptic.argument_of(-factor * sine, factor * cosine, m1) == -found
+        sn, cn, _, _ = elliptic.jacobi(found, m1)
+        assert abs(float(sn) - sine) < 1e-15
+        assert abs(float(cn) - cosine) < 1e-15
+    assert elliptic.argument_of(1.0, 0.0, 0.0) == np.inf
+    for sine, cosine in ((0.5, -0.1), (0.0, 0.0)):
+        with pytest.raises(ShapeError, match="cn"):
+            elliptic.argument_of(sine, cosine, m1)
+
+
 def test_complete_integrals_next_to_zero():
     assert elliptic.complete_k(0.0) == elliptic.complete_pi(-0.5, 0.0) == elliptic.complete_pi(0.5, 0.0) == np.inf
     assert elliptic.complete_e(0.0) == 1.0

@@ -12,6 +12,7 @@ from .arrays import Array, finite_array
 from .body import Body
 from .connection import CLOSED, path_gap
 from .errors import ShapeError, SingularInertiaError
+from .inertia_tensor import inertia_argument
 from .interpolant import Interpolant
 from .sampling import Sampler
 from .shape_path import ShapePath, breaks_argument, positive_argument, times_argument
@@ -22,7 +23,6 @@ from .sources import (
     RigidSource,
     SampledSource,
     Source,
-    inertia_argument,
 )
 
 

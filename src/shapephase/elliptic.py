@@ -72,6 +72,20 @@ def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
     return (sign * sine)[()], (sign * cosine)[()], delta[()], amplitude[()]
 
 
+def argument_of(sn: ArrayLike, cn: ArrayLike, m1: ArrayLike) -> Array:
+    """The u in [−K, K] with these sn and cn >= 0, up to a common factor: (...), (...), (...) -> (...).
+
+    To be preferred to `incomplete_f` of the amplitude: for small m1 next to ±K an amplitude has not the digits of cn.
+    Infinite at m1 = 0 and cn = 0. Parameter m = k² = 1 − m1.
+    """
+    sine, cosine, m1 = _arguments(sn=sn, cn=cn, m1=m1)
+    length = np.hypot(sine, cosine)
+    _refuse(
+        (cosine < 0.0) | (length == 0.0), np.broadcast_arrays(cosine, length)[0], "cn", "0 or more, sn and cn not 0"
+    )
+    return _first_kind(sine / length, cosine / length, m1)[()]
+
+
 def jacobi_pi(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> Array:
     """The integral of 1/(1 − n sn²) from 0 to u, which is Pi(n; am u), for n <= 0: (...), (...), (...) -> (...).
 

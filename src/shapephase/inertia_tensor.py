@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
-from .errors import SingularInertiaError
+from .errors import SingularInertiaError, UnphysicalInertiaError
+
+
+def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
+    """A user's tensors (N, 3, 3), made exactly symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
+    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
+    if skew > 1e-9 * np.abs(tensors).max(initial=0.0):
+        raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
+    symmetric = 0.5 * (tensors + np.swapaxes(tensors, -1, -2))
+    inverse_inertia(symmetric, times)
+    return symmetric
 
 
 def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
@@ -19,11 +29,11 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
     """
     with np.errstate(invalid="ignore", over="ignore"):
         adjugate, determinant = _adjugate(inertia)
-    a = inertia[..., 0, 0]
-    trace = np.trace(inertia, axis1=-2, axis2=-1)
-    # Above this no tensor is near-singular (the condition number is at most some hundred, and so are the digits that
-    # the adjugate loses), and the leading minors say whether it is positive.
-    safe = (determinant > 1e-3 * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
+        a = inertia[..., 0, 0]
+        trace = np.trace(inertia, axis1=-2, axis2=-1)
+        # Above this no tensor is near-singular (the condition number is at most some hundred, and so are the digits
+        # that the adjugate loses), and the leading minors say whether it is positive.
+        safe = (determinant > 1e-3 * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
     if safe.all():
         return adjugate / determinant[..., None, None]
     return _careful_inverse(inertia, times)

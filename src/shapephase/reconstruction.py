@@ -18,10 +18,12 @@ from .errors import AccuracyNotReached, ShapeError, unknown_name
 from .inertia_tensor import inverse_inertia
 from .interpolant import Interpolant
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
+from .rigid_rotation import rigid_rotation
 from .shape_path import times_argument
+from .sources import RigidSource
 from .stepping import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
 
-METHODS = ("auto", "collocation", "dop853")
+METHODS = ("auto", "collocation", "closed_form", "dop853")
 _COLUMNS = (
     "time",
     *("qx", "qy", "qz", "qw"),
@@ -297,12 +299,13 @@ def reconstruct(
         axes of both broadcast; the deformation is sampled once for all of them.
     tolerance : of the attitude, over the whole interval, between 1e-13 and 1e-4 [rad]
     method : "auto" or "collocation" (the deformation sampled at Chebyshev points, the attitude stepped on the
-        interpolant), or "dop853" (SciPy's integrator on the deformation itself, an independent check)
+        interpolant), "closed_form" (of a rigid body, by elliptic functions: `rigid_body.EulerTop`), or "dop853"
+        (SciPy's integrator on the deformation itself, an independent check)
 
     Raises
     ------
     ShapeError, UnknownNameError
-        For arguments of the wrong shape, or an unknown method.
+        For arguments of the wrong shape, an unknown method, or "closed_form" for a deformation not made by `rigid`.
     SingularInertiaError
         If the locked inertia is not positive definite somewhere.
     AccuracyNotReached
@@ -316,6 +319,12 @@ def reconstruct(
     spatial, start = _broadcast(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     at_start = at_start.reshape(-1, 3)
+    if method == "closed_form":
+        if not isinstance(deformation.source, RigidSource):
+            others = [name for name in METHODS if name != method]
+            raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", method, others)
+        exact = rigid_rotation(deformation.source.tensor, at_start, deformation.duration, goal)
+        return Motion(deformation, spatial, start, goal, method, 1, exact)
     if method == "dop853":
         solution = _dop853(deformation, at_start, goal)
         return Motion(deformation, spatial, start, goal, method, solution.evaluations, solution)

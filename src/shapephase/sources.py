@@ -13,8 +13,8 @@ from . import so3
 from .arrays import Array, finite_array
 from .body import Body
 from .connection import path_sampler
-from .errors import GaugeError, ShapeError, UnphysicalInertiaError
-from .inertia_tensor import inverse_inertia, second_moment
+from .errors import GaugeError, ShapeError
+from .inertia_tensor import inertia_argument, inverse_inertia, second_moment
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
 from .sampling import Sampler, sampler
 from .shape_path import ShapePath
@@ -248,16 +248,6 @@ def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> 
 def _inertia_of(moment: Array) -> Array:
     """tr(M) - M, from sums of m r r^T."""
     return np.trace(moment, axis1=-2, axis2=-1)[:, None, None] * np.eye(3) - moment
-
-
-def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
-    """A user's tensors (N, 3, 3), made exactly symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
-    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
-    if skew > 1e-9 * np.abs(tensors).max(initial=0.0):
-        raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
-    symmetric = 0.5 * (tensors + np.swapaxes(tensors, -1, -2))
-    inverse_inertia(symmetric, times)
-    return symmetric
 
 
 def _returned(value: ArrayLike, name: str, wanted: tuple[int, ...]) -> Array:

@@ -1,0 +1,320 @@
+"""The free rigid body, the Euler top, in closed form: momentum, attitude, period and phases at any time.
+
+The momentum goes round an axis ê of the body as `momentum_orbit` says. The attitude is
+
+    R(t) = R(0) Q(0)^T exp(psi ê) Q(t),
+
+where Q(t) is the shortest turn that takes the direction of Pi to ê, never farther than a quarter turn, and
+
+    psi' = L/I_k + (2 E/L − L/I_k)/(1 + ê.Pi/L),
+
+whose integral is Legendre's third kind of a characteristic n <= 0. There are no Euler angles and so no poles, and one
+path for every case.
+
+Sources: Marsden and Ratiu, exercise 15.8-1; van Zon and Schofield 2007 for what others do; theory.md D17, H.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import elliptic, so3
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+from ..inertia_tensor import inertia_argument, principal_axes
+from .momentum_orbit import MomentumOrbit, momentum_orbit, separatrix_solid_angle
+
+_TURNS = 1e12
+_EPS = float(np.finfo(float).eps)
+
+
+class EulerTop:
+    """A free rigid body with a given inertia, angular momentum and initial attitude.
+
+    Every inertia and momentum is allowed, also zero momentum; times may be negative.
+
+    Parameters
+    ----------
+    inertia : (3, 3) about the centre of mass, body axes [kg m^2], symmetric positive definite
+    momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
+    attitude : (3, 3) at t = 0, body axes to inertial axes; None: the identity
+
+    Attributes
+    ----------
+    inertia, momentum : as given
+    initial_attitude : (3, 3)
+    moments : (3,) principal moments, ascending [kg m^2]
+    axes : (3, 3) whose columns are the principal axes in body axes, determinant +1
+    orbit : the curve of Pi in those axes
+
+    Raises
+    ------
+    ShapeError
+        For arrays of the wrong shape or entries that are no finite numbers.
+    UnphysicalInertiaError, SingularInertiaError
+        If the inertia is not symmetric, or not positive definite.
+    """
+
+    inertia: Array
+    momentum: Array
+    initial_attitude: Array
+    moments: Array
+    axes: Array
+    orbit: MomentumOrbit
+
+    def __init__(self, inertia: ArrayLike, momentum: ArrayLike, attitude: ArrayLike | None = None) -> None:
+        tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
+        spatial = _array(momentum, "momentum", (3,), "kg m^2/s")
+        start = _attitude(attitude)
+        self._make(tensor, spatial, start, start.T @ spatial)
+
+    @classmethod
+    def principal(cls, moments: ArrayLike, momentum: ArrayLike, attitude: ArrayLike | None = None) -> EulerTop:
+        """A body whose axes are its principal axes, with its momentum in those: nothing is rounded on the way in.
+
+        Parameters
+        ----------
+        moments : (3,) about the three body axes, in any order [kg m^2]
+        momentum : (3,) at t = 0, body axes [kg m^2/s]
+        attitude : (3, 3) at t = 0; None: the identity
+        """
+        tensor = inertia_argument(np.diag(_array(moments, "moments", (3,), "kg m^2"))[None])[0]
+        body = _array(momentum, "momentum", (3,), "kg m^2/s")
+        start = _attitude(attitude)
+        top = cls.__new__(cls)
+        top._make(tensor, start @ body, start, body)
+        return top
+
+    def _make(self, inertia: Array, momentum: Array, attitude: Array, body_momentum: Array) -> None:
+        self.inertia, self.momentum, self.initial_attitude = inertia, momentum, attitude
+        self.moments, self.axes = _principal(inertia)
+        self.orbit = orbit = momentum_orbit(self.moments, self.axes.T @ body_momentum)
+        # What stands left and right of exp(psi ê) Q(t) stays as it is: one linear map of quaternions.
+        ends = so3.quat_from_matrix(self.axes)
+        outward = so3.quat_product(so3.quat_from_matrix(attitude), ends)
+        left = so3.quat_product(outward, so3.quat_inverse(_carried(orbit, np.zeros(()), np.asarray(orbit.phase))))
+        columns = so3.quat_product(np.eye(4), np.broadcast_to(so3.quat_inverse(ends), (4, 4)))
+        self._around = so3.quat_product(np.broadcast_to(left, (4, 4)), columns)
+
+    def __repr__(self) -> str:  # noqa: D105
+        moments = ", ".join(f"{moment:.6g}" for moment in self.moments)
+        return f"EulerTop(moments=({moments}) kg m^2, momentum={self.magnitude:.6g} kg m^2/s, {self.regime})"
+
+    def body_momentum(self, t: ArrayLike) -> Array:
+        """Pi(t): times (...) of either sign -> (..., 3), body axes [kg m^2/s]."""
+        orbit = self.orbit
+        return orbit.size * (orbit.directions(orbit.functions(self._argument(t)[1])) @ self.axes.T)
+
+    def angular_velocity(self, t: ArrayLike) -> Array:
+        """omega(t) = I^-1 Pi(t): times (...) -> (..., 3), body axes [rad/s]."""
+        return (self.body_momentum(t) @ self.axes / self.moments) @ self.axes.T
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """R(t), body axes to inertial axes: times (...) -> (..., 3, 3)."""
+        return so3.matrix_from_quat(self._quaternion(t))
+
+    def quat_xyzw(self, t: ArrayLike) -> Array:
+        """The attitude as quaternions x y z w with w >= 0: times (...) -> (..., 4)."""
+        return so3.positive_scalar(self._quaternion(t))
+
+    @property
+    def magnitude(self) -> float:
+        """|Pi| [kg m^2/s]."""
+        return self.orbit.size
+
+    @property
+    def energy(self) -> float:
+        """E = Pi.I^-1 Pi/2 [J]."""
+        return 0.5 * float(np.sum(self.orbit.start**2 / self.moments))
+
+    @property
+    def regime(self) -> str:
+        """What Pi does in the body.
+
+        "rest" without momentum; "spherical" with three equal moments; "steady" along a principal axis; "axisymmetric":
+        at a constant rate round the symmetry axis; "circling" the axis of the largest or of the smallest moment;
+        "separatrix": from one direction of the intermediate axis to the other, once in all time.
+        """
+        return self.orbit.regime
+
+    @property
+    def axis(self) -> Array:
+        """The principal axis that Pi circles, on Pi's side: (3,) unit vector, body axes.
+
+        On the separatrix that of the largest moment. Where Pi stands still and circles nothing (a spherical body, the
+        intermediate axis, the equator of an axisymmetric body) its own direction; zero at rest.
+        """
+        return self.axes @ self.orbit.direction
+
+    @property
+    def rate(self) -> float:
+        """Of the argument of the elliptic functions [rad/s]; 0 where Pi stands still and circles nothing."""
+        return self.orbit.rate
+
+    @property
+    def modulus(self) -> float:
+        """k of the elliptic functions (SciPy's parameter is its square): 0 next to the axis, 1 on the separatrix."""
+        return float(np.sqrt(1.0 - self.complement))
+
+    @property
+    def complement(self) -> float:
+        """m1 = 1 − k², right in all its digits, however small; from 0 on the separatrix to 1 next to the axis."""
+        return self.orbit.complement
+
+    @property
+    def condition(self) -> float:
+        """How much a relative change of the momentum or the moments is magnified in the phase of Pi, each half turn.
+
+        1 or more, about 1/m1 near the separatrix, infinite on it and along the intermediate axis. What was rounded
+        before it came here (a tensor turned out of its principal axes, say) is magnified so.
+        """
+        return self.orbit.condition
+
+    @property
+    def period(self) -> float:
+        """4 K/rate, after which Pi comes back [s].
+
+        Infinite on the separatrix and where Pi stands still and circles nothing; along the axes of the largest and
+        the smallest moment that of the small circles nearby.
+
+        Source: theory.md H7.
+        """
+        return 4.0 * float(elliptic.complete_k(self.complement)) / self.rate if self.rate else np.inf
+
+    @property
+    def dynamic_phase(self) -> float:
+        """The integral of omega.Pi/|Pi| over a period, 2 E T/|Pi| [rad]; 0 at rest.
+
+        Source: Cabrera 2006, example 3.8; theory.md D12.
+        """
+        return self._mean_rate * self.period if self.magnitude else 0.0
+
+    @property
+    def solid_angle(self) -> float:
+        """The signed area that the direction of Pi goes round in a period, in the body, on the side of `axis` [sr].
+
+        Between −2 pi and 2 pi; negative about the axis of the smallest moment, which Pi goes round clockwise. On the
+        separatrix its limit, plus or minus `separatrix_solid_angle`; 0 where Pi stands still.
+
+        Source: theory.md D12 and section 7.
+        """
+        orbit = self.orbit
+        if orbit.regime == "separatrix":
+            return orbit.sense * separatrix_solid_angle(self.moments, orbit.circled)
+        if orbit.regime in ("rest", "spherical", "steady"):
+            return 0.0
+        return (self._mean_rate - orbit.spin) * self.period - self._third_kind + 2.0 * np.pi * orbit.sense
+
+    @property
+    def montgomery_phase(self) -> float:
+        """dynamic_phase − solid_angle: R(t + T) = exp(this mu^) R(t), mu^ the momentum's direction [rad].
+
+        Not reduced modulo 2 pi. It is also what an axis that Pi does not circle turns through about the momentum,
+        counted along t. Infinite without a finite period; 0 at rest.
+
+        Source: Montgomery 1991; Marsden and Ratiu, section 15.9, remark 4; theory.md D12, D17.
+        """
+        return self.precession_per_period - 2.0 * np.pi * self.orbit.sense
+
+    @property
+    def precession_per_period(self) -> float:
+        """The angle that the circled axis turns through about the momentum in a period, counted along t [rad].
+
+        `montgomery_phase` and a turn more about the axis of the largest moment, a turn less about that of the smallest.
+
+        Source: theory.md D17 (from Marsden and Ratiu, exercise 15.8-1).
+        """
+        if not self.rate:
+            return np.inf if self.magnitude else 0.0
+        return self.orbit.spin * self.period + self._third_kind
+
+    @property
+    def long_axis_precession_per_period(self) -> float:
+        """As `precession_per_period`, for the axis of the smallest moment, whichever axis Pi circles [rad]."""
+        return self.precession_per_period if self.orbit.circled == 0 else self.montgomery_phase
+
+    @property
+    def polhode_frequency(self) -> float:
+        """2 pi/period, of the momentum's way round in the body [rad/s]; 0 where there is no finite period."""
+        return 2.0 * np.pi / self.period
+
+    @property
+    def precession_frequency(self) -> float:
+        """Mean rate of the circled axis about the momentum, precession_per_period/period [rad/s].
+
+        Where there is no finite period the limit, 2 E/|Pi|; 0 at rest.
+        """
+        return self.precession_per_period / self.period if np.isfinite(self.period) else self._mean_rate
+
+    @property
+    def _mean_rate(self) -> float:
+        """2 E/|Pi| = omega.Pi/|Pi|, the turn about the momentum [rad/s]."""
+        return 2.0 * self.energy / self.magnitude if self.magnitude else 0.0
+
+    @property
+    def _third_kind(self) -> float:
+        """The share of the complete integral of the third kind in the precession of a period."""
+        orbit = self.orbit
+        return 4.0 * orbit.precession * float(elliptic.complete_pi(orbit.characteristic, orbit.complement))
+
+    def _argument(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Times and the elliptic argument there."""
+        times = finite_array(t, "t", unit="s")
+        longest = _TURNS * min(self.period, 2.0 * np.pi * self.moments[0] / (self.magnitude or 1.0))
+        far = float(np.abs(times).max(initial=0.0))
+        if self.magnitude and far > longest:
+            raise ShapeError(
+                f"t: {far:.6g} s is more than 1e12 turns of this body away, too far for digits of the attitude to be "
+                "left; the largest time taken is " + f"{longest:.6g} s"
+            )
+        return times, self.rate * times + self.orbit.phase
+
+    def _quaternion(self, t: ArrayLike) -> Array:
+        times, u = self._argument(t)
+        return so3.normalised(_carried(self.orbit, times, u) @ self._around)
+
+
+def _carried(orbit: MomentumOrbit, times: Array, u: Array) -> Array:
+    """Quaternions of exp(psi ê) Q, in principal axes, psi up to a constant: (...) -> (..., 4)."""
+    functions = orbit.functions(u)
+    direction = orbit.directions(functions)
+    half = 0.5 * (orbit.spin * times + orbit.swing(u, functions))
+    turn = np.empty((*direction.shape[:-1], 4))
+    turn[..., :3] = np.cross(direction, orbit.direction)
+    turn[..., 3] = 1.0 + direction @ orbit.direction
+    turn = so3.normalised(turn)
+    cosine, sine = np.cos(half)[..., None], np.sin(half)[..., None]
+    across, scalar = turn[..., :3], turn[..., 3:]
+    # The vector of Q is at right angles to ê.
+    vector = cosine * across + sine * (scalar * orbit.direction + np.cross(orbit.direction, across))
+    return np.concatenate([vector, cosine * scalar], axis=-1)
+
+
+def _array(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:
+    array = finite_array(value, name, shape, unit=unit).copy()
+    if array.shape != shape:
+        raise ShapeError(f"{name}: one array of shape {shape} is needed, got {array.shape}; make a top for each")
+    return array
+
+
+def _attitude(value: ArrayLike | None) -> Array:
+    start = np.eye(3) if value is None else so3.rotation_argument(value, "attitude")
+    return _array(start, "attitude", (3, 3), "")
+
+
+def _principal(tensor: Array) -> tuple[Array, Array]:
+    """Ascending moments and axes: those of a diagonal tensor as they are, else with moments equal to rounding equal."""
+    diagonal = np.diagonal(tensor)
+    if np.array_equal(tensor, np.diag(diagonal)):
+        order = np.argsort(diagonal, kind="stable")
+        axes = np.eye(3)[:, order]
+        axes[:, 2] *= np.round(np.linalg.det(axes))
+        return diagonal[order], axes
+    moments, axes = principal_axes(tensor)
+    close = np.diff(moments) < 4.0 * _EPS * moments[2]
+    if close[0]:
+        moments[0] = moments[1]
+    if close[1]:
+        moments[2] = moments[1]
+    return moments, axes

@@ -1,0 +1,197 @@
+"""The curve of a free rigid body's momentum on its sphere, in principal axes and elliptic functions.
+
+In the axes of ascending moments I1 <= I2 <= I3 the momentum Pi circles the axis k, which is 3 where D = L² − 2 E I2 is
+positive and 1 where it is negative (L = |Pi|, E the energy; a is the other one of 1 and 3):
+
+    Pi_k = ± A_k dn(u),  Pi_a = ± A_a cn(u),  Pi_2 = ± A_2 sn(u),  u = rate t + u0,
+
+with the complementary parameter m1 proportional to |D|. Everything near the separatrix hangs on D, a difference: it is
+found in rational arithmetic, once, so that moments and momentum given as doubles are answered to rounding on both sides
+of the separatrix and on it.
+
+Sources: Jacobi 1850; Marsden and Ratiu, section 15.8, with the misprints of theory.md (M-E1, M-E2, M-E7) mended.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import elliptic
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+
+_NEGLIGIBLE = 1e-140
+
+
+@dataclass(frozen=True, eq=False)
+class MomentumOrbit:
+    """How Pi moves in the principal axes of a free rigid body.
+
+    Attributes
+    ----------
+    moments : (3,) ascending [kg m^2]
+    start : (3,) Pi at t = 0 [kg m^2/s]
+    size : |Pi|
+    regime : "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"
+    circled, other : the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles nothing
+    direction : (3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing
+    amplitudes : (3,) signed, relative to the size
+    rate : of u [rad/s]; 0 where Pi circles nothing
+    complement : m1
+    phase : u0
+    characteristic : n <= 0 of the integral of the third kind in the azimuth and the attitude; of the moments only
+    spin : L/I_k [rad/s]
+    precession : (L/I_a − L/I_k)/rate
+    sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
+    condition : how much a relative change of moments or momentum is magnified in u each half period; 1 or more
+    """
+
+    moments: Array
+    start: Array
+    size: float
+    regime: str
+    circled: int
+    other: int
+    direction: Array
+    amplitudes: Array
+    rate: float
+    complement: float
+    phase: float
+    characteristic: float
+    spin: float
+    precession: float
+    sense: float
+    condition: float
+
+    def functions(self, u: Array) -> tuple[Array, Array, Array, Array]:
+        """sn, cn, dn and am of u."""
+        return elliptic.jacobi(u, self.complement)
+
+    def directions(self, functions: tuple[Array, Array, Array, Array]) -> Array:
+        """Pi/|Pi| for these sn, cn, dn and am: (...) each -> (..., 3)."""
+        sn, cn, dn, _ = functions
+        direction = np.empty((*np.shape(sn), 3))
+        if not self.rate:
+            direction[...] = self.direction
+            return direction
+        for index, function in ((self.circled, dn), (self.other, cn), (1, sn)):
+            direction[..., index] = self.amplitudes[index] * function
+        return direction
+
+    def azimuth(self, functions: tuple[Array, Array, Array, Array]) -> Array:
+        """arctan(sqrt(1 − n) tan am), continued along am: the angle Pi has gone round ê, without its sign [rad]."""
+        sn, cn, _, amplitude = functions
+        q = np.sqrt(1.0 - self.characteristic)
+        return amplitude + np.arctan2((q - 1.0) * sn * cn, cn * cn + q * sn * sn)
+
+    def swing(self, u: Array, functions: tuple[Array, Array, Array, Array]) -> Array:
+        """What the angle psi of `EulerTop` has beside spin t, with these sn, cn, dn and am of u: (...) [rad]."""
+        if not self.rate:
+            return np.zeros(np.shape(u))
+        third = elliptic.jacobi_pi(self.characteristic, u, self.complement)
+        return self.precession * third - self.sense * self.azimuth(functions)
+
+
+def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
+    """The orbit of a momentum (3,), in the axes of these ascending moments (3,).
+
+    Components below 1e-140 of the momentum are taken as zero.
+    """
+    size = float(np.linalg.norm(start))
+    # Powers of two, so that squares neither overflow nor round.
+    momentum_unit, inertia_unit = np.exp2(np.frexp([size or 1.0, moments[2]])[1])
+    x = start / momentum_unit
+    x = np.where(np.abs(x) < _NEGLIGIBLE, 0.0, x)
+    i1, i2, i3 = i = (moments / inertia_unit).tolist()
+    if not size or i1 == i3 or not (x[0] or x[2]) or (i1 == i2 and not x[2]) or (i2 == i3 and not x[0]):
+        return _still(moments, start, size)
+    separation = _separation(i, x)
+    k, a = (2, 0) if separation >= 0 else (0, 2)
+    ends, inner, outer = i3 - i1, abs(i[k] - i2), abs(i2 - i[a])
+    # |L² − 2 E I_a| and |L² − 2 E I_k|: all terms of one sign.
+    far = x[1] ** 2 * outer / i2 + x[k] ** 2 * ends / i[k]
+    near = x[a] ** 2 * ends / i[a] + x[1] ** 2 * inner / i2
+    m1 = min(1.0, float(abs(separation) * Fraction(ends) / (Fraction(far) * Fraction(inner))))
+    terms = (x[2] ** 2 * (i3 - i2) / i3 + x[0] ** 2 * (i2 - i1) / i1) * ends / (far * inner)
+    length = float(np.linalg.norm(x))
+    amplitudes, direction = np.empty(3), np.zeros(3)
+    amplitudes[k] = np.copysign(np.sqrt(i[k] * far / ends), x[k])
+    amplitudes[a] = np.copysign(np.sqrt(i[a] * near / ends), x[a])
+    # By Euler's second equation; the signs and not the product, which may underflow.
+    amplitudes[1] = np.copysign(np.sqrt(i2 * near / inner), np.copysign(1.0, x[0]) * np.copysign(1.0, x[2]))
+    direction[k] = np.copysign(1.0, x[k])
+    sine, cosine = (x[1] / amplitudes[1], x[a] / amplitudes[a]) if near else (0.0, 1.0)
+    rate = float(np.sqrt(far * inner / (i1 * i2 * i3)))
+    axisymmetric = i1 == i2 or i2 == i3
+    return MomentumOrbit(
+        moments=moments,
+        start=start,
+        size=size,
+        regime="steady" if not near else "axisymmetric" if axisymmetric else "circling" if m1 else "separatrix",
+        circled=k,
+        other=a,
+        direction=direction,
+        amplitudes=amplitudes / length,
+        rate=rate * float(momentum_unit / inertia_unit),
+        complement=m1,
+        phase=float(elliptic.argument_of(sine, cosine, m1)),
+        characteristic=-i[k] * outer / (i[a] * inner),
+        spin=size / float(moments[k]),
+        precession=length * (i[k] - i[a]) / (i[k] * i[a]) / rate,
+        sense=1.0 if k == 2 else -1.0,
+        condition=max(1.0, float(terms) / m1) if m1 else np.inf,
+    )
+
+
+def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
+    """The area between the two separatrices, on the side of one principal axis [sr].
+
+    Parameters
+    ----------
+    moments : (3,) ascending, not all equal [kg m^2]
+    axis : 0 or 2, the axis of the smallest or of the largest moment
+
+    Source: theory.md section 7.
+    """
+    values = finite_array(moments, "moments", (3,), unit="kg m^2")
+    if values.ndim != 1 or values[0] <= 0.0 or np.any(np.diff(values) < 0.0) or values[0] == values[2]:
+        raise ShapeError(f"moments: three ascending numbers above 0, not all equal, are needed, got {values}")
+    if axis not in (0, 2):
+        raise ShapeError(f"axis: 0 (smallest moment) or 2 (largest moment) is needed, got {axis!r}")
+    own = np.sqrt(abs(values[1] - values[axis]) / values[axis])
+    opposite = np.sqrt(abs(values[2 - axis] - values[1]) / values[2 - axis])
+    return 4.0 * float(np.arctan2(own, opposite))
+
+
+def _still(moments: Array, start: Array, size: float) -> MomentumOrbit:
+    """Pi stands still in the body, and the body turns about it."""
+    direction = start / size if size else np.zeros(3)
+    unstable = bool(size) and bool(moments[0] < moments[1] < moments[2])
+    return MomentumOrbit(
+        moments=moments,
+        start=start,
+        size=size,
+        regime="rest" if not size else "spherical" if moments[0] == moments[2] else "steady",
+        circled=-1,
+        other=-1,
+        direction=direction,
+        amplitudes=direction,
+        rate=0.0,
+        complement=0.0 if unstable else 1.0,
+        phase=0.0,
+        characteristic=0.0,
+        spin=float(np.sum(direction**2 / moments)) * size,
+        precession=0.0,
+        sense=0.0,
+        condition=np.inf if unstable else 1.0,
+    )
+
+
+def _separation(moments: list[float], x: Array) -> Fraction:
+    """L² − 2 E I2 without rounding: its sign tells the axis circled, and it vanishes on the separatrix."""
+    i1, i2, i3 = map(Fraction, moments)
+    return Fraction(float(x[2])) ** 2 * (i3 - i2) / i3 - Fraction(float(x[0])) ** 2 * (i2 - i1) / i1
