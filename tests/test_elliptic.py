@@ -67,6 +67,29 @@ def test_the_argument_of_sn_and_cn(m1):
             elliptic.argument_of(sine, cosine, m1)
 
 
+@pytest.mark.parametrize("m1", [1.0, 0.5, 1e-3, 1e-8, 1e-18, 1e-30])
+def test_pi_without_its_even_growth(m1):
+    quarter = float(elliptic.complete_k(m1))
+    for n in (-1e-12, -1e-3, -0.9, -1.0, -30.0, -1e6):
+        with mpmath.workdps(90):
+            m = 1 - mp(m1)
+            whole = mpmath.ellippi(mp(n), m) - mpmath.ellipk(m) / (1 - mp(n))
+            assert off(elliptic.complete_pi_excess(n, m1), whole) < 1e-13
+            for part in (0.01, 0.3, 0.9, 0.99):
+                sn, cn, dn, am, excess = elliptic.jacobi_and_pi_excess(n, part * quarter, m1)
+                assert (sn, cn, dn, am) == elliptic.jacobi(part * quarter, m1)
+                phi = mpmath.asin(mpmath.ellipfun("sn", mp(part * quarter), m=m))
+                truth = mpmath.ellippi(mp(n), phi, m) - mp(part * quarter) / (1 - mp(n))
+                assert abs(float(excess - truth)) < 3e-15 * max(1.0, quarter) * min(1.0, -n)
+                later = elliptic.jacobi_and_pi_excess(n, (part + 6.0) * quarter, m1)[4]
+                assert abs(float(later - truth - 6 * whole)) < 3e-14 * max(1.0, quarter) * min(1.0, -n)
+                assert elliptic.jacobi_and_pi_excess(n, -part * quarter, m1)[4] == -excess
+    assert elliptic.complete_pi_excess(0.0, m1) == 0.0
+    for call in (lambda: elliptic.complete_pi_excess(0.1, m1), lambda: elliptic.jacobi_and_pi_excess(0.1, 1.0, m1)):
+        with pytest.raises(ShapeError, match="n:"):
+            call()
+
+
 def test_complete_integrals_next_to_zero():
     assert elliptic.complete_k(0.0) == elliptic.complete_pi(-0.5, 0.0) == elliptic.complete_pi(0.5, 0.0) == np.inf
     assert elliptic.complete_e(0.0) == 1.0

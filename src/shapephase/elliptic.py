@@ -66,10 +66,29 @@ def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
     """
     u, m1 = _arguments(u=u, m1=m1)
     sine, cosine, _, turns = _reduced_jacobi(u, m1)
-    sign = 1.0 - 2.0 * np.mod(turns, 2.0)
-    amplitude = turns * np.pi + np.arctan2(sine, cosine)
-    delta = np.hypot(cosine, np.sqrt(m1) * sine)
-    return (sign * sine)[()], (sign * cosine)[()], delta[()], amplitude[()]
+    return _continued(sine, cosine, turns, m1)
+
+
+def jacobi_and_pi_excess(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array, Array]:
+    """`jacobi`, and Pi(n; am u) − u/(1 − n) for n <= 0, at the cost of little more: (...) x 3 -> five (...).
+
+    The part proportional to u is split off, so that a caller with a large factor before it need not find it as the
+    difference of two rounded arguments.
+
+    Source: Abramowitz and Stegun 17.7.15, where the integrals of the first kind add up to u/(1 − n).
+    """
+    n, u, m1 = _arguments(n=n, u=u, m1=m1)
+    _refuse(n > 0.0, n, "n", "along u the characteristic must be 0 or less; incomplete_pi takes those up to 1")
+    sine, cosine, _, turns = _reduced_jacobi(u, m1)
+    excess = _excess(n, sine, cosine, m1) + _whole(turns, _excess(n, np.ones(()), np.zeros(()), m1))
+    return *_continued(sine, cosine, turns, m1), excess[()]
+
+
+def complete_pi_excess(n: ArrayLike, m1: ArrayLike) -> Array:
+    """Pi(n) − K/(1 − n), for n <= 0: (...), (...) -> (...); finite at m1 = 0 too. Parameter m = k² = 1 − m1."""
+    n, m1 = _arguments(n=n, m1=m1)
+    _refuse(n > 0.0, n, "n", "the characteristic must be 0 or less; complete_pi takes those up to 1")
+    return _excess(n, np.ones(()), np.zeros(()), m1)[()]
 
 
 def argument_of(sn: ArrayLike, cn: ArrayLike, m1: ArrayLike) -> Array:
@@ -220,6 +239,14 @@ def _reduced_jacobi(u: Array, m1: Array) -> tuple[Array, Array, Array, Array]:
     return np.where(small, rest, np.copysign(sine, rest)), np.where(small, 1.0, cosine), rest, turns
 
 
+def _continued(sine: Array, cosine: Array, turns: Array, m1: Array) -> tuple[Array, Array, Array, Array]:
+    """sn, cn, dn and am from those of the reduced argument."""
+    sign = 1.0 - 2.0 * np.mod(turns, 2.0)
+    amplitude = turns * np.pi + np.arctan2(sine, cosine)
+    delta = np.hypot(cosine, np.sqrt(m1) * sine)
+    return (sign * sine)[()], (sign * cosine)[()], delta[()], amplitude[()]
+
+
 def _folded(phi: Array) -> tuple[Array, Array, Array]:
     """Sine and cosine >= 0 of the amplitude's rest in [-pi/2, pi/2] after whole half turns, and their number.
 
@@ -260,6 +287,17 @@ def _third_kind(n: Array, sine: Array, cosine: Array, m1: Array, first: Array) -
     share = q / (1.0 + q)
     bend = np.sqrt(share / (m + q)) * np.arctan(np.sqrt(q * dual) * sine * cosine / np.sqrt(delta))
     return np.where(negative, share * m1 / (m + q) * third + m / (m + q) * first + bend, third)
+
+
+def _excess(n: Array, sine: Array, cosine: Array, m1: Array) -> Array:
+    """Pi(n) − F/(1 − n) of an amplitude in [-pi/2, pi/2], n <= 0."""
+    m1, q = np.maximum(m1, _FLOOR), -n
+    m, square = 1.0 - m1, cosine * cosine
+    delta = square + m1 * (sine * sine)
+    dual, share = (m + q) / (1.0 + q), q / (1.0 + q)
+    third = sine * sine * sine * elliprj(square, delta, 1.0, m1 / (1.0 + q) + dual * square) / 3.0
+    steep = np.sqrt(share / np.where(m + q > 0.0, m + q, 1.0))
+    return m1 * share / (1.0 + q) * third + steep * np.arctan(np.sqrt(q * dual) * sine * cosine / np.sqrt(delta))
 
 
 def _carlson_j(x: Array, y: Array, p: Array) -> Array:

@@ -8,8 +8,8 @@ where Q(t) is the shortest turn that takes the direction of Pi to ê, never fart
 
     psi' = L/I_k + (2 E/L − L/I_k)/(1 + ê.Pi/L),
 
-whose integral is Legendre's third kind of a characteristic n <= 0. There are no Euler angles and so no poles, and one
-path for every case.
+whose integral is L t/I_2 and Legendre's third kind of a characteristic n <= 0 without the part that grows evenly. There
+are no Euler angles and so no poles, and one path for every case.
 
 Sources: Marsden and Ratiu, exercise 15.8-1; van Zon and Schofield 2007 for what others do; theory.md D17, H.
 """
@@ -23,10 +23,11 @@ from .. import elliptic, so3
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inertia_argument, principal_axes
-from .momentum_orbit import MomentumOrbit, momentum_orbit, separatrix_solid_angle
+from .momentum_orbit import MomentumOrbit, momentum_orbit
 
 _TURNS = 1e12
 _EPS = float(np.finfo(float).eps)
+_BLOCK = 16_384
 
 
 class EulerTop:
@@ -93,7 +94,9 @@ class EulerTop:
         # What stands left and right of exp(psi ê) Q(t) stays as it is: one linear map of quaternions.
         ends = so3.quat_from_matrix(self.axes)
         outward = so3.quat_product(so3.quat_from_matrix(attitude), ends)
-        left = so3.quat_product(outward, so3.quat_inverse(_carried(orbit, np.zeros(()), np.asarray(orbit.phase))))
+        left = so3.quat_product(
+            outward, so3.quat_inverse(so3.normalised(_carried(orbit, np.zeros(()), np.asarray(orbit.phase))))
+        )
         columns = so3.quat_product(np.eye(4), np.broadcast_to(so3.quat_inverse(ends), (4, 4)))
         self._around = so3.quat_product(np.broadcast_to(left, (4, 4)), columns)
 
@@ -104,7 +107,7 @@ class EulerTop:
     def body_momentum(self, t: ArrayLike) -> Array:
         """Pi(t): times (...) of either sign -> (..., 3), body axes [kg m^2/s]."""
         orbit = self.orbit
-        return orbit.size * (orbit.directions(orbit.functions(self._argument(t)[1])) @ self.axes.T)
+        return orbit.size * (orbit.directions(self._argument(t)[1]) @ self.axes.T)
 
     def angular_velocity(self, t: ArrayLike) -> Array:
         """omega(t) = I^-1 Pi(t): times (...) -> (..., 3), body axes [rad/s]."""
@@ -164,9 +167,9 @@ class EulerTop:
 
     @property
     def condition(self) -> float:
-        """How much a relative change of the momentum or the moments is magnified in the phase of Pi, each half turn.
+        """How much a change of inertia or momentum, relative to its largest entry, is magnified in each half turn.
 
-        1 or more, about 1/m1 near the separatrix, infinite on it and along the intermediate axis. What was rounded
+        I3/I1 or more; about 1/m1 near the separatrix, infinite on it and along the intermediate axis. What was rounded
         before it came here (a tensor turned out of its principal axes, say) is magnified so.
         """
         return self.orbit.condition
@@ -200,11 +203,10 @@ class EulerTop:
         Source: theory.md D12 and section 7.
         """
         orbit = self.orbit
-        if orbit.regime == "separatrix":
-            return orbit.sense * separatrix_solid_angle(self.moments, orbit.circled)
         if orbit.regime in ("rest", "spherical", "steady"):
             return 0.0
-        return (self._mean_rate - orbit.spin) * self.period - self._third_kind + 2.0 * np.pi * orbit.sense
+        grown = orbit.excess * self.period if orbit.excess else 0.0
+        return grown - orbit.third_kind + 2.0 * np.pi * orbit.sense
 
     @property
     def montgomery_phase(self) -> float:
@@ -227,7 +229,7 @@ class EulerTop:
         """
         if not self.rate:
             return np.inf if self.magnitude else 0.0
-        return self.orbit.spin * self.period + self._third_kind
+        return self.orbit.spin * self.period + self.orbit.third_kind
 
     @property
     def long_axis_precession_per_period(self) -> float:
@@ -252,12 +254,6 @@ class EulerTop:
         """2 E/|Pi| = omega.Pi/|Pi|, the turn about the momentum [rad/s]."""
         return 2.0 * self.energy / self.magnitude if self.magnitude else 0.0
 
-    @property
-    def _third_kind(self) -> float:
-        """The share of the complete integral of the third kind in the precession of a period."""
-        orbit = self.orbit
-        return 4.0 * orbit.precession * float(elliptic.complete_pi(orbit.characteristic, orbit.complement))
-
     def _argument(self, t: ArrayLike) -> tuple[Array, Array]:
         """Times and the elliptic argument there."""
         times = finite_array(t, "t", unit="s")
@@ -272,23 +268,28 @@ class EulerTop:
 
     def _quaternion(self, t: ArrayLike) -> Array:
         times, u = self._argument(t)
-        return so3.normalised(_carried(self.orbit, times, u) @ self._around)
+        flat, u = times.ravel(), u.ravel()
+        quaternion = np.empty((flat.size, 4))
+        # In blocks that fit a processor's cache.
+        for start in range(0, flat.size, _BLOCK):
+            part = slice(start, start + _BLOCK)
+            quaternion[part] = so3.normalised(_carried(self.orbit, flat[part], u[part]) @ self._around)
+        return quaternion.reshape(*times.shape, 4)
 
 
 def _carried(orbit: MomentumOrbit, times: Array, u: Array) -> Array:
-    """Quaternions of exp(psi ê) Q, in principal axes, psi up to a constant: (...) -> (..., 4)."""
-    functions = orbit.functions(u)
-    direction = orbit.directions(functions)
-    half = 0.5 * (orbit.spin * times + orbit.swing(u, functions))
+    """Quaternions of exp(psi ê) Q, in principal axes, psi up to a constant: (...) -> (..., 4), of any length."""
+    direction, swing = orbit.directions_and_swing(u)
+    half = 0.5 * (orbit.spin * times + swing)
+    cosine, sine = np.cos(half), np.sin(half)
+    # Q is by the half angle from Pi to ê, about their cross product, which is at right angles to ê.
+    across = direction @ so3.hat(orbit.direction)
+    scalar = 1.0 + direction @ orbit.direction
     turn = np.empty((*direction.shape[:-1], 4))
-    turn[..., :3] = np.cross(direction, orbit.direction)
-    turn[..., 3] = 1.0 + direction @ orbit.direction
-    turn = so3.normalised(turn)
-    cosine, sine = np.cos(half)[..., None], np.sin(half)[..., None]
-    across, scalar = turn[..., :3], turn[..., 3:]
-    # The vector of Q is at right angles to ê.
-    vector = cosine * across + sine * (scalar * orbit.direction + np.cross(orbit.direction, across))
-    return np.concatenate([vector, cosine * scalar], axis=-1)
+    turn[..., :3] = cosine[..., None] * across + sine[..., None] * (across @ so3.hat(orbit.direction).T)
+    turn[..., :3] += (sine * scalar)[..., None] * orbit.direction
+    turn[..., 3] = cosine * scalar
+    return turn
 
 
 def _array(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:

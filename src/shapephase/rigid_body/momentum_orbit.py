@@ -44,10 +44,11 @@ class MomentumOrbit:
     complement : m1
     phase : u0
     characteristic : n <= 0 of the integral of the third kind in the azimuth and the attitude; of the moments only
-    spin : L/I_k [rad/s]
+    spin : L/I_2, the steady part of the turn about Pi [rad/s]
+    excess : 2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix
     precession : (L/I_a − L/I_k)/rate
     sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
-    condition : how much a relative change of moments or momentum is magnified in u each half period; 1 or more
+    condition : how much a small change of inertia or momentum is magnified, see `EulerTop.condition`
     """
 
     moments: Array
@@ -63,37 +64,36 @@ class MomentumOrbit:
     phase: float
     characteristic: float
     spin: float
+    excess: float
     precession: float
     sense: float
     condition: float
 
-    def functions(self, u: Array) -> tuple[Array, Array, Array, Array]:
-        """sn, cn, dn and am of u."""
-        return elliptic.jacobi(u, self.complement)
+    def directions(self, u: Array) -> Array:
+        """Pi/|Pi|: (...) -> (..., 3)."""
+        return self._direction(*elliptic.jacobi(u, self.complement)[:3])
 
-    def directions(self, functions: tuple[Array, Array, Array, Array]) -> Array:
-        """Pi/|Pi| for these sn, cn, dn and am: (...) each -> (..., 3)."""
-        sn, cn, dn, _ = functions
+    def directions_and_swing(self, u: Array) -> tuple[Array, Array]:
+        """Pi/|Pi|, and what the angle psi of `EulerTop` has beside spin t: (...) -> (..., 3), (...) [rad]."""
+        sn, cn, dn, amplitude, third = elliptic.jacobi_and_pi_excess(self.characteristic, u, self.complement)
+        q = np.sqrt(1.0 - self.characteristic)
+        # arctan(q tan am), continued along am: the azimuth of Pi round ê, without its sign.
+        azimuth = amplitude + np.arctan2((q - 1.0) * sn * cn, cn * cn + q * sn * sn)
+        return self._direction(sn, cn, dn), self.precession * third - self.sense * azimuth
+
+    @property
+    def third_kind(self) -> float:
+        """What psi + sense azimuth gains in a period beside spin t [rad]."""
+        return 4.0 * self.precession * float(elliptic.complete_pi_excess(self.characteristic, self.complement))
+
+    def _direction(self, sn: Array, cn: Array, dn: Array) -> Array:
         direction = np.empty((*np.shape(sn), 3))
         if not self.rate:
             direction[...] = self.direction
             return direction
         for index, function in ((self.circled, dn), (self.other, cn), (1, sn)):
-            direction[..., index] = self.amplitudes[index] * function
+            np.multiply(self.amplitudes[index], function, out=direction[..., index])
         return direction
-
-    def azimuth(self, functions: tuple[Array, Array, Array, Array]) -> Array:
-        """arctan(sqrt(1 − n) tan am), continued along am: the angle Pi has gone round ê, without its sign [rad]."""
-        sn, cn, _, amplitude = functions
-        q = np.sqrt(1.0 - self.characteristic)
-        return amplitude + np.arctan2((q - 1.0) * sn * cn, cn * cn + q * sn * sn)
-
-    def swing(self, u: Array, functions: tuple[Array, Array, Array, Array]) -> Array:
-        """What the angle psi of `EulerTop` has beside spin t, with these sn, cn, dn and am of u: (...) [rad]."""
-        if not self.rate:
-            return np.zeros(np.shape(u))
-        third = elliptic.jacobi_pi(self.characteristic, u, self.complement)
-        return self.precession * third - self.sense * self.azimuth(functions)
 
 
 def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
@@ -116,8 +116,10 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
     far = x[1] ** 2 * outer / i2 + x[k] ** 2 * ends / i[k]
     near = x[a] ** 2 * ends / i[a] + x[1] ** 2 * inner / i2
     m1 = min(1.0, float(abs(separation) * Fraction(ends) / (Fraction(far) * Fraction(inner))))
-    terms = (x[2] ** 2 * (i3 - i2) / i3 + x[0] ** 2 * (i2 - i1) / i1) * ends / (far * inner)
     length = float(np.linalg.norm(x))
+    # Of m1, for a change of x by one part of its length in any direction, as rounding turns the axes.
+    slope = length * (abs(x[2]) * (i3 - i2) / i3 + abs(x[0]) * (i2 - i1) / i1) * ends / (far * inner)
+    scale = float(momentum_unit / inertia_unit)
     amplitudes, direction = np.empty(3), np.zeros(3)
     amplitudes[k] = np.copysign(np.sqrt(i[k] * far / ends), x[k])
     amplitudes[a] = np.copysign(np.sqrt(i[a] * near / ends), x[a])
@@ -136,14 +138,15 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
         other=a,
         direction=direction,
         amplitudes=amplitudes / length,
-        rate=rate * float(momentum_unit / inertia_unit),
+        rate=rate * scale,
         complement=m1,
         phase=float(elliptic.argument_of(sine, cosine, m1)),
         characteristic=-i[k] * outer / (i[a] * inner),
-        spin=size / float(moments[k]),
+        spin=size / float(moments[1]),
+        excess=-float(separation) / (i2 * length) * scale,
         precession=length * (i[k] - i[a]) / (i[k] * i[a]) / rate,
         sense=1.0 if k == 2 else -1.0,
-        condition=max(1.0, float(terms) / m1) if m1 else np.inf,
+        condition=i3 / i1 * max(1.0, float(slope) / m1) if m1 else np.inf,
     )
 
 
@@ -185,9 +188,10 @@ def _still(moments: Array, start: Array, size: float) -> MomentumOrbit:
         phase=0.0,
         characteristic=0.0,
         spin=float(np.sum(direction**2 / moments)) * size,
+        excess=0.0,
         precession=0.0,
         sense=0.0,
-        condition=np.inf if unstable else 1.0,
+        condition=np.inf if unstable else float(moments[2] / moments[0]),
     )
 
 
