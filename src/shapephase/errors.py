@@ -87,6 +87,13 @@ class GaugeError(ShapePhaseError, ArithmeticError):
     """
 
 
+class ChartPoleError(ShapePhaseError, ArithmeticError):
+    """Euler angles whose middle angle is at 0 or pi, or next to it, where they are no coordinates of rotations.
+
+    Remedy: turn the inertial or the body axes by a constant rotation, or work with attitudes and body momenta.
+    """
+
+
 class MissingExtraError(ShapePhaseError, ImportError):
     """An optional dependency is not installed. Remedy: the message names the extra to install."""
 

@@ -1,0 +1,687 @@
+"""Euler angles against products of elementary turns, CasADi's derivatives, the printed formulas and integration."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from shapephase import so3
+from shapephase.errors import ChartPoleError, ShapeError, ShapePhaseError, SingularInertiaError, UnphysicalInertiaError
+from shapephase.rigid_body.euler_angles import ZXZ, ZYZ, canonical_bracket, precession_rate
+
+CHARTS = pytest.mark.parametrize("chart", [ZXZ, ZYZ], ids=["zxz", "zyz"])
+THIRD = np.array([0.0, 0.0, 1.0])
+SYMPLECTIC = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
+
+
+def random_angles(rng, count):
+    """Inside the chart, theta from 0.05 to pi - 0.05."""
+    return np.stack(
+        [rng.uniform(-3.1, 3.1, count), rng.uniform(0.05, np.pi - 0.05, count), rng.uniform(-3.1, 3.1, count)], axis=-1
+    )
+
+
+def random_inertia(rng):
+    root = rng.normal(size=(3, 3))
+    return root @ root.T + 0.5 * np.eye(3)
+
+
+def turn(axis, angle):
+    """Rodrigues' formula for a unit axis."""
+    across = so3.hat(np.asarray(axis, dtype=float))
+    return np.eye(3) + np.sin(angle) * across + (1.0 - np.cos(angle)) * across @ across
+
+
+def symbolic_turn(axis, angle):
+    c, s = ca.cos(angle), ca.sin(angle)
+    rows = {
+        "x": [[1, 0, 0], [0, c, -s], [0, s, c]],
+        "y": [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+        "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+    }[axis]
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
+
+
+def symbolic_attitude(chart, angles):
+    return ca.mtimes([symbolic_turn(axis, angles[i]) for i, axis in enumerate(chart.name)])
+
+
+def symbolic_vee(matrix):
+    return ca.vertcat(matrix[2, 1], matrix[0, 2], matrix[1, 0])
+
+
+def symbolic_velocities(chart):
+    """Functions of angles and rates: Omega and omega, from R^T R' and R' R^T by the chain rule."""
+    angles, rates = ca.SX.sym("angles", 3), ca.SX.sym("rates", 3)
+    attitude = symbolic_attitude(chart, angles)
+    rate = ca.reshape(ca.jacobian(ca.vec(attitude), angles) @ rates, 3, 3)
+    body, spatial = symbolic_vee(attitude.T @ rate), symbolic_vee(rate @ attitude.T)
+    return angles, rates, body, spatial
+
+
+def rows(function, *columns):
+    """A CasADi function of column vectors, over rows."""
+    return np.array([np.array(function(*row)).squeeze() for row in zip(*columns, strict=True)])
+
+
+def printed_p_matrix(phi, theta, psi):
+    """The matrix P of Marsden and Ratiu after (15.6.3)."""
+    cf, sf, ct, st, cp, sp = np.cos(phi), np.sin(phi), np.cos(theta), np.sin(theta), np.cos(psi), np.sin(psi)
+    return np.array(
+        [
+            [cp * cf - ct * sf * sp, cp * sf + ct * cf * sp, st * sp],
+            [-sp * cf - ct * sf * cp, -sp * sf + ct * cf * cp, st * cp],
+            [st * sf, -st * cf, ct],
+        ]
+    )
+
+
+def printed_body_velocity(angles, rates):
+    """Omega of Marsden and Ratiu (15.7.1)."""
+    (_, theta, psi), (dphi, dtheta, dpsi) = angles, rates
+    return np.array(
+        [
+            dtheta * np.cos(psi) + dphi * np.sin(psi) * np.sin(theta),
+            -dtheta * np.sin(psi) + dphi * np.cos(psi) * np.sin(theta),
+            dphi * np.cos(theta) + dpsi,
+        ]
+    )
+
+
+def printed_spatial_velocity(angles, rates):
+    """omega of Marsden and Ratiu (15.7.1)."""
+    (phi, theta, _), (dphi, dtheta, dpsi) = angles, rates
+    return np.array(
+        [
+            dtheta * np.cos(phi) + dpsi * np.sin(phi) * np.sin(theta),
+            dtheta * np.sin(phi) - dpsi * np.cos(phi) * np.sin(theta),
+            dphi + dpsi * np.cos(theta),
+        ]
+    )
+
+
+def printed_body_momentum(angles, momenta):
+    """Pi of Marsden and Ratiu (15.7.4)."""
+    (_, theta, psi), (p_phi, p_theta, p_psi) = angles, momenta
+    lever = p_phi - p_psi * np.cos(theta)
+    return np.array(
+        [
+            (lever * np.sin(psi) + p_theta * np.sin(theta) * np.cos(psi)) / np.sin(theta),
+            (lever * np.cos(psi) - p_theta * np.sin(theta) * np.sin(psi)) / np.sin(theta),
+            p_psi,
+        ]
+    )
+
+
+@CHARTS
+def test_j1_attitude_is_the_product_of_three_turns(chart):
+    rng = np.random.default_rng(1)
+    middle = np.array([*chart.node, 0.0])
+    for phi, theta, psi in rng.uniform(-7.0, 7.0, (40, 3)):
+        product = turn(THIRD, phi) @ turn(middle, theta) @ turn(THIRD, psi)
+        assert np.abs(chart.attitude([phi, theta, psi]) - product).max() < 3e-15
+    angles = rng.uniform(-3.0, 3.0, (5, 4, 3))
+    scipy = Rotation.from_euler(chart.name.upper(), angles.reshape(-1, 3)).as_matrix().reshape(5, 4, 3, 3)
+    assert np.abs(chart.attitude(angles) - scipy).max() < 2e-15
+
+
+def test_j1_printed_matrix_is_the_transpose():
+    rng = np.random.default_rng(2)
+    for angles in random_angles(rng, 30):
+        assert np.abs(ZXZ.attitude(angles).T - printed_p_matrix(*angles)).max() < 2e-15
+
+
+def test_m_e5_the_printed_attitude_contradicts_the_printed_velocities():
+    """(15.6.6) has [R] = P; with it Omega and omega of (15.7.1) are wrong, with R = P^T both are right."""
+    rng = np.random.default_rng(3)
+    step = 1e-6
+    for angles, rates in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
+        ahead, here, behind = (printed_p_matrix(*(angles + s * rates)) for s in (step, 0.0, -step))
+        for sign, attitude, rate in (
+            (False, here, (ahead - behind) / (2 * step)),
+            (True, here.T, (ahead - behind).T / (2 * step)),
+        ):
+            body = so3.vee(attitude.T @ rate)
+            spatial = so3.vee(rate @ attitude.T)
+            assert (np.abs(body - printed_body_velocity(angles, rates)).max() < 1e-8) == sign
+            assert (np.abs(spatial - printed_spatial_velocity(angles, rates)).max() < 1e-8) == sign
+        assert np.abs(ZXZ.attitude(angles) - here).max() > 1e-3
+
+
+@CHARTS
+def test_j2_angular_velocities_are_the_derivative_of_the_attitude(chart):
+    rng = np.random.default_rng(4)
+    angles, rates = random_angles(rng, 50), rng.normal(size=(50, 3))
+    q, dq, body, spatial = symbolic_velocities(chart)
+    body, spatial = (rows(ca.Function("f", [q, dq], [v]), angles, rates) for v in (body, spatial))
+    assert np.abs(chart.body_angular_velocity(angles, rates) - body).max() < 5e-15
+    assert np.abs(chart.spatial_angular_velocity(angles, rates) - spatial).max() < 5e-15
+    scale = 1.0 / np.sin(angles[:, 1:2])
+    assert np.abs((chart.rates(angles, body) - rates) / scale).max() < 1e-14
+    assert np.abs((chart.rates_from_spatial(angles, spatial) - rates) / scale).max() < 1e-14
+    turned = so3.apply(chart.attitude(angles), body)
+    assert np.abs(turned - spatial).max() < 5e-15
+
+
+def test_j2_printed_velocities():
+    rng = np.random.default_rng(5)
+    for angles, rates in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
+        assert np.abs(ZXZ.body_angular_velocity(angles, rates) - printed_body_velocity(angles, rates)).max() < 3e-15
+        spatial = ZXZ.spatial_angular_velocity(angles, rates)
+        assert np.abs(spatial - printed_spatial_velocity(angles, rates)).max() < 3e-15
+
+
+@CHARTS
+def test_j3_conjugate_momenta_are_derivatives_of_the_energy(chart):
+    rng = np.random.default_rng(6)
+    inertia = random_inertia(rng)
+    angles, rates = random_angles(rng, 40), rng.normal(size=(40, 3))
+    q, dq, body, _ = symbolic_velocities(chart)
+    energy = 0.5 * ca.dot(body, inertia @ body)
+    truth = rows(ca.Function("p", [q, dq], [ca.gradient(energy, dq)]), angles, rates)
+    momentum = chart.body_angular_velocity(angles, rates) @ inertia
+    assert np.abs(chart.conjugate_momenta(angles, momentum) - truth).max() < 1e-13
+
+
+def test_j3_printed_momenta():
+    rng = np.random.default_rng(7)
+    i1, i2, i3 = moments = np.array([3.0, 2.0, 1.2])
+    for angles, (dphi, dtheta, dpsi) in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
+        _, theta, psi = angles
+        ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(psi), np.sin(psi)
+        first, second = dphi * st * sp + dtheta * cp, dphi * st * cp - dtheta * sp
+        p_phi = i1 * first * st * sp + i2 * second * st * cp + i3 * (dphi * ct + dpsi) * ct
+        p_theta = i1 * first * cp - i2 * second * sp
+        truth = [p_phi, p_theta, i3 * (dphi * ct + dpsi)]
+        velocity = ZXZ.body_angular_velocity(angles, [dphi, dtheta, dpsi])
+        assert np.abs(ZXZ.conjugate_momenta(angles, moments * velocity) - truth).max() < 2e-14
+
+
+@CHARTS
+def test_j3_momenta_are_components_of_the_angular_momentum(chart):
+    """p_phi is along the inertial third axis, p_psi along the body's, p_theta along the line of nodes."""
+    rng = np.random.default_rng(8)
+    angles, momentum = random_angles(rng, 30), rng.normal(size=(30, 3))
+    p = chart.conjugate_momenta(angles, momentum)
+    attitude = chart.attitude(angles)
+    spatial = so3.apply(attitude, momentum)
+    nodes = np.stack([np.cos(angles[:, 0]), np.sin(angles[:, 0]), np.zeros(30)], axis=-1)
+    if chart is ZYZ:
+        nodes = np.cross(THIRD, nodes)
+    assert np.abs(p[:, 0] - spatial[:, 2]).max() < 3e-15
+    assert np.abs(p[:, 1] - np.sum(nodes * spatial, axis=-1)).max() < 3e-15
+    assert np.array_equal(p[:, 2], momentum[:, 2])
+    assert np.abs(np.cross(THIRD, attitude[:, :, 2]) - np.sin(angles[:, 1:2]) * nodes).max() < 3e-15
+
+
+@CHARTS
+def test_j4_body_momentum_is_the_inverse(chart):
+    rng = np.random.default_rng(9)
+    angles, p = random_angles(rng, 60), rng.normal(size=(60, 3))
+    back = chart.conjugate_momenta(angles, chart.body_momentum(angles, p))
+    assert np.abs((back - p) * np.sin(angles[:, 1:2])).max() < 3e-15
+
+
+def test_j4_printed_body_momentum():
+    rng = np.random.default_rng(10)
+    for angles, p in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
+        error = np.abs(ZXZ.body_momentum(angles, p) - printed_body_momentum(angles, p)).max()
+        assert error < 1e-14 / np.sin(angles[1])
+
+
+@CHARTS
+def test_j5_kinetic_energy_three_ways(chart):
+    rng = np.random.default_rng(11)
+    inertia = random_inertia(rng)
+    angles, rates = random_angles(rng, 40), rng.normal(size=(40, 3))
+    momentum = chart.body_angular_velocity(angles, rates) @ inertia
+    p = chart.conjugate_momenta(angles, momentum)
+    direct = 0.5 * np.sum(momentum * np.linalg.solve(inertia, momentum.T).T, axis=-1)
+    assert np.abs(chart.kinetic_energy(inertia, angles, rates) / direct - 1.0).max() < 1e-13
+    assert np.abs(chart.hamiltonian(inertia, angles, p) / direct - 1.0).max() < 1e-11
+    assert np.abs(0.5 * np.sum(p * rates, axis=-1) / direct - 1.0).max() < 1e-12
+
+
+def test_j5_printed_energy():
+    rng = np.random.default_rng(12)
+    moments = np.array([3.0, 2.0, 1.2])
+    for angles, p in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
+        (_, theta, psi), (p_phi, p_theta, p_psi) = angles, p
+        st, lever = np.sin(theta), p_phi - p_psi * np.cos(theta)
+        first = (lever * np.sin(psi) + p_theta * st * np.cos(psi)) ** 2 / (moments[0] * st**2)
+        second = (lever * np.cos(psi) - p_theta * st * np.sin(psi)) ** 2 / (moments[1] * st**2)
+        truth = 0.5 * (first + second + p_psi**2 / moments[2])
+        assert abs(ZXZ.hamiltonian(np.diag(moments), angles, p) / truth - 1.0) < 1e-13
+
+
+@CHARTS
+def test_j6_hamilton_equations_are_the_derivatives_of_the_energy(chart):
+    """The energy is built from R alone, as the inverse quadratic form of that in the rates."""
+    rng = np.random.default_rng(13)
+    inertia = random_inertia(rng)
+    q, dq, body, _ = symbolic_velocities(chart)
+    p = ca.SX.sym("p", 3)
+    mass = ca.hessian(0.5 * ca.dot(body, inertia @ body), dq)[0]
+    energy = 0.5 * ca.dot(p, ca.solve(mass, p))
+    by_q, by_p = (ca.Function("d", [q, p], [ca.gradient(energy, v)]) for v in (q, p))
+    angles, momenta = random_angles(rng, 40), rng.normal(size=(40, 3))
+    rates, momentum_rates = chart.hamilton_equations(inertia, angles, momenta)
+    scale = 1.0 / np.sin(angles[:, 1:2]) ** 3
+    assert np.abs((rates - rows(by_p, angles, momenta)) / scale).max() < 1e-13
+    assert np.abs((momentum_rates + rows(by_q, angles, momenta)) / scale).max() < 1e-12
+    assert not momentum_rates[:, 0].any()
+
+
+@CHARTS
+def test_j6_hamilton_equations_give_eulers_equations(chart):
+    rng = np.random.default_rng(14)
+    inertia = random_inertia(rng)
+    angles, momenta = random_angles(rng, 60), rng.normal(size=(60, 3))
+    rates, momentum_rates = chart.hamilton_equations(inertia, angles, momenta)
+    momentum = chart.body_momentum(angles, momenta)
+    jacobian = chart.body_momentum_jacobian(angles, momenta)
+    chain = so3.apply(jacobian, np.concatenate([rates, momentum_rates], axis=-1))
+    velocity = np.linalg.solve(inertia, momentum.T).T
+    scale = 1.0 / np.sin(angles[:, 1:2]) ** 4
+    assert np.abs((chain - np.cross(momentum, velocity)) / scale).max() < 1e-13
+    assert np.abs((chart.body_angular_velocity(angles, rates) - velocity) / scale).max() < 1e-13
+
+
+@CHARTS
+def test_j6_motion_in_the_chart_is_the_motion_of_attitude_and_momentum(chart):
+    rng = np.random.default_rng(15)
+    inertia = random_inertia(rng)
+    start, momentum = np.array([0.3, 1.2, -0.4]), np.array([0.3, -0.5, 0.6])
+    p = chart.conjugate_momenta(start, momentum)
+
+    def in_chart(_, state):
+        return np.concatenate(chart.hamilton_equations(inertia, state[:3], state[3:]))
+
+    def euler(_, state):
+        attitude, pi = state[:9].reshape(3, 3), state[9:]
+        velocity = np.linalg.solve(inertia, pi)
+        return np.concatenate([(attitude @ so3.hat(velocity)).ravel(), np.cross(pi, velocity)])
+
+    options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
+    first = solve_ivp(in_chart, (0.0, 4.0), np.concatenate([start, p]), **options).y[:, -1]
+    second = solve_ivp(euler, (0.0, 4.0), np.concatenate([chart.attitude(start).ravel(), momentum]), **options).y[:, -1]
+    assert np.abs(chart.attitude(first[:3]).ravel() - second[:9]).max() < 1e-11
+    assert np.abs(chart.body_momentum(first[:3], first[3:]) - second[9:]).max() < 1e-11
+    assert first[3] == p[0]
+
+
+@CHARTS
+def test_j7_canonical_bracket_becomes_minus_lie_poisson(chart):
+    """By CasADi: {F(Pi(q, p)), G(Pi(q, p))} with Pi from the inverse Legendre transform of R alone."""
+    rng = np.random.default_rng(16)
+    q, dq, body, _ = symbolic_velocities(chart)
+    p, pi = ca.SX.sym("p", 3), ca.SX.sym("pi", 3)
+    momentum = ca.solve(ca.jacobian(body, dq).T, p)
+    f = pi[0] ** 2 * pi[1] - ca.sin(pi[2]) + pi[0] * pi[2]
+    g = ca.exp(0.3 * pi[1]) * pi[2] + pi[0] ** 3
+    state = ca.vertcat(q, p)
+    by_state = [ca.gradient(ca.substitute(h, pi, momentum), state) for h in (f, g)]
+    lie_poisson = -ca.dot(pi, ca.cross(ca.gradient(f, pi), ca.gradient(g, pi)))
+    gradients = ca.Function("g", [q, p], by_state)
+    truth = ca.Function("t", [q, p], [ca.substitute(lie_poisson, pi, momentum)])
+    for angles, momenta in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
+        first, second = (np.array(v).ravel() for v in gradients(angles, momenta))
+        scale = 1.0 + np.abs(first).max() * np.abs(second).max()
+        assert abs(canonical_bracket(first, second) - float(truth(angles, momenta))) < 1e-13 * scale
+
+
+@CHARTS
+def test_j7_jacobian_takes_the_canonical_structure_to_hat_of_pi(chart):
+    rng = np.random.default_rng(17)
+    angles, momenta = random_angles(rng, 50), rng.normal(size=(50, 3))
+    jacobian = chart.body_momentum_jacobian(angles, momenta)
+    structure = jacobian @ SYMPLECTIC @ so3.transpose(jacobian)
+    scale = 1.0 / np.sin(angles[:, 1])[:, None, None] ** 3
+    assert np.abs((structure - so3.hat(chart.body_momentum(angles, momenta))) / scale).max() < 2e-14
+    rotated = canonical_bracket(jacobian[:, 0], jacobian[:, 1])
+    assert np.abs((rotated + chart.body_momentum(angles, momenta)[:, 2]) / scale[:, 0, 0]).max() < 2e-14
+
+
+@CHARTS
+def test_j7_jacobian_is_the_derivative(chart):
+    rng = np.random.default_rng(18)
+    q, dq, body, _ = symbolic_velocities(chart)
+    p = ca.SX.sym("p", 3)
+    momentum = ca.solve(ca.jacobian(body, dq).T, p)
+    derivative = ca.Function("d", [q, p], [ca.jacobian(momentum, ca.vertcat(q, p))])
+    for angles, momenta in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
+        error = np.abs(chart.body_momentum_jacobian(angles, momenta) - np.array(derivative(angles, momenta))).max()
+        assert error < 2e-14 / np.sin(angles[1]) ** 3
+
+
+@CHARTS
+def test_j8_the_chart_is_a_bijection_inside_its_domain(chart):
+    rng = np.random.default_rng(19)
+    angles = random_angles(rng, 500)
+    assert np.abs(chart.angles(chart.attitude(angles)) - angles).max() < 2e-14
+    attitudes = Rotation.random(500, random_state=20).as_matrix()
+    found = chart.angles(attitudes)
+    assert np.abs(chart.attitude(found) - attitudes).max() < 2e-15
+    assert np.all((found[:, 1] >= 0.0) & (found[:, 1] <= np.pi))
+    assert np.all((np.abs(found[:, ::2]) <= np.pi) & (found[:, ::2] > -np.pi))
+    assert chart.is_regular(angles).all()
+
+
+@CHARTS
+@pytest.mark.parametrize("near", [1e-3, 1e-7, 1e-9, 1e-12, 3e-15])
+def test_j8_next_to_a_pole_the_attitude_is_kept(chart, near):
+    for theta in (near, np.pi - near):
+        angles = np.array([0.7, theta, -1.9])
+        attitude = chart.attitude(angles)
+        found = chart.angles(attitude)
+        assert np.abs(chart.attitude(found) - attitude).max() < 2e-15
+        assert abs(found[1] - theta) < 4e-16
+        assert np.abs(found - angles).max() < 1e-15 + 4e-16 / near
+
+
+@CHARTS
+def test_j8_at_a_pole_theta_is_exact_and_psi_zero(chart):
+    rng = np.random.default_rng(21)
+    middle = np.array([*chart.node, 0.0])
+    for phi, psi in rng.uniform(-3.0, 3.0, (30, 2)):
+        for theta, whole in ((0.0, phi + psi), (np.pi, phi - psi)):
+            attitude = turn(THIRD, phi) @ np.round(turn(middle, theta)) @ turn(THIRD, psi)
+            found = chart.angles(attitude)
+            assert found[1] == theta
+            assert found[2] == 0.0
+            assert abs(so3.wrap(found[0] - whole)) < 1e-14
+            assert np.abs(chart.attitude(found) - attitude).max() < 2e-15
+    assert np.array_equal(chart.angles(np.eye(3)), np.zeros(3))
+
+
+@CHARTS
+@pytest.mark.parametrize("theta", [0.0, np.pi, -np.pi, 2 * np.pi, 1e-9, np.pi - 1e-9])
+def test_j8_poles_are_refused(chart, theta):
+    angles, vector = np.array([[0.1, 1.0, 0.2], [0.1, theta, 0.2]]), np.ones(3)
+    assert chart.is_regular(angles).tolist() == [True, False]
+    for refused in (
+        lambda: chart.rates(angles, vector),
+        lambda: chart.rates_from_spatial(angles, vector),
+        lambda: chart.conjugate_momenta(angles, vector),
+        lambda: chart.body_momentum(angles, vector),
+        lambda: chart.body_momentum_jacobian(angles, vector),
+        lambda: chart.hamiltonian(np.eye(3), angles, vector),
+        lambda: chart.hamilton_equations(np.eye(3), angles, vector),
+    ):
+        with pytest.raises(ChartPoleError, match=r"entry \[1\] has theta = .* pole of the Z[XY]Z chart"):
+            refused()
+    assert abs(np.linalg.det(chart.body_rate_matrix(angles[1]))) < 1e-8
+    assert np.isfinite(chart.kinetic_energy(np.eye(3), angles, vector)).all()
+    assert issubclass(ChartPoleError, ShapePhaseError)
+
+
+@CHARTS
+def test_j8_volume_is_the_sine_of_theta(chart):
+    angles = random_angles(np.random.default_rng(22), 30)
+    for matrix in (chart.body_rate_matrix(angles), chart.spatial_rate_matrix(angles)):
+        assert np.abs(np.abs(np.linalg.det(matrix)) - np.sin(angles[:, 1])).max() < 1e-15
+
+
+@CHARTS
+def test_continuous_angles_follow_many_turns(chart):
+    t = np.linspace(0.0, 40.0, 4001)
+    angles = np.stack([3.0 * t, 1.5 + 1.4 * np.sin(t), -5.0 * t + 1.0], axis=-1)
+    found = chart.continuous_angles(chart.attitude(angles))
+    assert np.abs(found - found[0] + angles[0] - angles).max() < 1e-12
+    assert np.abs(so3.wrap(found[0] - angles[0])).max() < 1e-13
+
+
+@CHARTS
+def test_continuous_angles_keep_the_sum_past_a_pole(chart):
+    """Right over theta = 0 and pi: phi and psi jump by half turns, the attitude and the known combination do not."""
+    middle = np.array([*chart.node, 0.0])
+    tilt = np.linspace(-0.5, 2.0 * np.pi, 201)
+    exact = np.concatenate([tilt, [0.0, np.pi]])
+    exact.sort()
+    attitudes = np.stack([turn(THIRD, 0.4 + a) @ turn(middle, a) @ turn(THIRD, 0.2) for a in exact])
+    found = chart.continuous_angles(attitudes)
+    assert np.abs(chart.attitude(found) - attitudes).max() < 3e-15
+    total, difference = found[:, 0] + found[:, 2], found[:, 0] - found[:, 2]
+    north, south = np.abs(exact) < 0.4, np.abs(exact - np.pi) < 0.4
+    assert np.abs(np.diff(total[north])).max() < 0.04
+    assert np.abs(np.diff(difference[south])).max() < 0.04
+    assert np.abs(np.diff(found[:, 1])).max() < 0.04
+    top, bottom = np.argmax(exact == 0.0), np.argmax(exact == np.pi)
+    assert found[top, 1] == 0.0
+    assert found[bottom, 1] == np.pi
+    assert abs(difference[top] - difference[top - 1]) < 1e-15
+    assert abs(total[bottom] - total[bottom - 1]) < 1e-15
+
+
+@CHARTS
+def test_continuous_angles_that_start_or_stay_at_a_pole(chart):
+    spin = np.stack([turn(THIRD, a) for a in np.linspace(0.0, 20.0, 101)])
+    found = chart.continuous_angles(spin)
+    assert not found[:, 1].any()
+    assert np.abs(found[:, 0] + found[:, 2] - np.linspace(0.0, 20.0, 101)).max() < 1e-13
+    upside_down = spin @ np.round(turn([*chart.node, 0.0], np.pi))
+    found = chart.continuous_angles(upside_down)
+    difference = found[:, 0] - found[:, 2]
+    assert np.all(found[:, 1] == np.pi)
+    assert np.abs(difference - difference[0] - np.linspace(0.0, 20.0, 101)).max() < 1e-13
+    assert np.abs(chart.attitude(found) - upside_down).max() < 1e-14
+    assert chart.continuous_angles(np.zeros((0, 3, 3))).shape == (0, 3)
+    batch = chart.continuous_angles(np.stack([spin, upside_down]))
+    assert np.array_equal(batch[1], found)
+
+
+def test_j9_bonnards_precession_and_angles():
+    """(4) and the relations before it, with L along the inertial third axis, against the derivative of R."""
+    rng = np.random.default_rng(23)
+    inertia = np.diag([3.0, 2.0, 1.2])
+    momentum = rng.normal(size=(200, 3))
+    velocity = momentum / np.diag(inertia)
+    size = np.linalg.norm(momentum, axis=-1)
+    for chart in (ZXZ, ZYZ):
+        theta_psi = chart.angles_about_momentum(momentum)
+        angles = np.concatenate([rng.uniform(-3.0, 3.0, (200, 1)), theta_psi], axis=-1)
+        upright = so3.apply(chart.attitude(angles), momentum) / size[:, None]
+        assert np.abs(upright - THIRD).max() < 1e-15
+        rates = chart.rates(angles, velocity)
+        error = (rates[:, 0] - precession_rate(momentum, velocity)) * np.sin(angles[:, 1])
+        assert np.abs(error / size).max() < 1e-14
+        p = chart.conjugate_momenta(angles, momentum)
+        assert np.abs(p[:, 0] - size).max() < 2e-14
+        assert np.abs(p[:, 1]).max() < 2e-14
+    (h1, h2, _), (u1, u2, _), (_, phi3) = momentum.T, velocity.T, ZYZ.angles_about_momentum(momentum).T
+    first = size * (np.sin(phi3) * u2 - np.cos(phi3) * u1) / (h2 * np.sin(phi3) - h1 * np.cos(phi3))
+    assert np.abs(first / precession_rate(momentum, velocity) - 1.0).max() < 1e-12
+
+
+def test_j9_proposition_6():
+    rng = np.random.default_rng(24)
+    moments = np.array([3.0, 2.0, 1.2])
+    for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):
+        (_, phi2, phi3), (p1, p2, p3) = angles, p
+        lever = (p1 - p3 * np.cos(phi2)) / np.sin(phi2)
+        h = np.array([p2 * np.sin(phi3) - np.cos(phi3) * lever, p2 * np.cos(phi3) + np.sin(phi3) * lever, p3])
+        assert np.abs(ZYZ.body_momentum(angles, p) - h).max() < 1e-14 / np.sin(phi2)
+        assert abs(ZYZ.hamiltonian(np.diag(moments), angles, p) / (0.5 * np.sum(h * h / moments)) - 1.0) < 1e-13
+
+
+def test_b_e3_the_printed_sign_of_h3_is_wrong():
+    rng = np.random.default_rng(25)
+    for momentum in rng.normal(size=(30, 3)):
+        size = np.linalg.norm(momentum)
+        phi2, phi3 = ZYZ.angles_about_momentum(momentum)
+        common = [-size * np.sin(phi2) * np.cos(phi3), size * np.sin(phi2) * np.sin(phi3)]
+        corrected, printed = [*common, size * np.cos(phi2)], [*common, -size * np.cos(phi2)]
+        attitude = turn(THIRD, 0.3) @ turn([0, 1, 0], phi2) @ turn(THIRD, phi3)
+        assert np.abs(attitude @ corrected - size * THIRD).max() < 3e-15 * size
+        assert np.abs(attitude @ printed - size * THIRD).max() > 0.1 * abs(momentum[2])
+        assert np.abs(corrected - momentum).max() < 3e-15 * size
+
+
+def test_b_e4_the_last_andoyer_relation_is_that_of_phi_3():
+    """Printed for phi_2 and with arctan; it is right for phi_3 and with arctan2. l is the angle of H from axis 2."""
+    rng = np.random.default_rng(26)
+    printed_fails = arctan_fails = 0
+    for angles, p in zip(random_angles(rng, 60), rng.normal(size=(60, 3)), strict=True):
+        h = ZYZ.body_momentum(angles, p)
+        (_, phi2, phi3), (k, p2, l3) = angles, p
+        size, azimuth = np.linalg.norm(h), np.arctan2(h[0], h[1])
+        radius = np.sqrt(size**2 - l3**2)
+        assert np.abs(h - [radius * np.sin(azimuth), radius * np.cos(azimuth), l3]).max() < 1e-13 * size / np.sin(phi2)
+        numerator, denominator = k - l3 * np.cos(phi2), p2 * np.sin(phi2)
+        right = azimuth + np.arctan2(numerator, denominator)
+        assert abs(so3.wrap(right - phi3)) < 1e-13 / np.sin(phi2)
+        printed_fails += abs(so3.wrap(right - phi2)) > 1e-3
+        arctan_fails += abs(so3.wrap(azimuth + np.arctan(numerator / denominator) - phi3)) > 1e-3
+    assert printed_fails == 60
+    assert 15 < arctan_fails < 45
+
+
+def momentum_map_derivative(chart, angles, momenta):
+    """(angles', momenta') -> (Omega, Pi'), the chart in left trivialisation, 6 x 6."""
+    lower = chart.body_momentum_jacobian(angles, momenta)
+    upper = np.concatenate([chart.body_rate_matrix(angles), np.zeros((3, 3))], axis=-1)
+    return np.concatenate([upper, lower])
+
+
+@CHARTS
+def test_j10_charts_pull_back_the_canonical_form(chart):
+    """On T*SO(3) in body axes: omega((a, x), (b, y)) = a.y - b.x + Pi.(a x b)."""
+    rng = np.random.default_rng(27)
+    for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):
+        pi = chart.body_momentum(angles, p)
+        form = np.block([[so3.hat(pi).T, np.eye(3)], [-np.eye(3), np.zeros((3, 3))]])
+        derivative = momentum_map_derivative(chart, angles, p)
+        defect = derivative.T @ form @ derivative - SYMPLECTIC
+        assert np.abs(defect).max() < 2e-14 / np.sin(angles[1]) ** 3
+
+
+@pytest.mark.parametrize(("first", "second"), [(ZXZ, ZXZ), (ZXZ, ZYZ), (ZYZ, ZYZ)])
+def test_j10_changes_of_chart_and_axes_are_symplectic(first, second):
+    """From one chart of R to the other of A R B, derivative by differences of sixth order."""
+    rng = np.random.default_rng(28)
+    inertial, body = Rotation.random(2, random_state=29).as_matrix()
+
+    def change(state):
+        attitude = inertial @ first.attitude(state[:3]) @ body
+        angles = second.angles(attitude)
+        momentum = body.T @ first.body_momentum(state[:3], state[3:])
+        return np.concatenate([angles, second.conjugate_momenta(angles, momentum)])
+
+    checked = 0
+    for state in np.concatenate([random_angles(rng, 30), rng.normal(size=(30, 3))], axis=-1):
+        if min(np.sin(state[1]), np.sin(change(state)[1])) < 0.4:
+            continue
+        steps = 2e-3 * np.arange(1, 4)[:, None, None] * np.eye(6)
+        differences = [[change(state + s) - change(state - s) for s in row] for row in steps]
+        near, middle, far = differences = np.array(differences)
+        differences[..., :3:2] = so3.wrap(differences[..., :3:2])
+        derivative = (45.0 * near - 9.0 * middle + far).T / (60.0 * 2e-3)
+        assert np.abs(derivative.T @ SYMPLECTIC @ derivative - SYMPLECTIC).max() < 1e-9
+        checked += 1
+    assert checked > 8
+
+
+@CHARTS
+def test_j10_the_flow_is_symplectic(chart):
+    """The derivative of the flow, from the variational equations by CasADi's Hessian of the energy."""
+    inertia = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, -0.2], [0.1, -0.2, 1.0]])
+    q, dq, body, _ = symbolic_velocities(chart)
+    p = ca.SX.sym("p", 3)
+    momentum = ca.solve(ca.jacobian(body, dq).T, p)
+    state = ca.vertcat(q, p)
+    second, gradient = ca.hessian(0.5 * ca.dot(momentum, ca.mtimes(np.linalg.inv(inertia), momentum)), state)
+    derivatives = ca.Function("d", [state], [second, gradient])
+
+    def motion(_, y):
+        hessian = np.array(derivatives(y[:6])[0])
+        rate = np.concatenate(chart.hamilton_equations(inertia, y[:3], y[3:6]))
+        return np.concatenate([rate, (SYMPLECTIC @ hessian @ y[6:].reshape(6, 6)).ravel()])
+
+    start = np.concatenate([[0.1, 1.3, 0.5], [0.4, 0.2, 0.5], np.eye(6).ravel()])
+    end = solve_ivp(motion, (0.0, 3.0), start, method="DOP853", rtol=1e-12, atol=1e-13).y[6:, -1].reshape(6, 6)
+    assert np.abs(end - np.eye(6)).max() > 0.1
+    assert np.abs(end.T @ SYMPLECTIC @ end - SYMPLECTIC).max() < 1e-9
+
+
+@CHARTS
+def test_batches_go_in_front(chart):
+    rng = np.random.default_rng(30)
+    angles, p = random_angles(rng, 4)[:, None], rng.normal(size=(5, 3))
+    inertia = np.stack([random_inertia(rng) for _ in range(5)])
+    rates, momentum_rates = chart.hamilton_equations(inertia, angles, p)
+    energy = chart.hamiltonian(inertia, angles, p)
+    assert rates.shape == momentum_rates.shape == (4, 5, 3)
+    assert energy.shape == chart.kinetic_energy(inertia, angles, p).shape == (4, 5)
+    one = chart.hamilton_equations(inertia[2], angles[3, 0], p[2])
+    assert np.array_equal(rates[3, 2], one[0])
+    assert np.abs(momentum_rates[3, 2] - one[1]).max() < 1e-15
+    assert energy[3, 2] == chart.hamiltonian(inertia[2], angles[3, 0], p[2])
+    assert chart.angles(chart.attitude(np.zeros((2, 0, 3)))).shape == (2, 0, 3)
+
+
+@CHARTS
+def test_every_method_takes_batches_of_any_shape(chart):
+    rng = np.random.default_rng(31)
+    angles, vectors = random_angles(rng, 6).reshape(2, 3, 3), rng.normal(size=(2, 3, 3))
+    for one in (chart.attitude, chart.is_regular, chart.body_rate_matrix, chart.spatial_rate_matrix):
+        assert np.array_equal(one(angles).reshape(6, -1), one(angles.reshape(6, 3)).reshape(6, -1))
+    for two in (
+        chart.body_angular_velocity,
+        chart.spatial_angular_velocity,
+        chart.rates,
+        chart.rates_from_spatial,
+        chart.conjugate_momenta,
+        chart.body_momentum,
+        chart.body_momentum_jacobian,
+    ):
+        rows_of = two(angles.reshape(6, 3), vectors.reshape(6, 3)).reshape(6, -1)
+        assert np.array_equal(two(angles, vectors).reshape(6, -1), rows_of)
+    attitudes = chart.attitude(angles)
+    assert np.array_equal(chart.angles(attitudes).reshape(6, 3), chart.angles(attitudes.reshape(6, 3, 3)))
+    about = chart.angles_about_momentum(vectors)
+    assert np.array_equal(about.reshape(6, 2), chart.angles_about_momentum(vectors.reshape(6, 3)))
+    assert np.array_equal(precession_rate(vectors, angles)[1], precession_rate(vectors[1], angles[1]))
+
+
+@CHARTS
+def test_bad_input_is_refused(chart):
+    angles = [0.1, 1.0, 0.2]
+    for bad in ([0.1, 1.0], [0.1, np.nan, 0.2], ["a", "b", "c"], [1j, 0.0, 0.0]):
+        for call in (chart.attitude, chart.body_rate_matrix, chart.is_regular, chart.spatial_rate_matrix):
+            with pytest.raises(ShapeError, match="angles"):
+                call(bad)
+        with pytest.raises(ShapeError, match="momenta"):
+            chart.body_momentum(angles, bad)
+    with pytest.raises(ShapeError, match=r"angles \(2,\), rates \(3,\)"):
+        chart.body_angular_velocity(np.ones((2, 3)), np.ones((3, 3)))
+    with pytest.raises(ShapeError, match="inertia"):
+        chart.hamiltonian(np.stack([np.eye(3)] * 2), np.ones((3, 3)), np.ones(3))
+    with pytest.raises(SingularInertiaError):
+        chart.hamiltonian(np.diag([1.0, 1.0, 0.0]), angles, np.ones(3))
+    with pytest.raises(UnphysicalInertiaError):
+        chart.kinetic_energy(np.array([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), angles, np.ones(3))
+    with pytest.raises(ShapeError, match="reflection"):
+        chart.angles(-np.eye(3))
+    with pytest.raises(ShapeError, match="attitudes"):
+        chart.continuous_angles(np.eye(3))
+    with pytest.raises(ShapeError, match="zero momentum"):
+        chart.angles_about_momentum(np.zeros(3))
+
+
+def test_bad_brackets_and_precessions_are_refused():
+    with pytest.raises(ShapeError, match="2n entries each"):
+        canonical_bracket(np.ones(3), np.ones(3))
+    with pytest.raises(ShapeError, match="2n entries each"):
+        canonical_bracket(np.ones(4), np.ones(6))
+    with pytest.raises(ShapeError, match="broadcast"):
+        canonical_bracket(np.ones((2, 4)), np.ones((3, 4)))
+    with pytest.raises(ChartPoleError, match=r"entry \[1\]"):
+        precession_rate([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]], np.ones(3))
+    with pytest.raises(ChartPoleError):
+        precession_rate(np.zeros(3), np.ones(3))
+    assert np.array_equal(ZXZ.angles_about_momentum([0.0, 0.0, -2.0]), [np.pi, 0.0])
+    assert np.array_equal(ZYZ.angles_about_momentum([0.0, -0.0, 2.0]), [0.0, 0.0])
+    assert ZXZ.angles_about_momentum([-0.0, -1.0, 0.0])[1] == ZYZ.angles_about_momentum([1.0, -0.0, 0.0])[1] == np.pi
