@@ -94,6 +94,14 @@ class ChartPoleError(ShapePhaseError, ArithmeticError):
     """
 
 
+class LieAlgebraError(ShapePhaseError, ValueError):
+    """Numbers that are no Lie algebra, or an element that is not of the algebra or group it is used in.
+
+    Remedy: the message names the law that fails and by how much; structure constants are c[i, j, k] with
+    [e_i, e_j] = c[i, j, k] e_k.
+    """
+
+
 class MissingExtraError(ShapePhaseError, ImportError):
     """An optional dependency is not installed. Remedy: the message names the extra to install."""
 
