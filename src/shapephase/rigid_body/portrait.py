@@ -1,0 +1,127 @@
+"""The portrait of the free rigid body on the momentum sphere: equilibria, separatrices and polhodes in closed form.
+
+Everything is for |Pi| = 1, from the principal moments alone. Source: Marsden and Ratiu, section 15.3 (figure 15.3.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A principal axis on the momentum sphere, where a steady rotation stands still.
+
+    direction : (3,) unit vector
+    kind : "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)
+    rate : of turning about a centre, of growth along a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
+    """
+
+    direction: Array
+    kind: str
+    rate: float
+
+
+def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
+    """The six steady rotations of a body, axis by axis in the order of its moments, + before −.
+
+    Source: Marsden and Ratiu, 15.3 (figure 15.3.1) and 15.9; theory.md L2.
+    """
+    inertia = _moments_argument(moments)
+    found = []
+    for axis in range(3):
+        product = inverse_difference(inertia, (axis + 1) % 3, axis) * inverse_difference(inertia, (axis + 2) % 3, axis)
+        kind = "degenerate" if product == 0.0 else "centre" if product > 0.0 else "saddle"
+        found += [Equilibrium(side * np.eye(3)[axis], kind, float(np.sqrt(abs(product)))) for side in (1.0, -1.0)]
+    return tuple(found)
+
+
+def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
+    """The four great half-circles from saddle to saddle, each along its motion: (4, count, 3) unit vectors.
+
+    Raises
+    ------
+    ShapeError
+        If two moments are equal: the middle axis is then on a circle of equilibria and there is no separatrix.
+
+    Source: theory.md M-E4 (Marsden and Ratiu 15.8.10, its signs corrected).
+    """
+    inertia = _moments_argument(moments)
+    order = np.argsort(inertia, kind="stable")
+    ascending = inertia[order]
+    if not np.all(np.diff(ascending) > 0.0):
+        raise ShapeError(f"moments: three different ones are needed for a separatrix, got {inertia} kg m^2")
+    angle = np.linspace(0.0, np.pi, count)
+    least = np.sqrt(inverse_difference(ascending, 1, 2) / inverse_difference(ascending, 0, 2))
+    most = np.sqrt(inverse_difference(ascending, 0, 1) / inverse_difference(ascending, 0, 2))
+    curves = np.empty((4, count, 3))
+    for row, (first, third) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
+        middle = -_parity(order) * first * third * np.cos(angle)
+        curves[row][:, order] = np.stack([first * least * np.sin(angle), middle, third * most * np.sin(angle)], axis=-1)
+    return curves
+
+
+def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array:
+    """Curves of constant energy on the sphere of unit momentum, along their motion: (N,) -> (N, 2, count, 3).
+
+    Parameters
+    ----------
+    moments : (3,) in any order [kg m^2]
+    energies : (N,) for |Pi| = 1, from 1/(2 I_max) to 1/(2 I_min) [1/(kg m^2)]; those of a top divided by |Pi|^2
+    count : points of each closed curve, the last one the first
+
+    The two curves of an energy circle the same axis on its two sides. At the ends they are points; at 1/(2 I_middle)
+    each is two halves of the separatrices.
+
+    Raises
+    ------
+    ShapeError
+        For an energy outside, or three equal moments: then no point of the sphere moves.
+    """
+    inertia = _moments_argument(moments)
+    levels = np.atleast_1d(finite_array(energies, "energies", unit="1/(kg m^2)"))
+    order = np.argsort(inertia, kind="stable")
+    ascending = inertia[order]
+    lowest, highest = 0.5 / ascending[2], 0.5 / ascending[0]
+    if lowest == highest:
+        raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
+    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - 1e-12)) | (levels > highest * (1.0 + 1e-12))):
+        raise ShapeError(f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {levels}")
+    phase = np.linspace(0.0, 2.0 * np.pi, count)
+    curves = np.empty((len(levels), 2, count, 3))
+    for row, level in enumerate(levels):
+        below = 2.0 * level * ascending[1] < 1.0 or ascending[1] == ascending[0]
+        circled, outer = (2, 0) if below else (0, 2)
+        above_circled = 2.0 * level - 1.0 / ascending[circled]
+        squares = np.clip([above_circled / inverse_difference(ascending, i, circled) for i in (outer, 1)], 0.0, 1.0)
+        a, b = np.sqrt(squares)
+        c = np.sqrt((1.0 - squares[0]) * np.cos(phase) ** 2 + (1.0 - squares[1]) * np.sin(phase) ** 2)
+        for branch, side in enumerate((1.0, -1.0)):
+            along = curves[row, branch]
+            along[:, order[outer]] = a * np.cos(phase)
+            along[:, order[1]] = _parity(order) * side * b * np.sin(phase)
+            along[:, order[circled]] = side * c
+    return curves
+
+
+def inverse_difference(moments: Array, first: int, second: int) -> float:
+    """1/I_first - 1/I_second, right in all digits for moments that nearly agree [1/(kg m^2)]."""
+    return float((moments[second] - moments[first]) / (moments[first] * moments[second]))
+
+
+def _moments_argument(moments: ArrayLike) -> Array:
+    values = finite_array(moments, "moments", (3,), unit="kg m^2")
+    if values.ndim != 1 or not np.all(values > 0.0):
+        raise ShapeError(f"moments: expected three positive principal moments [kg m^2], got {values}")
+    return values
+
+
+def _parity(order: NDArray[np.intp]) -> float:
+    """1 for an even permutation of the axes, -1 for an odd one."""
+    return float(np.round(np.linalg.det(np.eye(3)[order])))
