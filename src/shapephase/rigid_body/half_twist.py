@@ -1,0 +1,181 @@
+"""Flips of a body that spins about its intermediate axis: the half twist (Dzhanibekov) and the tennis racket.
+
+Body axes are principal axes; moments and momentum are taken as exact, so times are right however near the separatrix.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, finite_array
+from ..elliptic import complete_k
+from ..errors import ShapeError, SingularInertiaError
+from .momentum_orbit import momentum_orbit
+
+
+@dataclass(frozen=True)
+class HalfTwist:
+    """When a free rigid body turns over about its intermediate axis.
+
+    Attributes
+    ----------
+    time : (...) from one reversal of the intermediate component of Pi to the next, half the period 4K/rate; infinite
+        where it never reverses (steady rotations, the separatrix, a spherical body) [s]
+    asymptote : (...) log(16/complement)/growth_rate, which `time` approaches at the separatrix; infinite on it and
+        where two moments are equal [s]
+    complement : (...) m1 = 1 - k^2, 0 on the separatrix
+    rate : (...) argument of the elliptic functions per second; 0 where Pi stands still [rad/s]
+    growth_rate : (...) the positive eigenvalue at the intermediate axis,
+        |Pi| sqrt((I2 - I1)(I3 - I2)/(I1 I3))/I2 [1/s]
+    """
+
+    time: Array
+    asymptote: Array
+    complement: Array
+    rate: Array
+    growth_rate: Array
+
+
+def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
+    """Time between the flips of a free rigid body, from its principal moments and its body momentum.
+
+    Between two flips Pi circles the axis of the largest or of the smallest moment by half a turn, 2K of the elliptic
+    functions. The tilt off the separatrix is found without rounding; parts of Pi below 1e-140 count as zero.
+
+    Parameters
+    ----------
+    moments : (..., 3) principal moments in any order, any positive numbers [kg m^2]
+    momentum : (..., 3) Pi along these axes at any one time [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError
+        If shapes or entries are wrong.
+    SingularInertiaError
+        If a moment is not positive.
+
+    Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1; theory.md L4.
+    """
+    inertia, vector = _broadcast(_moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s"))
+    order = np.argsort(inertia, axis=-1, kind="stable")
+    inertia, vector = np.take_along_axis(inertia, order, -1), np.take_along_axis(vector, order, -1)
+    rows = [_flip(i, x) for i, x in zip(inertia.reshape(-1, 3), vector.reshape(-1, 3))]
+    table = np.array(rows, dtype=float).reshape(*inertia.shape[:-1], 5)
+    return HalfTwist(*(table[..., k][()] for k in range(5)))
+
+
+def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLike, azimuth: ArrayLike) -> HalfTwist:
+    """Time between the flips of a body that starts with a small tilt off its intermediate axis.
+
+    Parameters
+    ----------
+    moments : (..., 3) principal moments in any order [kg m^2]
+    magnitude : (...) |Pi| [kg m^2/s]
+    tilt : (...) angle between Pi and the intermediate axis at the start [rad]
+    azimuth : (...) direction of the tilt, from the axis of the smallest to that of the largest moment [rad]
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        As `half_twist`.
+    """
+    inertia = np.sort(_moments(moments), axis=-1)
+    values = (
+        finite_array(magnitude, "magnitude", unit="kg m^2/s"),
+        finite_array(tilt, "tilt", unit="rad"),
+        finite_array(azimuth, "azimuth", unit="rad"),
+    )
+    try:
+        size, lean, towards = np.broadcast_arrays(*values)
+    except ValueError:
+        shapes = ", ".join(str(v.shape) for v in values)
+        raise ShapeError(f"magnitude, tilt, azimuth: shapes {shapes} cannot be broadcast together") from None
+    across = size * np.sin(lean)
+    momentum = np.stack([across * np.cos(towards), size * np.cos(lean), across * np.sin(towards)], axis=-1)
+    return half_twist(inertia, momentum)
+
+
+def twist_defect(moments: ArrayLike) -> Array:
+    """Tennis-racket effect on the separatrix: the angle eps by which each end of the half twist falls short.
+
+    A racket is tossed about its intermediate axis; while its handle (the axis of the smallest moment) goes round the
+    momentum once, the racket twists about the handle by pi - 2 eps. With the handle's azimuth phi and the twist psi,
+    measured from the middle of the flip, a = I2/I1 - 1 and b = 1 - I2/I3 for ascending moments, motion on the
+    separatrix obeys dphi/dpsi = (1 - b cos^2 psi)/sqrt(b cos^2 psi (a + b cos^2 psi)). Half a turn gives, u = cos eps,
+
+        pi = artanh(u sqrt(a)/sqrt(a + b - b u^2))/sqrt(a b) - arcsin(u sqrt(b/(a + b))).
+
+    Parameters
+    ----------
+    moments : (..., 3) three different principal moments in any order [kg m^2]
+
+    Returns
+    -------
+    (...) eps in (0, pi/2) [rad]; a value below 1e-308 comes as 0
+
+    Raises
+    ------
+    ShapeError
+        If two moments are equal: there is no intermediate axis.
+
+    Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
+    """
+    inertia = np.sort(_moments(moments), axis=-1)
+    low, middle, high = np.moveaxis(inertia, -1, 0)
+    if np.any((low == middle) | (middle == high)):
+        raise ShapeError("moments: two are equal; a tennis racket needs three different principal moments")
+    a, b = (middle - low) / low, (high - middle) / high
+    share, scale = b / (a + b), np.sqrt(a * b)
+    # By w = arsinh(sqrt(a/(a + b)) cot eps), the value of the artanh: no digits are lost however small eps is.
+    lower, upper = scale * np.pi, scale * (np.pi + np.arcsin(np.sqrt(share)))
+    for _ in range(60):
+        w = 0.5 * (lower + upper)
+        sine = _sine(a, b, w)
+        short = w < scale * (np.pi + np.arctan2(np.sqrt(share * (1.0 - sine * sine)), _rest(share, sine)))
+        lower, upper = np.where(short, w, lower), np.where(short, upper, w)
+    w = 0.5 * (lower + upper)
+    return np.arctan2(np.sqrt(a) * _fade(w), np.sqrt(a + b))[()]
+
+
+def _fade(w: Array) -> Array:
+    """1/sinh w, without overflow."""
+    return 2.0 * np.exp(-w) / -np.expm1(-2.0 * w)
+
+
+def _sine(a: Array, b: Array, w: Array) -> Array:
+    tangent = np.sqrt(a / (a + b)) * _fade(w)
+    return tangent / np.hypot(1.0, tangent)
+
+
+def _rest(share: Array, sine: Array) -> Array:
+    return np.sqrt(1.0 - share + share * sine * sine)
+
+
+def _flip(moments: Array, momentum: Array) -> tuple[float, float, float, float, float]:
+    """Time, asymptote, complement, rate and growth rate of one top, moments ascending."""
+    low, middle, high = moments.tolist()
+    orbit = momentum_orbit(moments, momentum)
+    growth = orbit.size * math.sqrt((middle - low) / low * ((high - middle) / high)) / middle
+    m1, rate = orbit.complement, orbit.rate
+    asymptote = math.log(16.0 / m1) / growth if m1 and growth else math.inf
+    turns_over = rate > 0.0 and orbit.regime != "steady"
+    return 2.0 * float(complete_k(m1)) / rate if turns_over else math.inf, asymptote, m1, rate, growth
+
+
+def _moments(moments: ArrayLike) -> Array:
+    inertia = finite_array(moments, "moments", (3,), unit="kg m^2")
+    if np.any(inertia <= 0.0):
+        raise SingularInertiaError(f"moments: every principal moment must be above 0, got {inertia.min():.6g} kg m^2")
+    return inertia
+
+
+def _broadcast(moments: Array, momentum: Array) -> tuple[Array, Array]:
+    try:
+        shape = np.broadcast_shapes(moments.shape, momentum.shape)
+    except ValueError:
+        raise ShapeError(f"moments {moments.shape}, momentum {momentum.shape}: cannot be broadcast together") from None
+    return np.broadcast_to(moments, shape), np.broadcast_to(momentum, shape)

@@ -1,0 +1,397 @@
+"""The heavy top: a rigid body with a fixed point, in uniform gravity.
+
+Pi is the angular momentum about the fixed point and Gamma the upward vertical, both in body axes; chi is the unit
+vector from the fixed point to the centre of mass, Mgl its distance times the weight [J]. The equations are
+Lie-Poisson on se(3)*: Pi' = Pi x Omega + Mgl Gamma x chi, Gamma' = Gamma x Omega, Pi = I Omega.
+
+Source: Marsden and Ratiu, section 15.10; theory.md M1, M2, M10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import DOP853, DenseOutput, OdeSolution
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..errors import AccuracyNotReached, ShapeError
+from ..inertia_tensor import inertia_argument, inverse_inertia
+
+_FLOOR = 3e-14
+"""The local tolerance below which rounding decides."""
+_RATIO = 32.0
+"""Between the local tolerances of the two runs of a motion."""
+_SHARE = 0.1
+"""Of their difference, at most what the finer run errs by: its error is smaller by about the ratio (measured)."""
+_STEPS = 200_000
+_UP = np.array([0.0, 0.0, 1.0])
+
+Pair = tuple[Array, Array]
+"""A point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeavyTop:
+    """A heavy top, or a batch of them.
+
+    Parameters
+    ----------
+    inertia : (..., 3, 3) symmetric positive definite tensor about the fixed point, body axes [kg m^2]
+    mgl : (...) mass times gravity times the distance of the centre of mass from the fixed point [J]
+    chi : (..., 3) unit vector from the fixed point to the centre of mass, body axes
+
+    Raises
+    ------
+    ShapeError
+        If shapes or entries are wrong, or chi is no unit vector (to 1e-6).
+    UnphysicalInertiaError, SingularInertiaError
+        If a tensor is not symmetric, or not positive definite.
+
+    Source: Marsden and Ratiu (15.10.1-3).
+    """
+
+    inertia: Array
+    mgl: Array
+    chi: Array
+    inverse: Array = field(init=False, repr=False)
+
+    def __init__(self, inertia: ArrayLike, mgl: ArrayLike, chi: ArrayLike = (0.0, 0.0, 1.0)) -> None:
+        tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
+        tensor = inertia_argument(tensor.reshape(-1, 3, 3)).reshape(tensor.shape)
+        direction = finite_array(chi, "chi", (3,))
+        length = np.linalg.norm(direction, axis=-1)
+        if np.any(np.abs(length - 1.0) > 1e-6):
+            raise ShapeError(f"chi: must have length 1 (the distance belongs to mgl), got {np.ravel(length)[0]:.6g}")
+        strength = finite_array(mgl, "mgl", unit="J")
+        _common(inertia=tensor.shape[:-2], mgl=strength.shape, chi=direction.shape[:-1])
+        for name, value in (
+            ("inertia", tensor),
+            ("mgl", strength),
+            ("chi", so3.normalised(direction)),
+            ("inverse", inverse_inertia(tensor)),
+        ):
+            object.__setattr__(self, name, value)
+
+    def angular_velocity(self, momentum: ArrayLike) -> Array:
+        """Omega = I^-1 Pi: (..., 3) -> (..., 3) [rad/s]."""
+        return so3.apply(self.inverse, finite_array(momentum, "momentum", (3,)))
+
+    def energy(self, momentum: ArrayLike, gamma: ArrayLike) -> Array:
+        """H = Pi.Omega/2 + Mgl Gamma.chi: (..., 3), (..., 3) -> (...) [J]. Source: Marsden and Ratiu (15.10.3)."""
+        pi, up = _point(momentum, gamma)
+        return 0.5 * np.sum(pi * self.angular_velocity(pi), axis=-1) + self.mgl * np.sum(up * self.chi, axis=-1)
+
+    def energy_gradient(self, momentum: ArrayLike, gamma: ArrayLike) -> Pair:
+        """(dH/dPi, dH/dGamma) = (Omega, Mgl chi): (..., 3), (..., 3) -> two of (..., 3) [rad/s], [J]."""
+        pi, _ = _point(momentum, gamma)
+        omega = self.angular_velocity(pi)
+        return omega, np.broadcast_to(self.mgl[..., None] * self.chi, omega.shape)
+
+    def rates(self, momentum: ArrayLike, gamma: ArrayLike) -> Pair:
+        """(Pi', Gamma'): (..., 3), (..., 3) -> two of (..., 3). Source: Marsden and Ratiu (15.10.1-2)."""
+        pi, up = _point(momentum, gamma)
+        omega, weight = self.energy_gradient(pi, up)
+        return np.cross(pi, omega) + np.cross(up, weight), np.cross(up, omega)
+
+    def linearisation(self, momentum: ArrayLike, gamma: ArrayLike) -> Array:
+        """The derivative of (Pi', Gamma') by (Pi, Gamma): (..., 3), (..., 3) -> (..., 6, 6).
+
+        Its eigenvalues at an equilibrium are the spectrum; two of them are zero, for the two Casimirs.
+        Source: Marsden and Ratiu (15.10.12-13).
+        """
+        pi, up = _point(momentum, gamma)
+        omega, weight = self.energy_gradient(pi, up)
+        matrix = np.zeros((*omega.shape[:-1], 6, 6))
+        matrix[..., :3, :3] = so3.hat(pi) @ self.inverse - so3.hat(omega)
+        matrix[..., :3, 3:] = -so3.hat(weight)
+        matrix[..., 3:, :3] = so3.hat(up) @ self.inverse
+        matrix[..., 3:, 3:] = -so3.hat(omega)
+        return matrix
+
+    def legendre(self, momentum: ArrayLike, gamma: ArrayLike) -> Pair:
+        """(Omega, v) = gradient of H + |Gamma|^2/2, an element of se(3): (..., 3), (..., 3) -> two of (..., 3).
+
+        H alone is linear in Gamma and has no Legendre transform; |Gamma|^2/2 [J] is a Casimir, so the sum has the
+        same motions. Source: Marsden and Ratiu, exercise 15.10-1.
+        """
+        pi, up = _point(momentum, gamma)
+        omega, weight = self.energy_gradient(pi, up)
+        return omega, weight + up
+
+    def lagrangian(self, omega: ArrayLike, v: ArrayLike) -> Array:
+        """l = Omega.I Omega/2 + |v - Mgl chi|^2/2, of which H + |Gamma|^2/2 is the Legendre transform [J].
+
+        With Pi = dl/dOmega and Gamma = dl/dv the heavy top is Euler-Poincare on se(3): Pi' = Pi x Omega + Gamma x v,
+        Gamma' = Gamma x Omega: (..., 3), (..., 3) -> (...). Source: Marsden and Ratiu, exercise 15.10-1 (b).
+        """
+        turning, rest = finite_array(omega, "omega", (3,)), finite_array(v, "v", (3,)) - self.mgl[..., None] * self.chi
+        return 0.5 * np.sum(turning * so3.apply(self.inertia, turning), axis=-1) + 0.5 * np.sum(rest * rest, axis=-1)
+
+    def motion(
+        self,
+        momentum: ArrayLike,
+        gamma: ArrayLike | None = None,
+        *,
+        duration: float,
+        attitude: ArrayLike | None = None,
+        tolerance: float = 1e-9,
+    ) -> HeavyTopMotion:
+        """The motion from these initial values, with both Casimirs right to rounding at every time.
+
+        The attitude is integrated as a quaternion, and with it the two horizontal components of the spatial momentum
+        R Pi; its vertical component, Pi.Gamma, is constant and enters as given. Gamma = R^T e_z and Pi = R^T (R Pi) are
+        formed of them, so Pi.Gamma and |Gamma| cannot drift. By Dormand and Prince's order 8(5,3), twice.
+
+        Parameters
+        ----------
+        momentum : (..., 3) body momentum at the start [kg m^2/s]
+        gamma : (..., 3) upward vertical in body axes at the start; the attitude is then the shortest rotation that
+            takes it to e_z. Or give
+        attitude : (..., 3, 3) body to inertial axes; with neither of the two, the identity
+        duration : of the motion [s]
+        tolerance : of the attitude over the whole motion, in [1e-12, 1e-2] [rad]
+
+        Raises
+        ------
+        ShapeError
+            If an argument is of a wrong shape or value, or both `gamma` and `attitude` are given.
+        AccuracyNotReached
+            If the tolerance cannot be met: unstable or chaotic motions magnify rounding exponentially.
+        """
+        start, body, time, wanted = self._arguments(momentum, gamma, attitude, duration, tolerance)
+        least = _RATIO * _FLOOR
+        local = max(0.01 * wanted, least)
+        while True:
+            coarse = _solution(self, start, body, time, local)
+            fine = _solution(self, start, body, time, local / _RATIO)
+            estimate = _SHARE * _difference(coarse, fine)
+            worst = float(np.max(estimate, initial=0.0))
+            if worst <= wanted:
+                return replace(fine, error_estimate=estimate)
+            if local <= least:
+                raise AccuracyNotReached(
+                    f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance {wanted:.2g}; "
+                    "shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
+                )
+            local = max(local * max(0.3 * wanted / worst, 1e-3), least)
+
+    def _arguments(
+        self,
+        momentum: ArrayLike,
+        gamma: ArrayLike | None,
+        attitude: ArrayLike | None,
+        duration: float,
+        tolerance: float,
+    ) -> tuple[Array, Array, float, float]:
+        body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+        if gamma is not None and attitude is not None:
+            raise ShapeError("gamma, attitude: give one of them, each determines where the vertical is")
+        if gamma is not None:
+            vertical = finite_array(gamma, "gamma", (3,))
+            length = np.linalg.norm(vertical, axis=-1)
+            if np.any(np.abs(length - 1.0) > 1e-6):
+                raise ShapeError(f"gamma: the vertical must have length 1, got {np.ravel(length)[0]:.6g}")
+            start = so3.between(so3.normalised(vertical), np.broadcast_to(_UP, vertical.shape))
+        else:
+            start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
+        time = finite_array(duration, "duration", unit="s")
+        wanted = finite_array(tolerance, "tolerance", unit="rad")
+        if time.shape != () or time <= 0.0:
+            raise ShapeError(f"duration: one number above 0 s is needed, got {duration}")
+        if wanted.shape != () or not 1e-12 <= wanted <= 1e-2:
+            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {tolerance}")
+        shape = _common(
+            inertia=self.inertia.shape[:-2],
+            mgl=self.mgl.shape,
+            chi=self.chi.shape[:-1],
+            momentum=body.shape[:-1],
+            attitude=start.shape[:-2],
+        )
+        return (
+            np.broadcast_to(start, (*shape, 3, 3)),
+            np.broadcast_to(body, (*shape, 3)),
+            float(time),
+            float(wanted),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HeavyTopMotion:
+    """A motion of a heavy top on [0, duration]. Times (...) give results of shape batch + time + item.
+
+    Attributes
+    ----------
+    top : the `HeavyTop`
+    duration : [s]
+    vertical_momentum : (...) Pi.Gamma, constant [kg m^2/s]
+    error_estimate : (...) of the attitude over the whole motion, a tenth of its largest difference from a run with 32
+        times the local tolerance [rad]
+    energy_drift : (...) largest |H(t) - H(0)| at the ends of the steps [J]
+    """
+
+    top: HeavyTop
+    duration: float
+    vertical_momentum: Array
+    error_estimate: Array
+    energy_drift: Array
+    _scale: Array = field(repr=False)
+    _solution: OdeSolution = field(repr=False)
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """R(t), body to inertial axes: (...) -> (..., 3, 3)."""
+        return so3.matrix_from_quat(self._state(t)[0])
+
+    def gamma(self, t: ArrayLike) -> Array:
+        """The upward vertical in body axes, R^T e_z: (...) -> (..., 3)."""
+        return self.attitude(t)[..., 2, :]
+
+    def body_momentum(self, t: ArrayLike) -> Array:
+        """Pi(t), body axes: (...) -> (..., 3) [kg m^2/s]."""
+        quat_xyzw, spatial = self._state(t)
+        return so3.apply(so3.transpose(so3.matrix_from_quat(quat_xyzw)), spatial)
+
+    def angular_velocity(self, t: ArrayLike) -> Array:
+        """Omega(t), body axes: (...) -> (..., 3) [rad/s]."""
+        momentum = self.body_momentum(t)
+        inverse = self.top.inverse
+        return so3.apply(inverse[(..., *(None,) * np.ndim(t), slice(None), slice(None))], momentum)
+
+    def _state(self, t: ArrayLike) -> tuple[Array, Array]:
+        times = finite_array(t, "t", unit="s")
+        if np.any((times < 0.0) | (times > self.duration)):
+            raise ShapeError(f"t: from {times.min():.6g} to {times.max():.6g} s; the motion is on [0, {self.duration}]")
+        batch = self._scale.shape
+        flat = self._solution(times.ravel()) if times.size else np.empty((6 * self._scale.size, 0))
+        rows = np.moveaxis(flat.reshape(*batch, 6, times.size), -2, -1).reshape(*batch, *times.shape, 6)
+        lift = (..., *(None,) * times.ndim)
+        return _unpacked(rows, self._scale[lift], self.vertical_momentum[lift])
+
+
+def semidirect_bracket(
+    df: tuple[ArrayLike, ArrayLike], dg: tuple[ArrayLike, ArrayLike], momentum: ArrayLike, gamma: ArrayLike
+) -> Array:
+    """The minus Lie-Poisson bracket {F, G} of the semidirect product se(3)*: (...).
+
+    {F, G} = -Pi.(F_Pi x G_Pi) - Gamma.(F_Pi x G_Gamma + F_Gamma x G_Pi); F' = {F, H} along a heavy top's motion.
+
+    Parameters
+    ----------
+    df, dg : gradients (F_Pi, F_Gamma), (G_Pi, G_Gamma), each of two (..., 3)
+    momentum, gamma : (..., 3) the point
+
+    Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
+    """
+    (fp, fg), (gp, gg) = (tuple(finite_array(part, "gradient", (3,)) for part in pair) for pair in (df, dg))
+    pi, up = _point(momentum, gamma)
+    turning = np.sum(pi * np.cross(fp, gp), axis=-1)
+    return -turning - np.sum(up * (np.cross(fp, gg) + np.cross(fg, gp)), axis=-1)
+
+
+def casimirs(momentum: ArrayLike, gamma: ArrayLike) -> tuple[Array, Array]:
+    """(Pi.Gamma, |Gamma|^2), constant along every motion: (..., 3), (..., 3) -> two of (...).
+
+    Source: Marsden and Ratiu, before (15.10.4).
+    """
+    pi, up = _point(momentum, gamma)
+    return np.sum(pi * up, axis=-1), np.sum(up * up, axis=-1)
+
+
+def marched(
+    top: HeavyTop, attitude: Array, momentum: Array, duration: float, local: float
+) -> Iterator[tuple[float, Array, Array, DenseOutput]]:
+    """Steps of the integration: time, attitude (quaternions xyzw) and spatial momentum after each, and its interpolant.
+
+    All tops of the batch take the same steps; `local` is the tolerance of one step, of the attitude and of the momentum
+    relative to max(|Pi|, sqrt(Mgl I)).
+
+    Raises
+    ------
+    AccuracyNotReached
+        After 200 000 steps, or where the step shrinks to nothing.
+    """
+    vertical, scale, start = _packed(top, attitude, momentum)
+    strength = top.mgl / scale
+
+    def rates(_: float, y: Array) -> Array:
+        state, out = y.reshape(*scale.shape, 6), np.empty((*scale.shape, 6))
+        quat, spatial = _unpacked(state, scale, vertical)
+        rotation = so3.matrix_from_quat(quat)
+        omega = so3.apply(top.inverse, so3.apply(so3.transpose(rotation), spatial))
+        vector, scalar = state[..., :3], state[..., 3]
+        # Written out: np.cross would take half of the whole time.
+        out[..., :3] = 0.5 * (scalar[..., None] * omega + so3.apply(so3.hat(vector), omega))
+        out[..., 3] = -0.5 * np.sum(vector * omega, axis=-1)
+        arm = so3.apply(rotation, top.chi)
+        out[..., 4] = -strength * arm[..., 1]
+        out[..., 5] = strength * arm[..., 0]
+        return out.ravel()
+
+    solver = DOP853(rates, 0.0, start.ravel(), duration, rtol=_FLOOR, atol=local / np.sqrt(max(scale.size, 1)))
+    for _ in range(_STEPS):
+        message = solver.step()
+        if solver.status == "failed":
+            raise AccuracyNotReached(f"heavy top: {message} at t = {solver.t:.9g} s; loosen the tolerance")
+        yield solver.t, *_unpacked(solver.y.reshape(*scale.shape, 6), scale, vertical), solver.dense_output()
+        if solver.status == "finished":
+            return
+    raise AccuracyNotReached(
+        f"heavy top: {_STEPS} steps reach t = {solver.t:.6g} of {duration:.6g} s; shorten the motion"
+    )
+
+
+def _packed(top: HeavyTop, attitude: Array, momentum: Array) -> tuple[Array, Array, Array]:
+    """Vertical momentum, scale of momentum and state (quaternion, horizontal momentum over scale)."""
+    spatial = so3.apply(attitude, momentum)
+    moment = np.trace(top.inertia, axis1=-2, axis2=-1)
+    scale = np.maximum(np.linalg.norm(momentum, axis=-1), np.sqrt(np.abs(top.mgl) * moment))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    state = np.concatenate([so3.quat_from_matrix(attitude), spatial[..., :2] / scale[..., None]], axis=-1)
+    # Pi.Gamma of the data given: the rounding of the attitude does not enter.
+    return np.sum(momentum * attitude[..., 2, :], axis=-1), scale, state
+
+
+def _unpacked(state: Array, scale: Array, vertical: Array) -> tuple[Array, Array]:
+    """Unit quaternion and spatial momentum."""
+    horizontal = state[..., 4:] * scale[..., None]
+    upright = np.broadcast_to(vertical, horizontal.shape[:-1])[..., None]
+    return so3.normalised(state[..., :4]), np.concatenate([horizontal, upright], axis=-1)
+
+
+def _solution(top: HeavyTop, attitude: Array, momentum: Array, duration: float, local: float) -> HeavyTopMotion:
+    vertical, scale, _ = _packed(top, attitude, momentum)
+    before = top.energy(momentum, attitude[..., 2, :])
+    times, pieces, drift = [0.0], [], np.zeros(scale.shape)
+    for t, quat, spatial, piece in marched(top, attitude, momentum, duration, local):
+        rotation = so3.matrix_from_quat(quat)
+        energy = top.energy(so3.apply(so3.transpose(rotation), spatial), rotation[..., 2, :])
+        drift = np.maximum(drift, np.abs(energy - before))
+        times.append(t)
+        pieces.append(piece)
+    return HeavyTopMotion(top, duration, vertical, np.zeros(scale.shape), drift, scale, OdeSolution(times, pieces))
+
+
+def _difference(coarse: HeavyTopMotion, fine: HeavyTopMotion) -> Array:
+    """Largest angle between the attitudes, at the ends and middles of the finer steps."""
+    ends = fine._solution.ts
+    times = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
+    turn = so3.transpose(coarse.attitude(times)) @ fine.attitude(times)
+    return so3.angle(turn).max(axis=-1)
+
+
+def _point(momentum: ArrayLike, gamma: ArrayLike) -> Pair:
+    """A point of se(3)* as two arrays of one shape."""
+    pi, up = finite_array(momentum, "momentum", (3,), unit="kg m^2/s"), finite_array(gamma, "gamma", (3,))
+    shape = _common(momentum=pi.shape, gamma=up.shape)
+    return np.broadcast_to(pi, shape), np.broadcast_to(up, shape)
+
+
+def _common(**shapes: tuple[int, ...]) -> tuple[int, ...]:
+    try:
+        return np.broadcast_shapes(*shapes.values())
+    except ValueError:
+        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ShapeError(f"axes of {listed}: cannot be broadcast together") from None

@@ -1,0 +1,319 @@
+"""The Lagrange top, I1 = I2 with the centre of mass on the axis of symmetry, and the stability of the upright spin.
+
+The upright spin, or sleeping top, is the relative equilibrium Pi = (0, 0, p), Gamma = (0, 0, 1). In the body-fixed
+variables Pi, Gamma it is an equilibrium; p is Pi_3. Mgl below 0 hangs the top from its fixed point.
+
+Source: Marsden and Ratiu, section 15.10; theory.md M3-M9 and its errata M-E9, M-E10.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, Mask, finite_array
+from ..errors import ShapeError, SingularInertiaError
+from .heavy_top import HeavyTop, marched
+
+
+@dataclass(frozen=True)
+class LagrangeTop:
+    """A heavy top with I1 = I2 = `transverse`, I3 = `axial` [kg m^2], chi = e3 and this Mgl [J].
+
+    Raises
+    ------
+    ShapeError
+        If an entry is no finite number.
+    SingularInertiaError
+        If a moment is not positive.
+    """
+
+    transverse: float
+    axial: float
+    mgl: float
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in ("transverse", "axial", "mgl"):
+            object.__setattr__(self, name, _number(getattr(self, name), name))
+        if min(self.transverse, self.axial) <= 0.0:
+            raise SingularInertiaError(f"moments must be above 0, got {self.transverse:.6g}, {self.axial:.6g} kg m^2")
+
+    @property
+    def heavy_top(self) -> HeavyTop:
+        """The same as a general `HeavyTop`."""
+        return HeavyTop(np.diag([self.transverse, self.transverse, self.axial]), self.mgl)
+
+    @property
+    def critical_momentum(self) -> float:
+        """2 sqrt(Mgl I1), the least Pi_3 of a fast top; 0 for a hanging one [kg m^2/s]."""
+        return 2.0 * np.sqrt(max(self.mgl, 0.0) * self.transverse)
+
+
+@dataclass(frozen=True)
+class SleepingTop:
+    """The upright spin of a Lagrange top and what two methods say of its stability.
+
+    The conserved quantity is H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3); dots are derivatives by Pi.Gamma.
+
+    Attributes
+    ----------
+    momentum : p = Pi_3 [kg m^2/s]
+    phi_dot, phi_prime, axial_slope : Phi_dot, Phi' and phi'(p) that make the first variation vanish
+    first_variation : (6,) gradient of the conserved quantity by (Pi, Gamma) at the equilibrium; zero
+    second_variation : (6, 6) its second derivative there, with phi'' = Phi_dot_dot = Phi_dot' = 0 and Phi'' large
+    minors : (6,) its leading principal minors: all positive if the energy-Casimir method proves stability
+    quadratic : (3,) coefficients, highest first, of the e-quadratic that decides (see `e_quadratic`)
+    eigenvalues : (4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]
+    energy_casimir : whether the second variation is definite (stable in the sense of Liapunov)
+    spectrally_stable : whether no eigenvalue has a positive real part
+    verdict : "stable", "unstable", or "marginal" where p^2 = 4 Mgl I1: the first method and the spectrum are silent
+    """
+
+    momentum: float
+    phi_dot: float
+    phi_prime: float
+    axial_slope: float
+    first_variation: Array
+    second_variation: Array
+    minors: Array
+    quadratic: Array
+    eigenvalues: np.ndarray
+    energy_casimir: bool
+    spectrally_stable: bool
+    verdict: str
+
+
+@dataclass(frozen=True)
+class StabilityChart:
+    """Stability of the upright spin over the ratio of moments and the spin, by three methods.
+
+    Attributes
+    ----------
+    axial_ratios : (R,) I3/I1
+    momenta : (P,) Pi_3 in units of sqrt(Mgl I1); 2 is the threshold
+    energy_casimir, spectrum, simulation : (R, P) True where the method finds the spin stable
+    largest_tilt : (R, P) of the simulated motions [rad]
+    """
+
+    axial_ratios: Array
+    momenta: Array
+    energy_casimir: Mask
+    spectrum: Mask
+    simulation: Mask
+    largest_tilt: Array
+
+
+def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
+    """The upright spin with Pi_3 = `momentum` [kg m^2/s], and its stability: stable if Pi_3^2 > 4 Mgl I1, else not.
+
+    The free number e = -Phi_dot/p is taken at the top of the e-quadratic, 1/(2 I1).
+
+    Raises
+    ------
+    ShapeError
+        If the momentum is no finite number.
+
+    Source: Marsden and Ratiu, theorem 15.10.1.
+    """
+    p = _number(momentum, "momentum")
+    i1, i3, mgl = top.transverse, top.axial, top.mgl
+    phi_dot = -0.5 * p / i1
+    phi_prime = -0.5 * (mgl + phi_dot * p)
+    axial_slope = -(p / i3 + phi_dot)
+    b = -2.0 * phi_prime + 2.0 * i3 * phi_dot**2 + abs(mgl) + p * p / i1
+    second = second_variation(top, p, phi_dot, b=b)
+    excess = p * p - 4.0 * mgl * i1
+    stable = bool(np.all(spectrally_stable([i1, i1, i3], mgl, p)))
+    return SleepingTop(
+        momentum=p,
+        phi_dot=phi_dot,
+        phi_prime=phi_prime,
+        axial_slope=axial_slope,
+        first_variation=np.array(
+            [0.0, 0.0, p / i3 + phi_dot + axial_slope, 0.0, 0.0, mgl + phi_dot * p + 2.0 * phi_prime]
+        ),
+        second_variation=second,
+        minors=np.array([np.linalg.det(second[:n, :n]) for n in range(1, 7)]),
+        quadratic=e_quadratic(top, p),
+        eigenvalues=sleeping_spectrum([i1, i1, i3], mgl, p),
+        energy_casimir=excess > 0.0,
+        spectrally_stable=stable,
+        verdict="stable" if excess > 0.0 else "unstable" if excess < 0.0 else "marginal",
+    )
+
+
+def second_variation(
+    top: LagrangeTop, momentum: float, phi_dot: float, *, a: float = 0.0, b: float = 0.0, c: float = 0.0, d: float = 0.0
+) -> Array:
+    """Second derivative of H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3) at the upright spin: (6, 6) by (Pi, Gamma).
+
+    Phi' and phi' are those of a vanishing first variation, Phi' = -(Mgl + Phi_dot p)/2 and phi' = -(p/I3 + Phi_dot);
+    a = phi'', b = 4 Phi'', c = Phi_dot_dot, d = 2 Phi_dot'. Entries a36 = Phi_dot + p c + d and
+    a66 = 2 Phi' + b + p^2 c + 2 p d, otherwise than printed.
+
+    Source: Marsden and Ratiu (15.10.5-7) with theory.md M-E9.
+    """
+    p, phi_dot, a, b, c, d = (_number(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
+    vertical = -(top.mgl + phi_dot * p)
+    matrix = np.diag([1.0 / top.transverse, 1.0 / top.transverse, 1.0 / top.axial + a + c, vertical, vertical, 0.0])
+    matrix[0, 3] = matrix[3, 0] = matrix[1, 4] = matrix[4, 1] = phi_dot
+    matrix[2, 5] = matrix[5, 2] = phi_dot + p * c + d
+    matrix[5, 5] = vertical + b + p * p * c + 2.0 * p * d
+    return matrix
+
+
+def e_quadratic(top: LagrangeTop, momentum: float) -> Array:
+    """Coefficients, highest first, of -p^2 e^2 + (p^2/I1) e - Mgl/I1: (3,).
+
+    It is positive for some e, and the spin stable, if its discriminant p^2 (p^2 - 4 Mgl I1)/I1^2 is.
+    Source: Marsden and Ratiu (15.10.11).
+    """
+    p, i1 = _number(momentum, "momentum"), top.transverse
+    return np.array([-p * p, p * p / i1, -top.mgl / i1])
+
+
+def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> Array:
+    """The linearised equations of (Pi_1, Pi_2, Gamma_1, Gamma_2) at an upright spin: (..., 4, 4).
+
+    Parameters
+    ----------
+    moments : (..., 3) principal moments, I1 and I2 need not be equal; the centre of mass lies on axis 3 [kg m^2]
+    mgl : (...) [J]
+    momentum : (...) p = Pi_3 [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If an argument is of a wrong shape or value, or a moment is not positive.
+
+    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10; I2 of its own.
+    """
+    i1, i2, i3, weight, p = _upright(moments, mgl, momentum)
+    matrix = np.zeros((*p.shape, 4, 4))
+    matrix[..., 0, 1], matrix[..., 0, 3] = p / i3 - p / i2, weight
+    matrix[..., 1, 0], matrix[..., 1, 2] = p / i1 - p / i3, -weight
+    matrix[..., 2, 1], matrix[..., 2, 3] = -1.0 / i2, p / i3
+    matrix[..., 3, 0], matrix[..., 3, 2] = 1.0 / i1, -p / i3
+    return matrix
+
+
+def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, Array, Array]:
+    """B, C and the discriminant B^2 - 4C of lambda^4 + B lambda^2 + C of `sleeping_matrix`: three of (...).
+
+    For I1 = I2 the discriminant is (2 I1 - I3)^2 (p/I3)^2 (p^2 - 4 Mgl I1)/I1^4. It vanishes for I3 = 2 I1 whatever p
+    is: both pairs of roots coincide, and the sign of B decides.
+
+    Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments and errors as `sleeping_matrix`.
+    """
+    i1, i2, i3, weight, p = _upright(moments, mgl, momentum)
+    spin = p / i3
+    first, second = spin * (i1 - i3) / i1, spin * (i2 - i3) / i2
+    b = first * second + spin * spin - weight * (1.0 / i1 + 1.0 / i2)
+    c = (first * spin + weight / i1) * (second * spin + weight / i2)
+    symmetric = (2.0 * i1 - i3) ** 2 * spin * spin * (p * p - 4.0 * weight * i1) / i1**4
+    return b[()], c[()], np.where(i1 == i2, symmetric, b * b - 4.0 * c)[()]
+
+
+def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> np.ndarray:
+    """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments and errors as there.
+
+    Through the squares (-B +- sqrt(B^2 - 4C))/2, so they come in pairs of opposite sign.
+    """
+    b, c, discriminant = characteristic_polynomial(moments, mgl, momentum)
+    root = np.sqrt(np.asarray(discriminant, dtype=complex))
+    # The larger of the two without cancellation, the other by the product.
+    large = -0.5 * (b + np.where(b < 0.0, -root, root))
+    small = np.where(large == 0.0, 0.0, c / np.where(large == 0.0, 1.0, large))
+    first, second = np.sqrt(large), np.sqrt(small)
+    return np.stack([first, -first, second, -second], axis=-1)
+
+
+def spectrally_stable(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> Mask:
+    """Whether no eigenvalue of an upright spin has a positive real part: (...). Arguments as `sleeping_matrix`.
+
+    The squares of the eigenvalues must be real and not positive: B, C and B^2 - 4C not negative.
+    """
+    b, c, discriminant = characteristic_polynomial(moments, mgl, momentum)
+    return (b >= 0.0) & (c >= 0.0) & (discriminant >= 0.0)
+
+
+def stability_chart(
+    axial_ratios: ArrayLike, momenta: ArrayLike, *, tilt: float = 1e-3, duration: float = 100.0
+) -> StabilityChart:
+    """Stability of upright spins by energy-Casimir, by spectrum and by simulation, in units of I1, Mgl, sqrt(I1/Mgl).
+
+    Simulated is the heavy top released with its axis tilted and Pi along the axis; a spin counts as stable if the tilt
+    stays within 50 times the first one. Growth next to the threshold is slow, with rate sqrt(1 - Pi_3^2/4): there long
+    durations are needed.
+
+    Parameters
+    ----------
+    axial_ratios : (R,) I3/I1 > 0
+    momenta : (P,) Pi_3/sqrt(Mgl I1)
+    tilt : at the start, in (0, 0.01] [rad]
+    duration : of the simulation [sqrt(I1/Mgl)]
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If an argument is wrong.
+    AccuracyNotReached
+        If the simulation needs more than 200 000 steps.
+
+    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
+    """
+    ratios, spins = finite_array(axial_ratios, "axial_ratios"), finite_array(momenta, "momenta")
+    lean, time = _number(tilt, "tilt"), _number(duration, "duration")
+    if ratios.ndim != 1 or spins.ndim != 1 or not ratios.size or not spins.size:
+        raise ShapeError(f"axial_ratios, momenta: two lists are needed, got shapes {ratios.shape}, {spins.shape}")
+    if not 0.0 < lean <= 0.01 or time <= 0.0:
+        raise ShapeError(f"tilt must be in (0, 0.01] rad and duration above 0, got {lean:.6g}, {time:.6g}")
+    moments = np.ones((len(ratios), 1, 3))
+    moments[..., 0, 2] = ratios
+    spectrum = spectrally_stable(moments, 1.0, spins)
+    largest = _largest_tilt(HeavyTop(moments[..., None] * np.eye(3), 1.0), spins, lean, time)
+    return StabilityChart(
+        axial_ratios=ratios,
+        momenta=spins,
+        energy_casimir=np.broadcast_to(spins * spins > 4.0, spectrum.shape).copy(),
+        spectrum=spectrum,
+        simulation=largest <= 50.0 * lean,
+        largest_tilt=largest,
+    )
+
+
+def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> Array:
+    shape = np.broadcast_shapes(top.inertia.shape[:-2], spins.shape)
+    attitude = np.broadcast_to(so3.exp(np.array([tilt, 0.0, 0.0])), (*shape, 3, 3))
+    momentum = np.broadcast_to(spins[:, None] * np.array([0.0, 0.0, 1.0]), (*shape, 3))
+    largest = np.full(shape, tilt)
+    for _, quat, _, _ in marched(top, attitude, momentum, duration, 1e-9):
+        # Half the angle between body axis 3 and the vertical, from the quaternion's parts.
+        across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
+        largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
+    return largest
+
+
+def _upright(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, ...]:
+    """I1, I2, I3, Mgl and Pi_3 as arrays of one shape."""
+    inertia = finite_array(moments, "moments", (3,), unit="kg m^2")
+    if np.any(inertia <= 0.0):
+        raise SingularInertiaError(f"moments: every moment must be above 0, got {inertia.min():.6g} kg m^2")
+    weight, spin = finite_array(mgl, "mgl", unit="J"), finite_array(momentum, "momentum", unit="kg m^2/s")
+    try:
+        return tuple(np.broadcast_arrays(*np.moveaxis(inertia, -1, 0), weight, spin))
+    except ValueError:
+        raise ShapeError(
+            f"moments {inertia.shape}, mgl {weight.shape}, momentum {spin.shape}: leading axes cannot be broadcast"
+        ) from None
+
+
+def _number(value: ArrayLike, name: str) -> float:
+    array = finite_array(value, name)
+    if array.shape != ():
+        raise ShapeError(f"{name}: one number is needed, got shape {array.shape}")
+    return float(array)

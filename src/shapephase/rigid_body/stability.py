@@ -1,0 +1,202 @@
+"""Stability of the steady rotations of a free rigid body: energy-Casimir method, spectrum, Hessian on the sphere.
+
+Steady rotations are the equilibria of Euler's equations, Pi' = Pi x Omega with Pi = I Omega: the momentum lies along a
+principal axis. The body's axes are arbitrary: tensors need not be diagonal.
+
+Source: Marsden and Ratiu, section 15.9; Arnold 1966 (the method on the coadjoint orbit).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+from ..inertia_tensor import inertia_argument, principal_axes
+
+_ROUNDING = 16.0 * np.finfo(float).eps
+"""Moments of a turned tensor closer than this, relative to its trace, cannot be told from equal ones."""
+
+
+@dataclass(frozen=True)
+class SteadyRotation:
+    """A steady rotation of a free rigid body and what three methods say of its stability.
+
+    Attributes
+    ----------
+    momentum : (3,) the equilibrium Pi_e, body axes [kg m^2/s]
+    moment : I_e, the moment of inertia about it [kg m^2]
+    slope, curvature : Phi' and Phi'' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see `casimir`
+    first_variation : (3,) gradient of H + Phi at Pi_e, Omega + Phi' Pi; zero by the choice of the slope [rad/s]
+    second_variation : (3, 3) second derivative of H + Phi at Pi_e, body axes [1/(kg m^2)]
+    definiteness : "positive definite", "negative definite", "indefinite" or "semidefinite" (equal moments)
+    linearisation : (3, 3) A in dPi' = A dPi, Euler's equations linearised at Pi_e, body axes [1/s]
+    tangent : (3, 2) columns: the principal axes at right angles to Pi_e, right-handed with it
+    eigenvalues : (2,) complex, plus and minus, of the linearisation on the tangent plane of the sphere [1/s]
+    sphere_hessian : (2, 2) second derivative of H restricted to the momentum sphere, in the basis `tangent`
+    index : number of negative directions of `sphere_hessian`
+    verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (this moment equals exactly
+        one of the others: a neighbour drifts along the circle of equilibria, and stays near the circle)
+
+    A spherical body is "stable" everywhere: every momentum stands still.
+    """
+
+    momentum: Array
+    moment: float
+    slope: float
+    curvature: float
+    first_variation: Array
+    second_variation: Array
+    definiteness: str
+    linearisation: Array
+    tangent: Array
+    eigenvalues: np.ndarray
+    sphere_hessian: Array
+    index: int
+    verdict: str
+
+    def casimir(self, half_square: ArrayLike) -> Array:
+        """Phi(x) = slope x + curvature/2 (x - x_e)^2 at x = |Pi|^2/2: (...) -> (...) [J].
+
+        The curvature is +-2/(I_e |Pi_e|^2), of the sign that makes the second variation definite where any does.
+        Source: Marsden and Ratiu, after (15.9.8) and (15.9.10).
+        """
+        x = finite_array(half_square, "half_square", unit="(kg m^2/s)^2")
+        return self.slope * x + 0.5 * self.curvature * (x - 0.5 * self.momentum @ self.momentum) ** 2
+
+
+def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
+    """The steady rotation with this body momentum, and its stability.
+
+    On the tangent plane the second derivative of H is diag(1/I_i - 1/I_e, 1/I_j - 1/I_e), the eigenvalues are
+    +-|Pi| sqrt((I_e - I_i)(I_j - I_e)/(I_i I_j)) / I_e. The energy-Casimir method proves stability where that matrix
+    is definite (the largest and the smallest moment); the spectrum proves instability where it is indefinite.
+
+    Parameters
+    ----------
+    inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
+    momentum : (3,) along a principal axis, not zero, body axes [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError
+        If a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
+    UnphysicalInertiaError, SingularInertiaError
+        If the tensor is not symmetric, or not positive definite.
+
+    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2; theory.md L1-L3, L5, M-E13.
+    """
+    tensor = _tensor(inertia)
+    vector = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    if vector.shape != (3,):
+        raise ShapeError(f"momentum: one steady rotation has one momentum (3,), got {vector.shape}")
+    largest = np.abs(vector).max()
+    if largest == 0.0:
+        raise ShapeError("momentum: the body is at rest; a steady rotation needs a momentum other than zero")
+    if not 1e-100 < largest < 1e100:
+        raise ShapeError(f"momentum: {largest:.3g} kg m^2/s is out of range, 1e-100 to 1e100; take other units")
+    magnitude = float(largest * np.linalg.norm(vector / largest))
+    axis = vector / magnitude
+    image = tensor @ axis
+    moment = float(axis @ image)
+    tilt = float(np.linalg.norm(image - moment * axis))
+    if tilt > 1e-12 * np.trace(tensor):
+        raise ShapeError(
+            f"momentum: {vector} is not along a principal axis, so the rotation is not steady (I n leaves n by "
+            f"{tilt:.3g} kg m^2); take the axes from `steady_rotations`"
+        )
+    others, tangent = _across(tensor, axis)
+    gaps = (moment - others) / (moment * others)
+    gaps[np.abs(moment - others) <= _tie(tensor, axis)] = 0.0
+    return _judged(vector, magnitude, axis, moment, others, gaps, tangent)
+
+
+def steady_rotations(
+    inertia: ArrayLike, magnitude: float = 1.0
+) -> tuple[SteadyRotation, SteadyRotation, SteadyRotation]:
+    """The steady rotations about the three principal axes, by ascending moment of inertia.
+
+    The opposite momenta are the other three equilibria, alike in everything. The book's "long" axis, of the inertia
+    ellipsoid, is that of the smallest moment: here axes go by their moments (theory.md M-E12).
+
+    Parameters
+    ----------
+    inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
+    magnitude : |Pi| > 0 [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError, UnphysicalInertiaError, SingularInertiaError
+        As `steady_rotation`.
+
+    Source: Marsden and Ratiu, theorem 15.9.1.
+    """
+    tensor = _tensor(inertia)
+    size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
+    if size.shape != () or size <= 0.0:
+        raise ShapeError(f"magnitude: one number above 0 kg m^2/s is needed, got {magnitude}")
+    _, axes = principal_axes(tensor)
+    smallest, intermediate, largest = (steady_rotation(tensor, size * axes[:, k]) for k in range(3))
+    return smallest, intermediate, largest
+
+
+def _tensor(inertia: ArrayLike) -> Array:
+    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
+    if tensor.shape != (3, 3):
+        raise ShapeError(f"inertia: one tensor (3, 3) is needed, got {tensor.shape}")
+    return inertia_argument(tensor[None])[0]
+
+
+def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
+    """Moments and principal axes in the plane at right angles to a principal axis, right-handed with it."""
+    first = so3.perpendicular(axis)
+    basis = np.stack([first, np.cross(axis, first)], axis=-1)
+    plane = basis.T @ tensor @ basis
+    moments, turn = np.linalg.eigh(0.5 * (plane + plane.T))
+    turn[:, 1] *= np.sign(np.linalg.det(turn))
+    return moments, basis @ turn
+
+
+def _tie(tensor: Array, axis: Array) -> float:
+    """Moments of a diagonal tensor came as they stand: only equal ones are equal."""
+    exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
+    return 0.0 if exact else _ROUNDING * float(np.trace(tensor))
+
+
+def _judged(
+    momentum: Array, magnitude: float, axis: Array, moment: float, others: Array, gaps: Array, tangent: Array
+) -> SteadyRotation:
+    low, high = float(gaps.min()), float(gaps.max())
+    if low > 0.0:
+        definiteness, verdict = "positive definite", "stable"
+    elif high < 0.0:
+        definiteness, verdict = "negative definite", "stable"
+    elif low < 0.0 < high:
+        definiteness, verdict = "indefinite", "unstable"
+    else:
+        definiteness = "semidefinite"
+        verdict = "stable" if low == high else "stable modulo the circle of equilibria"
+    sign = -1.0 if low < 0.0 and high <= 0.0 else 1.0
+    slope, along = -1.0 / moment, sign * 2.0 / moment
+    root = magnitude * np.sqrt(complex(-gaps[0] * gaps[1]))
+    inverse = tangent @ np.diag(1.0 / others) @ tangent.T + np.outer(axis, axis) / moment
+    return SteadyRotation(
+        momentum=momentum.copy(),
+        moment=moment,
+        slope=slope,
+        curvature=along / magnitude**2,
+        first_variation=inverse @ momentum + slope * momentum,
+        second_variation=tangent @ np.diag(gaps) @ tangent.T + along * np.outer(axis, axis),
+        definiteness=definiteness,
+        # Pi_e x (D^2 H + Phi') dPi, since X_H = Pi x grad H and X_Phi = 0; no difference of equal terms is left.
+        linearisation=magnitude * so3.hat(axis) @ tangent @ np.diag(gaps) @ tangent.T,
+        tangent=tangent,
+        eigenvalues=np.array([root, -root]),
+        sphere_hessian=np.diag(gaps),
+        index=int(np.count_nonzero(gaps < 0.0)),
+        verdict=verdict,
+    )
