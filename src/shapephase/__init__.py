@@ -37,6 +37,7 @@ from .recorded_base import BaseDifference, base_difference
 from .recording import TrajectoryWarning
 from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .rigid_body.euler_top import EulerTop
 from .shape_path import ShapePath
 
 __version__ = "0.1.0"
@@ -47,6 +48,7 @@ __all__ = [
     "Body",
     "Crossings",
     "Deformation",
+    "EulerTop",
     "FinalAttitudes",
     "FixedPoints",
     "HorizontalLift",

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from .nambu_pair import moments_argument
+from ..inertia_tensor import moments_argument
 from .pendulum import rigid_body_pendulum
 
 _NAMES = {"libration": "oscillating", "rotation": "rotating"}

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import inertia_argument, principal_axes
+from ..inertia_tensor import inertia_argument, moments_argument, principal_axes
 
 _ZERO = 1e-14
 _CANCELLED = 16.0 * np.finfo(float).eps
@@ -199,22 +199,6 @@ def maxwell_bloch_rate(state: ArrayLike) -> Array:
     """(x_2, x_1 x_3, -x_1 x_2), the cross product of the gradients of the two invariants: (..., 3) -> (..., 3)."""
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)
     return np.stack([y, x * z, -x * y], axis=-1)
-
-
-def moments_argument(moments: ArrayLike) -> Array:
-    """Three positive principal moments, checked: (3,) [kg m^2].
-
-    Raises
-    ------
-    ShapeError
-        If they are not three finite numbers, or the least is not above 1e-12 of the largest.
-    """
-    values = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if values.shape != (3,):
-        raise ShapeError(f"moments: expected three principal moments (3,), got {values.shape}")
-    if not values.min() > 1e-12 * values.max():
-        raise ShapeError(f"moments: got {values}; principal moments are positive, the least above 1e-12 of the largest")
-    return values.copy()
 
 
 def _coefficients(moments: Array, row: Array, rounding: Array) -> Array:

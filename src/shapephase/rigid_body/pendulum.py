@@ -30,7 +30,7 @@ from scipy.special import elliprf
 from .. import elliptic
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from .nambu_pair import moments_argument
+from ..inertia_tensor import moments_argument
 
 _FAINT = 1e-140  # squares of smaller parts underflow
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
+from ..inertia_tensor import moments_argument
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
 
     Source: Marsden and Ratiu, 15.3 (figure 15.3.1) and 15.9; theory.md L2.
     """
-    inertia = _moments_argument(moments)
+    inertia = moments_argument(moments)
     found = []
     for axis in range(3):
         product = inverse_difference(inertia, (axis + 1) % 3, axis) * inverse_difference(inertia, (axis + 2) % 3, axis)
@@ -52,7 +53,7 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
 
     Source: theory.md M-E4 (Marsden and Ratiu 15.8.10, its signs corrected).
     """
-    inertia = _moments_argument(moments)
+    inertia = moments_argument(moments)
     order = np.argsort(inertia, kind="stable")
     ascending = inertia[order]
     if not np.all(np.diff(ascending) > 0.0):
@@ -84,7 +85,7 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     ShapeError
         For an energy outside, or three equal moments: then no point of the sphere moves.
     """
-    inertia = _moments_argument(moments)
+    inertia = moments_argument(moments)
     levels = np.atleast_1d(finite_array(energies, "energies", unit="1/(kg m^2)"))
     order = np.argsort(inertia, kind="stable")
     ascending = inertia[order]
@@ -113,13 +114,6 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
 def inverse_difference(moments: Array, first: int, second: int) -> float:
     """1/I_first - 1/I_second, right in all digits for moments that nearly agree [1/(kg m^2)]."""
     return float((moments[second] - moments[first]) / (moments[first] * moments[second]))
-
-
-def _moments_argument(moments: ArrayLike) -> Array:
-    values = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if values.ndim != 1 or not np.all(values > 0.0):
-        raise ShapeError(f"moments: expected three positive principal moments [kg m^2], got {values}")
-    return values
 
 
 def _parity(order: NDArray[np.intp]) -> float:
