@@ -128,11 +128,18 @@ ENTRIES: list[tuple[str, Callable[[Any], Any], np.ndarray]] = [
     ),
     ("stroboscopic_map", lambda a: sp.stroboscopic_map(deformation(), 1.0, a).end, VECTORS),
     ("continued_orbits", lambda a: sp.continued_orbits(deformation(), a).directions, single([0.0, 0.1, 0.2])),
+    ("EulerTop inertia", lambda a: sp.EulerTop(a, [0.3, 0.2, 1.0]).period, single(np.diag([1.0, 2.0, 2.5]))),
+    ("EulerTop momentum", lambda a: sp.EulerTop(np.diag([1.0, 2.0, 2.5]), a).montgomery_phase, VECTORS[0]),
+    ("EulerTop attitude", lambda a: sp.EulerTop(np.eye(3), [0.3, 0.2, 1.0], a).attitude(0.5), turned(0.0)),
+    ("EulerTop.principal", lambda a: sp.EulerTop.principal(a, [0.3, 0.2, 1.0]).solid_angle, single([1.0, 2.0, 2.5])),
+    ("top.attitude", lambda a: sp.EulerTop(np.diag([1.0, 2.0, 2.5]), [0.3, 0.2, 1.0]).attitude(a), TIMES),
+    ("top.body_momentum", lambda a: sp.EulerTop(np.diag([1.0, 2.0, 2.5]), [0.3, 0.2, 1.0]).body_momentum(a), TIMES),
 ]
 OPTIONAL = [
     function
     for name, function, _ in ENTRIES
-    if name in ("reconstruct attitude", "is_flat", "curvature_on_plane shape", "stokes_holonomy centre")
+    if name
+    in ("reconstruct attitude", "EulerTop attitude", "is_flat", "curvature_on_plane shape", "stokes_holonomy centre")
 ]
 IDS = [name for name, *_ in ENTRIES]
 
@@ -189,7 +196,9 @@ def test_wrong_arrays_are_refused(function, good):
 FIXED = [
     entry
     for entry in ENTRIES
-    if not entry[0].startswith(("path.", "motion.attitude", "motion.body", "motion.ang", "motion.dyn", "motion.solid"))
+    if not entry[0].startswith(
+        ("path.", "top.", "motion.attitude", "motion.body", "motion.ang", "motion.dyn", "motion.solid")
+    )
     and entry[0]
     not in (
         "deformation.inertia",
