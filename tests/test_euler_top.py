@@ -79,7 +79,7 @@ def top(request):
 
 
 @pytest.mark.parametrize("name", TOPS)
-def test_h9_h10_momentum_and_attitude_against_integration(name):
+def test_h1_h9_h10_momentum_and_attitude_against_integration(name):
     top = TOPS[name]
     assert top.regime == REGIMES.get(name, top.regime)
     body = top.initial_attitude.T @ top.momentum
@@ -254,7 +254,7 @@ def test_h6_steady_rotations():
 
 
 @pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
-def test_h5_four_separatrices(signs):
+def test_h5_m_e4_four_separatrices(signs):
     """From a start whose D vanishes in doubles exactly; the four curves and the sign rule of M-E4."""
     moments = np.array([1.0, 1.5, 3.0])
     start = np.array([signs[0] * 0.5, 0.25, signs[1] * 0.5])
@@ -339,7 +339,7 @@ def test_separatrix_solid_angle_is_the_area_of_the_lune():
         separatrix_solid_angle([1.0, 2.0, 3.0], 1)
 
 
-def test_m_e1_m_e7_the_book_s_solution_with_its_letters():
+def test_h3_h4_m_e1_m_e2_m_e7_the_book_s_solution_with_its_letters():
     """I1 >= I2 >= I3 there: a > I2 never means our k = 3 but circles about the I = I1 axis."""
     i1, i2, i3 = 3.0, 2.0, 1.0
     for a in (1.3, 2.6):
