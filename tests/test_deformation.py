@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
@@ -202,8 +203,8 @@ def test_the_same_body_as_particles_and_as_links(load_urdf, rng):
         np.testing.assert_allclose(one, other, atol=1e-12 * np.abs(other).max())
     np.testing.assert_allclose(as_masses.closure, np.eye(3), atol=1e-12)
     mu = np.array([0.3, -0.5, 0.8])
-    ends = [sp.reconstruct(each, mu, tolerance=1e-11).final_attitude for each in (as_links, as_masses)]
-    np.testing.assert_allclose(ends[0], ends[1], atol=1e-10)
+    turned = [sp.reconstruct(each, mu, tolerance=5e-13).attitude(t) for each in (as_links, as_masses)]
+    np.testing.assert_allclose(turned[0], turned[1], rtol=0, atol=1e-12)
 
 
 def test_the_closure_of_particles_is_found():
@@ -245,6 +246,101 @@ def test_particles_on_one_line_are_refused_when_reconstructed():
         sp.reconstruct(deformation, [0.0, 0.0, 1.0])
     with pytest.raises(SingularInertiaError):
         sp.horizontal_gauge(deformation)
+
+
+def crossing(t):
+    """Three masses that are on one line at t = 0.3721 only."""
+    points = np.zeros((len(t), 3, 3))
+    points[:, :, 0] = [-1.0, 0.1, 1.0]
+    points[:, 1, 1] = np.sin(t - 0.3721)
+    speeds = np.zeros_like(points)
+    speeds[:, 1, 1] = np.cos(t - 0.3721)
+    return points, speeds
+
+
+def test_a2_a_line_between_the_samples_is_found_when_the_motion_is_computed():
+    """No time at which the inertia is asked is the one; and near it nothing is refused."""
+    deformation = sp.particles([1.0, 2.0, 1.0], crossing, 1.0)
+    assert deformation.inertia(0.3722)[0, 0] > 0.0
+    with pytest.raises(SingularInertiaError, match=r"t = 0\.3721 s is not positive definite: all mass is on one line"):
+        sp.reconstruct(deformation, [1.0, 0.0, 0.3])
+    with pytest.raises(SingularInertiaError, match=r"t = 0\.3721 s"):
+        deformation.inertia(0.3721)
+    late = sp.particles([1.0, 2.0, 1.0], lambda t: crossing(t + 0.7), 1.0)
+    assert sp.reconstruct(late, [0.0, 0.0, 1.0]).error_estimate < 1e-9
+
+
+# ---- Point masses sampled in time -----------------------------------------------------------------------------------
+
+
+def test_sampled_particles_are_joined_by_the_cubic_spline(rng):
+    """Positions and rates are SciPy's spline, on its own knots, whatever the samples' origin and first time."""
+    times = np.sort(rng.uniform(0.0, 3.0, 12))
+    samples = POINTS + 0.3 * rng.normal(size=(12, 4, 3))
+    far = np.array([7e6, -2e6, 1e6])
+    spline = CubicSpline(times - times[0], samples)
+    length = times[-1] - times[0]
+    want = sp.particles(MASSES, lambda t: (spline(t), spline(t, 1)), length, times[1:-1] - times[0])
+    found = sp.particles(MASSES, (times, samples))
+    away = sp.particles(MASSES, (times, samples + far + times[:, None, None] * 7e3))
+    assert found.duration == pytest.approx(length, rel=1e-15)
+    np.testing.assert_allclose(found.breaks, times - times[0], rtol=0, atol=1e-15)
+    t = rng.uniform(0.0, length, 20)
+    for name in ("inertia", "internal_momentum", "inertia_rate", "kinetic_energy"):
+        value = getattr(want, name)(t)
+        np.testing.assert_allclose(getattr(found, name)(t), value, rtol=0, atol=1e-13 * np.abs(value).max())
+        # 7e6 m have 1e-9 m of digits, and knots lie 0.02 s apart.
+        np.testing.assert_allclose(getattr(away, name)(t), value, rtol=0, atol=1e-5 * np.abs(value).max())
+    assert found.closure is None
+    ends = [sp.reconstruct(each, [0.3, -0.5, 0.8], tolerance=1e-11).final_attitude for each in (found, want)]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=3e-11)
+
+
+def test_sampled_particles_that_return_move_smoothly_on():
+    """The spline is periodic where the last sample is the first, and converges to the motion in fourth order."""
+    gaps = []
+    for count in (40, 80):
+        times = np.linspace(0.0, 3.0, count + 1)
+        samples = wobble(times)[0]
+        deformation = sp.particles(MASSES, (times, samples))
+        np.testing.assert_allclose(deformation.closure, np.eye(3), rtol=0, atol=1e-12)
+        start, end = (deformation.inertia_rate(t) for t in (0.0, 3.0))
+        np.testing.assert_allclose(start, end, rtol=0, atol=1e-12)
+        true = sp.particles(MASSES, wobble, 3.0)
+        t = np.linspace(0, 3, 300)
+        gaps.append(np.abs(deformation.inertia(t) - true.inertia(t)).max())
+    assert 12.0 < gaps[0] / gaps[1] < 20.0
+
+
+def test_a2_samples_on_one_line_are_refused_at_once():
+    times = np.linspace(0.0, 1.0, 9)
+    with pytest.raises(
+        SingularInertiaError, match=r"t = 0\.372\d* s is not positive definite: all mass is on one line"
+    ):
+        sp.particles([1.0, 2.0, 1.0], (times, crossing(times)[0]))
+    flat = np.outer(np.arange(4.0), [1.0, 2.0, 2.0])
+    with pytest.raises(SingularInertiaError, match=r"t = .* s is not positive definite: all mass is on one line"):
+        sp.particles(MASSES, ([0.0, 1.0], np.stack([flat, 2.0 * flat])))
+
+
+def test_samples_of_particles_are_checked():
+    times, samples = np.linspace(0.0, 3.0, 7), wobble(np.linspace(0.0, 3.0, 7))[0]
+    assert sp.particles(MASSES, (times, samples), 3.0).duration == 3.0
+    for make, said in (
+        (lambda: sp.particles(MASSES, wobble), "duration"),
+        (lambda: sp.particles(MASSES, (times, samples), 2.0), "duration.*3 s"),
+        (lambda: sp.particles(MASSES, (times, samples[:, :3])), r"positions: expected shape .*4, 3\)"),
+        (lambda: sp.particles(MASSES, (times, samples[0])), "positions"),
+        (lambda: sp.particles(MASSES, (times, samples[None])), "positions: samples"),
+        (lambda: sp.particles(MASSES, (times[:5], samples)), "times"),
+        (lambda: sp.particles(MASSES, (times[::-1], samples)), "ascend"),
+        (lambda: sp.particles(MASSES, (times[:1], samples[:1])), "two samples"),
+        (lambda: sp.particles(MASSES, (times, np.where(samples > 0.3, np.nan, samples))), "nan"),
+        (lambda: sp.particles(MASSES, samples), "pair"),
+        (lambda: sp.particles(MASSES, (times, samples), breaks=[4.0]), "breaks"),
+    ):
+        with pytest.raises((ShapeError, TrajectoryError), match=said):
+            make()
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
@@ -400,6 +496,76 @@ def test_an_inertia_that_stops_being_positive_in_between_is_refused():
 
     with pytest.raises(SingularInertiaError, match="t = 0"):
         sp.reconstruct(sp.prescribed(f, None, 1.0), [0.1, 0.0, 1.0])
+
+
+def unphysical_for_a_while(t):
+    """Moments 1, 2 and 3 + a bump of 0.05 at t = 0.6137, of width 0.1: only there the third is above the sum."""
+    third = 2.98 + 0.05 * np.exp(-(((t - 0.6137) / 0.1) ** 2))
+    return np.stack([1 + 0 * t, 2 + 0 * t, third], axis=-1)[:, :, None] * np.eye(3)
+
+
+def test_a4_prescribed_tensors_are_checked_at_all_times_where_asked():
+    """Physical at both ends, not in between: the message has the worst time and by how much; to 1e-7 s here."""
+    with pytest.raises(UnphysicalInertiaError, match=r"t = 0\.6137 s .*triangle inequality by 0\.99 %"):
+        sp.prescribed(unphysical_for_a_while, None, 1.0, on_unphysical="error")
+    with pytest.warns(sp.UnphysicalInertiaWarning, match=r"t = 0\.6137 s .*on_unphysical='allow'"):
+        warned = sp.prescribed(unphysical_for_a_while, None, 1.0, on_unphysical="warn")
+    allowed = sp.prescribed(unphysical_for_a_while, None, 1.0)
+    for deformation in (warned, allowed):
+        defect, when = deformation.triangle_defect()
+        assert defect == pytest.approx(0.03 / 3.03, rel=1e-9)
+        assert when == pytest.approx(0.6137, abs=1e-6)
+        assert sp.reconstruct(deformation, [0.1, 0.2, 3.0]).error_estimate < 1e-9
+    with pytest.raises(UnknownNameError, match="'allow'"):
+        sp.prescribed(swelling, None, 1.0, on_unphysical="alow")
+
+
+def test_a4_every_piece_between_breaks_is_searched():
+    """One of 200 pieces is unphysical, for a fifth of its length."""
+
+    def inertia(t):
+        third = 2.9 + 0.2 * np.exp(-(((t - 137.37) / 0.1) ** 2))
+        return np.stack([1 + 0 * t, 2 + 0 * t, third], axis=-1)[:, :, None] * np.eye(3)
+
+    with pytest.raises(UnphysicalInertiaError, match=r"t = 137\.37 s"):
+        sp.prescribed(inertia, None, 200.0, np.arange(1.0, 200.0), on_unphysical="error")
+
+
+def test_a4_what_the_search_missed_is_refused_when_it_is_evaluated():
+    def inertia(t):
+        third = 2.9 + 0.2 * np.exp(-(((t - 0.51234) / 1e-5) ** 2))
+        return np.stack([1 + 0 * t, 2 + 0 * t, third], axis=-1)[:, :, None] * np.eye(3)
+
+    deformation = sp.prescribed(inertia, None, 1.0, on_unphysical="error")
+    with pytest.raises(UnphysicalInertiaError, match=r"t = 0\.51234 s"):
+        deformation.inertia(0.51234)
+
+
+def test_c_e13_cabreras_examples_as_printed_are_allowed_and_named():
+    """Examples 4.4 and 4.5 let one moment grow alone: past the sum of the others no body has them."""
+
+    def antenna(t):
+        return np.stack([1 + 0 * t, 1.05 + 0 * t, 1.06 + 2.0 * t], axis=-1)[:, :, None] * np.eye(3)
+
+    printed = sp.prescribed(antenna, None, 1.0)
+    defect, when = printed.triangle_defect()
+    assert defect == pytest.approx((3.06 - 2.05) / 3.06, rel=1e-9)
+    assert when == pytest.approx(1.0, abs=1e-9)
+    assert sp.reconstruct(printed, [0.6, 0.0, 0.8]).error_estimate < 1e-9
+    with pytest.raises(UnphysicalInertiaError, match="33 %"):
+        sp.prescribed(antenna, None, 1.0, on_unphysical="error")
+    capped = sp.prescribed(lambda t: antenna(0.49 * t), None, 1.0, on_unphysical="error")
+    assert -0.01 < capped.triangle_defect()[0] < 0.0
+
+
+def test_a4_flat_and_round_bodies_are_physical():
+    """At the limit rounding decides nothing."""
+    turns = Rotation.random(50, rng=np.random.default_rng(4)).as_matrix()
+    for turn in turns:
+        flat = turn @ np.diag([0.7, 1.9, 2.6]) @ turn.T
+        deformation = sp.prescribed(constant(flat), None, 1.0, on_unphysical="error")
+        assert abs(deformation.triangle_defect()[0]) < 1e-14
+    assert sp.rigid(np.eye(3), 1.0).triangle_defect()[0] == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, "long", [1.0]])

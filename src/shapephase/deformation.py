@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,12 +12,14 @@ from .arrays import Array, finite_array
 from .body import Body
 from .connection import CLOSED, path_gap
 from .errors import ShapeError, SingularInertiaError
-from .inertia_tensor import inertia_argument
+from .inertia_tensor import inertia_argument, triangle_defect
 from .interpolant import Interpolant
+from .physical_validity import check_never_on_a_line, check_triangle, least_over, on_unphysical_argument
 from .sampling import Sampler
 from .shape_path import ShapePath, breaks_argument, positive_argument, times_argument
 from .sources import (
     ArticulatedSource,
+    ParticlePath,
     ParticleSource,
     PrescribedSource,
     RigidSource,
@@ -30,7 +32,7 @@ from .sources import (
 class Deformation:
     """A free body that changes its shape in a known way, seen from its base frame.
 
-    Made by `articulated`, `particles`, `prescribed` or `rigid`, or from another by a gauge.
+    Made by `articulated`, `particles`, `assembly`, `prescribed` or `rigid`, or from another by a gauge.
 
     Attributes
     ----------
@@ -102,6 +104,15 @@ class Deformation:
         turning = np.broadcast_to(omega, (*times.shape, 3)).reshape(1, -1, 3)
         return self.source.kinetic_energy(times.ravel(), turning).reshape(times.shape)[()]
 
+    def triangle_defect(self) -> tuple[float, float]:
+        """By how much the triangle inequality fails at worst, relative to the largest moment, and when [s].
+
+        Negative where every inertia of [0, duration] is that of some distribution of mass. Found at 65 points
+        between any two breaks and around the worst of them. Source: theory.md A4.
+        """
+        least, when = least_over(lambda t: -triangle_defect(self.source.sample(t)[0]), self.breaks)
+        return -least, when
+
     def sampler(self) -> Sampler:
         """A fresh sampler for the integrator."""
         return self.source.sampler(self.breaks)
@@ -142,6 +153,8 @@ def prescribed(
     internal_momentum: Callable[[Array], ArrayLike] | None,
     duration: float,
     breaks: ArrayLike = (),
+    *,
+    on_unphysical: str = "allow",
 ) -> Deformation:
     """A deformation given by functions of time.
 
@@ -151,26 +164,39 @@ def prescribed(
     internal_momentum : times (N,) -> (N, 3) [kg m^2/s]; None: zero
     duration : [s]
     breaks : interior times where a derivative jumps [s]
+    on_unphysical : what to do with tensors that break the triangle inequality, as no distribution of mass does:
+        "allow" them, "warn" or "error". The last two search all times when the deformation is made, and "error" checks
+        whatever is evaluated later, too. The equations of motion need only positive definite tensors
 
     The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9.
 
     Raises
     ------
     ShapeError, UnphysicalInertiaError
-        If a function returns the wrong shape, or a tensor that is not symmetric.
+        If a function returns the wrong shape, a tensor that is not symmetric or, with "error", one that breaks the
+        triangle inequality.
+
+    Warns
+    -----
+    UnphysicalInertiaWarning
+        With "warn", for tensors that break the triangle inequality; the message has the worst time.
     """
     length = positive_argument(duration)
     edges = breaks_argument(breaks, length)
     source = PrescribedSource(inertia, internal_momentum, edges)
     ends = source.sample(np.array([0.0, length]))[0]
+    if on_unphysical_argument(on_unphysical) != "allow":
+        _, worst = least_over(lambda t: -triangle_defect(source.sample(t)[0]), edges)
+        check_triangle(source.sample(np.array([worst]))[0], np.array([worst]), on_unphysical)
+        source = replace(source, on_unphysical=on_unphysical)
     gap = float(np.max(np.abs(ends[1] - ends[0])) / np.max(np.abs(ends[0])))
     return Deformation(source, length, edges, np.eye(3) if gap <= CLOSED else None, gap, "prescribed inertia")
 
 
 def particles(
     masses: ArrayLike,
-    positions: Callable[[Array], tuple[ArrayLike, ArrayLike]],
-    duration: float,
+    positions: Callable[[Array], tuple[ArrayLike, ArrayLike]] | tuple[ArrayLike, ArrayLike],
+    duration: float | None = None,
     breaks: ArrayLike = (),
 ) -> Deformation:
     """A body of point masses that move in a known way as seen from a frame.
@@ -178,8 +204,10 @@ def particles(
     Parameters
     ----------
     masses : (m,) [kg], positive, two or more
-    positions : times (N,) -> positions (N, m, 3) [m], velocities (N, m, 3) [m/s]; need not be centred
-    duration : [s]
+    positions : times (N,) -> positions (N, m, 3) [m], velocities (N, m, 3) [m/s]; or samples in time, the pair
+        times (K,) [s], positions (K, m, 3) [m], joined by a cubic spline whose knots become breaks (periodic when the
+        last sample equals the first to 1e-9, else not-a-knot; the first time is shifted to 0). Need not be centred
+    duration : [s]; of samples it is known
     breaks : interior times where a derivative jumps [s]
 
     The shape is a loop when the particles at the end are those at the start turned by some rotation, which
@@ -187,25 +215,51 @@ def particles(
 
     Raises
     ------
-    ShapeError
-        If shapes of arrays disagree or a mass is not positive. Collinear particles raise SingularInertiaError
-        when the motion is computed.
+    ShapeError, TrajectoryError
+        If shapes of arrays disagree, a mass is not positive, or times do not ascend.
+    SingularInertiaError
+        If the particles are on one line at some time, which the message names: for samples at once, for a function
+        when the inertia or the motion is computed.
 
     Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
     """
     weights = finite_array(masses, "masses", (None,), unit="kg")
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
         raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {weights}")
-    length = positive_argument(duration)
-    source = ParticleSource(weights, positions)
+    if callable(positions):
+        if duration is None:
+            raise ShapeError("positions given by a function need a duration [s]")
+        length = positive_argument(duration)
+        edges = breaks_argument(breaks, length)
+        source = ParticleSource(weights, positions)
+    else:
+        path = _sampled_positions(positions, weights)
+        length = path.duration
+        if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
+            raise ShapeError(f"duration: the samples last {length:.9g} s, got {duration!r}; leave it out")
+        edges = np.union1d(path.breaks, breaks_argument(breaks, length))
+        source = ParticleSource(weights, ParticlePath(path), path.oscillations)
     ends, _ = source.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
     size = float(np.max(np.linalg.norm(ends[0], axis=-1)))
     if size == 0.0:
         raise SingularInertiaError("all particles are in one place: there is no inertia that could turn")
+    if not callable(positions):
+        check_never_on_a_line(source.moment, edges)
     gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / size
     closure = turn if gap <= CLOSED else None
-    return Deformation(source, length, breaks_argument(breaks, length), closure, gap, f"{len(weights)} particles")
+    return Deformation(source, length, edges, closure, gap, f"{len(weights)} particles")
+
+
+def _sampled_positions(samples: tuple[ArrayLike, ArrayLike], masses: Array) -> ShapePath:
+    """The spline through samples, each first moved to its centre of mass, which a spline lets through."""
+    if not isinstance(samples, tuple | list) or len(samples) != 2:
+        raise ShapeError("positions: a function of times, or the pair times (K,), positions (K, m, 3) is needed")
+    points = finite_array(samples[1], "positions", (None, len(masses), 3), unit="m")
+    if points.ndim != 3:
+        raise ShapeError(f"positions: samples (K, {len(masses)}, 3) are needed, got {points.shape}")
+    centred = points - ((masses / masses.sum()) @ points)[:, None]
+    return ShapePath.spline(samples[0], centred.reshape(len(points), -1))
 
 
 def sampled_deformation(

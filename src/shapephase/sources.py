@@ -16,6 +16,7 @@ from .connection import path_sampler
 from .errors import GaugeError, ShapeError
 from .inertia_tensor import inertia_argument, inverse_inertia, second_moment
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
+from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 from .sampling import Sampler, sampler
 from .shape_path import ShapePath
 
@@ -56,7 +57,7 @@ class Source(Protocol):
         ...
 
 
-class _Original:
+class Original:
     """The frame of a description that no gauge has turned, with its origin at the centre of mass; masses unknown."""
 
     def frame(self, times: Array) -> Array:
@@ -78,12 +79,12 @@ class _Original:
 def _unknown_masses(what: str) -> GaugeError:
     return GaugeError(
         f"of this deformation only the inertia is known, not where its masses are, and so not {what}; describe it by "
-        "`articulated` or `particles`"
+        "`articulated`, `particles` or `assembly`"
     )
 
 
 @dataclass(frozen=True, eq=False)
-class ArticulatedSource(_Original):
+class ArticulatedSource(Original):
     """An articulated body whose joints follow a path."""
 
     body: Body
@@ -113,7 +114,7 @@ class ArticulatedSource(_Original):
 
 
 @dataclass(frozen=True, eq=False)
-class RigidSource(_Original):
+class RigidSource(Original):
     """A tensor that stays as it is."""
 
     tensor: Array
@@ -136,15 +137,18 @@ class RigidSource(_Original):
 
 
 @dataclass(frozen=True, eq=False)
-class PrescribedSource(_Original):
-    """Functions of time for the inertia and the internal momentum."""
+class PrescribedSource(Original):
+    """Functions of time for the inertia and the internal momentum; `on_unphysical` "error" checks every tensor."""
 
     inertia: Callable[[Array], ArrayLike]
     momentum: Callable[[Array], ArrayLike] | None
     breaks: Array
+    on_unphysical: str = "allow"
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         tensors = inertia_argument(_returned(self.inertia(times), "inertia", (len(times), 3, 3)), times)
+        if self.on_unphysical == "error":
+            check_triangle(tensors, times, "error")
         if self.momentum is None:
             return tensors, np.zeros((len(times), 3))
         return tensors, _returned(self.momentum(times), "internal momentum", (len(times), 3))
@@ -157,11 +161,12 @@ class PrescribedSource(_Original):
 
 
 @dataclass(frozen=True, eq=False)
-class ParticleSource(_Original):
-    """Point masses that move as seen from a frame."""
+class ParticleSource(Original):
+    """Point masses that move as seen from a frame; `oscillations` as `sampler` has it."""
 
     masses: Array
     positions: Callable[[Array], tuple[ArrayLike, ArrayLike]]
+    oscillations: float | None = None
 
     def centred(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities (N, m, 3) from the centre of mass."""
@@ -173,16 +178,22 @@ class ParticleSource(_Original):
         fraction = self.masses / self.masses.sum()
         return points - (fraction @ points)[:, None], speeds - (fraction @ speeds)[:, None]
 
+    def moment(self, times: Array) -> Array:
+        """Sum of m r r^T about the centre of mass: (N,) -> (N, 3, 3) [kg m^2]."""
+        points, _ = self.centred(times)
+        return _moment(self.masses, points)
+
     def sample(self, times: Array) -> tuple[Array, Array]:
         points, speeds = self.centred(times)
-        moment = np.einsum("m,nmi,nmj->nij", self.masses, points, points)
+        moment = _moment(self.masses, points)
+        check_not_on_a_line(moment, times)
         momentum = np.einsum("m,nmi->ni", self.masses, np.cross(points, speeds))
-        return _inertia_of(moment), momentum
+        return inertia_of(moment), momentum
 
     def inertia_rate(self, times: Array) -> Array:
         points, speeds = self.centred(times)
         rate = np.einsum("m,nmi,nmj->nij", self.masses, points, speeds)
-        return _inertia_of(rate + np.swapaxes(rate, -1, -2))
+        return inertia_of(rate + np.swapaxes(rate, -1, -2))
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
         (points, speeds), (still, _) = self.centred(times), self.centred(np.array([reference]))
@@ -195,11 +206,25 @@ class ParticleSource(_Original):
         return 0.5 * np.einsum("m,bnmi,bnmi->bn", self.masses, total, total)
 
     def sampler(self, breaks: Array) -> Sampler:
-        return sampler(self.sample, breaks)
+        check_never_on_a_line(self.moment, breaks)
+        return sampler(self.sample, breaks, oscillations=self.oscillations)
 
 
 @dataclass(frozen=True, eq=False)
-class SampledSource(_Original):
+class ParticlePath:
+    """A path of 3 m columns read as the positions of m particles."""
+
+    path: ShapePath
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities: (N,) -> (N, m, 3), (N, m, 3)."""
+        points, speeds = self.path.curve(times)
+        wanted = (len(times), self.path.n_shape // 3, 3)
+        return points.reshape(wanted), speeds.reshape(wanted)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledSource(Original):
     """What a file keeps of a deformation: its interpolant, and the centre of mass."""
 
     interpolant: Interpolant
@@ -245,8 +270,12 @@ def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> 
     return np.einsum("nk,nkc->nc", weights, values).reshape(len(times), *function(times[:1]).shape[1:])
 
 
-def _inertia_of(moment: Array) -> Array:
-    """tr(M) - M, from sums of m r r^T."""
+def _moment(masses: Array, points: Array) -> Array:
+    return np.einsum("m,nmi,nmj->nij", masses, points, points)
+
+
+def inertia_of(moment: Array) -> Array:
+    """tr(M) - M, from sums of m r r^T: (N, 3, 3) -> (N, 3, 3)."""
     return np.trace(moment, axis1=-2, axis2=-1)[:, None, None] * np.eye(3) - moment
 
 
