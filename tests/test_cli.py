@@ -49,7 +49,7 @@ def test_json_holds_the_split(capsys):
     assert data["is_loop"] is True
     assert data["has_phase"] is True
     assert data["momentum_kg_m2_s"] == [0.01, -0.02, 0.0]
-    np.testing.assert_allclose(data["final_attitude_quat_xyzw"], motion.quat_xyzw(0.5), atol=1e-15)
+    np.testing.assert_allclose(data["final_attitude_quat_xyzw"], motion.quat_xyzw(0.5), atol=1e-15, rtol=0)
 
 
 def test_gauge_and_tolerance(capsys):

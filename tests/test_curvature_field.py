@@ -115,17 +115,21 @@ def test_curvature_of_a_planar_chain(planar, rng):
     """About the normal it is d_1 A_2 - d_2 A_1 without a bracket, in the plane nothing."""
     for shape in rng.uniform(-3.0, 3.0, (8, 2)):
         inertia, matrix, want = chain(*shape)
-        np.testing.assert_allclose(sp.mechanical_connection(planar, shape), np.outer(Z, matrix / inertia), atol=1e-14)
+        np.testing.assert_allclose(
+            sp.mechanical_connection(planar, shape), np.outer(Z, matrix / inertia), atol=1e-14, rtol=0
+        )
         found = sp.curvature(planar, shape)[0, 1]
         assert abs(want) > 1e-3
-        np.testing.assert_allclose(found, want * Z, atol=1e-14)
+        np.testing.assert_allclose(found, want * Z, atol=1e-14, rtol=0)
 
 
 def test_curvature_over_the_plane_of_a_planar_chain(planar):
     first, second = np.linspace(-2.0, 1.5, 5), np.linspace(-1.0, 2.8, 4)
     want = np.array([[chain(a, b)[2] * Z for b in second] for a in first])
-    np.testing.assert_allclose(curvature_on_plane(planar, ("near", "far"), first, second), want, atol=1e-14)
-    np.testing.assert_allclose(curvature_on_plane(planar, (1, 0), second, first), -np.swapaxes(want, 0, 1), atol=1e-14)
+    np.testing.assert_allclose(curvature_on_plane(planar, ("near", "far"), first, second), want, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(
+        curvature_on_plane(planar, (1, 0), second, first), -np.swapaxes(want, 0, 1), atol=1e-14, rtol=0
+    )
 
 
 def test_stokes_for_a_planar_chain(planar):
@@ -159,7 +163,7 @@ def test_curvature_against_differences_of_order_eight(body, rng):
     columns = sp.mechanical_connection(body, shape).T
     want = slopes - np.swapaxes(slopes, 0, 1) - np.cross(columns[:, None], columns[None])
     assert np.abs(want).max() > 5e-4
-    np.testing.assert_allclose(sp.curvature(body, shape), want, atol=3e-11)
+    np.testing.assert_allclose(sp.curvature(body, shape), want, atol=3e-11, rtol=0)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +226,7 @@ def test_curvature_over_a_plane_against_differences(body, rng):
         around = there + step * np.arange(-4, 5)[:, None, None] * np.eye(body.n_shape)[[i, j]]
         slopes = np.einsum("k,kiaj->ija", EIGHTH, sp.mechanical_connection(body, around)[..., [i, j]]) / step
         columns = sp.mechanical_connection(body, there)[:, [i, j]].T
-        np.testing.assert_allclose(found[a, b], slopes[0, 1] - slopes[1, 0] - np.cross(*columns), atol=3e-11)
+        np.testing.assert_allclose(found[a, b], slopes[0, 1] - slopes[1, 0] - np.cross(*columns), atol=3e-11, rtol=0)
 
 
 def test_a_plane_asks_two_derivatives_a_shape(monkeypatch):
@@ -233,7 +237,7 @@ def test_a_plane_asks_two_derivatives_a_shape(monkeypatch):
     assert sum(asked) == 2 * 6
     want = sp.curvature(cat, cat.shape({"waist_yaw": 0.3, "waist_pitch": 0.1}))
     pair = cat.joint_index("waist_yaw"), cat.joint_index("waist_pitch")
-    np.testing.assert_allclose(neutral[1, 1], want[pair], atol=1e-14)
+    np.testing.assert_allclose(neutral[1, 1], want[pair], atol=1e-14, rtol=0)
     assert curvature_on_plane(cat, (0, 1), [], [0.1]).shape == (0, 1, 3)
 
 
@@ -335,7 +339,7 @@ def test_any_centre_will_do(rng):
         for centre in places:
             assert apart(stokes_holonomy(cat, path, 1e-11, centre), want) < 1e-11
     through_its_centre = eight.shape(0.5)
-    np.testing.assert_allclose(through_its_centre, eight.shape(0.0), atol=1e-15)
+    np.testing.assert_allclose(through_its_centre, eight.shape(0.0), atol=1e-15, rtol=0)
     assert np.linalg.norm(rotation_vector(sp.holonomy(cat, eight))) > 0.01
 
 
@@ -346,7 +350,7 @@ def test_stokes_keeps_its_tolerance(tolerance, rng):
         path = random_loop(cat, rng, harmonics=4, amplitude=1.4)
         found = stokes_holonomy(cat, path, tolerance)
         assert apart(found, sp.holonomy(cat, path, 1e-13)) < tolerance + 2e-13
-        np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14)
+        np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-14, rtol=0)
 
 
 def test_rays_left_coarse_are_owned_up_to(monkeypatch):
@@ -397,8 +401,8 @@ def test_joints_are_matched_by_name(rng):
     renamed = sp.ShapePath.fourier(
         np.zeros(3), a[order], b[order], 1.0, joint_names=[cat.joint_names[k] for k in order]
     )
-    np.testing.assert_allclose(stokes_holonomy(cat, renamed), stokes_holonomy(cat, path), atol=1e-14)
-    np.testing.assert_allclose(horizontal_lift(cat, renamed).end, horizontal_lift(cat, path).end, atol=1e-14)
+    np.testing.assert_allclose(stokes_holonomy(cat, renamed), stokes_holonomy(cat, path), atol=1e-14, rtol=0)
+    np.testing.assert_allclose(horizontal_lift(cat, renamed).end, horizontal_lift(cat, path).end, atol=1e-14, rtol=0)
     with pytest.raises(TrajectoryError, match="lacks"):
         stokes_holonomy(cat, sp.ShapePath.fourier([0], [[1]], [[0]], 1.0, joint_names=cat.joint_names[:1]))
 
@@ -512,14 +516,14 @@ def test_curvature_of_a_body_with_a_follower(led_and_free, rng):
     for shape in rng.uniform(-1.5, 1.5, (4, 2)):
         whole, factors = unfolded(led, free, shape)
         want = np.einsum("ki,lj,kla->ija", factors, factors, sp.curvature(free, whole))
-        np.testing.assert_allclose(sp.curvature(led, shape), want, atol=1e-13)
+        np.testing.assert_allclose(sp.curvature(led, shape), want, atol=1e-13, rtol=0)
         plane = curvature_on_plane(led, (0, 1), shape[:1], shape[1:])
-        np.testing.assert_allclose(plane[0, 0], want[0, 1], atol=1e-13)
+        np.testing.assert_allclose(plane[0, 0], want[0, 1], atol=1e-13, rtol=0)
         step = 0.02
         around = shape + step * np.arange(-4, 5)[:, None, None] * np.eye(2)
         slopes = np.einsum("k,kiaj->ija", EIGHTH, sp.mechanical_connection(led, around)) / step
         columns = sp.mechanical_connection(led, shape).T
-        np.testing.assert_allclose(want[0, 1], slopes[0, 1] - slopes[1, 0] - np.cross(*columns), atol=1e-11)
+        np.testing.assert_allclose(want[0, 1], slopes[0, 1] - slopes[1, 0] - np.cross(*columns), atol=1e-11, rtol=0)
 
 
 def test_stokes_and_lift_of_a_body_with_a_follower(led_and_free):
@@ -571,7 +575,10 @@ def test_wheels_on_parallel_axes_are_flat(size, length, load_urdf):
     assert not is_flat(skew)
     columns = sp.mechanical_connection(skew, skew.shape()).T
     np.testing.assert_allclose(
-        sp.curvature(skew, skew.shape())[1, 2], -np.cross(columns[1], columns[2]), atol=1e-15 * size
+        sp.curvature(skew, skew.shape())[1, 2],
+        -np.cross(columns[1], columns[2]),
+        atol=1e-15 * size,
+        rtol=0,
     )
 
 
@@ -623,7 +630,7 @@ def test_a_frame_without_mass_is_flat(load_urdf):
         )
     )
     columns = sp.mechanical_connection(gimbal, [0.2, 0.3, 0.4]).T
-    np.testing.assert_allclose(columns[:2], [Z, [-np.sin(0.2), np.cos(0.2), 0.0]], atol=1e-14)
+    np.testing.assert_allclose(columns[:2], [Z, [-np.sin(0.2), np.cos(0.2), 0.0]], atol=1e-14, rtol=0)
     assert is_flat(gimbal)
     path = ellipse(gimbal, ("yaw", "pitch"), (1.0, 0.8))
     assert apart(stokes_holonomy(gimbal, path, 1e-12), np.eye(3)) < 1e-12
@@ -719,11 +726,11 @@ def test_the_lift_of_an_open_path(name, rng):
     assert lift.duration == 2.0
     momentum = np.einsum("tij,tj->ti", body.locked_inertia(path.shape(times)), lift.angular_velocity(times))
     momentum += body.internal_momentum(path.shape(times), path.rate(times))
-    np.testing.assert_allclose(momentum, 0.0, atol=1e-12 * np.abs(body.locked_inertia(shapes)).max())
+    np.testing.assert_allclose(momentum, 0.0, atol=1e-12 * np.abs(body.locked_inertia(shapes)).max(), rtol=0)
     step = 2e-3
     around = lift.attitude(0.3 + step * np.arange(-4, 5))
     rate = around[4].T @ np.einsum("k,kij->ij", EIGHTH, around) / step
-    np.testing.assert_allclose(rate, hat(lift.angular_velocity(0.3)), atol=1e-8)
+    np.testing.assert_allclose(rate, hat(lift.angular_velocity(0.3)), atol=1e-8, rtol=0)
 
 
 def test_the_lift_of_a_loop_ends_in_its_holonomy(body, rng):

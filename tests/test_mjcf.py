@@ -189,8 +189,10 @@ def test_every_body_of_the_file_is_a_link(load_mjcf):
     base = data.body("trunk").xmat.reshape(3, 3)
     for name in body.link_names:
         pose = body.link_pose(shape, name)
-        np.testing.assert_allclose(pose[:3, :3], base.T @ data.body(name).xmat.reshape(3, 3), atol=1e-14)
-        np.testing.assert_allclose(pose[:3, 3], base.T @ (data.body(name).xpos - data.body("trunk").xpos), atol=1e-14)
+        np.testing.assert_allclose(pose[:3, :3], base.T @ data.body(name).xmat.reshape(3, 3), atol=1e-14, rtol=0)
+        np.testing.assert_allclose(
+            pose[:3, 3], base.T @ (data.body(name).xpos - data.body("trunk").xpos), atol=1e-14, rtol=0
+        )
 
 
 def test_names_made_up_do_not_depend_on_chance(load_mjcf):
@@ -209,7 +211,7 @@ def test_a_motion_of_an_mjcf_body_is_reconstructed(load_mjcf):
         body.locked_inertia(path.shape(times)) @ motion.angular_velocity(times)[..., None]
         + body.internal_momentum(path.shape(times), path.rate(times))[..., None]
     )
-    np.testing.assert_allclose(turned[..., 0], np.tile([0.0, 0.1, 0.2], (7, 1)), atol=1e-9)
+    np.testing.assert_allclose(turned[..., 0], np.tile([0.0, 0.1, 0.2], (7, 1)), atol=1e-9, rtol=0)
 
 
 def test_what_mujoco_writes_out_is_read(load_mjcf, tmp_path):

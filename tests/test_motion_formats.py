@@ -169,7 +169,7 @@ def test_qpos_as_a_bare_array_takes_its_step_from_the_caller(tmp_path):
     sample = Sample.random(SATELLITE)
     np.save(tmp_path / "q.npy", sample.in_body_order)
     path = read_shape_path(tmp_path / "q.npy", SATELLITE, timestep=0.002)
-    np.testing.assert_allclose(path.breaks, 0.002 * np.arange(len(sample.ns)), atol=1e-16)
+    np.testing.assert_allclose(path.breaks, 0.002 * np.arange(len(sample.ns)), atol=1e-16, rtol=0)
     np.savez(tmp_path / "q.npz", qpos=sample.in_body_order, timestep=0.002)
     np.testing.assert_array_equal(read_shape_path(tmp_path / "q.npz", SATELLITE).breaks, path.breaks)
     with pytest.raises(TrajectoryError, match="times of qpos come from one of"):
@@ -203,9 +203,9 @@ def test_the_motion_of_the_base_is_read_too(tmp_path, kind):
     motion = read_recorded_motion(file, SATELLITE)
     vectors = np.random.default_rng(1).normal(size=(len(sample.ns), 3))
     turned = (motion.base_attitude @ vectors[..., None])[..., 0]
-    np.testing.assert_allclose(turned, rotated(sample.quaternions, vectors), atol=1e-14)
+    np.testing.assert_allclose(turned, rotated(sample.quaternions, vectors), atol=1e-14, rtol=0)
     np.testing.assert_array_equal(motion.base_position, sample.positions)
-    np.testing.assert_allclose(motion.path.shape(motion.times), sample.in_body_order, atol=1e-14)
+    np.testing.assert_allclose(motion.path.shape(motion.times), sample.in_body_order, atol=1e-14, rtol=0)
 
 
 def test_the_table_of_a_reconstructed_motion_gives_its_attitude_back(tmp_path):
@@ -217,8 +217,8 @@ def test_the_table_of_a_reconstructed_motion_gives_its_attitude_back(tmp_path):
     joints = [",".join(DIVER.joint_names), *(",".join(map(repr, map(float, row))) for row in path.shape(t))]
     (tmp_path / "both.csv").write_text("\n".join(f"{a},{b}" for a, b in zip(lines, joints, strict=True)))
     back = read_recorded_motion(tmp_path / "both.csv", DIVER)
-    np.testing.assert_allclose(back.base_attitude, motion.attitude(t), atol=1e-14)
-    np.testing.assert_allclose(back.base_position, motion.base_position(t), atol=1e-15)
+    np.testing.assert_allclose(back.base_attitude, motion.attitude(t), atol=1e-14, rtol=0)
+    np.testing.assert_allclose(back.base_position, motion.base_position(t), atol=1e-15, rtol=0)
     with pytest.raises(TrajectoryError, match="no column for left_shoulder_abduction, right_shoulder_abduction"):
         read_recorded_motion(tmp_path / "motion.csv", DIVER)
 
@@ -230,7 +230,9 @@ def test_quaternions_a_little_off_are_normalised_and_others_refused(tmp_path):
         labels, values = with_base(off)
         write_delimited(tmp_path / "m.csv", [*labels, *sample.names], sample.ns / NANO, values)
         attitude = read_recorded_motion(tmp_path / "m.csv", SATELLITE).base_attitude
-        np.testing.assert_allclose(attitude @ np.swapaxes(attitude, -1, -2), np.tile(np.eye(3), (12, 1, 1)), atol=1e-14)
+        np.testing.assert_allclose(
+            attitude @ np.swapaxes(attitude, -1, -2), np.tile(np.eye(3), (12, 1, 1)), atol=1e-14, rtol=0
+        )
     sample.quaternions[4] *= 1.0011
     labels, values = with_base(sample)
     write_delimited(tmp_path / "m.csv", [*labels, *sample.names], sample.ns / NANO, values)
@@ -255,7 +257,7 @@ def test_columns_are_renamed_and_left_out(tmp_path):
     del names["t"]
     path = read_shape_path(file, DIVER, names=names)
     # A column keeps its unit under another name.
-    np.testing.assert_allclose(path.shape(0.5), [np.radians(0.3), 0.1], atol=1e-16)
+    np.testing.assert_allclose(path.shape(0.5), [np.radians(0.3), 0.1], atol=1e-16, rtol=0)
     with pytest.raises(TrajectoryError, match=f"no column for {RIGHT}"):
         read_shape_path(file, DIVER, names=names | {"pelvis": None})
     with pytest.raises(UnknownNameError, match=r"unknown column of .* in names 'pelvi'\. Did you mean 'pelvis'"):
@@ -268,10 +270,10 @@ def test_degrees_by_argument_are_for_turning_joints_only(tmp_path):
     sample = Sample.random(SATELLITE)
     write_delimited(tmp_path / "m.csv", sample.names, sample.ns / NANO, sample.degrees)
     path = read_shape_path(tmp_path / "m.csv", SATELLITE, degrees=True)
-    np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14)
+    np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14, rtol=0)
     write_opensim(tmp_path / "m.mot", sample.names, sample.ns / NANO, sample.degrees, False)
     path = read_shape_path(tmp_path / "m.mot", SATELLITE, degrees=True)
-    np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14)
+    np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14, rtol=0)
 
 
 def test_a_header_without_units_is_asked_about(tmp_path):
@@ -280,7 +282,7 @@ def test_a_header_without_units_is_asked_about(tmp_path):
     with pytest.raises(TrajectoryError, match="does not say inDegrees"):
         read_shape_path(tmp_path / "m.mot", SATELLITE)
     path = read_shape_path(tmp_path / "m.mot", SATELLITE, degrees=False)
-    np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-15)
+    np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-15, rtol=0)
 
 
 def test_what_looks_like_degrees_is_refused_until_it_is_said(tmp_path):
@@ -288,11 +290,11 @@ def test_what_looks_like_degrees_is_refused_until_it_is_said(tmp_path):
     with pytest.raises(TrajectoryError, match=f"row 3: joint {LEFT} is at 45 rad.*degrees=True"):
         read_shape_path(file, DIVER)
     path = read_shape_path(file, DIVER, degrees=True)
-    np.testing.assert_allclose(path.shape(1.0), np.radians([45.0, 90.0]), atol=1e-15)
+    np.testing.assert_allclose(path.shape(1.0), np.radians([45.0, 90.0]), atol=1e-15, rtol=0)
     with pytest.warns(TrajectoryWarning, match="outside its limits") as seen:
         path = read_shape_path(file, DIVER, degrees=False)
     assert len(seen) == 2
-    np.testing.assert_allclose(path.shape(1.0), [45.0, 90.0], atol=1e-13)
+    np.testing.assert_allclose(path.shape(1.0), [45.0, 90.0], atol=1e-13, rtol=0)
 
 
 def test_periodic_is_passed_on(tmp_path):
@@ -312,7 +314,7 @@ def test_smoothing_by_the_reader_reports_what_is_left(tmp_path):
     clean = np.stack([np.sin(t), 0.4 * np.cos(2.0 * t)], axis=1)
     write_delimited(tmp_path / "m.csv", DIVER.joint_names, t, clean + 0.01 * rng.normal(size=clean.shape))
     motion = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth={RIGHT: 0.01})
-    np.testing.assert_allclose(motion.residual, [0.0, 0.01], atol=2e-5)
+    np.testing.assert_allclose(motion.residual, [0.0, 0.01], atol=2e-5, rtol=0)
     both = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth=0.01)
     np.testing.assert_allclose(both.residual, 0.01, rtol=5.1e-4)  # FITPACK meets its sum of squares to a thousandth
     assert np.sqrt(np.mean((both.path.shape(t) - clean) ** 2)) < 0.004
@@ -379,7 +381,7 @@ def test_of_several_topics_one_is_chosen_by_name(tmp_path):
         read_shape_path(tmp_path / "two.bag", DIVER, topic="/c")
     for topic, kept in (("/a", sample), ("/b", other)):
         path = read_shape_path(tmp_path / "two.bag", DIVER, topic=topic)
-        np.testing.assert_allclose(path.shape(path.breaks), kept.in_body_order, atol=1e-14)
+        np.testing.assert_allclose(path.shape(path.breaks), kept.in_body_order, atol=1e-14, rtol=0)
 
 
 def test_trajectories_follow_each_other_by_their_headers(tmp_path):
@@ -404,8 +406,8 @@ def test_trajectories_follow_each_other_by_their_headers(tmp_path):
     (tmp_path / "two.yaml").write_text("---\n".join(documents) + "---\n")
     for file in ("two", "two.yaml"):
         path = read_shape_path(tmp_path / file, DIVER)
-        np.testing.assert_allclose(path.breaks, sample.ns / NANO, atol=1e-15)
-        np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14)
+        np.testing.assert_allclose(path.breaks, sample.ns / NANO, atol=1e-15, rtol=0)
+        np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14, rtol=0)
 
 
 @pytest.mark.parametrize(("module", "file"), [("rosbags.highlevel", "m.bag"), ("yaml", "m.yaml")])
