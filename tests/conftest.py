@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
+from browser import chromium  # noqa: F401 (a fixture)
 
 BODIES = (*sp.robot_names(), "example:human")
 

@@ -17,10 +17,12 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from conftest import random_loop
 from independent import apart, hat
+from shapephase import so3
 from shapephase.assemblies import assembly, boom, moving_mass, rigid_part
 from shapephase.errors import SingularInertiaError
 from shapephase.inertia_tensor import principal_axes, second_moment, triangle_defect
 from shapephase.physical_validity import line_measure
+from shapephase.rigid_body.euler_top import EulerTop
 
 DURATION = 2.0
 TIMES = np.array([0.13, 0.6, 1.05, 1.4, 1.87])
@@ -586,3 +588,23 @@ def test_equation_12_the_dynamic_phase(motion):
     slope = derivative(motion.dynamic_phase, TIMES)
     np.testing.assert_allclose(slope, np.sum(want * pi, axis=-1) / size, rtol=0, atol=1e-8)
     assert motion.dynamic_phase(0.0) == 0.0
+
+
+def test_c_e3_the_turn_is_about_the_unit_vector():
+    """exp(theta L/|L|) with the vector's length; with L itself, or the norm of its hat matrix, the turn is another."""
+    top = EulerTop.principal([1.0, 2.0, 3.0], [0.9, 0.3, 1.4])
+    hat, phase, end = so3.hat(top.momentum), top.montgomery_phase, top.attitude(top.period)
+    np.testing.assert_allclose(expm(phase * hat / top.magnitude), end, rtol=0, atol=1e-12)
+    assert np.abs(expm(phase * hat) - end).max() > 0.1
+    assert np.abs(expm(phase * hat / np.linalg.norm(hat)) - end).max() > 0.1
+
+
+def test_c_e15_the_whole_turn_does_not_depend_on_the_description_and_the_phase_does(rng):
+    body = sp.load_body("satellite")
+    original = sp.articulated(body, random_loop(body, rng, duration=3.0))
+    motion = sp.reconstruct(original, [0.5, 0.3, 1.0], tolerance=1e-11)
+    turning = lambda t: so3.exp(np.outer(t, [0.2, 0.1, 0.4]))  # noqa: E731
+    seen = [sp.split(motion, gauge) for gauge in ("base", "horizontal", turning)]
+    for other in seen[1:]:
+        np.testing.assert_allclose(other.total_rotation, seen[0].total_rotation, rtol=0, atol=1e-10)
+        assert abs(so3.wrap(other.montgomery_phase - seen[0].montgomery_phase)) > 1e-3

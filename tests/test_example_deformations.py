@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.energy import energy_along
 from shapephase.errors import (
     AccuracyNotReached,
     ShapeError,
@@ -36,6 +37,7 @@ from shapephase.example_deformations import (
 from shapephase.inertia_tensor import triangle_defect
 from shapephase.known_motions import Scale, expansion, pulsation
 from shapephase.phases import arc_phases
+from shapephase.regimes import regime_certificate
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.scenarios import antenna_deployment
 from shapephase.slow_deformation import adiabatic_precession, first_loop, orbit_of_area, slow_antenna, slow_phase_slope
@@ -714,3 +716,32 @@ def test_every_example_is_computed_to_1e_12(name):
 def test_what_cannot_be_is_refused(call, error, words):
     with pytest.raises(error, match=words):
         call()
+
+
+@pytest.mark.parametrize("name", ["default", "nearer the separatrix", "fast"])
+def test_f4_the_certificate_is_given_before_the_motion_and_kept(name):
+    """Must hold for the printed antenna along axis 3: the order prevails, the energy falls."""
+    options = {
+        "default": {},
+        "nearer the separatrix": {"momentum": (0.2, 0.45, 0.85)},
+        "fast": {"momentum": (1.0, 1.0, 9.0)},
+    }[name]
+    example = printed_antenna(3, **options)
+    certificate = regime_certificate(example.deformation, example.momentum)
+    assert certificate.regime == "about axis 3"
+    motion = motion_of(example, 1e-10)
+    times = np.linspace(0.0, motion.duration, 2000)
+    momentum = motion.body_momentum(times)
+    assert np.all(momentum @ certificate.axis > 0.0)
+    low, high = certificate.cosines
+    cosine = momentum @ certificate.axis / np.linalg.norm(example.momentum)
+    assert low.min() <= cosine.min() <= cosine.max() <= high.max()
+    energy = energy_along(motion, times)
+    assert certificate.energy[0] <= energy.min() <= energy.max() <= certificate.energy[1] * (1.0 + 1e-12)
+    assert np.all(energy < certificate.threshold[0])
+
+
+@pytest.mark.parametrize("name", ["antenna_1", "regime_crossing"])
+def test_f3_no_certificate_where_the_momentum_changes_its_axis(name):
+    example = printed_antenna(1) if name == "antenna_1" else regime_crossing()
+    assert regime_certificate(example.deformation, example.momentum).regime == "may cross"

@@ -222,12 +222,12 @@ def test_heavy_top_chart_grows_with_its_tops():
 
 def test_figures_are_complete_and_draw_without_a_warning():
     for make in (flat_axes, solid_axes):
-        plot_polhodes(make(), TOPS["largest"]).figure.canvas.draw()
+        plot_polhodes(make(), TOPS["largest"]).figure.draw_without_rendering()
     for ax in (plot_herpolhode(flat_axes(), TOPS["separatrix"]), plot_heavy_top_stability(flat_axes())):
-        ax.figure.canvas.draw()
+        ax.figure.draw_without_rendering()
     # The legend under the sphere is inside the axes, where nothing cuts it off.
     ax = flat_axes()
-    plot_polhodes(ax, TOPS["largest"]).figure.canvas.draw()
+    plot_polhodes(ax, TOPS["largest"]).figure.draw_without_rendering()
     legend, frame = ax.get_legend().get_window_extent(), ax.get_window_extent()
     assert legend.y0 >= frame.y0 - 1.0
     bottom = ax.transData.transform((0.0, -1.0))[1]

@@ -48,11 +48,14 @@ def test_importing_brings_nothing_heavy():
     assert said.strip() == "[]"
 
 
-def test_the_readme_s_python_runs(tmp_path, monkeypatch):
+def test_the_readme_s_python_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robots").symlink_to(ROOT / "robots")
-    (block,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    ((block, output),) = re.findall(
+        r"```python\n(.*?)```\n\n```text\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL
+    )
     exec(compile(block, "README.md", "exec"), {})
+    assert capsys.readouterr().out == output
     assert (tmp_path / "fall.npz").exists()
     assert len((tmp_path / "fall.csv").read_text().splitlines()) == 202
 

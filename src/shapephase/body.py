@@ -7,6 +7,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +19,29 @@ from . import so3
 from .arrays import Array, check_reach, finite_array
 from .errors import ShapeError, unknown_name
 from .inertia_tensor import second_moment
+from .joint_chain import joint_chain
+from .joint_map import JointMap
 from .link_tree import Mimic
-from .model_tree import mimic_map, moving_joints
 
 _BASE = 6  # velocities of the free-flyer in Pinocchio's order
+
+
+@dataclass(frozen=True, eq=False)
+class MovingPart:
+    """Links that are fixed to each other, and their inertia together, in the axes of the first.
+
+    Attributes
+    ----------
+    links : their names
+    mass : [kg]
+    centre : (3,) centre of mass [m]
+    inertia : (3, 3) about the centre of mass [kg m^2]
+    """
+
+    links: tuple[str, ...]
+    mass: float
+    centre: Array
+    inertia: Array
 
 
 class Body:
@@ -33,13 +54,14 @@ class Body:
     Attributes
     ----------
     name : str
-    sha256 : of the file it was loaded from; None without a file
+    sha256, file : of the file it was loaded from, and where that was; None without a file
     joint_names : tuple of the independent joints, in the order of the shape vector
     n_shape : number of independent joints
     mass : [kg]
     joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
     joint_units : "rad" or "m" for each joint
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
+    chain : its links and joints as plain numbers
     """
 
     def __init__(self, model: pin.Model, name: str, mimics: Mapping[str, Mimic] | None = None) -> None:
@@ -47,27 +69,12 @@ class Body:
         self._local = threading.local()
         self.name = name
         self.sha256: str | None = None
+        self.file: Path | None = None
         self.mass = float(pin.computeTotalMass(model))
-        moving = moving_joints(model)
-        mimics = dict(mimics or {})
-        self.joint_names = tuple(n for n in moving if n not in mimics)
-        self._map, self._offset = mimic_map(list(moving), self.joint_names, mimics)
-        self._plain = len(self.joint_names) == len(moving)
-        kinds = [model.joints[i] for i in moving.values()]
-        turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
-        self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
-        self._velocity_index = np.array([kind.idx_v for kind in kinds], dtype=int) - _BASE
-        self._turning = turning
-        self._any_turning = bool(turning.any())
-        self._neutral = pin.neutral(model)
-        independent = [list(moving).index(n) for n in self.joint_names]
-        self.continuous = turning[independent]
-        limits = np.stack([model.lowerPositionLimit, model.upperPositionLimit], axis=-1)
-        self.joint_limits = limits[self._configuration_index[independent]].reshape(-1, 2)
-        self.joint_limits[self.continuous] = [-np.inf, np.inf]
-        self.joint_limits.setflags(write=False)
-        sliding = [kind.shortname().startswith("JointModelP") for kind in kinds]
-        self.joint_units = tuple("m" if sliding[i] else "rad" for i in independent)
+        self._joints = JointMap(model, pin.neutral(model), dict(mimics or {}))
+        self.chain = joint_chain(model, dict(mimics or {}))
+        self.joint_names, self.joint_units = self._joints.names, self._joints.units
+        self.joint_limits, self.continuous = self._joints.limits, self._joints.continuous
 
     @property
     def n_shape(self) -> int:
@@ -78,6 +85,21 @@ class Body:
     def link_names(self) -> tuple[str, ...]:
         """The names of all links, those fixed to others included."""
         return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
+
+    @property
+    def moving_parts(self) -> tuple[MovingPart, ...]:
+        """The base and what each joint moves, in Pinocchio's order, as far as they have links."""
+        frames: dict[int, list[Any]] = {}
+        for frame in self._model.frames:
+            if frame.type == pin.FrameType.BODY:
+                frames.setdefault(frame.parentJoint, []).append(frame)
+        parts = []
+        for joint, inertia in enumerate(self._model.inertias.tolist()):
+            if joint in frames:
+                seen = frames[joint][0].placement.actInv(inertia)
+                names = tuple(frame.name for frame in frames[joint])
+                parts.append(MovingPart(names, seen.mass, np.array(seen.lever), np.array(seen.inertia)))
+        return tuple(parts)
 
     def __repr__(self) -> str:
         """One line for people."""
@@ -208,21 +230,20 @@ class Body:
             raise ShapeError(f"base_rate: (3,) or one for each shape {r.shape} is needed, got {w.shape}")
         w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
         model, data = self._model, self._data()
-        velocities = self._velocities(self._rows(v))
+        velocities = self._joints.velocities(self._rows(v))
         velocities[:, 3:6] = w
         none = np.zeros(model.nv)
         gradients = np.empty((len(velocities), 3, model.nv))
-        for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), velocities, strict=True)):
+        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), velocities, strict=True)):
             gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
-        joints = gradients[:, :, _BASE + self._velocity_index]
-        joints = joints if self._plain else joints @ self._map
+        joints = self._joints.columns(gradients[:, :, _BASE:])
         return np.swapaxes(joints, -1, -2).reshape(*r.shape, 3)
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
         """Centre of mass of the whole body from the base origin, base axes: (..., n) -> (..., 3) [m]."""
         r = self._checked(shape)
         model, data = self._model, self._data()
-        configurations = self._configurations(self._rows(r))
+        configurations = self._joints.configurations(self._rows(r))
         centres = np.empty((len(configurations), 3))
         for row, q in enumerate(configurations):
             centres[row] = pin.centerOfMass(model, data, q)
@@ -239,7 +260,7 @@ class Body:
         frame = self._link_frame(link)
         r = self._checked(shape)
         model, data = self._model, self._data()
-        configurations = self._configurations(self._rows(r))
+        configurations = self._joints.configurations(self._rows(r))
         poses = np.empty((len(configurations), 4, 4))
         for row, q in enumerate(configurations):
             pin.forwardKinematics(model, data, q)
@@ -254,9 +275,9 @@ class Body:
         frame = self._link_frame(link)
         r, v = self._pair(shape, rate)
         model, data = self._model, self._data()
-        velocities = self._velocities(self._rows(v))
+        velocities = self._joints.velocities(self._rows(v))
         turning = np.empty((len(velocities), 3))
-        for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), velocities, strict=True)):
+        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), velocities, strict=True)):
             pin.forwardKinematics(model, data, q, full)
             turning[row] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).angular
         return turning.reshape(*r.shape[:-1], 3)
@@ -305,10 +326,10 @@ class Body:
         batch = self._batch(r.shape[:-1], omega.shape[:-1])
         r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
         model, data = self._model, self._data()
-        rates = self._velocities(self._rows(v))
+        rates = self._joints.velocities(self._rows(v))
         rates[:, 3:6] = np.broadcast_to(omega, (*batch, 3)).reshape(-1, 3)
         energies = np.empty(len(rates))
-        for row, (q, full) in enumerate(zip(self._configurations(self._rows(r)), rates, strict=True)):
+        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), rates, strict=True)):
             pin.ccrba(model, data, q, full)
             whole = pin.computeKineticEnergy(model, data, q, full)
             energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / self.mass
@@ -320,7 +341,7 @@ class Body:
         Unchecked and in one pass: the library's own hot path.
         """
         whole = self._full_map(shape)
-        return whole[:, :, :3], (whole[:, :, 3:] @ self._velocities(rate)[:, _BASE:, None])[..., 0]
+        return whole[:, :, :3], (whole[:, :, 3:] @ self._joints.velocities(rate)[:, _BASE:, None])[..., 0]
 
     def sample_rates(self, shape: Array, rate: Array) -> tuple[Array, Array, Array, Array]:
         """I, J, dI/dt and dJ/dt along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3, n) and once more. Unchecked."""
@@ -336,7 +357,8 @@ class Body:
         count = model.njoints - 1
         turns, places = np.empty((len(shapes), count, 3, 3)), np.empty((len(shapes), count, 3))
         motions = np.empty((len(shapes), count, 6))
-        for row, (q, v) in enumerate(zip(self._configurations(shapes), self._velocities(rates), strict=True)):
+        states = zip(self._joints.configurations(shapes), self._joints.velocities(rates), strict=True)
+        for row, (q, v) in enumerate(states):
             pin.forwardKinematics(model, data, q, v)
             for link in range(count):
                 place = data.oMi[link + 1]
@@ -394,7 +416,7 @@ class Body:
         # data.Ag is a view, refreshed by each call (what the call returns is a copy): one copy a sample.
         rows = data.Ag[3:, 3:]
         whole = np.empty((len(shapes), *rows.shape))
-        for row, q in enumerate(self._configurations(shapes)):
+        for row, q in enumerate(self._joints.configurations(shapes)):
             centroidal_map(model, data, q)
             whole[row] = rows
         return whole
@@ -402,9 +424,9 @@ class Body:
     def _angular_map_rate(self, shapes: Array, rates: Array) -> Array:
         """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""
         model, data = self._model, self._data()
-        velocities = self._velocities(rates)
+        velocities = self._joints.velocities(rates)
         whole = np.empty((len(shapes), 3, model.nv - 3))
-        for row, (q, v) in enumerate(zip(self._configurations(shapes), velocities, strict=True)):
+        for row, (q, v) in enumerate(zip(self._joints.configurations(shapes), velocities, strict=True)):
             pin.dccrba(model, data, q, v)
             whole[row] = data.dAg[3:, 3:]
         return self._independent(whole)
@@ -418,29 +440,7 @@ class Body:
 
     def _independent(self, whole: Array) -> Array:
         """Columns of the full joints folded into those of the independent ones."""
-        joints = whole[:, :, 3 + self._velocity_index]
-        if not self._plain:
-            joints = joints @ self._map
-        return np.concatenate([whole[:, :, :3], joints], axis=-1)
-
-    def _configurations(self, shapes: Array) -> Array:
-        full = shapes if self._plain else shapes @ self._map.T + self._offset
-        q = np.empty((len(shapes), self._model.nq))
-        q[:] = self._neutral
-        if self._any_turning:
-            turning = self._configuration_index[self._turning]
-            fixed = self._configuration_index[~self._turning]
-            q[:, fixed] = full[:, ~self._turning]
-            q[:, turning] = np.cos(full[:, self._turning])
-            q[:, turning + 1] = np.sin(full[:, self._turning])
-        else:
-            q[:, self._configuration_index] = full
-        return q
-
-    def _velocities(self, rates: Array) -> Array:
-        v = np.zeros((len(rates), self._model.nv))
-        v[:, _BASE + self._velocity_index] = rates if self._plain else rates @ self._map.T
-        return v
+        return np.concatenate([whole[:, :, :3], self._joints.columns(whole[:, :, 3:])], axis=-1)
 
     def _data(self) -> pin.Data:
         try:

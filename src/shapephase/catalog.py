@@ -101,12 +101,17 @@ def example_file(name: str) -> Path:
     return files[name]
 
 
+def example_folder() -> Path | None:
+    """The folder of example-robot-data, where it is installed."""
+    folders = (Path(entry) / "cmeel.prefix" / "share" / "example-robot-data" for entry in sys.path)
+    return next((folder for folder in folders if (folder / "robots").is_dir()), None)
+
+
 def _example_files() -> dict[str, Path]:
-    for entry in sys.path:
-        folder = Path(entry) / "cmeel.prefix" / "share" / "example-robot-data" / "robots"
-        if folder.is_dir():
-            return {path.stem: path for path in sorted(folder.rglob("*.urdf"), reverse=True)}
-    return {}
+    folder = example_folder()
+    if folder is None:
+        return {}
+    return {path.stem: path for path in sorted((folder / "robots").rglob("*.urdf"), reverse=True)}
 
 
 def _path_of(source: str | bytes) -> tuple[Path, bool]:
@@ -181,7 +186,7 @@ def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, li
     tree = mjcf_tree(root) if root.tag == "mujoco" else urdf_tree(root)
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.mimics)
-    body.sha256 = hashlib.sha256(content).hexdigest()
+    body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     check_against_file(body, tree, where)
     doubts += massless_warning(tree)
     found: list[tuple[type[Warning], str]] = [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
@@ -196,4 +201,16 @@ def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[W
     if not isinstance(model, pinocchio.Model):  # pyright: ignore[reportAttributeAccessIssue]
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(model).__name__}")
     checked, doubts = checked_model(model, f"model {model.name!r}", on_unphysical)
+    _name_bare_parts(checked)
     return Body(checked, model.name), [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
+
+
+def _name_bare_parts(model: Any) -> None:
+    """A link for whatever a joint moves and nobody has named, called after the joint, so that it can be asked for."""
+    import pinocchio
+
+    pin: Any = pinocchio
+    named = {frame.parentJoint for frame in model.frames if frame.type == pin.FrameType.BODY}
+    for joint in range(1, model.njoints):
+        if joint not in named and not model.existFrame(model.names[joint], pin.FrameType.BODY):
+            model.addBodyFrame(model.names[joint], joint, pin.SE3.Identity(), 0)

@@ -1,9 +1,10 @@
-"""The command line: `shapephase split`, `shapephase check`, `shapephase orbits`, `shapephase robots`."""
+"""The command line: `shapephase split`, `check`, `orbits`, `view`, `plot`, `robots`."""
 
 from __future__ import annotations
 
 import json
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,16 +38,18 @@ from .errors import (
     ShapePhaseError,
     TrajectoryError,
     UnknownNameError,
+    unknown_name,
 )
 from .gauge import named_gauge
 from .motion_files import RecordedMotion, read_recorded_motion
 from .phases import split
-from .reconstruction import reconstruct
+from .progress import steps
+from .reconstruction import Motion, reconstruct
 from .return_map import fixed_points
 from .scenarios import MOTIONS, named_motion
 from .shape_path import ShapePath
 
-_USAGE, _MODEL, _TRAJECTORY, _NUMERICS = 2, 3, 4, 5
+_USAGE, _MODEL, _TRAJECTORY, _NUMERICS, _STOPPED = 2, 3, 4, 5, 130
 
 app = App(
     name="shapephase",
@@ -65,9 +68,9 @@ class _Outcome:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0, or 2 usage, 3 body, 4 trajectory, 5 numerics, with one line on stderr.
+    """Run the command line and exit: 0, or with one line on stderr 2 usage, 3 body, 4 trajectory, 5 numerics.
 
-    Warnings are lines on stderr too, and a list in what `--json` prints.
+    Warnings are lines on stderr too, and a list in what `--json` prints. Ctrl-C ends with 130.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     as_json = "--json" in tokens
@@ -80,6 +83,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             failure = (_one_line(error), _USAGE, as_json, "usage")
         except ShapePhaseError as error:
             failure = (_one_line(error), _exit_code(error), as_json, type(error).__name__)
+        except KeyboardInterrupt:
+            raise SystemExit(_STOPPED) from None
     doubts = list(dict.fromkeys(_one_line(warning.message) for warning in raised))
     for doubt in doubts:
         print(f"shapephase: warning: {doubt}", file=sys.stderr)
@@ -108,6 +113,7 @@ def split_command(
     smooth: float | None = None,
     topic: str | None = None,
     out: Path | None = None,
+    html: Path | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
 ) -> _Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase.
@@ -133,21 +139,105 @@ def split_command(
         of a ROS bag with more than one motion
     out
         write the motion to this NPZ file
+    html
+        write a report with animation and figures to this HTML file
     json
         print JSON
     """
-    if out is not None:
-        _check_writable(out)
-    loaded = load_body(body, isolate=True)
-    path, recorded = _motion(motion, loaded, smooth, topic)
-    start = so3.quat_argument(attitude, "attitude")
-    moved = reconstruct(articulated(loaded, path), momentum, start, tolerance=tolerance)
-    result = split(moved, gauge)
-    if out is not None:
-        moved.save(out)
+    _check_writable(out, "--out", ".npz")
+    _check_writable(html, "--html", ".html")
+    with steps(12 if html else 2) as work:
+        work.begin("loading and reconstructing")
+        moved, loaded, path, recorded = _moved(body, motion, momentum, attitude, tolerance, smooth, topic)
+        result = split(moved, gauge)
+        if out is not None:
+            moved.save(out)
+        if html is not None:
+            from .report import write_report
+
+            title = f"{loaded.name} along {Path(motion).name}"
+            write_report(moved, result, html, shape_path=path, title=title, begin=work.begin)
     lines, data = base_said(moved, recorded)
     text = [*split_lines(loaded, motion, moved, result), *lines]
     return _Outcome("\n".join(text), split_data(loaded, motion, moved, result) | data)
+
+
+@app.command(name="view")
+def view_command(
+    body: str,
+    motion: str,
+    /,
+    *,
+    momentum: Annotated[tuple[float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0),
+    attitude: Annotated[tuple[float, float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0, 1.0),
+    html: Path | None = None,
+    trail: str | None = None,
+    speed: float | None = None,
+    smooth: float | None = None,
+    topic: str | None = None,
+) -> _Outcome | None:
+    """Show a motion in 3-D: in a browser until Ctrl-C, or as one HTML file that opens offline.
+
+    Parameters
+    ----------
+    body, motion, momentum, attitude, smooth, topic
+        as for split
+    html
+        write the animation to this HTML file, and serve nothing
+    trail
+        a link that leaves a trail
+    speed
+        seconds of motion in a second
+    """
+    from .viewer import motion_page, view
+
+    _check_writable(html, "--html", ".html")
+    with steps(2) as work:
+        work.begin("loading and reconstructing")
+        moved, *_ = _moved(body, motion, momentum, attitude, 1e-9, smooth, topic)
+        if html is not None:
+            work.begin("recording the animation")
+            motion_page(moved, html, trail=trail, speed=speed)
+            return _Outcome(f"wrote {html}", {"html": str(html)})
+    with view(moved, trail=trail, speed=speed) as live:
+        print(f"{live.url}  (Ctrl-C to stop)", flush=True)
+        threading.Event().wait()
+    return None
+
+
+@app.command(name="plot")
+def plot_command(
+    kind: str,
+    body: str,
+    motion: str,
+    /,
+    *,
+    out: Path,
+    momentum: Annotated[tuple[float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0),
+    attitude: Annotated[tuple[float, float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0, 1.0),
+    gauge: str = "horizontal",
+    smooth: float | None = None,
+    topic: str | None = None,
+) -> _Outcome:
+    """Draw one figure of a motion, one column wide.
+
+    Parameters
+    ----------
+    kind
+        momentum, phases, attitude, shape, inertia, internal_momentum or energy
+    out
+        the file, .svg, .pdf or .png
+    body, motion, momentum, attitude, gauge, smooth, topic
+        as for split
+    """
+    from .figures import FIGURES, write_figure
+
+    if kind not in FIGURES:
+        raise unknown_name("kind of figure", kind, FIGURES)
+    _check_writable(out, "--out", ".svg", ".pdf", ".png")
+    moved, _, path, _ = _moved(body, motion, momentum, attitude, 1e-9, smooth, topic)
+    write_figure(kind, moved, out, path, gauge)
+    return _Outcome(f"wrote {out}", {"figure": str(out)})
 
 
 @app.command(name="check")
@@ -254,11 +344,30 @@ def robots_command(
     return _Outcome("\n".join(lines), {"bodies": listed, "motions": motions, "examples": examples})
 
 
-def _check_writable(out: Path) -> None:
-    if out.suffix != ".npz":
-        raise UnknownNameError(f"--out writes an NPZ file, its name must end in .npz, got {str(out)!r}")
+def _check_writable(out: Path | None, option: str, *endings: str) -> None:
+    """Before anything is computed."""
+    if out is None:
+        return
+    if out.suffix not in endings:
+        raise UnknownNameError(f"{option}: the file's name must end in {' or '.join(endings)}, got {str(out)!r}")
     if not out.absolute().parent.is_dir():
         raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
+
+
+def _moved(
+    body: str,
+    motion: str,
+    momentum: tuple[float, float, float],
+    attitude: tuple[float, float, float, float],
+    tolerance: float,
+    smooth: float | None,
+    topic: str | None,
+) -> tuple[Motion, Body, ShapePath, RecordedMotion | None]:
+    """The motion that the options ask for, and what it is made of."""
+    loaded = load_body(body, isolate=True)
+    path, recorded = _motion(motion, loaded, smooth, topic)
+    start = so3.quat_argument(attitude, "attitude")
+    return reconstruct(articulated(loaded, path), momentum, start, tolerance=tolerance), loaded, path, recorded
 
 
 def _motion(

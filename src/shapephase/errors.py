@@ -110,6 +110,22 @@ class ResultFileError(ShapePhaseError, ValueError):
     """A result file that this version cannot read: another format, or damaged. Remedy: compute it anew."""
 
 
+class PlanNotFound(ShapePhaseError, ArithmeticError):
+    """No motion of the joints was found that turns the body as asked.
+
+    Causes: a turn that no motion makes (a loop of one joint), joint or rate limits too tight for it, too short a time,
+    or a search that went astray. Remedy: loosen the limits, give more time, iterations or starts.
+
+    Attributes
+    ----------
+    best : the best try, a `Plan` that misses the goal; None where not even one was left
+    """
+
+    def __init__(self, message: str, best: object = None) -> None:
+        super().__init__(message)
+        self.best = best
+
+
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
     """The error for a name that does not exist, with the nearest and all valid names."""
     choices = [str(v) for v in valid]

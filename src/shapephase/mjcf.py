@@ -71,7 +71,7 @@ _CONSTRAINING = ("equality", "tendon")
 
 
 @dataclass(frozen=True)
-class _Placed:
+class Placed:
     """An element of a body or the world, with the pose of the frames around it and the default class there."""
 
     node: Node
@@ -112,9 +112,9 @@ def mjcf_tree(root: Node) -> LinkTree:
         child_of(root, tag, "<mujoco>")
     for node in root.all("deformable"):
         raise node.fault("<deformable>", "soft bodies are no rigid links; remove them")
-    reading = _settings(root)
+    reading = settings_of(root)
     world = needed_child(root, "worldbody", "<mujoco>")
-    held = _contents(reading, world, _Placed(world, np.zeros(3), np.eye(3), "main"), "<worldbody>", ("body", "geom"))
+    held = contents_of(reading, world, Placed(world, np.zeros(3), np.eye(3), "main"), "<worldbody>", ("body", "geom"))
     bodies = [each.node for each in held if each.node.tag == "body"]
     if not bodies:
         raise world.fault("<worldbody>", "there is no <body> in it; a free body needs one")
@@ -131,7 +131,8 @@ def mjcf_tree(root: Node) -> LinkTree:
     return LinkTree(name, reading.links, joints, frames=frozenset(reading.frames), notes=tuple(_notes(root)))
 
 
-def _settings(root: Node) -> _Reading:
+def settings_of(root: Node) -> _Reading:
+    """What a file sets for all of its elements."""
     compiler = child_of(root, "compiler", "<mujoco>")
     if compiler is None:
         return _Reading(Orientation(True, "xyz"), True, "auto", _classes(root))
@@ -192,7 +193,7 @@ def _merged(above: Mapping[str, str], own: Mapping[str, str]) -> dict[str, str]:
     return merged
 
 
-def _resolved(reading: _Reading, node: Node, surrounding: str, owner: str) -> Node:
+def with_defaults(reading: _Reading, node: Node, surrounding: str, owner: str) -> Node:
     """The element with the attributes of its default class."""
     name = node.get("class") or surrounding
     if name not in reading.classes:
@@ -202,7 +203,7 @@ def _resolved(reading: _Reading, node: Node, surrounding: str, owner: str) -> No
     )
 
 
-def _contents(reading: _Reading, node: Node, here: _Placed, owner: str, tags: tuple[str, ...]) -> list[_Placed]:
+def contents_of(reading: _Reading, node: Node, here: Placed, owner: str, tags: tuple[str, ...]) -> list[Placed]:
     """What a body or the world holds, through the frames in it."""
     found = []
     for child in node.children:
@@ -210,16 +211,16 @@ def _contents(reading: _Reading, node: Node, here: _Placed, owner: str, tags: tu
             child.no_misspelt_attributes(_FRAME_READ, owner)
             place, turn = _pose(reading, child, owner)
             surrounding = child.get("childclass") or here.surrounding
-            inside = _Placed(child, here.place + here.turn @ place, here.turn @ turn, surrounding)
-            found += _contents(reading, child, inside, owner, ("body", "geom"))
+            inside = Placed(child, here.place + here.turn @ place, here.turn @ turn, surrounding)
+            found += contents_of(reading, child, inside, owner, ("body", "geom"))
         elif child.tag in tags:
-            found.append(_Placed(child, here.place, here.turn, here.surrounding))
+            found.append(Placed(child, here.place, here.turn, here.surrounding))
         elif child.tag not in _PASSIVE:
             raise child.fault(owner, f"<{quoted(child.tag)}> is not supported in <{node.tag}>; {_WRITE_OUT}")
     return found
 
 
-def _body(reading: _Reading, here: _Placed, parent: str | None) -> None:
+def _body(reading: _Reading, here: Placed, parent: str | None) -> None:
     """Read a body, its joints, and the bodies on it."""
     node = here.node
     reading.bodies += 1
@@ -231,8 +232,8 @@ def _body(reading: _Reading, here: _Placed, parent: str | None) -> None:
     if node.get("mocap", "false") != "false":
         raise node.fault(owner, "a mocap body is moved from outside; remove it")
     surrounding = node.get("childclass") or here.surrounding
-    own = _Placed(node, np.zeros(3), np.eye(3), surrounding)
-    held = _contents(reading, node, own, owner, ("inertial", "joint", "freejoint", "geom", "body"))
+    own = Placed(node, np.zeros(3), np.eye(3), surrounding)
+    held = contents_of(reading, node, own, owner, ("inertial", "joint", "freejoint", "geom", "body"))
     geoms = [each for each in held if each.node.tag == "geom"]
     reading.links[name] = _link(reading, node, name, geoms)
     if parent is None:
@@ -251,7 +252,7 @@ def _root_joint(reading: _Reading, node: Node, surrounding: str, owner: str) -> 
     for child in node.all("freejoint"):
         if child.get("align", "auto") == "true":
             raise child.fault(owner, 'align="true" turns the axes of the body; remove it')
-    joints = [_resolved(reading, child, surrounding, owner) for child in node.all("joint")]
+    joints = [with_defaults(reading, child, surrounding, owner) for child in node.all("joint")]
     for joint in joints:
         if joint.get("type") != "free":
             raise joint.fault(
@@ -297,7 +298,7 @@ def _joint(reading: _Reading, written: Node, body: str, count: int, surrounding:
     name = name_of(written) if written.get("name") else f"{body}_joint{count}"
     owner = f"joint {name!r}"
     written.no_misspelt_attributes(_JOINT_READ, owner)
-    node = _resolved(reading, written, surrounding, owner)
+    node = with_defaults(reading, written, surrounding, owner)
     kind = node.get("type") or "hinge"
     if kind not in _KINDS:
         way_out = {
@@ -336,7 +337,7 @@ def _pose(reading: _Reading, node: Node, owner: str) -> tuple[Array, Array]:
     return place, reading.orientation.matrix(node, owner)
 
 
-def _link(reading: _Reading, node: Node, name: str, geoms: list[_Placed]) -> Link:
+def _link(reading: _Reading, node: Node, name: str, geoms: list[Placed]) -> Link:
     """The inertia of a body: as written, or of its geoms."""
     owner, where = f"body {name!r}", f"{node.file}:{node.line}"
     inertial = child_of(node, "inertial", owner)
@@ -348,7 +349,7 @@ def _link(reading: _Reading, node: Node, name: str, geoms: list[_Placed]) -> Lin
     solids = []
     for geom in geoms:
         geom.node.no_misspelt_attributes(_GEOM_READ, owner)
-        written = _resolved(reading, geom.node, geom.surrounding, owner)
+        written = with_defaults(reading, geom.node, geom.surrounding, owner)
         solids.append(solid_of(written, reading.orientation, owner).moved(geom.place, geom.turn))
     heavy = [solid for solid in solids if solid.mass > 0.0]
     if inertial is not None and not heavy:

@@ -119,7 +119,7 @@ def solid_of(geom: Node, orientation: Orientation, owner: str) -> Solid:
         )
     if geom.get("shellinertia", "false") != "false":
         raise geom.fault(owner, "inertia of a shell is not computed; give the body an <inertial>")
-    place, turn, size = _placed(geom, kind, orientation, owner)
+    place, turn, size = placed_geom(geom, kind, orientation, owner)
     volume, moments = _unit_solid(kind, size)
     mass = density * volume if mass is None else mass
     if not (LEAST_MASS < mass < MOST_MASS):
@@ -127,7 +127,7 @@ def solid_of(geom: Node, orientation: Orientation, owner: str) -> Solid:
     return Solid(mass, place, turn @ np.diag(mass * moments) @ turn.T)
 
 
-def _placed(geom: Node, kind: str, orientation: Orientation, owner: str) -> tuple[Array, Array, list[float]]:
+def placed_geom(geom: Node, kind: str, orientation: Orientation, owner: str) -> tuple[Array, Array, list[float]]:
     """Place, rotation and sizes, from `fromto` where it is given."""
     text = geom.get("size", "") or ""
     given = len(text.split())

@@ -6,31 +6,28 @@ Line styles and markers differ as the colours do (those of Okabe and Ito), so no
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Array, Mask, finite_array
+from .arrays import Array, finite_array
 from .elliptic import incomplete_f
-from .errors import MissingExtraError, ShapeError
+from .errors import ShapeError
+from .plot_style import BLACK, BLUE, GREEN, ORANGE, SKY, SMALL, VERMILION, check_axes, finish
 from .rigid_body.euler_top import EulerTop
 from .rigid_body.poinsot import Poinsot
 from .rigid_body.portrait import equilibria, heteroclinics, polhodes
+from .sphere_axes import SphereAxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BLACK, BLUE, SKY, VERMILION, ORANGE, GREEN = "#000000", "#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73"
 _LARGEST = {"color": BLUE, "linestyle": "-", "linewidth": 0.9}
 _SMALLEST = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.9}
 _SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.8}
 _AT_REST = {"color": ORANGE, "linestyle": (0, (1, 1)), "linewidth": 2.4}
 _OWN = {"color": GREEN, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 2.4}
-_HIDDEN = 0.25
-_SMALL = 8
-"""Points; readable in a figure one column wide, 3.4 in."""
 _TAIL = 10.0
 """So many 1/rate from its crest, a herpolhode of the separatrix is within a line's width of the foot."""
 _LARGEST_RATIO = 2.2
@@ -55,12 +52,12 @@ def plot_polhodes(
 
     Source: Marsden and Ratiu, figure 15.3.1.
     """
-    _check_axes(ax)
+    check_axes(ax)
     top = body if isinstance(body, EulerTop) else None
     moments = finite_array(body.moments if isinstance(body, EulerTop) else body, "body", (3,), unit="kg m^2")
     points = equilibria(moments)
-    sphere = _Sphere(ax, view)
-    levels = _spread(moments) if energies is None else np.atleast_1d(finite_array(energies, "energies"))
+    sphere = SphereAxes(ax, view)
+    levels = spread_energies(moments) if energies is None else np.atleast_1d(finite_array(energies, "energies"))
     for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
         largest = 2.0 * level * np.median(moments) < 1.0 or np.median(moments) == np.min(moments)
         label = "round largest moment" if largest else "round smallest moment"
@@ -76,8 +73,8 @@ def plot_polhodes(
         sphere.curve(np.cos(around) * first + np.sin(around) * second, "circle of equilibria", **_AT_REST)
         points = tuple(point for point in points if point.kind == "centre")
     if top is not None and top.magnitude > 0.0:
-        sphere.own(top)
-    markers = {
+        _own_polhode(sphere, top)
+    markers: dict[str, tuple[str, dict[str, Any]]] = {
         "centre": ("centre", {"marker": "o", "color": BLACK}),
         "saddle": ("saddle", {"marker": "X", "color": VERMILION}),
         "degenerate": ("at rest, as every point", {"marker": "s", "color": ORANGE}),
@@ -85,7 +82,9 @@ def plot_polhodes(
     for point in points:
         label, style = markers[point.kind]
         sphere.point(point.direction, label, **style)
-    sphere.finish(moments)
+    for axis, end in enumerate(np.eye(3) * np.copysign(1.0, sphere.eye)):
+        sphere.text(end, f"I{'₁₂₃'[axis]} = {moments[axis]:.3g}", 0.17)
+    sphere.finish("Π{}/|Π| [1]", "principal moments in kg m²")
     return ax
 
 
@@ -104,7 +103,7 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
 
     Source: Marsden and Ratiu, section 15.5; theory.md I5.
     """
-    _check_axes(ax)
+    check_axes(ax)
     count = float(finite_array(periods, "periods"))
     if not count > 0.0:
         raise ShapeError(f"periods: a positive number of them is drawn, got {periods}")
@@ -123,9 +122,9 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     ax.plot([0.0], [0.0], marker="+", color=BLACK, markersize=8, linestyle="none", label="foot of the normal")
     reach = 1.1 * (outer or poinsot.distance)
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    ax.set_xlabel("ω₁ in the invariable plane [rad/s]", fontsize=_SMALL)
-    ax.set_ylabel("ω₂ in the invariable plane [rad/s]", fontsize=_SMALL)
-    _finish(ax, loc="upper center", bbox_to_anchor=(0.5, -0.18))
+    ax.set_xlabel("ω₁ in the invariable plane [rad/s]", fontsize=SMALL)
+    ax.set_ylabel("ω₂ in the invariable plane [rad/s]", fontsize=SMALL)
+    finish(ax)
     return ax
 
 
@@ -147,7 +146,7 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
 
     Source: Marsden and Ratiu, theorem 15.10.1; theory.md M-E10.
     """
-    _check_axes(ax)
+    check_axes(ax)
     marked = finite_array(tops, "tops") if np.size(tops) == 0 else finite_array(tops, "tops", (2,))
     marked = marked.reshape(-1, 2)
     end = float(finite_array(fastest, "fastest"))
@@ -171,83 +170,24 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
             colour = GREEN if stable else VERMILION
             ax.plot(chosen[:, 0], chosen[:, 1], marker=style, color=colour, linestyle="none", markersize=5, label=label)
     ax.set(xlim=(-end, end), ylim=(0.0, highest))
-    ax.set_xlabel("Π₃ / √(MglI₁) [1]", fontsize=_SMALL)
-    ax.set_ylabel("I₃ / I₁ [1]", fontsize=_SMALL)
-    _finish(ax, loc="upper center", bbox_to_anchor=(0.5, -0.18))
+    ax.set_xlabel("Π₃ / √(MglI₁) [1]", fontsize=SMALL)
+    ax.set_ylabel("I₃ / I₁ [1]", fontsize=SMALL)
+    finish(ax)
     return ax
 
 
-class _Sphere:
-    """Curves and points on the unit sphere, in three-dimensional axes or projected along the line of sight."""
-
-    def __init__(self, ax: Axes, view: tuple[float, float]) -> None:
-        self.ax: Any = ax
-        self.solid = ax.name == "3d"
-        elevation, azimuth = np.radians(
-            [self.ax.elev, self.ax.azim] if self.solid else finite_array(view, "view", (2,))
-        )
-        rise, level = np.sin(elevation), np.cos(elevation)
-        self.eye = np.array([level * np.cos(azimuth), level * np.sin(azimuth), rise])
-        self.screen = np.array(
-            [[-np.sin(azimuth), np.cos(azimuth), 0.0], [-rise * np.cos(azimuth), -rise * np.sin(azimuth), level]]
-        )
-        around = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
-        limb = np.cos(around) * self.screen[0] + np.sin(around) * self.screen[1]
-        self.named: dict[str, Any] = {}
-        self.ax.plot(*self._seen(limb), color="0.6", linewidth=0.8, zorder=1)
-
-    def curve(self, points: Array, label: str, **style: Any) -> None:
-        """A curve in pieces, those on the far side dimmed."""
-        for piece, near in _pieces(points, points @ self.eye >= -1e-9):
-            self._draw(piece, near, label, zorder=3 if near else 2, **style)
-
-    def point(self, point: Array, label: str, **style: Any) -> None:
-        look = {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "linestyle": "none"}
-        self._draw(point[None], bool(point @ self.eye >= -1e-9), label, zorder=5, **{**look, **style})
-
-    def own(self, top: EulerTop) -> None:
-        """The polhode of a top, uniform in the amplitude, which on the separatrix goes through half a turn only."""
-        orbit = top.orbit
-        if top.regime not in ("steady", "spherical"):
-            half = 0.5 * np.pi - 1e-5 if top.regime == "separatrix" else np.pi
-            u = incomplete_f(np.linspace(-half, half, 721), top.complement)
-            points = top.body_momentum((u - orbit.phase) / top.rate) @ top.axes / top.magnitude
-            self.curve(points, "this top", **_OWN)
-        self.point(orbit.start / orbit.size, "t = 0", marker="*", color=GREEN, markersize=11)
-
-    def finish(self, moments: Array) -> None:
-        title = "principal moments in kg m²"
-        box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
-        for axis in range(3):
-            end = np.eye(3)[axis] * np.copysign(1.0, self.eye[axis])
-            # Away from the middle of the picture, so that the marker stays free.
-            place = 1.25 * end if self.solid else end @ self.screen.T + 0.17 * _outward(end @ self.screen.T)
-            name = f"I{'₁₂₃'[axis]} = {moments[axis]:.3g}"
-            self.ax.text(*place, name, fontsize=_SMALL, ha="center", va="center", zorder=4, bbox=box)
-        if self.solid:
-            for axis, name in zip("xyz", "₁₂₃"):
-                getattr(self.ax, f"set_{axis}label")(f"Π{name}/|Π| [1]", fontsize=_SMALL, labelpad=-8.0)
-                getattr(self.ax, f"set_{axis}ticks")([-1.0, 1.0])
-            self.ax.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0), zlim=(-1.0, 1.0))
-            self.ax.set_box_aspect((1.0, 1.0, 1.0))
-            place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.06)}
-        else:
-            # Room for the legend below the sphere, inside the axes: so it cannot be cut off.
-            self.ax.set(xlim=(-1.35, 1.35), ylim=(-1.95, 1.3), aspect="equal")
-            self.ax.set_axis_off()
-            place = {"loc": "lower center", "borderaxespad": 0.0}
-        _finish(self.ax, handles=self.named.values(), labels=self.named.keys(), title=title, **place)
-
-    def _draw(self, points: Array, near: bool, label: str, **style: Any) -> None:
-        (line,) = self.ax.plot(*self._seen(points), alpha=1.0 if near else _HIDDEN, **style)
-        if near or label not in self.named:
-            self.named[label] = line
-
-    def _seen(self, points: Array) -> tuple[Array, ...]:
-        return tuple((points if self.solid else points @ self.screen.T).T)
+def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
+    """That of a top, uniform in the amplitude, which on the separatrix goes through half a turn only."""
+    orbit = top.orbit
+    if top.regime not in ("steady", "spherical"):
+        half = 0.5 * np.pi - 1e-5 if top.regime == "separatrix" else np.pi
+        u = incomplete_f(np.linspace(-half, half, 721), top.complement)
+        points = top.body_momentum((u - orbit.phase) / top.rate) @ top.axes / top.magnitude
+        sphere.curve(points, "this top", **_OWN)
+    sphere.point(orbit.start / orbit.size, "t = 0", marker="*", color=GREEN, markersize=11)
 
 
-def _spread(moments: Array) -> Array:
+def spread_energies(moments: Array) -> Array:
     """Energies of four curves round each stable axis, at equal angles from the axis to the separatrix."""
     least, middle, most = np.sort(1.0 / moments)
     if least == most:
@@ -267,38 +207,3 @@ def _herpolhode_times(top: EulerTop, periods: float) -> Array:
         start, end = 0.0, periods * top.period
     phases = (end - start) * max(top.rate, top.magnitude / float(top.moments[0]))
     return np.linspace(start, end, int(np.clip(phases / 0.02, 400, 200_000)))
-
-
-def _pieces(points: Array, near: Mask) -> list[tuple[Array, bool]]:
-    """A curve cut where it passes to the other side of the sphere; neighbours share the point of the cut."""
-    cuts = np.flatnonzero(near[1:] != near[:-1]) + 1
-    edges = [0, *cuts.tolist(), len(points)]
-    return [(points[max(a - 1, 0) : b], bool(near[a])) for a, b in pairwise(edges)]
-
-
-def _outward(place: Array) -> Array:
-    distance = float(np.linalg.norm(place))
-    return place / distance if distance > 0.05 else np.array([0.0, 1.0])
-
-
-def _finish(ax: Any, **place: Any) -> None:
-    ax.tick_params(labelsize=_SMALL)
-    look = {"fontsize": _SMALL - 1, "title_fontsize": _SMALL - 1, "handlelength": 2.6, "columnspacing": 1.2}
-    ax.legend(ncols=2, frameon=False, **look, **place)
-
-
-def _check_axes(ax: object) -> None:
-    """
-    Raises
-    ------
-    MissingExtraError
-        If Matplotlib is not installed.
-    ShapeError
-        If these are no axes of it.
-    """
-    try:
-        from matplotlib.axes import Axes
-    except ImportError:
-        raise MissingExtraError("figures need Matplotlib; install it with: pip install 'shapephase[plot]'") from None
-    if not isinstance(ax, Axes):
-        raise ShapeError(f"ax: expected Matplotlib axes, as of Figure().add_subplot(), got {type(ax).__name__}")

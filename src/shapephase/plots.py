@@ -1,0 +1,36 @@
+"""Every figure of the library: functions that draw into Matplotlib axes they are given, and return them.
+
+Nothing here opens a window or keeps a state; figures, their sizes and files are the caller's, and `column_axes` makes
+one of a paper's column. Importing this does not import Matplotlib: the first drawing does.
+
+    ax = plots.plot_momentum_curve(plots.column_axes(3.8), motion)
+    ax.figure.savefig("curve.pdf")
+"""
+
+from __future__ import annotations
+
+from .momentum_plots import plot_fixed_points, plot_momentum_curve
+from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
+from .plot_style import column_axes
+from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
+from .regime_plots import plot_bounds, plot_crown
+from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
+
+__all__ = [
+    "column_axes",
+    "plot_attitude",
+    "plot_bounds",
+    "plot_crown",
+    "plot_curvature",
+    "plot_energy",
+    "plot_fixed_points",
+    "plot_heavy_top_stability",
+    "plot_herpolhode",
+    "plot_inertia",
+    "plot_internal_momentum",
+    "plot_momentum_curve",
+    "plot_phases",
+    "plot_polhodes",
+    "plot_shape_path",
+    "plot_shape_plane",
+]

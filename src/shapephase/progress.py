@@ -1,0 +1,55 @@
+"""A progress bar for what takes more than a second, on a terminal only."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+_PATIENCE = 1.0
+
+
+class Steps:
+    """The steps of a longer work, one after the other.
+
+    Parameters
+    ----------
+    total : how many there are
+    display : what shows them (a `rich.progress.Progress`), or None: nothing is shown
+    """
+
+    def __init__(self, total: int, display: Any = None) -> None:
+        self._display = display
+        self._task = None if display is None else display.add_task("", total=total)
+
+    def begin(self, what: str) -> None:
+        """The next step begins, and the one before is done; `what` it does, in words."""
+        if self._display is None:
+            return
+        task = self._display.tasks[0]
+        done = task.completed + (1 if task.description else 0)
+        self._display.update(self._task, description=what, completed=done)
+
+
+@contextmanager
+def steps(total: int) -> Iterator[Steps]:
+    """Show `total` steps on standard error once a second has passed; in a pipe or a file nothing is written."""
+    if not sys.stderr.isatty():
+        yield Steps(total)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(bar_width=24), TextColumn("{task.description}"), TimeElapsedColumn())
+    display = Progress(*columns, console=Console(stderr=True), transient=True)
+    timer = threading.Timer(_PATIENCE, display.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield Steps(total, display)
+    finally:
+        timer.cancel()
+        timer.join()
+        display.stop()

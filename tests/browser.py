@@ -1,0 +1,49 @@
+"""A headless browser without a network, and what is seen in it."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import time
+
+import numpy as np
+import pytest
+
+CHROMIUM_FLAGS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@pytest.fixture
+def chromium():
+    """A headless browser without a network, where there is one."""
+    found = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+    if not found:
+        pytest.skip("no Chromium on this machine; install it, or name it in the environment variable CHROMIUM")
+    playwright = pytest.importorskip("playwright.sync_api", reason="driving a browser needs the package playwright")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=found, args=list(CHROMIUM_FLAGS))
+        context = browser.new_context(offline=True, viewport={"width": 400, "height": 320})
+        yield context
+        context.close()
+        browser.close()
+
+
+def seen(page, scene, second):
+    """The picture once it stands still at a second of the playing, the bar below and notices left out."""
+    from PIL import Image
+
+    scene.locator("input").first.fill(str(second))
+    before, deadline = None, time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        page.wait_for_timeout(200)
+        shot = scene.locator("canvas").first.screenshot()
+        picture = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=int)
+        if before is not None and np.array_equal(picture, before) and np.ptp(picture) > 100:
+            return picture
+        before = picture
+    raise AssertionError("the picture never came to rest")
+
+
+def furred(picture):
+    """Rows and columns of what has the brown of the cat: red well above blue."""
+    return np.argwhere(picture[..., 0] - picture[..., 2] > 60)
