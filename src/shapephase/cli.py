@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import threading
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -199,9 +198,11 @@ def view_command(
             work.begin("recording the animation")
             motion_page(moved, html, trail=trail, speed=speed)
             return _Outcome(f"wrote {html}", {"html": str(html)})
-    with view(moved, trail=trail, speed=speed) as live:
-        print(f"{live.url}  (Ctrl-C to stop)", flush=True)
-        threading.Event().wait()
+    live = view(moved, trail=trail, speed=speed, notebook=False)
+    if live is not None:
+        with live:
+            print(f"{live.url}  (Ctrl-C to stop)", flush=True)
+            live.wait()
     return None
 
 

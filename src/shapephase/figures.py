@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .errors import ShapeError, unknown_name
 from .files import write_whole
@@ -50,6 +50,12 @@ class Figure:
     with_path: bool = False
 
 
+def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
+    if path is None:
+        raise ShapeError("the figure 'shape' needs the path of the joints, and there is none")
+    plot_shape_path(ax, path, getattr(motion.deformation.source, "body", None))
+
+
 FIGURES: Mapping[str, Figure] = {
     "momentum": Figure(
         "The momentum seen from the gauge's frame, and the area it goes round",
@@ -61,12 +67,7 @@ FIGURES: Mapping[str, Figure] = {
         "The phases as they grow", 2.8, lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge), with_momentum=True
     ),
     "attitude": Figure("The attitude as a rotation vector", 2.8, lambda ax, motion, *_: plot_attitude(ax, motion)),
-    "shape": Figure(
-        "The joints",
-        2.8,
-        lambda ax, motion, path, _: plot_shape_path(ax, path, getattr(motion.deformation.source, "body", None)),
-        with_path=True,
-    ),
+    "shape": Figure("The joints", 2.8, lambda ax, motion, path, _: _draw_shape(ax, motion, path), with_path=True),
     "inertia": Figure(
         "Principal moments of the locked inertia", 2.8, lambda ax, motion, *_: plot_inertia(ax, motion.deformation)
     ),
@@ -108,14 +109,13 @@ def figure_image(
     figure = FIGURES[kind]
     if figure.with_momentum and not motion.momentum.any():
         raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
-    if figure.with_path and path is None:
-        raise ShapeError(f"the figure {kind!r} needs the path of the joints, and there is none")
     ax = column_axes(figure.height)
     figure.draw(ax, motion, path, gauge)
+    drawn: Any = ax.figure
     stream = BytesIO()
     # Nothing in the file may depend on the time of day.
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
-    ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
+    drawn.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
     return stream.getvalue()
 
 
