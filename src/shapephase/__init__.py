@@ -39,6 +39,7 @@ from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .rigid_body.euler_top import EulerTop
 from .shape_path import ShapePath
+from .viewer import motion_page, view
 
 __version__ = "0.1.0"
 
@@ -93,6 +94,7 @@ __all__ = [
     "momentum_crossings",
     "momentum_from_rate",
     "momentum_returns",
+    "motion_page",
     "parallel_transport",
     "particles",
     "path_card",
@@ -107,5 +109,6 @@ __all__ = [
     "split",
     "stokes_holonomy",
     "stroboscopic_map",
+    "view",
     "write_shape_path",
 ]

@@ -302,15 +302,19 @@ def orbits_command(
     json
         print JSON
     """
-    loaded = load_body(body, isolate=True)
-    path, _ = _motion(motion, loaded, None, None)
-    deformation = articulated(loaded, path)
-    seen = named_gauge(deformation, gauge)
-    found = fixed_points(seen, magnitude)
-    upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
-    moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=1e-11) for attitude in upright]
-    splits = [split(orbit, "base") for orbit in moved]
-    holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
+    with steps(3) as work:
+        work.begin("loading")
+        loaded = load_body(body, isolate=True)
+        path, _ = _motion(motion, loaded, None, None)
+        deformation = articulated(loaded, path)
+        seen = named_gauge(deformation, gauge)
+        work.begin("finding what closes")
+        found = fixed_points(seen, magnitude)
+        upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
+        work.begin("splitting")
+        moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=1e-11) for attitude in upright]
+        splits = [split(orbit, "base") for orbit in moved]
+        holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
     said = (loaded, motion, gauge, found, found.directions @ seen.frame(0.0), splits)
     lines = [*orbit_lines(*said), "", rotation_line("shape holonomy (base axes)", holonomy)]
     return _Outcome("\n".join(lines), orbit_data(*said) | {"holonomy": holonomy.tolist()})
