@@ -28,6 +28,19 @@ def chromium():
         browser.close()
 
 
+def stopped(page, scene):
+    """Stop the playing: the number beside the bar does not change any more."""
+    number = scene.locator("input").first
+    for _ in range(20):
+        before = number.input_value()
+        page.wait_for_timeout(500)
+        if number.input_value() == before:
+            return
+        scene.locator("body").press("Space")
+        page.wait_for_timeout(200)
+    raise AssertionError("the playing does not stop")
+
+
 def seen(page, scene, second):
     """The picture once it stands still at a second of the playing, the bar below and notices left out."""
     from PIL import Image

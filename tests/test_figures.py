@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from browser import furred, seen
+from browser import furred, seen, stopped
 from shapephase import so3
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.figures import FIGURES, figure_image, write_figure
@@ -190,6 +190,7 @@ def test_the_report_of_the_righting_opens_offline_and_the_cat_lands_on_its_feet(
     scene.locator("input").first.wait_for()
     for notice in scene.locator(".mantine-Notification-closeButton").all():
         notice.click()
+    stopped(page, scene)
     first, last = (seen(page, scene, second) for second in (0.2, 5.4))
     assert [message for message in said if message[0] == "error"] == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []

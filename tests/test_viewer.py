@@ -18,7 +18,7 @@ import zstandard
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from browser import furred, seen
+from browser import furred, seen, stopped
 from conftest import link, random_loop, urdf
 from shapephase import scene_drawing, so3, viewer
 from shapephase.assemblies import assembly, moving_mass, rigid_part
@@ -522,7 +522,7 @@ def test_the_page_opens_in_a_browser_without_a_network_and_moves(cat_page, chrom
     page.goto(cat_page.as_uri())
     page.wait_for_selector("canvas", timeout=60_000)
     page.locator("input").first.wait_for()
-    page.keyboard.press("Space")
+    stopped(page, page)
     # What warns of software rendering lies over the picture.
     for notice in page.locator(".mantine-Notification-closeButton").all():
         notice.click()
