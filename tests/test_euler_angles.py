@@ -685,3 +685,9 @@ def test_bad_brackets_and_precessions_are_refused():
     assert np.array_equal(ZXZ.angles_about_momentum([0.0, 0.0, -2.0]), [np.pi, 0.0])
     assert np.array_equal(ZYZ.angles_about_momentum([0.0, -0.0, 2.0]), [0.0, 0.0])
     assert ZXZ.angles_about_momentum([-0.0, -1.0, 0.0])[1] == ZYZ.angles_about_momentum([1.0, -0.0, 0.0])[1] == np.pi
+
+
+@pytest.mark.parametrize("chart", [ZXZ, ZYZ])
+def test_one_sample_alone_is_continuous(chart):
+    turned = so3.exp(np.array([[[0.3, -0.4, 0.9]], [[-1.0, 0.2, 0.1]]]))
+    np.testing.assert_allclose(chart.continuous_angles(turned), chart.angles(turned), rtol=0, atol=1e-15)

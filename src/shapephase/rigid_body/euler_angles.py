@@ -88,7 +88,7 @@ class EulerChart:
         half_sum, half_difference, theta, pole = self._half_angles(matrices)
         quat = so3.quat_from_matrix(matrices)
         flips = np.sum(quat[..., 1:, :] * quat[..., :-1, :], axis=-1) < 0.0
-        flipped = np.concatenate([np.zeros_like(flips[..., :1]), np.cumsum(flips, axis=-1) % 2 == 1], axis=-1)
+        flipped = np.cumsum(np.pad(flips, [(0, 0)] * (flips.ndim - 1) + [(1, 0)]), axis=-1) % 2 == 1
         # The other sign of a quaternion adds a half turn to both half sums.
         half_sum = np.unwrap(_held(half_sum + np.pi * flipped, pole & (theta > 0.0), half_difference), axis=-1)
         half_difference = np.unwrap(
