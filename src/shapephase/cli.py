@@ -1,4 +1,4 @@
-"""The command line: `shapephase split`, `check`, `orbits`, `view`, `plot`, `robots`."""
+"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `view`, `plot`, `robots`."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ import json
 import sys
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
@@ -18,9 +17,12 @@ from . import so3
 from .body import Body
 from .cards import model_card, path_card
 from .catalog import example_names, load_body, robot_names
+from .cli_plan import plan_command
 from .cli_text import (
+    Outcome,
     base_said,
     body_lines,
+    check_writable,
     orbit_data,
     orbit_lines,
     path_lines,
@@ -32,7 +34,6 @@ from .cli_text import (
 )
 from .deformation import articulated
 from .errors import (
-    InputFileNotFoundError,
     ModelFileError,
     ShapePhaseError,
     TrajectoryError,
@@ -55,15 +56,6 @@ app = App(
     help="A free body changes its shape in a known way; how does it turn?",
     result_action="return_value",
 )
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    """What a command has to say, for people and for programs."""
-
-    text: str
-    data: dict[str, Any]
-    judged: bool = False
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -89,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(f"shapephase: warning: {doubt}", file=sys.stderr)
     if failure:
         _fail(*failure)
-    if isinstance(outcome, _Outcome):
+    if isinstance(outcome, Outcome):
         data, text = {"shapephase": version("shapephase"), **outcome.data, "warnings": doubts}, outcome.text
         if outcome.judged:
             many = "1 warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
@@ -114,7 +106,7 @@ def split_command(
     out: Path | None = None,
     html: Path | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
-) -> _Outcome:
+) -> Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase.
 
     Parameters
@@ -143,8 +135,8 @@ def split_command(
     json
         print JSON
     """
-    _check_writable(out, "--out", ".npz")
-    _check_writable(html, "--html", ".html")
+    check_writable(out, "--out", ".npz")
+    check_writable(html, "--html", ".html")
     with steps(12 if html else 2) as work:
         work.begin("loading and reconstructing")
         moved, loaded, path, recorded = _moved(body, motion, momentum, attitude, tolerance, smooth, topic)
@@ -158,7 +150,7 @@ def split_command(
             write_report(moved, result, html, shape_path=path, title=title, begin=work.begin)
     lines, data = base_said(moved, recorded)
     text = [*split_lines(loaded, motion, moved, result), *lines]
-    return _Outcome("\n".join(text), split_data(loaded, motion, moved, result) | data)
+    return Outcome("\n".join(text), split_data(loaded, motion, moved, result) | data)
 
 
 @app.command(name="view")
@@ -174,7 +166,7 @@ def view_command(
     speed: float | None = None,
     smooth: float | None = None,
     topic: str | None = None,
-) -> _Outcome | None:
+) -> Outcome | None:
     """Show a motion in 3-D: in a browser until Ctrl-C, or as one HTML file that opens offline.
 
     Parameters
@@ -190,14 +182,14 @@ def view_command(
     """
     from .viewer import motion_page, view
 
-    _check_writable(html, "--html", ".html")
+    check_writable(html, "--html", ".html")
     with steps(2) as work:
         work.begin("loading and reconstructing")
         moved, *_ = _moved(body, motion, momentum, attitude, 1e-9, smooth, topic)
         if html is not None:
             work.begin("recording the animation")
             motion_page(moved, html, trail=trail, speed=speed)
-            return _Outcome(f"wrote {html}", {"html": str(html)})
+            return Outcome(f"wrote {html}", {"html": str(html)})
     live = view(moved, trail=trail, speed=speed, notebook=False)
     if live is not None:
         with live:
@@ -219,7 +211,7 @@ def plot_command(
     gauge: str = "horizontal",
     smooth: float | None = None,
     topic: str | None = None,
-) -> _Outcome:
+) -> Outcome:
     """Draw one figure of a motion, one column wide.
 
     Parameters
@@ -235,10 +227,13 @@ def plot_command(
 
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
-    _check_writable(out, "--out", ".svg", ".pdf", ".png")
+    check_writable(out, "--out", ".svg", ".pdf", ".png")
     moved, _, path, _ = _moved(body, motion, momentum, attitude, 1e-9, smooth, topic)
     write_figure(kind, moved, out, path, gauge)
-    return _Outcome(f"wrote {out}", {"figure": str(out)})
+    return Outcome(f"wrote {out}", {"figure": str(out)})
+
+
+app.command(plan_command, name="plan")
 
 
 @app.command(name="check")
@@ -250,7 +245,7 @@ def check_command(
     smooth: float | None = None,
     topic: str | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
-) -> _Outcome:
+) -> Outcome:
     """Check a body, and a joint motion for it: what was read, and whether it can be used.
 
     Parameters
@@ -274,7 +269,7 @@ def check_command(
         moved = path_card(loaded, path)
         lines += ["", *path_lines(loaded, motion, moved, recorded)]
         data["motion"] = plain(moved) | record_data(loaded, recorded)
-    return _Outcome("\n".join(lines), data, judged=True)
+    return Outcome("\n".join(lines), data, judged=True)
 
 
 @app.command(name="orbits")
@@ -286,7 +281,7 @@ def orbits_command(
     *,
     gauge: str = "horizontal",
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
-) -> _Outcome:
+) -> Outcome:
     """Find the motions whose shape and momentum close together, and split each.
 
     Parameters
@@ -317,14 +312,14 @@ def orbits_command(
         holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
     said = (loaded, motion, gauge, found, found.directions @ seen.frame(0.0), splits)
     lines = [*orbit_lines(*said), "", rotation_line("shape holonomy (base axes)", holonomy)]
-    return _Outcome("\n".join(lines), orbit_data(*said) | {"holonomy": holonomy.tolist()})
+    return Outcome("\n".join(lines), orbit_data(*said) | {"holonomy": holonomy.tolist()})
 
 
 @app.command(name="robots")
 def robots_command(
     *,
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
-) -> _Outcome:
+) -> Outcome:
     """List the bodies and motions that come with the library.
 
     Parameters
@@ -346,17 +341,7 @@ def robots_command(
         name: {"joints": list(body.joint_names), "units": list(body.joint_units), "mass": body.mass}
         for name, body in bodies.items()
     }
-    return _Outcome("\n".join(lines), {"bodies": listed, "motions": motions, "examples": examples})
-
-
-def _check_writable(out: Path | None, option: str, *endings: str) -> None:
-    """Before anything is computed."""
-    if out is None:
-        return
-    if out.suffix not in endings:
-        raise UnknownNameError(f"{option}: the file's name must end in {' or '.join(endings)}, got {str(out)!r}")
-    if not out.absolute().parent.is_dir():
-        raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
+    return Outcome("\n".join(lines), {"bodies": listed, "motions": motions, "examples": examples})
 
 
 def _moved(

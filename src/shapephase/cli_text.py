@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,31 @@ from . import so3
 from .arrays import Array
 from .body import Body
 from .cards import ModelCard, PathCard
+from .errors import InputFileNotFoundError, UnknownNameError
 from .motion_files import RecordedMotion
 from .phases import PhaseSplit
 from .reconstruction import Motion
 from .recorded_base import base_difference
 from .return_map import FixedPoints
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command has to say, for people and for programs."""
+
+    text: str
+    data: dict[str, Any]
+    judged: bool = False
+
+
+def check_writable(out: Path | None, option: str, *endings: str) -> None:
+    """Before anything is computed."""
+    if out is None:
+        return
+    if out.suffix not in endings:
+        raise UnknownNameError(f"{option}: the file's name must end in {' or '.join(endings)}, got {str(out)!r}")
+    if not out.absolute().parent.is_dir():
+        raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
 
 
 def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> list[str]:

@@ -1,0 +1,76 @@
+"""Times and costs of plans from default arguments, and one method against the other: `python -m benchmarks.planning`.
+
+The turns of the issue with their aims. A time is the processor's, of
+the first plan for a body: its symbolic functions are included.
+"""
+
+from __future__ import annotations
+
+import os
+
+for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_pool, "1")
+
+import time
+
+import numpy as np
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.errors import PlanNotFound
+from shapephase.optimal_control.problems import path_cost, plan_reorientation
+from shapephase.scenarios import kane_scher
+
+# Body, turn [rad], the time aimed at [s].
+TURNS = (
+    ("cat_two_halves", np.pi * np.eye(3)[0], 5.0),
+    ("cat", np.pi * np.eye(3)[0], 60.0),
+    *(("astronaut", 0.5 * np.pi * axis, 120.0) for axis in np.eye(3)),
+)
+WAYS = (("collocation", None), ("collocation", 10), ("reduced", 10), ("reduced", 20))
+RIGHTINGS = ((0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222), (60, 77.132402))
+
+
+def main() -> None:
+    """Print both tables."""
+    print(
+        f"{'body':16}{'turn':>18}{'method':>13}{'pieces':>7}{'time s':>8}{'aim':>5}{'cost':>12}{'miss':>9}"
+        f"{'gap':>9}{'KKT':>9}{'iterations':>11}"
+    )
+    for name, turn, aim in TURNS:
+        for method, pieces in WAYS:
+            print_row(name, turn, aim, method, pieces)
+    print(f"\n{'alpha':>6}{'Kane and Scher':>16}{'optimum':>12}{'saved':>8}")
+    body = sp.load_body("cat_two_halves")
+    for alpha, beta in RIGHTINGS:
+        theirs = kane_scher(np.radians(alpha), np.radians(beta))
+        cost, target = path_cost(body, theirs), sp.holonomy(body, theirs, 1e-11)
+        plan = plan_reorientation(body, target, start=theirs.shape(0.0))
+        print(f"{alpha:6d}{cost:16.7f}{plan.cost:12.7f}{1.0 - plan.cost / cost:8.2%}")
+    straight = plan_reorientation(body, so3.exp(TURNS[0][1]))
+    print(f"from the straight posture, half a turn about the long axis: {straight.cost:.7f}")
+
+
+def print_row(name: str, turn: np.ndarray, aim: float, method: str, pieces: int | None) -> None:
+    """One plan."""
+    degrees = " ".join(f"{value:.0f}" for value in np.degrees(turn))
+    body = sp.load_body(name)
+    begin = time.process_time()
+    try:
+        plan = plan_reorientation(body, so3.exp(turn), method=method, pieces=pieces, iterations=500)
+    except PlanNotFound as failure:
+        print(
+            f"{name:16}{degrees:>18}{method:>13}{pieces or 'default':>7}{time.process_time() - begin:8.1f}{aim:5.0f}"
+            f"  {failure}"
+        )
+        return
+    seconds = time.process_time() - begin
+    print(
+        f"{name:16}{degrees:>18}{method:>13}{len(plan.coefficients) - 1:7d}{seconds:8.1f}{aim:5.0f}{plan.cost:12.6g}"
+        f"{plan.miss:9.1e}{plan.transcription_gap:9.1e}{plan.kkt_residual:9.1e}{plan.iterations:11d}",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,141 @@
+"""`shapephase plan`: the joint motion that turns a body as asked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from . import so3
+from .arrays import Array
+from .body import Body
+from .catalog import load_body
+from .cli_text import Outcome, check_writable, rotation_line
+from .errors import ShapeError
+from .motion_files import write_shape_path
+from .phases import split
+from .progress import steps
+
+_SAMPLES = 2001
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def plan_command(
+    body: str,
+    /,
+    *,
+    rotate: float | None = None,
+    about: str = "x",
+    momentum: Annotated[tuple[float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0),
+    duration: float = 1.0,
+    somersaults: float | None = None,
+    half_twists: float | None = None,
+    cost: str = "kinetic",
+    starts: int = 1,
+    seed: int = 0,
+    out: Path | None = None,
+    html: Path | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+) -> Outcome:
+    """Find the cheapest motion of the joints that turns a body as asked, and compute what it does.
+
+    Parameters
+    ----------
+    body
+        as for split
+    rotate
+        angle of the turn [degrees]
+    about
+        its axis, x, y or z of the base at the start, or three numbers with commas between them
+    momentum
+        angular momentum about the centre of mass, inertial axes [kg m^2/s]
+    duration
+        [s]; for the cost "time" the longest allowed
+    somersaults
+        instead of --rotate, turns about the momentum, with --half-twists about the z axis of the base
+    half_twists
+        see --somersaults
+    cost
+        kinetic, rate, acceleration or time
+    starts
+        searches from different guesses
+    seed
+        of the guesses
+    out
+        write the joint motion to this CSV file
+    html
+        write a report with animation and figures to this HTML file
+    json
+        print JSON
+    """
+    from .optimal_control.problems import plan_reorientation
+
+    check_writable(out, "--out", ".csv")
+    check_writable(html, "--html", ".html")
+    if (rotate is None) == (somersaults is None and half_twists is None):
+        raise ShapeError("what to do: give --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
+    with steps(12 if html else 2) as work:
+        work.begin("loading")
+        loaded = load_body(body, isolate=True)
+        target = None if rotate is None else so3.exp(np.radians(rotate) * _axis(about))
+        work.begin("searching")
+        found = plan_reorientation(
+            loaded,
+            target,
+            momentum=momentum,
+            duration=duration,
+            somersaults=somersaults,
+            half_twists=half_twists,
+            cost=cost,
+            starts=starts,
+            seed=seed,
+        )
+        if out is not None:
+            # So dense that a reader who joins the ends smoothly, as closed samples are read, changes next to nothing.
+            write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
+        if html is not None:
+            from .report import write_report
+
+            title = f"{loaded.name} turns itself"
+            write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
+    turned = found.motion.final_attitude
+    lines = [
+        _heading(loaded, found.path.duration, momentum),
+        "",
+        rotation_line("turned", turned),
+        f"{'off the goal':24}{found.miss:16.2e} rad",
+        f"{'cost':24}{found.cost:16.9g}   {found.cost_name}",
+        f"{'KKT residual':24}{found.kkt_residual:16.2e}",
+        f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
+    ]
+    data = {
+        "body": loaded.name,
+        "duration_s": found.path.duration,
+        "momentum_kg_m2_s": list(momentum),
+        "final_attitude_quat_xyzw": so3.quat_from_matrix(turned).tolist(),
+        "miss_rad": found.miss,
+        "cost": found.cost,
+        "cost_name": found.cost_name,
+        "kkt_residual": found.kkt_residual,
+        "iterations": found.iterations,
+    }
+    return Outcome("\n".join(lines), data)
+
+
+def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:
+    numbers = " ".join(f"{value:g}" for value in momentum)
+    return f"{body.name}: {duration:g} s, {body.n_shape} joints, momentum ({numbers}) kg m^2/s"
+
+
+def _axis(text: str) -> Array:
+    if text in _AXES:
+        return np.array(_AXES[text])
+    try:
+        axis = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        axis = np.zeros(0)
+    if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
+        raise ShapeError(f"--about: x, y, z or three numbers such as 1,0,0 are needed, got {text!r}")
+    return so3.normalised(axis)

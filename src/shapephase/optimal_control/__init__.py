@@ -1,0 +1,1 @@
+"""Optimal reorientation: loops of shapes that turn a free body by a given rotation at least cost."""

@@ -1,0 +1,194 @@
+"""Where the search for a plan starts: loops in the plane of shapes in which the body turns most."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..connection import curvature, mechanical_connection
+from ..deformation import articulated
+from ..errors import PlanNotFound, ShapePhaseError
+from ..reconstruction import Motion, reconstruct
+from .reorientation import Reorientation
+from .spline_basis import SplineBasis
+from .symbolic import symbolic_body
+
+PLACES = np.linspace(0.0, 1.0, 101)
+_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)
+_PHASES = 6
+_ATTEMPTS = 10
+_TOLERANCE = 1e-4
+# Of a guess that turns the body less than this share of the way its price tells nothing.
+_LEAST_SHARE = 1e-3
+# Loops in a plane of a flatter body turn it by less than rounding.
+_FLAT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Guess:
+    """A motion of the joints near the wanted one.
+
+    Attributes
+    ----------
+    control : (size, m) control points
+    motion : its reconstruction, roughly
+    miss : how far it is from the goal [rad]
+    price : its cost in the metric of the start, more where it turns only part of the way: what guesses are ranked by
+    """
+
+    control: Array
+    motion: Motion
+    miss: float
+    price: float
+
+    def quaternions(self, places: Array, turn: Array) -> Array:
+        """Attitudes at places of [0, 1], the miss `turn` taken off evenly: (N,) -> (N, 4), continuous."""
+        attitude = self.motion.attitude(places * self.motion.duration)
+        quats = so3.quat_from_matrix(so3.exp(places[:, None] * turn) @ attitude)
+        flips = np.where(np.sum(quats[1:] * quats[:-1], axis=1) < 0.0, -1.0, 1.0)
+        quats[1:] *= np.cumprod(flips)[:, None]
+        return quats
+
+
+def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> list[Guess]:
+    """Guesses, the best first: circles through the start in the planes of largest curvature, then random loops.
+
+    The curvature F of the mechanical connection along the axis of the turn, in the kinetic metric, is an antisymmetric
+    form; its largest singular value sigma belongs to the plane of shapes in which a small loop turns the body most for
+    its length: a circle of radius rho turns it by pi rho^2 sigma. Circles of several sizes, in several directions from
+    the start, once or twice round, are tried by the integrator; those that come near the goal at
+    little cost come first.
+
+    Raises
+    ------
+    PlanNotFound
+        If not one guess can be reconstructed.
+
+    Source: Montgomery 1990, isoholonomic problem; theory.md B6.
+    """
+    curves = [*_circles(task), *_straight(task)]
+    rng = np.random.default_rng(seed)
+    tried = [guess for curve in curves if (guess := guess_of(task, basis, curve)) is not None]
+    tried.sort(key=lambda guess: guess.price)
+    # Every third start is random: circles are all alike where the optimum is not.
+    found = _different(tried)[: count - count // 3]
+    for _ in range(_ATTEMPTS * count):
+        if len(found) == count:
+            break
+        guess = guess_of(task, basis, _random(task, rng))
+        if guess is not None:
+            found.append(guess)
+    if not found:
+        raise PlanNotFound(
+            f"not one guess of a motion of {task.body.name} could be reconstructed; change start or limits"
+        )
+    return found
+
+
+def _circles(task: Reorientation) -> list[Array]:
+    """Loops (N, m) over `PLACES` through the start."""
+    loops = []
+    turn = task.turn()
+    angle = float(np.linalg.norm(turn))
+    if angle == 0.0 or np.count_nonzero(task.moves) < 2:
+        return []
+    # The plane is looked for at the start and half way to the middle of the limits: the start may be special.
+    lower, upper = np.maximum(task.lower, task.start - np.pi), np.minimum(task.upper, task.start + np.pi)
+    middle = 0.5 * (lower + upper)
+    for centre in (task.start, 0.5 * (task.start + middle)):
+        plane = _plane(task, centre, turn / angle)
+        if plane is None:
+            continue
+        first, second, sigma = plane
+        for rounds in (1, 2):
+            for size in _SIZES:
+                radius = size * np.sqrt(angle / (np.pi * sigma * rounds))
+                phase = 2.0 * np.pi * rounds * PLACES
+                for lean in 2.0 * np.pi * np.arange(_PHASES) / _PHASES:
+                    across = np.cos(phase + lean) - np.cos(lean)
+                    along = np.sin(phase + lean) - np.sin(lean)
+                    loops.append(task.start + radius * (across[:, None] * first + along[:, None] * second))
+    return loops
+
+
+def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
+    """Two orthogonal directions of length 1 in the kinetic metric, and sigma, loops turning by +axis."""
+    shape = task.shapes(coordinates)
+    moves = np.flatnonzero(task.moves)
+    form = task.ties.T @ (curvature(task.body, shape) @ axis) @ task.ties
+    metric = task.ties.T @ symbolic_body(task.body).shape_metric(shape).full() @ task.ties
+    metric = metric[np.ix_(moves, moves)]
+    root = np.linalg.cholesky(metric + 1e-9 * np.trace(metric) / len(moves) * np.eye(len(moves)))
+    inverse = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(1j * inverse @ form[np.ix_(moves, moves)] @ inverse.T)
+    sigma = float(values[-1])
+    if sigma * np.linalg.norm(metric) <= _FLAT:
+        return None
+    first, second = np.zeros((2, task.size))
+    first[moves] = np.sqrt(2.0) * inverse.T @ np.real(vectors[:, -1])
+    second[moves] = np.sqrt(2.0) * inverse.T @ np.imag(vectors[:, -1])
+    # A loop from `first` to `second` turns by -F(first, second): the plane's sense is chosen so that this is positive.
+    return (first, second, sigma) if first @ form @ second < 0.0 else (first, -second, sigma)
+
+
+def _straight(task: Reorientation) -> list[Array]:
+    """The way that turns the body best to first order, for a free end; else straight to another end."""
+    ramp = PLACES[:, None]
+    if task.end is not None:
+        return [task.start + ramp * (task.end - task.start)] if np.any(task.end != task.start) else []
+    connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.ties
+    metric = start_metric(task)
+    needed = task.needed() @ -connection
+    cheap = np.linalg.solve(metric + 1e-9 * np.trace(metric) / len(metric) * np.eye(len(metric)), needed.T)
+    direction = cheap @ np.linalg.lstsq(needed @ cheap, task.needed() @ task.turn(), rcond=1e-8)[0]
+    return [task.start + size * ramp * direction for size in (0.5, 1.0)]
+
+
+def _random(task: Reorientation, rng: np.random.Generator) -> Array:
+    """A loop of two random harmonics through the start, as large as half the limits or one radian."""
+    reach = np.minimum(0.5 * (task.upper - task.lower), 1.0)
+    phase = 2.0 * np.pi * PLACES[:, None]
+    curve = np.zeros((len(PLACES), task.size))
+    for harmonic in (1, 2):
+        cosine, sine = rng.normal(size=(2, task.size)) * reach / harmonic
+        curve += cosine * (np.cos(harmonic * phase) - 1.0) + sine * np.sin(harmonic * phase)
+    return task.start + curve
+
+
+def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | None:
+    """A curve (101, m) at even places, taken within the limits and from start to end; None where it has no motion."""
+    if task.end is not None:
+        curve = curve + PLACES[:, None] * (task.end - curve[-1])
+    control = basis.fitted(np.clip(curve, task.lower, task.upper), PLACES)
+    if task.rest_to_rest:
+        control[1] = control[0]
+        control[-2] = control[-1]
+    control = np.clip(control, task.lower, task.upper)
+    path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
+    try:
+        motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_TOLERANCE)
+    except ShapePhaseError:
+        return None
+    miss = task.miss(motion.final_attitude)
+    steps = np.diff(basis.matrix(PLACES) @ control, axis=0)
+    length = np.sum((steps @ start_metric(task)) * steps)
+    whole = float(np.linalg.norm(task.turn()))
+    share = max(whole - miss, _LEAST_SHARE * whole) / whole if whole else 1.0
+    return Guess(control, motion, miss, float(length / share**2))
+
+
+def start_metric(task: Reorientation) -> Array:
+    """The kinetic metric of the coordinates at the start: (m, m)."""
+    return task.ties.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.ties
+
+
+def _different(tried: list[Guess]) -> list[Guess]:
+    """Without those that clipping made equal."""
+    kept: list[Guess] = []
+    for guess in tried:
+        if all(np.abs(guess.control - other.control).max() > 1e-6 for other in kept):
+            kept.append(guess)
+    return kept

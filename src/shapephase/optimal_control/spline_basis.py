@@ -1,0 +1,70 @@
+"""The splines that plans are made of: linear in their control points, which bound them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import Array
+from ..shape_path import ShapePath
+
+_DEGREE = 3
+
+
+@dataclass(frozen=True)
+class SplineBasis:
+    """C2 cubic splines on `pieces` equal pieces of [0, 1], with not-a-knot ends.
+
+    They are the very functions that `ShapePath.spline(..., periodic=False)` makes of their values at the ends of the
+    pieces. A spline lies between the least and the largest of its control points, its rate between those of the rate.
+
+    Attributes
+    ----------
+    pieces : six or more
+    """
+
+    pieces: int
+
+    @property
+    def size(self) -> int:
+        """The number of control points."""
+        return self.pieces + 1
+
+    @cached_property
+    def nodes(self) -> Array:
+        """The ends of the pieces: (pieces + 1,)."""
+        return np.linspace(0.0, 1.0, self.pieces + 1)
+
+    @cached_property
+    def knots(self) -> Array:
+        """With the ends fourfold, the second node and the last but one left out."""
+        return np.concatenate([np.zeros(_DEGREE + 1), self.nodes[2:-2], np.ones(_DEGREE + 1)])
+
+    def matrix(self, places: Array, order: int = 0) -> Array:
+        """What the control points weigh at places of [0, 1], or in a derivative there: (N,) -> (N, size)."""
+        from scipy.interpolate import BSpline
+
+        spline = BSpline(self.knots, np.eye(self.size), _DEGREE)
+        return np.asarray(spline.derivative(order)(places) if order else spline(places))
+
+    @cached_property
+    def rate_control(self) -> Array:
+        """From control points to those of the derivative by place: (size - 1, size)."""
+        spread = self.knots[_DEGREE + 1 : -1] - self.knots[1 : -_DEGREE - 1]
+        return _DEGREE / spread[:, None] * np.diff(np.eye(self.size), axis=0)
+
+    def fitted(self, values: Array, places: Array) -> Array:
+        """Control points of the spline with the ends of a curve and nearest to its values: (N, m) -> (size, m)."""
+        weights = self.matrix(places)
+        control = np.zeros((self.size, values.shape[1]))
+        control[[0, -1]] = values[[0, -1]]
+        rest = values - weights @ control
+        control[1:-1] = np.linalg.lstsq(weights[:, 1:-1], rest, rcond=None)[0]
+        return control
+
+    def path(self, control: Array, duration: float, joint_names: tuple[str, ...]) -> ShapePath:
+        """The spline as a path of the joints: control points (size, n)."""
+        values = self.matrix(self.nodes) @ control
+        return ShapePath.spline(self.nodes * duration, values, periodic=False, joint_names=joint_names)

@@ -1,0 +1,262 @@
+"""The mechanics of a body as CasADi functions of its shape, to be differentiated and put into larger expressions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..arrays import Array
+from ..body import Body
+from ..errors import unknown_name
+from ..joint_chain import JointChain
+
+QUANTITIES = ("inertia", "momentum_matrix", "connection", "centre_of_mass", "shape_metric")
+
+_built: WeakKeyDictionary[Body, SymbolicBody] = WeakKeyDictionary()
+_building = Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicBody:
+    """What a body's shape r (n,) determines, each a `casadi.Function` of r alone.
+
+    Called with symbols of CasADi's kind SX a function gives its expression, with MX one call in the larger graph, with
+    numbers a DM. All are in base axes. Can be pickled, and each function has CasADi's own `serialize`. For numbers of
+    many shapes at once the methods of `Body` are faster.
+
+    Attributes
+    ----------
+    name : of the body
+    joint_names : in the order of r
+    inertia : I(r), (3, 3) about the centre of mass [kg m^2]
+    momentum_matrix : J(r), (3, n): the internal momentum is J rate
+    connection : A(r) = I^-1 J, (3, n): with zero momentum the base turns at -A rate
+    centre_of_mass : (3,) from the base origin [m]
+    shape_metric : g(r), (n, n): 1/2 rate g rate is the kinetic energy, about the centre of mass, of a motion with zero
+        angular momentum. It is M_ss - M_sb M_bb^-1 M_bs of the mass matrix M with base b and joints s, and twice the
+        form T_0 - 1/2 L_o I^-1 L_o
+    links : name of a link -> pose of its frame, (4, 4), from the base origin
+
+    Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    inertia: Any
+    momentum_matrix: Any
+    connection: Any
+    centre_of_mass: Any
+    shape_metric: Any
+    chain: JointChain = field(repr=False)
+    _made: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def n_shape(self) -> int:
+        """The number of independent joints."""
+        return len(self.joint_names)
+
+    def derivative(self, quantity: str) -> Any:
+        """The derivative of one of the five quantities by r, as a function of r, built at the first call.
+
+        Returns
+        -------
+        casadi.Function, r -> (entries, n): row a + rows b holds the gradient of entry [a, b] (columns one after the
+        other, as CasADi stores matrices)
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such quantity.
+        """
+        import casadi
+
+        if quantity not in QUANTITIES:
+            raise unknown_name("quantity", quantity, QUANTITIES)
+        key = f"{quantity}_derivative"
+        if key not in self._made:
+            shape = casadi.SX.sym("shape", self.n_shape)
+            rows = casadi.jacobian(casadi.vec(getattr(self, quantity)(shape)), shape)
+            self._made[key] = casadi.Function(key, [shape], [casadi.densify(rows)], ["shape"], [key])
+        return self._made[key]
+
+    def link_pose(self, link: str) -> Any:
+        """The pose of a link in base axes from the base origin, as a function of r: r -> (4, 4).
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such link.
+        """
+        import casadi
+
+        if link not in self.chain.link_frames:
+            raise unknown_name(f"link of {self.name}", link, self.chain.link_frames)
+        key = f"link_{tuple(self.chain.link_frames).index(link)}"
+        if key not in self._made:
+            shape = casadi.SX.sym("shape", self.n_shape)
+            frame, pose = self.chain.link_frames[link]
+            turn, place = _frames(self.chain, shape)[frame]
+            last = casadi.SX([[0.0, 0.0, 0.0, 1.0]])
+            seen = casadi.horzcat(turn @ _constant(pose[:3, :3]), place + turn @ _constant(pose[:3, 3]))
+            self._made[key] = casadi.Function(key, [shape], [casadi.densify(casadi.vertcat(seen, last))])
+        return self._made[key]
+
+
+def symbolic_body(body: Body) -> SymbolicBody:
+    """The functions of a body; built at the first call for it, kept as long as the body is.
+
+    Source: the composite rigid body algorithm (Featherstone, Rigid Body Dynamics Algorithms, section 6.2), reduced by
+    the momentum of the base.
+    """
+    with _building:
+        if body not in _built:
+            _built[body] = _symbolic(body)
+        return _built[body]
+
+
+def solved(matrix: Any, right: Any) -> Any:
+    """matrix^-1 right in symbols, for a symmetric positive definite matrix: (m, m), (m, k) -> (m, k).
+
+    By the factors L D L^T, entry by entry: backward stable, which the adjugate of a thin body's inertia is not.
+    """
+    import casadi
+
+    size = matrix.shape[0]
+    lower, pivots = np.empty((size, size), dtype=object), []
+    for column in range(size):
+        known = sum(lower[column, k] ** 2 * pivots[k] for k in range(column))
+        pivots.append(matrix[column, column] - known)
+        for row in range(column + 1, size):
+            known = sum(lower[row, k] * lower[column, k] * pivots[k] for k in range(column))
+            lower[row, column] = (matrix[row, column] - known) / pivots[column]
+    rows: list[Any] = []
+    for row in range(size):
+        rows.append(right[row, :] - sum(lower[row, k] * rows[k] for k in range(row)))
+    rows = [row / pivot for row, pivot in zip(rows, pivots, strict=True)]
+    for row in reversed(range(size)):
+        rows[row] = rows[row] - sum(lower[k, row] * rows[k] for k in range(row + 1, size))
+    return casadi.vertcat(*rows)
+
+
+def _symbolic(body: Body) -> SymbolicBody:
+    import casadi
+
+    chain = body.chain
+    shape = casadi.SX.sym("shape", body.n_shape)
+    frames = _frames(chain, shape)
+    masses, moments, tensors = _composites(chain, frames)
+    centre = moments[0] / masses[0]
+    inertia = _about(tensors[0], moments[0], centre)
+    speeds = [_joint_motion(chain, number, frames[number + 1]) for number in range(len(chain.parents))]
+    # Linear and angular momentum, about the base origin, of what each joint carries at unit rate.
+    carried = []
+    for number, (turning, speed) in enumerate(speeds):
+        mass, moment, tensor = masses[number + 1], moments[number + 1], tensors[number + 1]
+        linear = mass * speed + casadi.cross(turning, moment)
+        carried.append((linear, tensor @ turning + casadi.cross(moment, speed)))
+    none = casadi.SX(3, 0)
+    full_linear = casadi.horzcat(none, *(linear for linear, _ in carried))
+    full_angular = casadi.horzcat(none, *(angular - casadi.cross(centre, linear) for linear, angular in carried))
+    fold = _constant(chain.matrix)
+    linear, momentum_matrix = full_linear @ fold, full_angular @ fold
+    connection = solved(inertia, momentum_matrix)
+    mass_matrix = fold.T @ _joint_mass_matrix(chain, speeds, carried) @ fold
+    metric = mass_matrix - linear.T @ linear / masses[0] - momentum_matrix.T @ connection
+    made = {
+        "inertia": inertia,
+        "momentum_matrix": momentum_matrix,
+        "connection": connection,
+        "centre_of_mass": centre,
+        "shape_metric": 0.5 * (metric + metric.T),
+    }
+    functions: dict[str, Any] = {
+        key: casadi.Function(key, [shape], [casadi.densify(casadi.cse(value))], ["shape"], [key])
+        for key, value in made.items()
+    }
+    return SymbolicBody(body.name, body.joint_names, *(functions[key] for key in QUANTITIES), chain=chain)
+
+
+def _constant(array: Array) -> Any:
+    """A constant matrix whose zeros take part in no product."""
+    import casadi
+
+    return casadi.SX(casadi.sparsify(casadi.DM(array)))
+
+
+def _frames(chain: JointChain, shape: Any) -> list[tuple[Any, Any]]:
+    """Orientation and origin of each frame of the chain, base axes."""
+    import casadi
+
+    joints = _constant(chain.matrix) @ shape + casadi.DM(chain.offset)
+    frames = [(casadi.SX.eye(3), casadi.SX(3, 1))]
+    for number, parent in enumerate(chain.parents):
+        turn, place = frames[parent]
+        coordinate = joints[number]
+        place = place + turn @ _constant(chain.places[number])
+        turn = turn @ _constant(chain.turns[number])
+        if chain.slides[number].any():
+            place = place + turn @ (_constant(chain.slides[number]) * coordinate)
+        if chain.axes[number].any():
+            turn = turn @ _rotation(chain.axes[number], coordinate)
+        frames.append((turn, place))
+    return frames
+
+
+def _rotation(axis: Array, angle: Any) -> Any:
+    import casadi
+
+    along = np.outer(axis, axis)
+    across = casadi.skew(_constant(axis))
+    return _constant(np.eye(3) - along) * casadi.cos(angle) + across * casadi.sin(angle) + _constant(along)
+
+
+def _composites(chain: JointChain, frames: list[tuple[Any, Any]]) -> tuple[Array, list[Any], list[Any]]:
+    """Of each frame with all that hangs on it: mass, first moment and inertia about the base origin, base axes."""
+    masses = chain.masses.copy()
+    moments, tensors = [], []
+    for (turn, place), mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True):
+        moment = mass * (place + turn @ _constant(centre))
+        moments.append(moment)
+        own = turn @ _constant(inertia) @ turn.T
+        tensors.append(own if mass == 0.0 else _about(own, -moment, moment / mass))
+    for number in reversed(range(len(chain.parents))):
+        parent = chain.parents[number]
+        masses[parent] += masses[number + 1]
+        moments[parent] = moments[parent] + moments[number + 1]
+        tensors[parent] = tensors[parent] + tensors[number + 1]
+    return masses, moments, tensors
+
+
+def _about(tensor: Any, moment: Any, point: Any) -> Any:
+    """An inertia about the origin, moved to the centre of mass: less that of its mass at the centre."""
+    import casadi
+
+    return tensor - (casadi.dot(moment, point) * casadi.SX.eye(3) - moment @ point.T)
+
+
+def _joint_motion(chain: JointChain, number: int, frame: tuple[Any, Any]) -> tuple[Any, Any]:
+    """What a joint of unit rate makes all it carries do: angular velocity, and speed at the base origin, base axes."""
+    import casadi
+
+    turn, place = frame
+    turning = turn @ _constant(chain.axes[number])
+    return turning, turn @ _constant(chain.slides[number]) + casadi.cross(place, turning)
+
+
+def _joint_mass_matrix(chain: JointChain, speeds: list[tuple[Any, Any]], carried: list[tuple[Any, Any]]) -> Any:
+    """Mass matrix of all joints with the base held."""
+    import casadi
+
+    count = len(chain.parents)
+    matrix = casadi.SX(count, count)
+    for number, (linear, angular) in enumerate(carried):
+        above = number
+        while above >= 0:
+            turning, speed = speeds[above]
+            matrix[number, above] = matrix[above, number] = casadi.dot(turning, angular) + casadi.dot(speed, linear)
+            above = chain.parents[above] - 1
+    return matrix

@@ -1,0 +1,343 @@
+"""Plans of reorientation: they turn the body as asked, within its limits, and cost what the best can."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+
+import shapephase as sp
+from conftest import joint, link, urdf
+from independent import apart, mujoco_motion, pinocchio_motion
+from shapephase import so3
+from shapephase.errors import PlanNotFound, ShapeError, UnknownNameError
+from shapephase.optimal_control.problems import path_cost, plan_reorientation
+from shapephase.optimal_control.symbolic import symbolic_body
+from shapephase.scenarios import kane_scher
+
+HALF_TURN = so3.exp(np.array([np.pi, 0.0, 0.0]))
+RIGHTINGS = [(0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222), (60, 77.132402)]
+CASES = {
+    "kinetic": (HALF_TURN, {}),
+    "rate": (HALF_TURN, {"cost": "rate"}),
+    "acceleration": (HALF_TURN, {"cost": "acceleration"}),
+    "time": (HALF_TURN, {"cost": "time", "rate_limits": [15.0, 20.0, 25.0]}),
+    "limited rates": (HALF_TURN, {"rate_limits": 13.0}),
+    "momentum": (so3.exp(np.array([0.5, 0.4, 0.3])), {"momentum": [0.01, 0.0, 0.02]}),
+    "momentum in least time": (
+        so3.exp(np.array([0.2, 0.1, -0.3])),
+        {"momentum": [0.001, 0.0, 0.002], "cost": "time", "rate_limits": 20.0},
+    ),
+    "free end": (HALF_TURN, {"end": "free"}),
+    "another end": (HALF_TURN, {"start": [0.2, 0.0, 0.0], "end": [0.0, 0.3, -0.1]}),
+    "axis": ([[0.0, 0.0, 2.0], [0.0, 0.0, -1.0]], {}),
+    "two joints": (HALF_TURN, {"joints": ["waist_pitch", "waist_yaw"], "start": [0.0, 0.0, 0.2]}),
+    "tied": (so3.exp(np.array([0.0, 0.3, 0.0])), {"symmetric": {"waist_roll": ("waist_pitch", -0.5)}, "end": "free"}),
+}
+QUICK = ("axis", "momentum")
+LARGE = [
+    ("cat", np.array([np.pi, 0.0, 0.0])),
+    *(("astronaut", axis * np.pi / 2) for axis in np.eye(3)),
+]
+
+
+def rotor(load_urdf):
+    """A wheel about z on a body: J = 0.5 of I = 4.5 kg m^2."""
+    text = urdf(
+        link("hub", 1.0, (3.0, 3.5, 4.0)),
+        link("wheel", 0.5, (0.3, 0.3, 0.5)),
+        joint("spin", "continuous", "hub", "wheel"),
+    )
+    return load_urdf(text)
+
+
+def planar_chain(load_urdf):
+    """Three bars in a plane."""
+    text = urdf(
+        link("middle", 1.0, (0.001, 0.021, 0.02)),
+        link("left", 1.0, (0.001, 0.021, 0.02), com=(-0.25, 0.0, 0.0)),
+        link("right", 1.0, (0.001, 0.021, 0.02), com=(0.25, 0.0, 0.0)),
+        joint("one", "revolute", "middle", "left", xyz=(-0.25, 0.0, 0.0)),
+        joint("two", "revolute", "middle", "right", xyz=(0.25, 0.0, 0.0)),
+    )
+    return load_urdf(text)
+
+
+@pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.full) for name in CASES if name not in QUICK)]
+)
+def test_a_plan_does_what_it_is_asked(name):
+    """By Pinocchio's centroidal momentum and SciPy's integrator, with nothing of the library but the path."""
+    target, options = CASES[name]
+    body = sp.load_body("cat_two_halves")
+    plan = plan_reorientation(body, target, **options)
+    momentum = options.get("momentum", np.zeros(3))
+    truth = pinocchio_motion("cat_two_halves", body.joint_names, plan.path, momentum, breaks=plan.path.breaks[1:-1])
+    end = truth.attitude[-1]
+    if np.shape(target) == (3, 3):
+        assert apart(end, target) < 1e-8
+    else:
+        axis, direction = so3.normalised(np.asarray(target))
+        assert np.linalg.norm(end @ axis - direction) < 1e-8
+    assert plan.miss < 1e-8
+    assert plan.starts[0].converged
+    assert plan.kkt_residual < 1e-6
+    shapes, rates = plan.path.shape(plan.path.sample_times), plan.path.rate(plan.path.sample_times)
+    lower, upper = body.joint_limits.T
+    assert np.all((shapes >= lower) & (shapes <= upper))
+    assert np.all(np.abs(rates) <= np.asarray(options.get("rate_limits", np.inf)) * (1.0 + 1e-6))
+    start = np.asarray(options.get("start", np.zeros(3)))
+    assert_allclose(shapes[0], start, atol=1e-12)
+    end = options.get("end", start)
+    if not isinstance(end, str):
+        assert_allclose(shapes[-1], end, atol=1e-12)
+    if name == "acceleration":
+        assert_allclose(rates[[0, -1]], 0.0, atol=1e-8)
+    if name == "two joints":
+        assert_allclose(shapes[:, 2], 0.2, atol=1e-12)
+    if name == "tied":
+        assert_allclose(shapes[:, 2], -0.5 * shapes[:, 0], atol=1e-12)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "turn"), LARGE)
+def test_cat_and_astronaut_from_default_arguments(name, turn):
+    body = sp.load_body(name)
+    target = so3.exp(turn)
+    plan = plan_reorientation(body, target)
+    times = plan.path.breaks
+    truth = pinocchio_motion(name, body.joint_names, plan.path, np.zeros(3), breaks=times[1:-1])
+    assert apart(truth.attitude[-1], target) < 1e-8
+    shapes = plan.path.shape(np.linspace(0.0, 1.0, 2001))
+    assert np.all((shapes >= body.joint_limits[:, 0]) & (shapes <= body.joint_limits[:, 1]))
+    assert plan.kkt_residual < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("alpha", "beta"), [pytest.param(*pair, marks=[pytest.mark.full] * (pair[0] != 45)) for pair in RIGHTINGS]
+)
+def test_no_dearer_than_kane_and_scher(alpha, beta):
+    """With the first posture of their righting at both ends, and its own rotation."""
+    body = sp.load_body("cat_two_halves")
+    theirs = kane_scher(np.radians(alpha), np.radians(beta))
+    target = sp.holonomy(body, theirs, 1e-11)
+    plan = plan_reorientation(body, target, start=theirs.shape(0.0))
+    assert plan.cost <= path_cost(body, theirs) * (1.0 + 1e-6)
+    if alpha == 0:
+        # Bent without a lean theirs is the best: a circle of the curvature's symmetry.
+        assert plan.cost == pytest.approx(path_cost(body, theirs), rel=1e-6)
+
+
+@pytest.mark.full
+def test_twenty_starts_find_nothing_better():
+    body = sp.load_body("cat_two_halves")
+    one = plan_reorientation(body, HALF_TURN)
+    many = plan_reorientation(body, HALF_TURN, starts=20, seed=3)
+    assert len(many.starts) == 20
+    assert one.cost <= 1.01 * many.cost
+    assert many.cost <= one.cost * (1.0 + 1e-9)
+    assert many.cost == pytest.approx(min(start.cost for start in many.starts if start.converged), rel=1e-4)
+
+
+def test_the_cost_of_a_steady_loop():
+    """alpha = 0: in the frame of the bend nothing changes, so the energy is constant; and quadratic in the pace."""
+    body = sp.load_body("cat_two_halves")
+    path = kane_scher(0.0, np.radians(59.426459), 2.0)
+    times = np.linspace(0.0, 2.0, 7)
+    still = np.array(
+        [
+            body.kinetic_energy(r, v, -sp.mechanical_connection(body, r) @ v)
+            for r, v in zip(path.shape(times), path.rate(times))
+        ]
+    )
+    assert_allclose(still, still[0], rtol=1e-12)
+    assert path_cost(body, path) == pytest.approx(2.0 * still[0], rel=1e-12)
+    assert path_cost(body, path.stretched(3.0)) == pytest.approx(path_cost(body, path) / 3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [1.0, *(pytest.param(size, marks=pytest.mark.full) for size in (0.1, 0.01))])
+def test_small_turns_are_isoperimetric_circles(degrees):
+    """E T sigma/(2 pi theta) -> 1; sigma is the curvature's largest singular value in the kinetic metric."""
+    body = sp.load_body("cat_two_halves")
+    metric = symbolic_body(body).shape_metric(np.zeros(3)).full()
+    root = np.linalg.inv(np.linalg.cholesky(metric))
+    sigma = np.linalg.norm(root @ sp.curvature(body, np.zeros(3))[..., 0] @ root.T, 2)
+    theta = np.radians(degrees)
+    plan = plan_reorientation(body, so3.exp(np.array([theta, 0.0, 0.0])), duration=0.7, pieces=20)
+    assert plan.cost * 0.7 * sigma / (2.0 * np.pi * theta) == pytest.approx(1.0, abs=0.0045 * degrees + 5e-6)
+
+
+def test_a_rotor_in_closed_form(load_urdf):
+    """The wheel goes 9 times as far as the body turns back; without limits evenly, from rest to rest by a cubic."""
+    body = rotor(load_urdf)
+    turn, period = 1.2, 2.0
+    target, way = so3.exp(np.array([0.0, 0.0, turn])), -9.0 * turn
+    common = {"end": "free", "duration": period}
+    plan = plan_reorientation(body, target, **common)
+    times = np.linspace(0.0, period, 17)
+    assert_allclose(plan.path.shape(times)[:, 0], way * times / period, atol=1e-8)
+    assert plan.cost == pytest.approx(0.5 * (0.5 - 0.5**2 / 4.5) * way**2 / period, rel=1e-12)
+    by_rate = plan_reorientation(body, target, cost="rate", **common)
+    assert by_rate.cost == pytest.approx(0.5 * way**2 / period, rel=1e-12)
+    x = times / period
+    smooth = plan_reorientation(body, target, cost="acceleration", **common)
+    assert_allclose(smooth.path.shape(times)[:, 0], 0.5 * way * x**2 * (3.0 - x), atol=1e-7)
+    assert smooth.cost == pytest.approx(1.5 * way**2 / period**3, rel=1e-10)
+    rested = plan_reorientation(body, target, cost="acceleration", end=[way], duration=period)
+    assert_allclose(rested.path.shape(times)[:, 0], way * x**2 * (3.0 - 2.0 * x), atol=1e-7)
+    assert rested.cost == pytest.approx(6.0 * way**2 / period**3, rel=1e-10)
+    for one in (plan, by_rate, smooth, rested):
+        assert one.starts[0].cost == pytest.approx(one.cost, rel=1e-9), "the program counts as the quadrature does"
+    fast = plan_reorientation(body, target, cost="time", rate_limits=4.0, end="free", duration=5.0)
+    assert fast.path.duration == pytest.approx(abs(way) / 4.0, rel=1e-9)
+    assert fast.cost == fast.path.duration
+
+
+@pytest.mark.full
+def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
+    """In the plane of two joints an optimal loop bends by a constant times the curvature, at constant speed.
+
+    The equation is integrated anew from the loop's start; the constant and the first rates are fitted, and the cost of
+    what comes out is the plan's.
+    """
+    body = planar_chain(load_urdf)
+    period = 1.0
+    plan = plan_reorientation(body, so3.exp(np.array([0.0, 0.0, 0.35])), duration=period, pieces=60)
+    known = symbolic_body(body)
+    metric, by_shape = known.shape_metric, known.derivative("shape_metric")
+
+    def slope(_, y, charge):
+        r, v = y[:2], y[2:]
+        slopes = by_shape(r).full().reshape(2, 2, 2)
+        force = 0.5 * np.einsum("ijk,i,j->k", slopes, v, v) - np.einsum("kij,i,j->k", slopes, v, v)
+        field = charge * sp.curvature(body, r)[0, 1, 2]
+        return np.concatenate([v, np.linalg.solve(metric(r).full(), force + field * np.array([v[1], -v[0]]))])
+
+    times = np.linspace(0.0, period, 9)
+
+    def gap(unknown):
+        first = [*plan.path.shape(0.0), *unknown[:2]]
+        run = solve_ivp(slope, (0.0, period), first, args=(unknown[2],), rtol=1e-8, atol=1e-10, t_eval=times)
+        return (run.y[:2].T - plan.path.shape(times)).ravel()
+
+    fitted = least_squares(gap, [*plan.path.rate(0.0), 0.0])
+    assert np.abs(fitted.fun).max() < 2e-5
+    start = fitted.x[:2]
+    energy = 0.5 * start @ metric(plan.path.shape(0.0)).full() @ start
+    assert plan.cost == pytest.approx(energy * period, rel=5e-5)
+
+
+class _AsSplined:
+    """A plan's path as MuJoCo's integration wants it: one time after another, with accelerations."""
+
+    def __init__(self, path):
+        self.duration = path.duration
+        self._spline = CubicSpline(path.breaks, path.shape(path.breaks))
+
+    def shape(self, t):
+        return self._spline(min(t, self.duration))
+
+    def rate(self, t):
+        return self._spline(min(t, self.duration), 1)
+
+    def acceleration(self, t):
+        return self._spline(min(t, self.duration), 2)
+
+
+@pytest.mark.full
+def test_a_somersault_with_a_full_twist():
+    """The diver leaves upright with both arms up and moves nothing but them; MuJoCo turns it just so."""
+    body = sp.load_body("diver")
+    momentum = [0.0, 37.6, 0.0]
+    plan = plan_reorientation(
+        body, momentum=momentum, duration=1.5, somersaults=1, half_twists=2, end="free", cost="rate", pieces=20
+    )
+    assert plan.miss < 1e-8
+    times = np.linspace(0.0, 1.5, 401)
+    truth = mujoco_motion("diver", body.joint_names, _AsSplined(plan.path), momentum, None, times).attitude
+    assert apart(truth, plan.motion.attitude(times)) < 1e-6
+    assert apart(truth[-1], np.eye(3)) < 1e-6
+    # Counted by hand: the body's long axis goes once round the momentum, and its side once round the long axis.
+    nose, side = truth[:, :, 2], truth[:, :, 1]
+    around = np.unwrap(np.arctan2(nose[:, 0], nose[:, 2]))
+    assert around[-1] - around[0] == pytest.approx(2.0 * np.pi, abs=1e-5)
+    level = so3.normalised(np.cross(np.array([0.0, 1.0, 0.0]), nose))
+    turned = np.unwrap(np.arctan2(np.sum(-side * level, axis=1), np.sum(side * np.cross(nose, level), axis=1)))
+    assert abs(turned[-1] - turned[0]) == pytest.approx(2.0 * np.pi, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"somersaults": 1}, "momentum"),
+        ({"somersaults": 1, "momentum": [0.0, 0.0, 1.0]}, "right angles"),
+        ({"half_twists": 1, "momentum": [0.0, 1.0, 0.0], "target": np.eye(3)}, "leave it None"),
+        ({}, "target"),
+    ],
+)
+def test_windings_need_a_momentum_across(options, match):
+    with pytest.raises(ShapeError, match=match):
+        plan_reorientation(sp.load_body("diver"), **options)
+
+
+@pytest.mark.parametrize("method", ["collocation", "reduced"])
+def test_a_closed_loop_of_one_joint_turns_nothing(method, load_urdf):
+    body = rotor(load_urdf)
+    with pytest.raises(PlanNotFound, match="no motion of the joints of body was found") as failure:
+        plan_reorientation(body, so3.exp(np.array([0.0, 0.0, 0.4])), method=method, iterations=40)
+    assert isinstance(failure.value, ArithmeticError)
+    best = failure.value.best
+    assert best.iterations <= 40
+    assert best.miss == pytest.approx(0.4, abs=1e-6)
+    assert not best.starts[0].converged
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"rate_limits": 4.0, "duration": 2.0}, {"rate_limits": 4.0, "duration": 2.0, "cost": "time"}],
+)
+def test_too_short_a_time(options, load_urdf):
+    """The wheel needs 2.7 s at 4 rad/s."""
+    with pytest.raises(PlanNotFound) as failure:
+        plan_reorientation(rotor(load_urdf), so3.exp(np.array([0.0, 0.0, 1.2])), end="free", **options, iterations=60)
+    assert failure.value.best.iterations <= 60
+
+
+def test_an_axis_that_no_joint_turns(load_urdf):
+    with pytest.raises(PlanNotFound):
+        plan_reorientation(rotor(load_urdf), so3.exp(np.array([0.3, 0.0, 0.0])), end="free", iterations=60)
+
+
+def test_the_same_seed_gives_the_same_plan():
+    body = sp.load_body("cat_two_halves")
+    first, second = (plan_reorientation(body, HALF_TURN, seed=7, starts=2, pieces=8) for _ in range(2))
+    assert np.array_equal(first.coefficients, second.coefficients)
+    assert [start.cost for start in first.starts] == [start.cost for start in second.starts]
+
+
+def test_nothing_to_turn_costs_nothing():
+    plan = plan_reorientation(sp.load_body("cat_two_halves"), np.eye(3))
+    assert plan.cost == pytest.approx(0.0, abs=1e-12)
+    assert plan.miss < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "match"),
+    [
+        ({"method": "shooting"}, UnknownNameError, "collocation, reduced"),
+        ({"pieces": 5}, ShapeError, "pieces"),
+        ({"starts": 0}, ShapeError, "starts"),
+        ({"iterations": 1.5}, ShapeError, "iterations"),
+    ],
+)
+def test_options_that_make_no_sense(options, error, match):
+    with pytest.raises(error, match=match):
+        plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, **options)
+
+
+def test_the_cost_of_another_kind_is_refused():
+    with pytest.raises(UnknownNameError, match="kinetic, rate"):
+        path_cost(sp.load_body("cat_two_halves"), kane_scher(0.0, 1.0), "time")
