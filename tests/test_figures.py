@@ -161,7 +161,7 @@ with steps(2) as work:
 def test_an_interrupt_leaves_no_file(tmp_path):
     out = tmp_path / "report.html"
     command = [sys.executable, "-m", "shapephase", "split", "cat", "cat_righting", "--html", str(out)]
-    for wait in (0.6, 1.2, 2.0):
+    for wait in (0.6, 1.4):
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         time.sleep(wait)
         process.send_signal(signal.SIGINT)
