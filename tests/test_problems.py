@@ -14,6 +14,8 @@ from conftest import joint, link, urdf
 from independent import apart, mujoco_motion, pinocchio_motion
 from shapephase import so3
 from shapephase.errors import PlanNotFound, ShapeError, UnknownNameError
+from shapephase.optimal_control.extremals import wong_residual
+from shapephase.optimal_control.jacobi_fields import conjugate_times, shoot
 from shapephase.optimal_control.problems import path_cost, plan_reorientation
 from shapephase.optimal_control.symbolic import symbolic_body
 from shapephase.scenarios import kane_scher
@@ -73,7 +75,7 @@ def test_a_plan_does_what_it_is_asked(name):
     """By Pinocchio's centroidal momentum and SciPy's integrator, with nothing of the library but the path."""
     target, options = CASES[name]
     body = sp.load_body("cat_two_halves")
-    plan = plan_reorientation(body, target, **options)
+    plan = plan_reorientation(body, target, **{"pieces": 40, **options})
     momentum = options.get("momentum", np.zeros(3))
     truth = pinocchio_motion("cat_two_halves", body.joint_names, plan.path, momentum, breaks=plan.path.breaks[1:-1])
     end = truth.attitude[-1]
@@ -341,3 +343,19 @@ def test_options_that_make_no_sense(options, error, match):
 def test_the_cost_of_another_kind_is_refused():
     with pytest.raises(UnknownNameError, match="kinetic, rate"):
         path_cost(sp.load_body("cat_two_halves"), kane_scher(0.0, 1.0), "time")
+
+
+@pytest.mark.parametrize("cost", ["kinetic", "rate"])
+def test_a_plan_from_default_arguments_is_an_extremal(cost):
+    """Wong's equations hold, shooting finds the same optimum, and no conjugate time comes before its end, where the
+    kernel has the dimension of the symmetries that fix start and target: one, the optima come in circles."""
+    body, target = sp.load_body("cat_two_halves"), so3.exp(np.array([np.pi, 0.0, 0.0]))
+    plan = plan_reorientation(body, target, cost=cost)
+    assert wong_residual(body, plan.path, metric=cost).residual < 1e-4
+    found = shoot(body, plan.path, target, metric=cost)
+    assert found.cost == pytest.approx(plan.cost, rel=1e-6)
+    times = np.linspace(0.0, 1.0, 50)
+    assert_allclose(found.shape(times), plan.path.shape(times), atol=1e-5)
+    if cost == "kinetic":
+        ((time, multiplicity),) = [(c.time, c.multiplicity) for c in conjugate_times(found, 1.2)]
+        assert (round(time, 6), multiplicity) == (1.0, 1)

@@ -25,6 +25,8 @@ from .spline_basis import SplineBasis
 from .transcription import CollocationProgram, Solved, gauss_tableau
 
 METHODS = ("collocation", "reduced")
+_FINE, _FEW = 160, 4
+"""So many pieces obey Wong's equations to 1e-4; accelerations would lose digits on them."""
 _PIECES, _PIECES_OF_MANY, _MANY = 40, 20, 8
 # Rates and durations may exceed their limits by this share, as much as the solver leaves.
 _SLACK = 1e-7
@@ -84,7 +86,8 @@ def plan_reorientation(
         for IPOPT; or "reduced", the path's coefficients alone, with the exact derivative of the integrator's attitude
         (no cost "time"). On equal splines both come to the same costs within 1.5 %, of the cat in 16 and 10 s, of the
         astronaut in 27 and 23 s; the first leaves a KKT residual of 1e-9, the second of 1e-6: the first is the default
-    pieces : of the spline, six or more; None: 40, or 20 where more than eight joints are free
+    pieces : of the spline, six or more; None: 160 for up to four free joints and the costs
+        kinetic and rate, else 40 for up to eight, 20 for more
     iterations : of the solver, for each start
 
     Raises
@@ -120,7 +123,7 @@ def plan_reorientation(
         twist_axis=twist_axis,
     )
     began = time.perf_counter()
-    basis = SplineBasis(int(pieces or (_PIECES if task.size <= _MANY else _PIECES_OF_MANY)))
+    basis = SplineBasis(int(pieces or _pieces(task)))
     program = CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
     begun = _starts(task, basis, seed, int(starts), int(iterations))
     tries = [_search(task, basis, program, guess, int(iterations)) for guess in begun]
@@ -137,6 +140,12 @@ def plan_reorientation(
         return replace(min(good, key=lambda plan: plan.cost), **whole)
     best = replace(min(plans, key=lambda plan: plan.miss), **whole) if plans else None
     raise PlanNotFound(_failure(task, reports, best), best)
+
+
+def _pieces(task: Reorientation) -> int:
+    if task.size <= _FEW and task.cost in ("kinetic", "rate"):
+        return _FINE
+    return _PIECES if task.size <= _MANY else _PIECES_OF_MANY
 
 
 def _starts(task: Reorientation, basis: SplineBasis, seed: int, count: int, iterations: int) -> list[Guess]:
