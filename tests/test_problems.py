@@ -114,7 +114,8 @@ def test_cat_and_astronaut_from_default_arguments(name, turn):
     truth = pinocchio_motion(name, body.joint_names, plan.path, np.zeros(3), breaks=times[1:-1])
     assert apart(truth.attitude[-1], target) < 1e-8
     shapes = plan.path.shape(np.linspace(0.0, 1.0, 2001))
-    assert np.all((shapes >= body.joint_limits[:, 0]) & (shapes <= body.joint_limits[:, 1]))
+    lower, upper = body.joint_limits.T
+    assert max(np.max(lower - shapes), np.max(shapes - upper)) < 1e-15, "beyond a limit by more than rounding"
     assert plan.kkt_residual < 1e-6
 
 
@@ -207,7 +208,7 @@ def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
     """
     body = planar_chain(load_urdf)
     period = 1.0
-    plan = plan_reorientation(body, so3.exp(np.array([0.0, 0.0, 0.35])), duration=period, pieces=60)
+    plan = plan_reorientation(body, so3.exp(np.array([0.0, 0.0, 0.35])), duration=period, pieces=240)
     known = symbolic_body(body)
     metric, by_shape = known.shape_metric, known.derivative("shape_metric")
 
@@ -222,14 +223,14 @@ def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
 
     def gap(unknown):
         first = [*plan.path.shape(0.0), *unknown[:2]]
-        run = solve_ivp(slope, (0.0, period), first, args=(unknown[2],), rtol=1e-8, atol=1e-10, t_eval=times)
+        run = solve_ivp(slope, (0.0, period), first, args=(unknown[2],), rtol=1e-10, atol=1e-12, t_eval=times)
         return (run.y[:2].T - plan.path.shape(times)).ravel()
 
     fitted = least_squares(gap, [*plan.path.rate(0.0), 0.0])
-    assert np.abs(fitted.fun).max() < 2e-5
+    assert np.abs(fitted.fun).max() < 1e-6
     start = fitted.x[:2]
     energy = 0.5 * start @ metric(plan.path.shape(0.0)).full() @ start
-    assert plan.cost == pytest.approx(energy * period, rel=5e-5)
+    assert plan.cost == pytest.approx(energy * period, rel=1e-6)
 
 
 class _AsSplined:
