@@ -1,4 +1,4 @@
-"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `view`, `plot`, `robots`."""
+"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `conjugate`, `view`, `plot`, `robots`."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from . import so3
 from .body import Body
 from .cards import model_card, path_card
 from .catalog import example_names, load_body, robot_names
+from .cli_conjugate import conjugate_command
 from .cli_plan import plan_command
 from .cli_text import (
     Outcome,
@@ -234,6 +235,7 @@ def plot_command(
 
 
 app.command(plan_command, name="plan")
+app.command(conjugate_command, name="conjugate")
 
 
 @app.command(name="check")

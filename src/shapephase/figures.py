@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .errors import ShapeError, unknown_name
 from .files import write_whole
 from .momentum_curve import Gauge
+from .plot_style import axes_image
 from .plots import (
     column_axes,
     plot_attitude,
@@ -27,8 +27,6 @@ from .shape_path import ShapePath
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_RESOLUTION = 300
 
 
 @dataclass(frozen=True)
@@ -111,12 +109,7 @@ def figure_image(
         raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
     ax = column_axes(figure.height)
     figure.draw(ax, motion, path, gauge)
-    drawn: Any = ax.figure
-    stream = BytesIO()
-    # Nothing in the file may depend on the time of day.
-    stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
-    drawn.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
-    return stream.getvalue()
+    return axes_image(ax, ending)
 
 
 def write_figure(

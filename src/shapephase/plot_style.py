@@ -6,6 +6,7 @@ by their markers, so nothing is lost in black and white. Sizes are for figures o
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,6 +36,7 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": PURPLE, "linestyle": (0, (3, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.5},
 )
 """One look for each curve of a figure, the first three for x, y and z."""
+_RESOLUTION = 300
 _FEWEST = 800
 _BY_LOOP = 200
 
@@ -58,6 +60,14 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     if not tall > 0.0:
         raise ShapeError(f"height: a length above 0 [in] is needed, got {height!r}")
     return Figure(figsize=(COLUMN, tall), layout="constrained").add_subplot(projection=projection)
+
+
+def axes_image(ax: Any, ending: str) -> bytes:
+    """The figure of some axes as "svg", "pdf" or "png"; nothing in it depends on the time of day."""
+    stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
+    stream = BytesIO()
+    ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
+    return stream.getvalue()
 
 
 def check_axes(ax: object) -> None:
