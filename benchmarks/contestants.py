@@ -57,9 +57,10 @@ class FloatingModel:
         body = case.body
         self.model, self.data = body._model, body._model.createData()
         self.q, self.v = pin.neutral(self.model), np.zeros(self.model.nv)
-        self._body, self._path = body, scalar_path(case.path)
-        self._plain = body._plain and not body.continuous.any()
-        self._q_joint, self._v_joint = body._configuration_index, 6 + body._velocity_index
+        self._path = scalar_path(case.path)
+        joints = self._joints = body._joints
+        self._plain = joints._plain and not body.continuous.any()
+        self._q_joint, self._v_joint = joints._configuration_index, 6 + joints._velocity_index
 
     def set(self, t: float) -> None:
         """The joints at time t."""
@@ -67,8 +68,8 @@ class FloatingModel:
         if self._plain:
             self.q[self._q_joint], self.v[self._v_joint] = r, rate
         else:
-            self.q[:] = self._body._configurations(r[None])[0]
-            self.v[:] = self._body._velocities(rate[None])[0]
+            self.q[:] = self._joints.configurations(r[None])[0]
+            self.v[:] = self._joints.velocities(rate[None])[0]
 
 
 def solve_ivp_attitude(case: Case, rtol: float, atol: float | None = None) -> tuple[np.ndarray, int]:

@@ -71,3 +71,12 @@ def test_bodies_say_where_their_numbers_come_from(name):
     text = (ROOT / "robots" / f"{name}.urdf").read_text()
     assert "<!--" in text
     assert text.count("<visual>") >= text.count("<mass ")
+
+
+def test_the_benchmark_s_opponent_still_stands_on_the_body():
+    code = (
+        "from benchmarks.cases import cases; from benchmarks.contestants import FloatingModel; "
+        "[FloatingModel(case).set(0.1) for case in cases()]; print('set')"
+    )
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT).stdout
+    assert said == "set\n"
