@@ -47,12 +47,6 @@ class LeftInvariantMetric:
         """Whether a direction is forbidden."""
         return bool(self.inverse_moments[0] == 0.0)
 
-    @property
-    def is_axisymmetric(self) -> bool:
-        """Whether two moments are equal."""
-        a = self.inverse_moments
-        return bool(a[0] == a[1] or a[1] == a[2])
-
     def angular_velocity(self, momentum: ArrayLike) -> Array:
         """u = a Pi, which maximises the pseudo-Hamiltonian: (..., 3) -> (..., 3), body axes [rad/s].
 
