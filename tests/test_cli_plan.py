@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 
@@ -10,7 +11,10 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase import so3
+from shapephase import cli_plan, so3
+from shapephase.cli import main
+from shapephase.optimal_control.plan import Progress
+from shapephase.progress import steps
 
 
 def ran(*arguments):
@@ -50,3 +54,50 @@ def test_what_cannot_be_planned_is_refused_in_one_line(arguments, code, words):
     assert failed.returncode == code
     assert words in failed.stderr
     assert failed.stderr.count("\n") == 1
+
+
+def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
+    """The signal itself, in the third iteration; the motion written turns the body nearly as asked."""
+    plain = cli_plan._Search.watch
+
+    def pressed(self, now):
+        if (now.stage, now.iteration) == ("search", 3):
+            signal.raise_signal(signal.SIGINT)
+        return plain(self, now)
+
+    monkeypatch.setattr(cli_plan._Search, "watch", pressed)
+    handler = signal.getsignal(signal.SIGINT)
+    out = tmp_path / "plan.csv"
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--rotate", "60", "--out", str(out), "--json"])
+    assert ended.value.code == 130
+    assert signal.getsignal(signal.SIGINT) is handler
+    said = capsys.readouterr()
+    data = json.loads(said.out)
+    assert data["miss_rad"] < 1e-8
+    assert "stopped" in data["warnings"][0]
+    assert said.err.count("\n") == 1
+    body = sp.load_body("cat_two_halves")
+    again = sp.reconstruct(sp.articulated(body, sp.read_shape_path(out, body)), np.zeros(3))
+    assert so3.angle(again.final_attitude.T @ so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))) < 1e-5
+
+
+def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
+    def pressed(*_, **__):
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("shapephase.optimal_control.problems.reorientation", pressed)
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--rotate", "60"])
+    assert ended.value.code == 130
+    assert capsys.readouterr().out == ""
+
+
+def test_pressed_twice_gives_it_up():
+    with steps(1) as work:
+        search = cli_plan._Search(work)
+        search.watch(Progress("search", 1, 1, 0, 1.0, 0.0))
+        search.interrupted()
+        assert search.stopped
+        with pytest.raises(KeyboardInterrupt):
+            search.interrupted()

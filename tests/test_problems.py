@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -360,3 +362,68 @@ def test_a_plan_from_default_arguments_is_an_extremal(cost):
     if cost == "kinetic":
         ((time, multiplicity),) = [(c.time, c.multiplicity) for c in conjugate_times(found, 1.2)]
         assert (round(time, 6), multiplicity) == (1.0, 1)
+
+
+@pytest.mark.parametrize("method", ["collocation", "reduced"])
+def test_the_search_is_told_and_stopped_with_the_best_so_far(method):
+    body = sp.load_body("cat_two_halves")
+    turn = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))
+    whole = plan_reorientation(body, turn, method=method, pieces=20)
+    told = []
+
+    def watch(now):
+        told.append(now)
+        return now.stage == "search" and now.iteration == 3
+
+    with pytest.raises(PlanNotFound, match=r"stopped as asked.*reaches the goal") as stopped:
+        plan_reorientation(body, turn, method=method, pieces=20, watch=watch)
+    assert (told[-1].stage, told[-1].iteration) == ("search", 3)
+    assert {now.stage for now in told[:-1]} == {"guesses", "search"}
+    best = stopped.value.best
+    assert so3.angle(best.motion.final_attitude.T @ turn) < 1e-8
+    assert whole.cost * (1.0 - 1e-6) < best.cost < 2.0 * whole.cost
+    assert not best.starts[-1].converged
+    assert best.cost == pytest.approx(path_cost(body, best.path), rel=1e-12)
+
+
+def test_a_search_stopped_among_its_guesses_keeps_one():
+    goal = so3.exp(np.array([0.6, 0.0, 0.0]))
+    with pytest.raises(PlanNotFound, match="stopped as asked") as stopped:
+        plan_reorientation(sp.load_body("cat_two_halves"), goal, pieces=20, watch=lambda now: now.iteration == 1)
+    assert so3.angle(stopped.value.best.motion.final_attitude.T @ goal) < 1e-8
+
+
+def test_a_search_stopped_after_a_start_has_its_plan():
+    body = sp.load_body("cat_two_halves")
+    options = {"pieces": 10, "starts": 3, "seed": 1}
+    plan = plan_reorientation(body, HALF_TURN, **options, watch=lambda now: (now.stage, now.start) == ("search", 2))
+    assert [start.converged for start in plan.starts] == [True, False]
+    assert plan.miss < 1e-8
+
+
+class OutOfPatience(Exception):
+    """Raised by one who watches."""
+
+
+@pytest.mark.parametrize("error", [OutOfPatience, KeyboardInterrupt])
+def test_what_a_watch_raises_comes_through(error):
+    def watch(now):
+        if now.iteration == 2:
+            raise error
+
+    with pytest.raises(error):
+        plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, pieces=10, watch=watch)
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no timers that interrupt")
+@pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])
+def test_ctrl_c_is_not_taken_for_a_failed_search(seconds):
+    body = sp.load_body("cat_two_halves")
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            plan_reorientation(body, HALF_TURN, starts=50)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

@@ -90,6 +90,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             listed = "".join(f"\nwarning: {doubt}" for doubt in doubts)
             data, text = data | {"verdict": verdict}, f"{text}\n{listed}\nverdict: {verdict}"
         print(json.dumps(data, indent=2) if as_json else text)
+        if outcome.code:
+            raise SystemExit(outcome.code)
 
 
 @app.command(name="split")

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 from cyclopts import Parameter
@@ -13,12 +18,16 @@ from .arrays import Array
 from .body import Body
 from .catalog import load_body
 from .cli_text import Outcome, check_writable, rotation_line
-from .errors import ShapeError
+from .errors import PlanNotFound, ShapeError
 from .motion_files import write_shape_path
 from .phases import split
-from .progress import steps
+from .progress import Steps, steps
+
+if TYPE_CHECKING:
+    from .optimal_control.plan import Plan, Progress
 
 _SAMPLES = 2001
+_STOPPED = 130
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -40,6 +49,8 @@ def plan_command(
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
 ) -> Outcome:
     """Find the cheapest motion of the joints that turns a body as asked, and compute what it does.
+
+    Ctrl-C ends the search; the best motion so far is told and written, and the exit code is 130.
 
     Parameters
     ----------
@@ -81,17 +92,25 @@ def plan_command(
         loaded = load_body(body, isolate=True)
         target = None if rotate is None else so3.exp(np.radians(rotate) * _axis(about))
         work.begin("searching")
-        found = plan_reorientation(
-            loaded,
-            target,
-            momentum=momentum,
-            duration=duration,
-            somersaults=somersaults,
-            half_twists=half_twists,
-            cost=cost,
-            starts=starts,
-            seed=seed,
-        )
+        with _stoppable(work) as search:
+            try:
+                found = plan_reorientation(
+                    loaded,
+                    target,
+                    momentum=momentum,
+                    duration=duration,
+                    somersaults=somersaults,
+                    half_twists=half_twists,
+                    cost=cost,
+                    starts=starts,
+                    seed=seed,
+                    watch=search.watch,
+                )
+            except PlanNotFound as failure:
+                if not search.stopped or failure.best is None:
+                    raise
+                found = cast("Plan", failure.best)
+                warnings.warn(str(failure), stacklevel=2)
         if out is not None:
             # So dense that a reader who joins the ends smoothly, as closed samples are read, changes next to nothing.
             write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
@@ -121,7 +140,52 @@ def plan_command(
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
     }
-    return Outcome("\n".join(lines), data)
+    return Outcome("\n".join(lines), data, code=_STOPPED if search.stopped else 0)
+
+
+class _Search:
+    """A search on the terminal.
+
+    Attributes
+    ----------
+    begun : whether there is something to keep
+    stopped : whether Ctrl-C was pressed since
+    """
+
+    def __init__(self, work: Steps) -> None:
+        self._work = work
+        self.begun = self.stopped = False
+
+    def watch(self, now: Progress) -> bool:
+        """Shows where the search stands, and stops it when asked."""
+        which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
+        self._work.say(
+            f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
+        )
+        self.begun = True
+        return self.stopped
+
+    def interrupted(self, *_: Any) -> None:
+        """Ctrl-C: the search ends after this iteration; pressed again, at once."""
+        if self.stopped or not self.begun:
+            raise KeyboardInterrupt
+        self.stopped = True
+        self._work.say("stopping, to keep the best so far (Ctrl-C again gives it up)")
+
+
+@contextmanager
+def _stoppable(work: Steps) -> Iterator[_Search]:
+    """A search that Ctrl-C stops."""
+    search = _Search(work)
+    if threading.current_thread() is not threading.main_thread():
+        # Python hands Ctrl-C to the main thread alone.
+        yield search
+        return
+    before = signal.signal(signal.SIGINT, search.interrupted)
+    try:
+        yield search
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:

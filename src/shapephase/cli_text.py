@@ -23,11 +23,12 @@ from .return_map import FixedPoints
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command has to say, for people and for programs."""
+    """What a command has to say, for people and for programs, and its exit code."""
 
     text: str
     data: dict[str, Any]
     judged: bool = False
+    code: int = 0
 
 
 def check_writable(out: Path | None, option: str, *endings: str) -> None:

@@ -32,6 +32,11 @@ class Steps:
         done = task.completed + (1 if task.description else 0)
         self._display.update(self._task, description=what, completed=done)
 
+    def say(self, what: str) -> None:
+        """Other words for the step under way."""
+        if self._display is not None:
+            self._display.update(self._task, description=what)
+
 
 @contextmanager
 def steps(total: int) -> Iterator[Steps]:

@@ -11,6 +11,27 @@ from ..shape_path import ShapePath
 
 
 @dataclass(frozen=True)
+class Progress:
+    """Where a search stands after an iteration of the solver.
+
+    Attributes
+    ----------
+    stage : "guesses", each improved on a coarse spline, or "search"
+    start, starts : which of how many, from 1
+    iteration : of the solver, from 0
+    cost : so far [of the plan's cost]
+    infeasibility : the largest constraint violated so far, scaled: the equations of motion, the goal, the limits
+    """
+
+    stage: str
+    start: int
+    starts: int
+    iteration: int
+    cost: float
+    infeasibility: float
+
+
+@dataclass(frozen=True)
 class Start:
     """How one start of the search went.
 

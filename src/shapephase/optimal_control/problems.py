@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -17,10 +17,11 @@ from ..connection import mechanical_connection
 from ..errors import PlanNotFound, ShapeError, ShapePhaseError, unknown_name
 from ..shape_path import ShapePath
 from .guesses import PLACES, Guess, guess_of, guesses
-from .plan import Plan, Start
+from .plan import Plan, Progress, Start
 from .polish import REACHED, Polished, panel_nodes, polished
 from .reduced import ReducedProgram
 from .reorientation import Reorientation, reorientation
+from .solver_watch import Watch
 from .spline_basis import SplineBasis
 from .transcription import CollocationProgram, Solved, gauss_tableau
 
@@ -33,6 +34,29 @@ _SLACK = 1e-7
 # Windings of the same attitude differ by half a turn or more.
 _WINDING = 0.1
 _COARSE, _SCOUTS, _SCOUTING = 10, 8, 60
+
+
+class _Watched:
+    """Passes on where the search stands.
+
+    Attributes
+    ----------
+    stopped : whether it has been asked to stop
+    """
+
+    def __init__(self, watch: Callable[[Progress], Any] | None) -> None:
+        self._watch = watch
+        self.stopped = False
+
+    def during(self, stage: str, start: int, starts: int) -> Watch:
+        """What the solver tells, of one start."""
+
+        def told(iteration: int, cost: float, infeasibility: float) -> bool:
+            if self._watch is not None and not self.stopped:
+                self.stopped = bool(self._watch(Progress(stage, start, starts, iteration, cost, infeasibility)))
+            return self.stopped
+
+        return told
 
 
 def plan_reorientation(
@@ -56,6 +80,7 @@ def plan_reorientation(
     method: str = "collocation",
     pieces: int | None = None,
     iterations: int = 300,
+    watch: Callable[[Progress], Any] | None = None,
 ) -> Plan:
     """The cheapest motion of the joints that turns a free body as asked: the falling cat's problem, for any body.
 
@@ -70,8 +95,8 @@ def plan_reorientation(
     start : (n,) shape at the start [rad or m]; None: neutral, or as near as the limits let
     end : (n,) shape at the end; None: as at the start, a closed loop; "free": any
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
-        joint motion has without angular momentum, M the mass matrix with base b and joints s; "rate", that of
-        1/2 |r'|^2; "acceleration", that of 1/2 |r''|^2, from rest, and to rest where the end is given;
+        joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
+        other, as in a gimbal that is flat, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that of 1/2 |r''|^2, from rest, and to rest where the end is given;
         "time", the duration, under `rate_limits`
     joint_limits : whether the joints stay within those of the body
     rate_limits : one for all joints, or (n,) [rad/s or m/s]
@@ -89,13 +114,16 @@ def plan_reorientation(
     pieces : of the spline, six or more; None: 160 for up to four free joints and the costs
         kinetic and rate, else 40 for up to eight, 20 for more
     iterations : of the solver, for each start
+    watch : told after each iteration where the search stands; if it returns something true, the search stops there:
+        with the cheapest plan of the starts that had ended, or else PlanNotFound with the best so far.
+        Ctrl-C is raised as KeyboardInterrupt, and nothing is kept
 
     Raises
     ------
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, unknown names.
     PlanNotFound
-        If no start came to a local optimum that reaches the goal; it carries the best try.
+        If no start came to a local optimum that reaches the goal, or `watch` stopped it; it carries the best try.
 
     Source: Montgomery 1990, Isoholonomic problems and some applications.
     """
@@ -125,21 +153,25 @@ def plan_reorientation(
     began = time.perf_counter()
     basis = SplineBasis(int(pieces or _pieces(task)))
     program = CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
-    begun = _starts(task, basis, seed, int(starts), int(iterations))
-    tries = [_search(task, basis, program, guess, int(iterations)) for guess in begun]
-    reports = tuple(report for report, _ in tries)
-    plans = [plan for report, plan in tries if plan is not None]
+    watched = _Watched(watch)
+    begun = _starts(task, basis, seed, int(starts), int(iterations), watched)
+    tries: list[_Try] = []
+    for guess in begun:
+        if watched.stopped and tries:
+            break
+        told = watched.during("search", len(tries) + 1, len(begun))
+        tries.append(_search(task, basis, program, guess, int(iterations), told))
     whole = {
         "method": method,
-        "iterations": sum(report.iterations for report in reports),
+        "iterations": sum(one.report.iterations for one in tries),
         "seconds": time.perf_counter() - began,
-        "starts": reports,
+        "starts": tuple(one.report for one in tries),
     }
-    good = [plan for report, plan in tries if plan is not None and report.converged]
-    if good:
-        return replace(min(good, key=lambda plan: plan.cost), **whole)
-    best = replace(min(plans, key=lambda plan: plan.miss), **whole) if plans else None
-    raise PlanNotFound(_failure(task, reports, best), best)
+    best = min((one for one in tries if one.plan is not None), key=_Try.rank, default=None)
+    plan = replace(best.plan, **whole) if best is not None and best.plan is not None else None
+    if best is None or plan is None or not best.report.converged:
+        raise PlanNotFound(_failure(task, tries, best, watched.stopped), plan)
+    return plan
 
 
 def _pieces(task: Reorientation) -> int:
@@ -148,7 +180,24 @@ def _pieces(task: Reorientation) -> int:
     return _PIECES if task.size <= _MANY else _PIECES_OF_MANY
 
 
-def _starts(task: Reorientation, basis: SplineBasis, seed: int, count: int, iterations: int) -> list[Guess]:
+@dataclass(frozen=True, eq=False)
+class _Try:
+    """One local search: its report, its polished plan, and whether that reaches the goal within the limits."""
+
+    report: Start
+    plan: Plan | None
+    reaches: bool
+
+    def rank(self) -> tuple[bool, bool, float]:
+        """The best try has the least: local optima first, then what reaches the goal, by cost, then what misses it."""
+        if self.plan is None:
+            return True, True, np.inf
+        return not self.report.converged, not self.reaches, self.plan.cost if self.reaches else self.plan.miss
+
+
+def _starts(
+    task: Reorientation, basis: SplineBasis, seed: int, count: int, iterations: int, watched: _Watched
+) -> list[Guess]:
     """The guesses to start from; for few joints each first improved on a coarse spline, the cheapest taken."""
     if task.size > _MANY:
         return guesses(task, basis, seed, count)
@@ -157,6 +206,8 @@ def _starts(task: Reorientation, basis: SplineBasis, seed: int, count: int, iter
     program = CollocationProgram(task, coarse)
     found: list[tuple[float, int, Guess]] = []
     for place, scout in enumerate(scouts):
+        if watched.stopped and found:
+            break
         turn = task.turn(scout.motion.final_attitude)
         solved = program.solve(
             scout.control,
@@ -166,6 +217,7 @@ def _starts(task: Reorientation, basis: SplineBasis, seed: int, count: int, iter
             else lambda places, scout=scout, turn=turn: scout.quaternions(places, turn),
             iterations=min(_SCOUTING, iterations),
             tolerance=1e-5,
+            watch=watched.during("guesses", place + 1, len(scouts)),
         )
         curve = coarse.matrix(PLACES) @ (solved.control if solved.converged else scout.control)
         guess = guess_of(task, basis, curve)
@@ -174,10 +226,8 @@ def _starts(task: Reorientation, basis: SplineBasis, seed: int, count: int, iter
     return [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])][:count]
 
 
-def _search(
-    task: Reorientation, basis: SplineBasis, program: Any, guess: Guess, iterations: int
-) -> tuple[Start, Plan | None]:
-    """One local search, its report and its polished plan."""
+def _search(task: Reorientation, basis: SplineBasis, program: Any, guess: Guess, iterations: int, watch: Watch) -> _Try:
+    """One local search."""
     began = time.perf_counter()
     turn = task.turn(guess.motion.final_attitude)
     solved: Solved = program.solve(
@@ -185,15 +235,17 @@ def _search(
         task.duration,
         task.evenly_wound if task.windings is not None else lambda places: guess.quaternions(places, turn),
         iterations=iterations,
+        watch=watch,
     )
     plan = None
     try:
         plan = _plan(task, basis, solved, polished(task, basis, solved.control, solved.duration))
     except ShapePhaseError:
         plan = None
+    reaches = plan is not None and plan.miss <= REACHED and _within_limits(task, basis, plan)
     report = Start(
         solved.status,
-        solved.converged and plan is not None and plan.miss <= REACHED and _within_limits(task, basis, plan),
+        solved.converged and reaches,
         solved.cost,
         task.miss(solved.attitude),
         solved.kkt_residual,
@@ -201,7 +253,7 @@ def _search(
         solved.iterations,
         time.perf_counter() - began,
     )
-    return report, plan
+    return _Try(report, plan, reaches)
 
 
 def _plan(task: Reorientation, basis: SplineBasis, solved: Solved, done: Polished) -> Plan:
@@ -266,17 +318,22 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     return float((steps[:, None] * weights).ravel() @ density)
 
 
-def _failure(task: Reorientation, reports: tuple[Start, ...], best: Plan | None) -> str:
+def _failure(task: Reorientation, tries: Sequence[_Try], best: _Try | None, stopped: bool) -> str:
     """What to tell about starts that all failed."""
     tale = "; ".join(
-        f"start {number + 1}: {report.status}, off by {report.miss:.3g} rad, KKT residual {report.kkt_residual:.2g}"
-        for number, report in enumerate(reports)
+        f"start {number + 1}: {one.report.status}, off by {one.report.miss:.3g} rad, KKT residual "
+        f"{one.report.kkt_residual:.2g}"
+        for number, one in enumerate(tries)
     )
-    left = (
-        f"the best try, in `best`, misses the goal by {best.miss:.3g} rad in {best.path.duration:.6g} s"
-        if best is not None
-        else "no try was left"
-    )
+    if best is None or best.plan is None:
+        left = "no try was left"
+    elif best.reaches:
+        left = f"the best try, in `best`, reaches the goal at cost {best.plan.cost:.6g}, but there may be cheaper ones"
+    else:
+        length = best.plan.path.duration
+        left = f"the best try, in `best`, misses the goal by {best.plan.miss:.3g} rad in {length:.6g} s"
+    if stopped:
+        return f"the search for a motion of the joints of {task.body.name} was stopped as asked ({tale}); {left}"
     return (
         f"no motion of the joints of {task.body.name} was found that turns it as asked ({tale}); {left}; loosen the "
         "limits, or give more time, iterations or starts"

@@ -16,6 +16,7 @@ from ..shape_path import ShapePath
 from .guesses import start_metric
 from .polish import end_derivative, movable_points
 from .reorientation import COSTS, Reorientation
+from .solver_watch import Followed, Watch
 from .spline_basis import SplineBasis
 from .symbolic import symbolic_body
 from .transcription import Solved, gauss_tableau
@@ -25,6 +26,19 @@ _STAGES = 4
 # The cost still changes by this share of the tolerance where SLSQP stops; the turn missing must be less than that.
 _CHANGE, _REACHED = 1e-2, 1e-6
 _ACTIVE = 1e-9
+
+
+# It may stop earlier, where the conditions of optimality are met to this many tolerances: more its cost cannot tell.
+_SETTLED = 10.0
+_STOPPED = "stopped as asked"
+
+
+class _EnoughError(Exception):
+    """Ends SLSQP where it is: it offers no other way out in all versions of SciPy."""
+
+    def __init__(self, last: Array, why: str) -> None:
+        super().__init__(why)
+        self.last = last
 
 
 class ReducedProgram:
@@ -58,6 +72,7 @@ class ReducedProgram:
         *,
         iterations: int,
         tolerance: float = 1e-8,
+        watch: Watch | None = None,
     ) -> Solved:
         """A local optimum from a guess: control points (size, m) and T. As `CollocationProgram.solve`."""
         from scipy.optimize import minimize
@@ -91,31 +106,51 @@ class ReducedProgram:
         constraints: list[dict[str, Any]] = [{"type": "eq", "fun": lambda x: end(x)[0], "jac": lambda x: end(x)[1]}]
         if np.isfinite(task.rates).any():
             constraints.append(self._within_rates(guess, free, unit, duration))
-        found = minimize(
-            cost,
-            guess[free] / unit,
-            jac=True,
-            method="SLSQP",
-            bounds=np.stack([low, high], axis=1),
-            constraints=constraints,
-            options={"maxiter": iterations, "ftol": _CHANGE * tolerance},
-        )
-        missed, slopes = end(found.x)
-        _, gradient = cost(found.x)
-        inside = (found.x > low + _ACTIVE) & (found.x < high - _ACTIVE)
-        multipliers = np.linalg.lstsq(slopes[:, inside].T, gradient[inside], rcond=None)[0]
-        residual = float(np.abs(gradient[inside] - multipliers @ slopes[:, inside]).max(initial=0.0))
-        infeasible = float(np.abs(missed).max())
+        followed = Followed(watch)
+
+        def left(x: Array) -> tuple[float, float]:
+            """Of the conditions of Karush, Kuhn and Tucker, without limits of rates, and of the constraints."""
+            missed, slopes = end(x)
+            gradient = cost(x)[1]
+            below, above = x <= low + _ACTIVE, x >= high - _ACTIVE
+            inside = ~(below | above)
+            gradient -= np.linalg.lstsq(slopes[:, inside].T, gradient[inside], rcond=None)[0] @ slopes
+            wrong = np.concatenate([np.abs(gradient[inside]), -gradient[below & ~above], gradient[above & ~below]])
+            return float(wrong.max(initial=0.0)), float(np.abs(missed).max())
+
+        def heard(x: Array) -> None:
+            residual, missed = left(x)
+            asked = followed.stops(x.copy(), cost(x)[0] * scale, missed)
+            if asked or max(residual, missed) < _SETTLED * tolerance:
+                raise _EnoughError(x, _STOPPED if asked else "conditions of optimality met")
+
+        try:
+            found = minimize(
+                cost,
+                guess[free] / unit,
+                jac=True,
+                method="SLSQP",
+                bounds=np.stack([low, high], axis=1),
+                constraints=constraints,
+                callback=heard,
+                options={"maxiter": iterations, "ftol": _CHANGE * tolerance},
+            )
+            last, success, status, count = found.x, bool(found.success), str(found.message), int(found.nit)
+        except _EnoughError as enough:
+            status, count = str(enough), followed.iterations
+            success = status != _STOPPED
+            last = enough.last if success else followed.unknowns
+        residual, missed = left(last)
         return Solved(
-            points(found.x),
+            points(last),
             duration,
-            self._motion(points(found.x), duration)[1].final_attitude,
-            float(found.fun) * scale,
-            str(found.message),
-            bool(found.success) and infeasible < _REACHED,
-            max(residual, infeasible),
-            infeasible,
-            int(found.nit),
+            self._motion(points(last), duration)[1].final_attitude,
+            cost(last)[0] * scale,
+            status,
+            success and missed < _REACHED,
+            max(residual, missed),
+            missed,
+            count,
         )
 
     def _motion(self, control: Array, duration: float) -> tuple[ShapePath, Motion]:

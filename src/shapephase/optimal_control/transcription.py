@@ -13,12 +13,16 @@ from .. import so3
 from ..arrays import Array
 from ..body import Body
 from .reorientation import Reorientation
+from .solver_watch import Followed, Watch, ipopt_callback
 from .spline_basis import SplineBasis
 from .symbolic import solved, symbolic_body
 
 _STAGES = 3
 _DEGENERATE = 1e-3
 _GOOD = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+# CasADi takes Ctrl-C for itself: in the middle of an iteration the solver says the first, between them the second.
+_INTERRUPTED, _STOPPED = "NonIpopt_Exception_Thrown", "User_Requested_Stop"
+
 _built: WeakKeyDictionary[Body, dict[tuple[object, ...], tuple[Any, Any, Any]]] = WeakKeyDictionary()
 
 
@@ -199,6 +203,7 @@ class CollocationProgram:
         *,
         iterations: int,
         tolerance: float = 1e-8,
+        watch: Watch | None = None,
     ) -> Solved:
         """A local optimum from a guess: control points (size, m), T, and the attitude at places (N,) -> (N, 4)."""
         import casadi
@@ -220,25 +225,42 @@ class CollocationProgram:
             "linear_solver": "mumps",
             "mu_strategy": "adaptive",
         }
+        followed = Followed(watch)
+        # CasADi does not keep it alive.
+        heard = ipopt_callback(followed, len(guess), self._low, self._high)
         solver = casadi.nlpsol(
-            "plan", "ipopt", self.program, {"ipopt": options, "print_time": False, **self.derivatives}
+            "plan",
+            "ipopt",
+            self.program,
+            {
+                "ipopt": options,
+                "print_time": False,
+                "iteration_callback": heard,
+                **self.derivatives,
+            },
         )
         found = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=self._low, ubg=self._high)
         stats = solver.stats()
-        values = np.array(found["x"]).ravel()
+        status = str(stats["return_status"])
+        if followed.error is not None:
+            raise followed.error
+        if status == _INTERRUPTED or (status == _STOPPED and not followed.stopped):
+            raise KeyboardInterrupt
+        values, cost = np.array(found["x"]).ravel(), float(found["f"])
         points = task.size * basis.size
         history = stats["iterations"]
         dual, primal = (float(history[key][-1]) if history[key] else np.inf for key in ("inf_du", "inf_pr"))
-        status = str(stats["return_status"])
         if status in _GOOD and dual > _DEGENERATE:
             # IPOPT measures by the multipliers, which have no bound where the constraints leave no way but one.
             status = f"{status}, but degenerate"
+        if status == _STOPPED:
+            values, cost, primal = followed.unknowns, followed.cost, followed.infeasibility
         last = so3.matrix_from_quat(so3.normalised(values[-4:]))
         return Solved(
             values[:points].reshape(basis.size, task.size),
             float(values[points]),
             last,
-            float(found["f"]),
+            cost,
             status,
             status in _GOOD,
             max(dual, primal),
