@@ -96,8 +96,8 @@ def plan_reorientation(
     end : (n,) shape at the end; None: as at the start, a closed loop; "free": any
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
         joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
-        other, as in a gimbal that is flat, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that of 1/2 |r''|^2, from rest, and to rest where the end is given;
-        "time", the duration, under `rate_limits`
+        other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
+        of 1/2 |r''|^2, from rest, and to rest where the end is given; "time", the duration, under `rate_limits`
     joint_limits : whether the joints stay within those of the body
     rate_limits : one for all joints, or (n,) [rad/s or m/s]
     joints : names of those that may move; None: all
