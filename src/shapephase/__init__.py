@@ -19,6 +19,7 @@ from .deformation import Deformation, articulated, particles, prescribed, rigid
 from .errors import ShapePhaseError
 from .gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
+from .machine_code import MachineCodeWarning
 from .many_paths import FinalAttitudes, final_attitudes
 from .motion_files import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .orbit_branch import OrbitBranch, continued_orbits
@@ -39,6 +40,7 @@ from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .rigid_body.euler_top import EulerTop
 from .shape_path import ShapePath
+from .step_code import compile_steps
 from .viewer import motion_page, view
 
 __version__ = "0.1.0"
@@ -54,6 +56,7 @@ __all__ = [
     "FixedPoints",
     "HorizontalLift",
     "IgnoredElementWarning",
+    "MachineCodeWarning",
     "ModelCard",
     "Motion",
     "OrbitBranch",
@@ -72,6 +75,7 @@ __all__ = [
     "articulated",
     "base_difference",
     "closed_orbits",
+    "compile_steps",
     "continued_orbits",
     "curvature",
     "curvature_on_plane",

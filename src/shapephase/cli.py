@@ -1,4 +1,4 @@
-"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `conjugate`, `view`, `plot`, `robots`."""
+"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `conjugate`, `view`, `plot`, `robots`, `compile`."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ from .cli_text import (
 )
 from .deformation import articulated
 from .errors import (
+    CompilerError,
     ModelFileError,
     ShapePhaseError,
     TrajectoryError,
@@ -49,6 +50,7 @@ from .reconstruction import Motion, reconstruct
 from .return_map import fixed_points
 from .scenarios import MOTIONS, named_motion
 from .shape_path import ShapePath
+from .step_code import compile_steps
 
 _USAGE, _MODEL, _TRAJECTORY, _NUMERICS, _STOPPED = 2, 3, 4, 5, 130
 
@@ -348,6 +350,27 @@ def robots_command(
     return Outcome("\n".join(lines), {"bodies": listed, "motions": motions, "examples": examples})
 
 
+@app.command(name="compile")
+def compile_command(
+    *,
+    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+) -> Outcome:
+    """Compile the innermost loops with this machine's C compiler: the same results, sooner.
+
+    Once is enough for all later sessions. $CC names the compiler; what it writes is kept in $XDG_CACHE_HOME/shapephase,
+    or ~/.cache/shapephase.
+
+    Parameters
+    ----------
+    json
+        print JSON
+    """
+    with steps(1) as work:
+        work.begin("compiling")
+        written = compile_steps()
+    return Outcome(f"compiled: {len(written)} functions in {written[0].parent}", {"files": [str(p) for p in written]})
+
+
 def _moved(
     body: str,
     motion: str,
@@ -381,7 +404,8 @@ def _exit_code(error: ShapePhaseError) -> int:
         return _TRAJECTORY
     if isinstance(error, ModelFileError):
         return _MODEL
-    return _USAGE if isinstance(error, ValueError | FileNotFoundError | ImportError) else _NUMERICS
+    asked = ValueError | FileNotFoundError | ImportError | CompilerError
+    return _USAGE if isinstance(error, asked) else _NUMERICS
 
 
 def _one_line(error: Warning | Exception | str) -> str:

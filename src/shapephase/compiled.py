@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .arrays import Array
+from .machine_code import in_machine_code
 
 Formula = Callable[[list[Any]], list[Any]]
 
@@ -37,12 +38,18 @@ def for_rows(formula: Formula, entries: int, values: Array) -> Array:
 
 @lru_cache(maxsize=512)
 def _mapped(formula: Formula, entries: int, count: int) -> Any:
-    return _function(formula, entries).map(count)
+    return in_machine_code(row_function(formula, entries)).map(count)
 
 
 @lru_cache(maxsize=32)
-def _function(formula: Formula, entries: int) -> Any:
+def row_function(formula: Formula, entries: int) -> Any:
+    """A formula of numbers as a CasADi function of one row."""
     import casadi
 
     row = casadi.SX.sym("row", entries)
-    return casadi.Function("formula", [row], [casadi.vertcat(*formula(casadi.vertsplit(row)))])
+    return casadi.Function(formula.__name__, [row], [casadi.vertcat(*formula(casadi.vertsplit(row)))])
+
+
+def forget_functions() -> None:
+    """Build the functions of many rows anew when next needed."""
+    _mapped.cache_clear()

@@ -110,6 +110,14 @@ class ResultFileError(ShapePhaseError, ValueError):
     """A result file that this version cannot read: another format, or damaged. Remedy: compute it anew."""
 
 
+class CompilerError(ShapePhaseError, RuntimeError):
+    """The steps could not be compiled.
+
+    Causes: no C compiler, one that fails or rounds otherwise, a folder that cannot be written to. Remedy: another
+    compiler in $CC, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps.
+    """
+
+
 class PlanNotFound(ShapePhaseError, ArithmeticError):
     """No motion of the joints was found that turns the body as asked.
 

@@ -10,10 +10,11 @@ import numpy as np
 from . import so3
 from .arrays import Array
 from .compiled import called, for_rows
+from .machine_code import in_machine_code
 from .march import BLOCK, adjugate_of, matrix_product, momentum_step_function
 from .rotation_step import STAGES, attitude_step
 
-_CHECKPOINTS = 8
+CHECKPOINTS = 8
 
 
 def amplification(growth: Array) -> Array:
@@ -25,19 +26,19 @@ def amplification(growth: Array) -> Array:
     count = growth.shape[1]
     if count == 0:
         return np.ones(1)
-    chosen = growth[:, np.arange(_CHECKPOINTS) * (count - 1) // (_CHECKPOINTS - 1)].reshape(len(growth), -1)
-    largest = for_rows(_largest_growth, 9 * _CHECKPOINTS, chosen)[:, 0]
+    chosen = growth[:, np.arange(CHECKPOINTS) * (count - 1) // (CHECKPOINTS - 1)].reshape(len(growth), -1)
+    largest = for_rows(largest_growth, 9 * CHECKPOINTS, chosen)[:, 0]
     # Where steps were so long that they overflowed, nothing is known.
     return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
 
 
-def _largest_growth(entries: Any) -> list[Any]:
+def largest_growth(entries: Any) -> list[Any]:
     """From the growth matrices at the checkpoints, row by row."""
     import casadi
 
-    matrices = [[entries[9 * k + 3 * i : 9 * k + 3 * i + 3] for i in range(3)] for k in range(_CHECKPOINTS)]
+    matrices = [[entries[9 * k + 3 * i : 9 * k + 3 * i + 3] for i in range(3)] for k in range(CHECKPOINTS)]
     rest: Any = 1.0
-    for later in range(1, _CHECKPOINTS):
+    for later in range(1, CHECKPOINTS):
         for earlier in range(later):
             between = matrix_product(matrices[later], adjugate_of(matrices[earlier])) if earlier else matrices[later]
             squares = sum(entry * entry for row in between for entry in row)
@@ -102,11 +103,12 @@ def _derivatives(channels: Array, direction: Array, size: float, loops: int, see
 @lru_cache(maxsize=512)
 def _slope_function(length: int) -> Any:
     """`length` steps as one CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
-    return _slope_step_function().mapaccum("steps", length)
+    return in_machine_code(slope_step_function()).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1)
-def _slope_step_function() -> Any:
+def slope_step_function() -> Any:
+    """One step as a CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
     import casadi
 
     quaternion, momentum = casadi.SX.sym("quaternion", 4), casadi.SX.sym("momentum", 3)
@@ -117,17 +119,18 @@ def _slope_step_function() -> Any:
     further = casadi.jtimes(following, quaternion, slopes) + casadi.jacobian(following, momentum)
     state = casadi.vertcat(quaternion, momentum, casadi.reshape(slopes, 12, 1))
     onward = casadi.vertcat(following, momentum, casadi.reshape(further, 12, 1))
-    return casadi.Function("step", [state, data], [onward])
+    return casadi.Function("slope_step", [state, data], [onward])
 
 
 @lru_cache(maxsize=512)
 def _derivative_function(length: int, columns: int) -> Any:
     """`length` steps as one CasADi function of the state with its derivatives, and the channels."""
-    return _derivative_step_function(columns).mapaccum("steps", length)
+    return in_machine_code(derivative_step_function(columns)).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1)
-def _derivative_step_function(columns: int) -> Any:
+def derivative_step_function(columns: int) -> Any:
+    """One step as a CasADi function of the state with its derivatives, and the channels."""
     import casadi
 
     state, slopes = casadi.SX.sym("state", 8), casadi.SX.sym("slopes", 8, columns)
@@ -135,4 +138,10 @@ def _derivative_step_function(columns: int) -> Any:
     following, _ = momentum_step_function(False)(state, data)
     further = casadi.reshape(casadi.jtimes(following, state, slopes), 8 * columns, 1)
     whole = casadi.vertcat(state, casadi.reshape(slopes, 8 * columns, 1))
-    return casadi.Function("step", [whole, data], [casadi.vertcat(following, further)])
+    return casadi.Function(f"derivative_step_{columns}", [whole, data], [casadi.vertcat(following, further)])
+
+
+def forget_functions() -> None:
+    """Build the functions anew when next needed."""
+    _slope_function.cache_clear()
+    _derivative_function.cache_clear()

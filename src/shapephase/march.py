@@ -10,6 +10,7 @@ import numpy as np
 
 from .arrays import Array
 from .compiled import called
+from .machine_code import in_machine_code
 from .rotation_step import (
     STAGES,
     local_error,
@@ -198,13 +199,13 @@ def matrix_product(a: Any, b: Any) -> list[list[Any]]:
 @lru_cache(maxsize=1024)
 def _momentum_function(length: int, with_growth: bool) -> Any:
     """`length` steps as one CasADi function of the state (direction, quaternion, size, growth) and the channels."""
-    return momentum_step_function(with_growth).mapaccum("steps", length)
+    return in_machine_code(momentum_step_function(with_growth)).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=512)
 def _rest_function(length: int) -> Any:
     """`length` steps without momentum as one CasADi function of the quaternion and the drifts."""
-    return _rest_step_function().mapaccum("steps", length)
+    return in_machine_code(rest_step_function()).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=2)
@@ -223,15 +224,23 @@ def momentum_step_function(with_growth: bool) -> Any:
         growth = [parts[8 + 3 * i : 11 + 3 * i] for i in range(3)]
         following += [part for row in _grown(growth, direction, end, size, channels) for part in row]
     side = casadi.vertcat(turn, dynamic, local_error(differences))
-    return casadi.Function("step", [state, data], [casadi.vertcat(*following), side])
+    name = "momentum_step_with_growth" if with_growth else "momentum_step"
+    return casadi.Function(name, [state, data], [casadi.vertcat(*following), side])
 
 
 @lru_cache(maxsize=1)
-def _rest_step_function() -> Any:
+def rest_step_function() -> Any:
+    """One step without momentum as a CasADi function: quaternion and drifts -> the next one; error estimate."""
     import casadi
 
     state, data = casadi.SX.sym("state", 4), casadi.SX.sym("drifts", 3 * STAGES)
     components = casadi.vertsplit(data)
     turn, differences = rest_step([components[3 * s : 3 * s + 3] for s in range(STAGES)])
     following = casadi.vertcat(*unit(product(casadi.vertsplit(state), turn)))
-    return casadi.Function("step", [state, data], [following, local_error(differences)])
+    return casadi.Function("rest_step", [state, data], [following, local_error(differences)])
+
+
+def forget_functions() -> None:
+    """Build the functions anew when next needed."""
+    _momentum_function.cache_clear()
+    _rest_function.cache_clear()

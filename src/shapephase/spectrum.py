@@ -39,7 +39,7 @@ class Channels:
         self.count += len(times)
         flat = np.empty((len(times), 12))
         flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
-        channels = for_rows(_channels, 12, flat)
+        channels = for_rows(inverted, 12, flat)
         if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
             inverse = inverse_inertia(inertia, times)
             channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
@@ -50,7 +50,7 @@ class Channels:
         return channels[:, :9]
 
 
-def _channels(entries: list[Any]) -> list[Any]:
+def inverted(entries: list[Any]) -> list[Any]:
     """I^-1, I^-1 L_o and a number above zero where the tensor is far from singular, from the nine of I and L_o.
 
     Far from singular: the condition number is at most some hundred, and so are the digits that the adjugate loses.

@@ -1,0 +1,110 @@
+"""Compiled steps: the same results to the last bit, and never a wrong one."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase import compiled, growth, machine_code, march
+from shapephase.cli import main
+from shapephase.errors import CompilerError
+from shapephase.scenarios import MOTIONS
+
+pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler on this machine")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty place for compiled functions; nothing compiled is left in this process."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    forget()
+    yield tmp_path / "shapephase"
+    forget()
+
+
+def forget():
+    for module in (compiled, march, growth):
+        module.forget_functions()
+
+
+def is_compiled():
+    return machine_code.in_machine_code(march.rest_step_function()).class_name() == "External"
+
+
+def computed():
+    """Everything that steps: with momentum, without, over many turns, for many momenta, and derivatives."""
+    named = MOTIONS["cat_righting"]
+    deformation = sp.articulated(sp.load_body(named.body), named.path())
+    rng = np.random.default_rng(3)
+    some, many = rng.normal(size=3) * 0.05, rng.normal(size=(30, 3)) * 0.05
+    for momentum in (some, np.zeros(3), np.array([0.0, 3.0, 0.5]), many):
+        motion = sp.reconstruct(deformation, momentum, tolerance=1e-9)
+        times = np.linspace(0.0, motion.duration, 11)
+        yield motion.attitude(times)
+        yield np.asarray(motion.error_estimate)
+        yield motion.dynamic_phase(times)
+    yield sp.reconstruct(deformation, some).sensitivity.by_momentum
+
+
+def test_compiled_steps_give_the_same_bits(folder, capsys):
+    interpreted = list(computed())
+    assert not is_compiled()
+    main(["compile", "--json"])
+    written = json.loads(capsys.readouterr().out)["files"]
+    assert sorted(map(str, folder.iterdir())) == sorted(written)
+    assert is_compiled()
+    for before, after in zip(interpreted, computed(), strict=True):
+        assert np.array_equal(before, after)
+
+
+def test_a_compiler_that_rounds_otherwise_is_refused(folder, monkeypatch):
+    monkeypatch.setenv("CC", "cc -ffast-math")
+    with pytest.raises(CompilerError, match="other numbers"):
+        sp.compile_steps()
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize(("compiler", "words"), [("no_such_compiler", "there is no C compiler"), ("false", "failed")])
+def test_without_a_compiler_that_works_it_is_said(folder, monkeypatch, compiler, words, capsys):
+    monkeypatch.setenv("CC", compiler)
+    with pytest.raises(SystemExit) as ended:
+        main(["compile"])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert not folder.exists() or list(folder.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("not a folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    with pytest.raises(CompilerError, match="cannot be written to"):
+        sp.compile_steps()
+
+
+def test_a_library_that_is_none_is_told_and_left_alone(folder):
+    function = march.rest_step_function()
+    library = machine_code._library(function.name(), machine_code._source(function))
+    folder.mkdir()
+    library.write_bytes(b"no machine code")
+    with pytest.warns(sp.MachineCodeWarning, match="shapephase compile"):
+        assert machine_code.in_machine_code(function) is function
+
+
+def test_what_another_user_wrote_is_not_run(folder, monkeypatch):
+    function = march.rest_step_function()
+    library = machine_code._library(function.name(), machine_code._source(function))
+    folder.mkdir()
+    library.write_bytes(b"somebody's machine code")
+    if os.getuid() == 0:
+        os.chown(library, 12345, -1)
+    else:
+        monkeypatch.setattr(os, "getuid", lambda: 12345)
+    assert machine_code.in_machine_code(function) is function
