@@ -63,11 +63,14 @@ def test_compiled_steps_give_the_same_bits(folder, capsys):
         assert np.array_equal(before, after)
 
 
-def test_a_compiler_that_rounds_otherwise_is_refused(folder, monkeypatch):
-    monkeypatch.setenv("CC", "cc -ffast-math")
+@pytest.mark.parametrize("options", ["-ffast-math", "-Dsqrt=cbrt"])
+def test_a_compiler_that_computes_otherwise_is_refused(folder, monkeypatch, options):
+    """The first would also make this whole process take the smallest numbers for zero."""
+    monkeypatch.setenv("CC", f"cc {options}")
     with pytest.raises(CompilerError, match="other numbers"):
-        sp.compile_steps()
+        machine_code.compile_functions([march.rest_step_function()])
     assert list(folder.iterdir()) == []
+    assert np.array([5e-324])[0] * 1.0 > 0.0
 
 
 @pytest.mark.parametrize(("compiler", "words"), [("no_such_compiler", "there is no C compiler"), ("false", "failed")])

@@ -26,12 +26,11 @@ def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] =
         names the argument, the shape that came and the first bad entry.
     """
     array = real_array(value, name, unit)
-    wanted = _shape_text(trailing)
     if array.ndim < len(trailing) or any(
         want is not None and have != want
         for want, have in zip(trailing, array.shape[array.ndim - len(trailing) :], strict=False)
     ):
-        raise ShapeError(f"{name}: expected shape {wanted}{_in(unit)}, got {array.shape}")
+        raise ShapeError(f"{name}: expected shape {_shape_text(trailing)}{_in(unit)}, got {array.shape}")
     check_finite(array, name)
     return array
 

@@ -413,13 +413,9 @@ class Body:
         """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
         model, data = self._model, self._data()
         centroidal_map = pin.computeCentroidalMap
-        # data.Ag is a view, refreshed by each call (what the call returns is a copy): one copy a sample.
-        rows = data.Ag[3:, 3:]
-        whole = np.empty((len(shapes), *rows.shape))
-        for row, q in enumerate(self._joints.configurations(shapes)):
-            centroidal_map(model, data, q)
-            whole[row] = rows
-        return whole
+        # Each call returns a copy: all at once are put together sooner than one by one.
+        maps = [centroidal_map(model, data, q) for q in self._joints.configurations(shapes)]
+        return np.array(maps).reshape(-1, 6, model.nv)[:, 3:, 3:]
 
     def _angular_map_rate(self, shapes: Array, rates: Array) -> Array:
         """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""

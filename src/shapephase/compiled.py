@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
@@ -12,6 +13,28 @@ from .arrays import Array
 from .machine_code import in_machine_code
 
 Formula = Callable[[list[Any]], list[Any]]
+_MOST_BUFFERS = 128
+
+
+class _Buffers(threading.local):
+    """Of each thread its own: what it last called, with the memory that is worked on."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[Any, Any, Any, list[int]]] = {}
+
+    def of(self, function: Any) -> tuple[Any, Any, list[int]]:
+        """The buffer of a function, what evaluates it, and the sizes of its results."""
+        known = self._known.get(id(function))
+        if known is None:
+            if len(self._known) >= _MOST_BUFFERS:
+                self._known.clear()
+            # Held on to, so that no other function comes to have its identity.
+            sizes = [function.numel_out(place) for place in range(function.n_out())]
+            known = self._known[id(function)] = function, *function.buffer(), sizes
+        return known[1:]
+
+
+_buffers = _Buffers()
 
 
 def called(function: Any, rows: int, *arguments: Array) -> list[Array]:
@@ -19,8 +42,8 @@ def called(function: Any, rows: int, *arguments: Array) -> list[Array]:
 
     Arguments hold numbers in the order of the function's inputs (column-major); each result is (rows, entries / rows).
     """
-    results = [np.empty((rows, function.numel_out(place) // rows)) for place in range(function.n_out())]
-    buffer, evaluate = function.buffer()
+    buffer, evaluate, sizes = _buffers.of(function)
+    results = [np.empty((rows, size // rows)) for size in sizes]
     kept = [np.ascontiguousarray(argument) for argument in arguments]
     for place, argument in enumerate(kept):
         buffer.set_arg(place, argument.data)

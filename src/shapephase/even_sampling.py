@@ -64,9 +64,13 @@ class EvenSampler:
         count = len(self._values)
         panels = max(1, count // _EVEN_A_PANEL)
         degree = _PANEL_DEGREE if count > 1 else 0
-        coefficients = _even_to_panels(count, panels, degree) @ self._values
-        edges = np.linspace(0.0, self._period * self._loops, panels * self._loops + 1)
-        return Interpolant(edges, coefficients, self._loops, self._asked.count)
+        # Panels differ only in where their samples begin: twice round, each finds its own in one piece.
+        twice = np.concatenate([self._values, self._values])
+        row, number = twice.strides
+        begun = np.ndarray((panels, count, 9), buffer=twice, strides=(count // panels * row, row, number))
+        edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
+        edges[-1] = self._period * self._loops
+        return Interpolant(edges, _even_to_panel(count, panels, degree) @ begun, self._loops, self._asked.count)
 
     def _times(self, index: Integers, count: int) -> Array:
         return (self._period / count) * index.astype(np.float64)
@@ -85,14 +89,14 @@ class EvenSampler:
 
 
 @lru_cache(maxsize=32)
-def _even_to_panels(count: int, panels: int, degree: int) -> Array:
-    """Samples at `count` even times of a period -> Chebyshev coefficients on even panels: (panels, degree + 1, count).
+def _even_to_panel(count: int, panels: int, degree: int) -> Array:
+    """Samples at `count` even times of a period -> Chebyshev coefficients on the first of even panels.
 
-    Through the Fourier series, whose highest term is halved (count even).
+    (degree + 1, count). Through the Fourier series, whose highest term is halved (count even).
     """
     if count == 1:
-        return np.ones((1, 1, 1))
-    phase = (2.0 * np.pi / panels) * (np.arange(panels)[:, None] + 0.5 + 0.5 * unit_nodes(degree)).ravel()
+        return np.ones((1, 1))
+    phase = (2.0 * np.pi / panels) * (0.5 + 0.5 * unit_nodes(degree))
     angle = phase[:, None] - 2.0 * np.pi / count * np.arange(count)
     half = count // 2
     # The periodic sinc, sum of cos(k angle) for |k| < half plus half the last term.
@@ -100,4 +104,4 @@ def _even_to_panels(count: int, panels: int, degree: int) -> Array:
     for k in range(1, half):
         kernel += 2.0 * np.cos(k * angle)
     kernel = (kernel + np.cos(half * angle)) / count
-    return values_to_coefficients(degree) @ kernel.reshape(panels, degree + 1, count)
+    return values_to_coefficients(degree) @ kernel

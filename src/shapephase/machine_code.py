@@ -11,6 +11,7 @@ import os
 import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 import warnings
 from pathlib import Path
@@ -65,44 +66,78 @@ def compile_functions(functions: list[Any]) -> list[Path]:
     CompilerError
         If there is no C compiler (`cc`, or what $CC names), it fails, or its code gives other numbers.
     """
-    words = os.environ.get("CC", "cc").split() or ["cc"]
-    if shutil.which(words[0]) is None:
+    compiler = os.environ.get("CC", "cc").split() or ["cc"]
+    if shutil.which(compiler[0]) is None:
         raise CompilerError(
-            f"there is no C compiler {words[0]!r} on this machine; install one (gcc or clang), or name it in $CC. "
+            f"there is no C compiler {compiler[0]!r} on this machine; install one (gcc or clang), or name it in $CC. "
             "Everything works without it"
         )
     folder = code_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as workshop:
-            return [_compiled(function, words, Path(workshop)) for function in functions]
+            for function in functions:
+                _compile(function, compiler, Path(workshop))
+            _try_all(compiler, workshop)
+            return [_kept(function, Path(workshop)) for function in functions]
     except OSError as error:
         raise CompilerError(f"{folder}: cannot be written to ({error}); $XDG_CACHE_HOME names another place") from error
 
 
-def _compiled(function: Any, compiler: list[str], workshop: Path) -> Path:
-    """One function compiled, tried and put in its place."""
-    import casadi
-
-    source = _source(function)
-    written, made = workshop / f"{function.name()}.c", workshop / f"{function.name()}.so"
-    written.write_text(source)
-    command = [*compiler, *_OPTIONS, str(written), "-o", str(made), "-lm"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
-    except subprocess.TimeoutExpired:
-        raise CompilerError(f"the compiler {compiler[0]} took more than {_PATIENCE:g} s; $CC names another") from None
+def _compile(function: Any, compiler: list[str], workshop: Path) -> None:
+    """One function compiled, and kept as it is beside that."""
+    source, made = workshop / f"{function.name()}.c", workshop / f"{function.name()}.so"
+    source.write_text(_source(function))
+    function.save(str(workshop / f"{function.name()}.casadi"))
+    done = _ran([*compiler, *_OPTIONS, str(source), "-o", str(made), "-lm"], compiler)
     if done.returncode:
         raise CompilerError(f"the compiler {compiler[0]} failed: {done.stderr.strip()[-500:] or 'it says nothing'}")
-    twin = casadi.external(function.name(), str(made))
+
+
+def _try_all(compiler: list[str], workshop: str) -> None:
+    """In a process of its own: code for "fast" mathematics changes how all of its process computes, once loaded."""
+    trial = "import sys; from shapephase.machine_code import same_numbers; sys.exit(not same_numbers(sys.argv[1]))"
+    done = _ran([sys.executable, "-c", trial, workshop], compiler)
+    if done.returncode:
+        said = f" ({done.stderr.strip().splitlines()[-1][-300:]})" if done.stderr.strip() else ""
+        words = " ".join(compiler)
+        raise CompilerError(f"what {words!r} makes of the steps gives other numbers{said}; name another in $CC")
+
+
+def same_numbers(workshop: str) -> bool:
+    """Whether all compiled functions in a folder do the same as the interpreted ones beside them, bit by bit."""
+    import casadi
+
     rng = np.random.default_rng(0)
-    for _ in range(_TRIALS):
-        given = [rng.uniform(-1.0, 1.0, function.size_in(place)) for place in range(function.n_in())]
-        pairs = zip(function.call(given), twin.call(given), strict=True)
-        if not all(np.array_equal(np.array(a), np.array(b), equal_nan=True) for a, b in pairs):
-            raise CompilerError(f"what {compiler[0]} makes of the steps gives other numbers; name another in $CC")
-    library = _library(function.name(), source)
-    write_whole(library, lambda stream: stream.write(made.read_bytes()))
+    for kept in sorted(Path(workshop).glob("*.casadi")):
+        function = casadi.Function.load(str(kept))
+        trials = [
+            [rng.uniform(-1.0, 1.0, function.size_in(place)) for place in range(function.n_in())]
+            for _ in range(_TRIALS)
+        ]
+        wanted = [function.call(given) for given in trials]
+        twin = casadi.external(function.name(), str(kept.with_suffix(".so")))
+        for given, numbers in zip(trials, wanted, strict=True):
+            pairs = zip(numbers, twin.call(given), strict=True)
+            if not all(np.array_equal(np.array(a), np.array(b), equal_nan=True) for a, b in pairs):
+                return False
+    smallest = np.array([5e-324])
+    return bool((smallest * 1.0)[0] > 0.0)
+
+
+def _ran(command: list[str], compiler: list[str]) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        raise CompilerError(
+            f"compiling with {compiler[0]} took more than {_PATIENCE:g} s; $CC names another compiler"
+        ) from None
+
+
+def _kept(function: Any, workshop: Path) -> Path:
+    """What was compiled, in its place."""
+    library = _library(function.name(), _source(function))
+    write_whole(library, lambda stream: stream.write((workshop / f"{function.name()}.so").read_bytes()))
     return library
 
 

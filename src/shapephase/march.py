@@ -25,6 +25,7 @@ from .rotation_step import (
 BLOCK = 256
 FEW = 24
 _ROWS_AT_ONCE = 2048
+_NO_GROWTH = np.eye(3)
 # The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
 _INNER = (5, 8)
 
@@ -72,7 +73,7 @@ def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, wit
     )
     march.quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0]
     march.directions[:, 0] = directions
-    march.growth[:, :1] = np.eye(3)
+    march.growth[:, :1] = _NO_GROWTH
     if len(sizes) <= FEW:
         for row, size in enumerate(sizes):
             _march_one(march, row, float(size), channels, loops)
@@ -121,8 +122,9 @@ def _repeated(quaternions: Array, loops: int) -> Array:
 
 def _march_one(march: March, row: int, size: float, channels: Array, loops: int) -> None:
     count, with_growth = len(channels), bool(march.growth.shape[1])
-    state = np.concatenate([march.directions[row, 0], [0.0, 0.0, 0.0, 1.0, size], np.eye(3).ravel()])
-    state = state if with_growth else state[:8]
+    state = np.zeros(17 if with_growth else 8)
+    state[:3], state[6], state[7] = march.directions[row, 0], 1.0, size
+    state[8::4] = 1.0
     done = 0
     for _ in range(loops):
         for first in range(0, count, BLOCK):

@@ -23,6 +23,8 @@ from .shape_path import times_argument
 from .sources import RigidSource
 from .stepping import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
 
+_IDENTITY = np.eye(3)
+_IDENTITY.flags.writeable = False
 METHODS = ("auto", "collocation", "closed_form", "dop853")
 _COLUMNS = (
     "time",
@@ -420,7 +422,7 @@ def _stepped(motion: Motion) -> SteppedRotation:
 def _broadcast(momentum: ArrayLike, attitude: ArrayLike | None) -> tuple[Array, Array]:
     spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
     if attitude is None:
-        return spatial, np.zeros((*spatial.shape[:-1], 3, 3)) + np.eye(3)
+        return spatial, np.broadcast_to(_IDENTITY, (*spatial.shape[:-1], 3, 3)) if spatial.ndim > 1 else _IDENTITY
     start = so3.rotation_argument(attitude, "attitude")
     try:
         batch = np.broadcast_shapes(spatial.shape[:-1], start.shape[:-2])

@@ -93,7 +93,7 @@ class SteppedRotation:
     @cached_property
     def rounding_error(self) -> Array:
         """What rounding alone contributes: (B,) [rad]."""
-        chords = np.diff(self.quaternions, axis=1)
+        chords = self.quaternions[:, 1:] - self.quaternions[:, :-1]
         turned_by = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords)).sum(axis=1)
         # The rate of turning itself is known to a few units of rounding only, which is felt as the body turns on.
         committed = 8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + turned_by
@@ -324,6 +324,8 @@ def _run(
 def _directions(momentum: Array, sizes: Array) -> Array:
     """Pi/|Pi|; of a motion without momentum among others with it any direction shows the rotation."""
     moving = sizes > 0.0
+    if moving.all():
+        return momentum / sizes[:, None]
     return np.where(moving[:, None], momentum, [0.0, 0.0, 1.0]) / np.where(moving, sizes, 1.0)[:, None]
 
 
