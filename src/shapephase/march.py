@@ -78,8 +78,9 @@ def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, wit
         for row, size in enumerate(sizes):
             _march_one(march, row, float(size), channels, loops)
         return march
+    together = _march_many_compiled if _is_compiled(with_growth) else _march_many
     for first in range(0, len(sizes), _ROWS_AT_ONCE):
-        _march_many(march, slice(first, first + _ROWS_AT_ONCE), sizes, channels, loops)
+        together(march, slice(first, first + _ROWS_AT_ONCE), sizes, channels, loops)
     return march
 
 
@@ -165,6 +166,21 @@ def _march_many(march: March, rows: slice, sizes: Array, channels: Array, loops:
         direction = end
 
 
+def _march_many_compiled(march: March, rows: slice, sizes: Array, channels: Array, loops: int) -> None:
+    count, with_growth = len(sizes[rows]), bool(march.growth.shape[1])
+    state = np.zeros((count, 17 if with_growth else 8))
+    state[:, :3], state[:, 6], state[:, 7] = march.directions[rows, 0], 1.0, sizes[rows]
+    state[:, 8::4] = 1.0
+    function = _many_function(count, with_growth)
+    for number in range(loops * len(channels)):
+        state, sides = called(function, count, state, channels[number % len(channels)])
+        march.directions[rows, number + 1] = state[:, :3]
+        march.quaternions[rows, number + 1] = state[:, 3:7]
+        if with_growth:
+            march.growth[rows, number + 1] = state[:, 8:].reshape(-1, 3, 3)
+        march.turns[rows, number], march.dynamics[rows, number], march.errors[rows, number] = sides.T
+
+
 def adjugate_of(matrix: Any) -> list[list[Any]]:
     """Of a 3 x 3 matrix of numbers, arrays or symbols."""
     (a, b, c), (d, e, f), (g, h, i) = matrix
@@ -202,6 +218,19 @@ def matrix_product(a: Any, b: Any) -> list[list[Any]]:
 def _momentum_function(length: int, with_growth: bool) -> Any:
     """`length` steps as one CasADi function of the state (direction, quaternion, size, growth) and the channels."""
     return in_machine_code(momentum_step_function(with_growth)).mapaccum("steps", length)
+
+
+@lru_cache(maxsize=2)
+def _is_compiled(with_growth: bool) -> bool:
+    """Whether steps are machine code: only then are those of many sooner done one by one than on whole arrays."""
+    function = momentum_step_function(with_growth)
+    return in_machine_code(function) is not function
+
+
+@lru_cache(maxsize=16)
+def _many_function(count: int, with_growth: bool) -> Any:
+    """One step of many states as one CasADi function, for machine code."""
+    return in_machine_code(momentum_step_function(with_growth)).map("many", "serial", count, [1], [])
 
 
 @lru_cache(maxsize=512)
@@ -244,5 +273,5 @@ def rest_step_function() -> Any:
 
 def forget_functions() -> None:
     """Build the functions anew when next needed."""
-    _momentum_function.cache_clear()
-    _rest_function.cache_clear()
+    for kept in (_momentum_function, _rest_function, _many_function, _is_compiled):
+        kept.cache_clear()

@@ -13,7 +13,8 @@ def compile_steps() -> list[Path]:
     """Compile the innermost loops of `reconstruct` with this machine's C compiler, once and for all.
 
     They are kept in $XDG_CACHE_HOME/shapephase (or ~/.cache/shapephase), where this and every later session finds
-    them; deleting the folder undoes it. Results stay the same to the last bit.
+    them; deleting the folder undoes it. Results stay the same to the last bit; of more than 24 momenta at once, to
+    rounding.
 
     Returns
     -------
