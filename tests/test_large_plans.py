@@ -23,7 +23,7 @@ SKEW = so3.exp(np.array([0.9, 0.5, -0.3]))
 LARGE = {
     "cat rate": ("cat", np.radians(60.0) * X, "rate", {}),
     "cat kinetic": ("cat", np.radians(8.0) * X, "kinetic", {}),
-    "satellite": ("satellite", np.radians(10.0) * Z, "rate", {"joint_limits": False}),
+    "satellite": ("satellite", np.radians(5.0) * Y, "rate", {"joint_limits": False}),
     "astronaut": ("astronaut", np.radians(60.0) * Z, "rate", {"joint_limits": False}),
     "human": ("example:human", np.radians(60.0) * X, "rate", {"joint_limits": False}),
 }
@@ -62,15 +62,15 @@ def varied(motion, wave, size):
     return sp.ShapePath.function(curve, motion.duration, breaks=np.linspace(0.0, motion.duration, 17)[1:-1])
 
 
-def slopes(motion, target, wave, cost, size=1e-3):
+def slopes(motion, target, wave, cost, size=3e-4):
     """First and second derivative along a variation of the cost and of the turn (inertial axes), by differences."""
     values = []
-    for step in size * np.arange(-2, 3):
+    for step in (-size, 0.0, size):
         path = varied(motion, wave, step)
         turn = so3.log(sp.holonomy(motion.body, path, 1e-12) @ target.T)
         values.append([path_cost(motion.body, path, cost), *turn])
-    a, b, c, d, e = np.array(values)
-    return (a - 8.0 * b + 8.0 * d - e) / (12.0 * size), (-a + 16.0 * b - 30.0 * c + 16.0 * d - e) / (12.0 * size**2)
+    before, here, after = np.array(values)
+    return (after - before) / (2.0 * size), (after - 2.0 * here + before) / size**2
 
 
 def check_multipliers(motion, target, cost, rng):
@@ -82,7 +82,7 @@ def check_multipliers(motion, target, cost, rng):
     waves = [wave(rng, n, motion.duration) for _ in range(4)]
     firsts = np.array([slopes(motion, target, one, cost)[0] for one in waves])
     size = np.linalg.norm(motion.charge) * np.abs(firsts[:, 1:]).max()
-    assert_allclose(firsts[:, 0], firsts[:, 1:] @ motion.charge, rtol=0, atol=1e-7 * size)
+    assert_allclose(firsts[:, 0], firsts[:, 1:] @ motion.charge, rtol=0, atol=1e-6 * size)
     mix = np.linalg.svd(firsts[:, 1:].T)[2][-1]
 
     def kept(times):
@@ -113,7 +113,8 @@ def test_from_a_coarse_plan_to_its_extremal(two_halves, skew):
     assert motion.cost == pytest.approx(path_cost(two_halves, motion.path), rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(1, marks=pytest.mark.full)])
+@pytest.mark.full
+@pytest.mark.parametrize("seed", [1, 3])
 def test_back_from_a_path_beside_it(two_halves, skew, seed):
     """The path runs beside the extremal by a wave, its rate by a good part of itself."""
     _, motion = skew
@@ -170,7 +171,7 @@ def test_more_pieces_obey_wongs_equations_to_the_fourth_digit():
 
 @pytest.mark.full
 def test_an_extremal_of_light_joints_that_whirl():
-    """In the kinetic metric the astronaut's shoulders and ankles go far for little; on one piece shooting fails."""
+    """In the kinetic metric the astronaut's shoulders and ankles go far for little: whole steps lead astray."""
     body, target = sp.load_body("astronaut"), so3.exp(np.radians(5.0) * Y)
     plan = plan_reorientation(body, target, joint_limits=False, pieces=20)
     motion = shoot(body, plan.path, target)

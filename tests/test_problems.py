@@ -15,7 +15,7 @@ import shapephase as sp
 from conftest import joint, link, urdf
 from independent import apart, mujoco_motion, pinocchio_motion
 from shapephase import so3
-from shapephase.errors import PlanNotFound, ShapeError, UnknownNameError
+from shapephase.errors import AccuracyNotReached, PlanNotFound, ShapeError, UnknownNameError
 from shapephase.optimal_control.extremals import wong_residual
 from shapephase.optimal_control.jacobi_fields import conjugate_times, shoot
 from shapephase.optimal_control.problems import path_cost, plan_reorientation
@@ -341,6 +341,31 @@ def test_nothing_to_turn_costs_nothing():
 def test_options_that_make_no_sense(options, error, match):
     with pytest.raises(error, match=match):
         plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, **options)
+
+
+def test_the_cost_of_a_wavy_path_without_breaks():
+    body = sp.load_body("cat_two_halves")
+    names = body.joint_names
+    pace = 2.0 * np.pi * 40.0
+
+    def curve(times):
+        turn = pace * times[:, None]
+        return 0.01 * np.sin(turn) * [1.0, 2.0, 0.0], 0.01 * pace * np.cos(turn) * [1.0, 2.0, 0.0]
+
+    path = sp.ShapePath.function(curve, 1.0, joint_names=names)
+    assert path_cost(body, path, "rate") == pytest.approx(0.25 * (0.01 * pace) ** 2 * 5.0, rel=1e-12)
+
+
+def test_the_cost_of_an_undeclared_jump_is_refused():
+    body = sp.load_body("cat_two_halves")
+
+    def curve(times):
+        late = np.maximum(times - 1.0 / 3.0, 0.0)
+        along = np.array([1.0, 0.0, 0.0])
+        return (times - 0.7 * late)[:, None] * along, np.where(late > 0.0, 0.3, 1.0)[:, None] * along
+
+    with pytest.raises(AccuracyNotReached, match="breaks"):
+        path_cost(body, sp.ShapePath.function(curve, 1.0, joint_names=body.joint_names), "rate")
 
 
 def test_the_cost_of_another_kind_is_refused():

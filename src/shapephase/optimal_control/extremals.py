@@ -28,7 +28,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PIECES = (2, 4, 8, 16, 32, 64)
 _LEAST_METRIC = 1e-12
 _MOST = 200_000
-_SETTLED = 1e-10
+_SETTLED = 1e-9
 _LEAST_FELT = 1e-9
 
 _COSTS = ("kinetic", "rate")
@@ -276,22 +276,29 @@ def natural_sizes(body: Body, equations: Hamiltonian, shape: Array, rate: Array,
     return momenta, max(float(np.linalg.norm(charge)), float(momenta.max()) / felt if felt else 0.0) or 1.0
 
 
-def integrated(field: Callable[[Array], Array], span: float, state: Array, goal: float, size: Array) -> Any:
-    """Solution with steps of relative accuracy `goal`, and a polynomial for each. Raises AccuracyNotReached."""
-    count = 0
+def integrated(
+    field: Callable[[Array], Array], span: float, state: Array, goal: float, size: Array, most: int | None = None
+) -> Any:
+    """Solution with steps of relative accuracy `goal`, and a polynomial for each.
+
+    Raises AccuracyNotReached, also after more evaluations than `most`.
+    """
+    count, limit = 0, _MOST if most is None else most
 
     def counted(time: float, now: Array) -> Array:
         nonlocal count
         count += 1
-        if count > _MOST:
+        if count > limit:
             raise AccuracyNotReached(
-                f"the extremal is at {time:.6g} s of {span:.6g} s after {_MOST} evaluations: its charge turns it too "
+                f"the extremal is at {time:.6g} s of {span:.6g} s after {limit} evaluations: its charge turns it too "
                 "fast, or it passes too near a shape in which a motion of the joints has no kinetic energy; take less "
                 "charge or a shorter motion, or loosen the tolerance"
             )
         return field(now)
 
-    answer = solve_ivp(counted, (0.0, span), state, method="DOP853", rtol=goal, atol=goal * size, dense_output=True)
+    # What overflows is rejected with its step.
+    with np.errstate(over="ignore", invalid="ignore"):
+        answer = solve_ivp(counted, (0.0, span), state, method="DOP853", rtol=goal, atol=goal * size, dense_output=True)
     if answer.status != 0:
         raise AccuracyNotReached(
             f"the extremal breaks down at {answer.t[-1]:.6g} s of {span:.6g} s ({answer.message}): a shape lies ahead "

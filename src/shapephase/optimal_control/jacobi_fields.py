@@ -28,6 +28,13 @@ from .extremals import (
 )
 
 _STEPS = 40
+# First to here by steps this accurate, which takes a fraction of the time.
+_NEAR, _ROUGH = 1e-6, 1e-8
+_DAMPING, _HOPELESS = 1e-5, 1e5
+_SYMMETRY = 10.0
+_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
+# A trial that takes more evaluations than this has gone astray.
+_MOST = 20_000
 _NOTHING = 1e-9
 _ZERO = 1e-6
 _SCAN = 600
@@ -216,9 +223,9 @@ def shoot(
 ) -> Extremal:
     """The extremal next to a nearly optimal path, with its start and end and the rotation asked for.
 
-    Newton's method on the initial rate and the charge. Where a symmetry of the body turns one solution into others the
-    derivative is singular, and the damping, which falls with the residual, leads to a nearest solution all the same
-    (Yamashita and Fukushima 2001: quadratically).
+    Newton's method on the initial rate and the charge, with steps shortened until the end comes nearer. Where a
+    symmetry of the body turns one solution into others the derivative is singular, and the damping, which falls with
+    the residual, leads to a nearest solution all the same (Yamashita and Fukushima 2001: quadratically).
 
     Parameters
     ----------
@@ -230,7 +237,8 @@ def shoot(
     Raises
     ------
     AccuracyNotReached
-        If it does not converge: the message holds what is left.
+        If it does not converge: the message holds what is left. Plans of bodies of up to 36 joints are near enough
+        from 20 pieces on, where light joints do not whirl.
     As `extremal` and `wong_residual`.
     """
     route = path.matched(body.joint_names, body.name)
@@ -245,38 +253,64 @@ def shoot(
     equations = hamiltonian(body, metric)
     tensor = np.array(equations.metric(start))
 
-    def shot(speed: Array, moment: Array) -> tuple[Array, Array]:
-        """What is missing at the end, and its derivative by the change of speed and charge."""
-        fields = jacobi_fields(body, metric, start, speed, moment, route.duration, fine)
-        shape, attitude, matrix = fields.end()
-        per = np.concatenate([fields.momentum_sizes, np.full(3, fields.charge_size)])
-        return np.concatenate([shape - end, so3.log(attitude @ turned.T)]), matrix / per
+    def slopes(speed: Array, moment: Array, accuracy: float) -> Array:
+        fields = jacobi_fields(body, metric, start, speed, moment, route.duration, accuracy)
+        return fields.end()[2] / np.concatenate([fields.momentum_sizes, np.full(3, fields.charge_size)])
 
-    gap, matrix = shot(rate, charge)
-    damping = 1e-2
-    for _ in range(_STEPS):
-        if np.linalg.norm(gap) <= goal:
-            return extremal(body, start, rate, charge, route.duration, metric=metric, tolerance=fine)
+    def missing(speed: Array, moment: Array, accuracy: float, most: int | None = None) -> Array:
+        state = initial_state(equations, start, speed, moment)
+        momenta, _ = natural_sizes(body, equations, start, speed, moment)
+        size = np.concatenate([np.ones(n), momenta, np.ones(4)])
+
+        def field(now: Array) -> Array:
+            return called(equations.field, 1, now, moment)[0][0]
+
+        last = integrated(field, route.duration, state, accuracy, size, most).y[:, -1]
+        attitude = so3.matrix_from_quat(so3.normalised(last[2 * n :]))
+        return np.concatenate([last[:n] - end, so3.log(attitude @ turned.T)])
+
+    def stepped(accuracy: float, damping: float) -> tuple[Array, Array, float] | None:
+        """Rate and charge from which the end is nearer, and the next damping; None if there are none."""
+        matrix = slopes(rate, charge, accuracy)
         momenta, of_charge = natural_sizes(body, equations, start, rate, charge)
         sizes = np.concatenate([momenta, np.full(3, of_charge)])
         scaled = matrix * sizes
         weights = np.repeat([_inverse_size(scaled[:n]), _inverse_size(scaled[n:])], [n, 3])
         left, right = weights[:, None] * scaled, weights * gap
-        normal = left.T @ left + damping * np.linalg.norm(right) * np.eye(n + 3)
-        step = -sizes * np.linalg.solve(normal, left.T @ right)
-        trial = rate + np.linalg.solve(tensor, step[:n]), charge + step[n:]
-        try:
-            next_gap, next_matrix = shot(*trial)
-        except AccuracyNotReached:
-            next_gap = np.full(n + 3, np.inf)
-            next_matrix = matrix
-        if np.linalg.norm(weights * next_gap) < np.linalg.norm(right):
-            (rate, charge), gap, matrix, damping = trial, next_gap, next_matrix, damping / 4.0
-        else:
-            damping *= 8.0
+        across, values, along = np.linalg.svd(left)
+        # The rest are symmetries, as far as the integration can tell: along them the extremal stays where the path is.
+        telling = values > _SYMMETRY * accuracy * values[0]
+        across, values, along = across[:, telling], values[telling], along[telling]
+        while damping < _HOPELESS:
+            share = values / (values**2 + damping * np.linalg.norm(right))
+            step = -sizes * (along.T @ (share * (across.T @ right)))
+            for share in _SHARES:
+                trial = rate + share * np.linalg.solve(tensor, step[:n]), charge + share * step[n:]
+                try:
+                    after = missing(*trial, accuracy, _MOST)
+                except AccuracyNotReached:
+                    continue
+                if np.linalg.norm(weights * after) < (1.0 - 0.1 * share) * np.linalg.norm(right):
+                    return *trial, damping / 4.0
+            damping *= 64.0
+        return None
+
+    gap = np.full(n + 3, np.inf)
+    for reach, accuracy in ((max(goal, _NEAR), max(fine, _ROUGH)), (goal, fine)):
+        damping = _DAMPING
+        for _ in range(_STEPS):
+            gap = missing(rate, charge, accuracy)
+            if np.linalg.norm(gap) <= reach:
+                break
+            better = stepped(accuracy, damping)
+            if better is None:
+                break
+            rate, charge, damping = better
+    if np.linalg.norm(gap) <= goal:
+        return extremal(body, start, rate, charge, route.duration, metric=metric, tolerance=fine)
     raise AccuracyNotReached(
-        f"no extremal found next to the path: after {_STEPS} steps the end is {np.linalg.norm(gap):.3g} away, "
-        f"{goal:.3g} was asked; start from a path nearer to the optimum (its wong_residual should be small)"
+        f"no extremal found next to the path: the end is {np.linalg.norm(gap):.3g} away, {goal:.3g} was asked; start "
+        "from a path nearer to the optimum (its wong_residual should be small; that of a plan falls with its pieces)"
     )
 
 

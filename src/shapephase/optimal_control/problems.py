@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..body import Body
 from ..connection import mechanical_connection
-from ..errors import PlanNotFound, ShapeError, ShapePhaseError, unknown_name
+from ..errors import AccuracyNotReached, PlanNotFound, ShapeError, ShapePhaseError, unknown_name
 from ..shape_path import ShapePath
 from .guesses import PLACES, Guess, guess_of, guesses
 from .plan import Plan, Progress, Start
@@ -34,6 +34,7 @@ _SLACK = 1e-7
 # Windings of the same attitude differ by half a turn or more.
 _WINDING = 0.1
 _COARSE, _SCOUTS, _SCOUTING = 10, 8, 60
+_PARTS, _SETTLED = (4, 8, 16, 32, 64, 128), 1e-10
 
 
 class _Watched:
@@ -296,18 +297,35 @@ def _within_limits(task: Reorientation, basis: SplineBasis, plan: Plan) -> bool:
 def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     """The cost "kinetic" or "rate" of a path, as `plan_reorientation` counts it, with the body's own matrices.
 
-    By Gauss with twelve nodes between the path's breaks, each divided by four.
+    By Gauss with twelve nodes between the path's breaks, each divided by four, and again by two until the cost stays
+    the same to 1e-10 of it.
 
     Raises
     ------
     UnknownNameError, TrajectoryError
         For another cost, or a path of other joints.
+    AccuracyNotReached
+        If the cost does not settle: the path has jumps that are not declared as breaks.
     """
     if cost not in ("kinetic", "rate"):
         raise unknown_name("cost of a path", cost, ("kinetic", "rate"))
     route = path.matched(body.joint_names, body.name)
+    before = _integral(body, route, cost, 2)
+    for parts in _PARTS:
+        now = _integral(body, route, cost, parts)
+        if abs(now - before) <= _SETTLED * abs(now):
+            return now
+        before = now
+    raise AccuracyNotReached(
+        f"the cost of the path of {body.name} does not settle on {_PARTS[-1]} parts between its breaks (last at "
+        f"{before:.9g}); declare the times of its jumps as breaks"
+    )
+
+
+def _integral(body: Body, route: ShapePath, cost: str, parts: int) -> float:
+    """Of the cost's density, with so many parts between breaks."""
     inside, weights, _ = gauss_tableau(12)
-    ends = np.concatenate([np.linspace(a, b, 5)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
+    ends = np.concatenate([np.linspace(a, b, parts + 1)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
     steps = np.diff(ends)
     shapes, rates = route.curve((ends[:-1, None] + steps[:, None] * inside).ravel())
     if cost == "rate":
