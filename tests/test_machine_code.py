@@ -89,7 +89,9 @@ def test_a_compiler_that_computes_otherwise_is_refused(folder, monkeypatch, opti
     assert np.array([5e-324])[0] * 1.0 > 0.0
 
 
-@pytest.mark.parametrize(("compiler", "words"), [("no_such_compiler", "there is no C compiler"), ("false", "failed")])
+@pytest.mark.parametrize(
+    ("compiler", "words"), [("no_such_compiler", "there is no C compiler"), ("false", "the compiler false failed")]
+)
 def test_without_a_compiler_that_works_it_is_said(folder, monkeypatch, compiler, words, capsys):
     monkeypatch.setenv("CC", compiler)
     with pytest.raises(SystemExit) as ended:
@@ -98,6 +100,7 @@ def test_without_a_compiler_that_works_it_is_said(folder, monkeypatch, compiler,
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+    assert "no place" not in said
     assert not folder.exists() or list(folder.iterdir()) == []
 
 
@@ -105,6 +108,25 @@ def test_a_folder_that_cannot_be_written_to(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("not a folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(CompilerError, match="cannot be written to"):
+        sp.compile_steps()
+
+
+def test_a_place_that_cannot_be_looked_at_is_no_obstacle(monkeypatch):
+    def refuse(*_, **__):
+        raise PermissionError
+
+    monkeypatch.setattr(machine_code.Path, "is_dir", refuse)
+    assert not is_compiled()
+
+
+def test_without_a_home_nothing_is_kept(monkeypatch):
+    def nowhere():
+        raise RuntimeError("nobody is at home")
+
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative/is/ignored")
+    monkeypatch.setattr(machine_code.Path, "home", nowhere)
+    assert not is_compiled()
+    with pytest.raises(CompilerError, match="XDG_CACHE_HOME"):
         sp.compile_steps()
 
 

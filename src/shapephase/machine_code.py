@@ -33,19 +33,27 @@ class MachineCodeWarning(UserWarning):
 
 
 def code_folder() -> Path:
-    """Where compiled functions are kept: $XDG_CACHE_HOME/shapephase, or ~/.cache/shapephase."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "shapephase"
+    """Where compiled functions are kept: $XDG_CACHE_HOME/shapephase, or ~/.cache/shapephase.
+
+    Raises RuntimeError where nobody is at home.
+    """
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # A relative path is to be ignored: XDG Base Directory Specification.
+    return (named if named.is_absolute() else Path.home() / ".cache") / "shapephase"
 
 
 def in_machine_code(function: Any) -> Any:
     """The compiled twin of a CasADi function if there is one in `code_folder`, else the function itself."""
     import casadi
 
-    if not code_folder().is_dir():
-        return function
-    library = _library(function.name(), _source(function))
-    # In a folder that others may write to, their code is not ours to run.
-    if not library.is_file() or library.stat().st_uid not in (0, os.getuid()):
+    try:
+        if not code_folder().is_dir():
+            return function
+        library = _library(function.name(), _source(function))
+        # In a folder that others may write to, their code is not ours to run.
+        if not library.is_file() or library.stat().st_uid not in (0, os.getuid()):
+            return function
+    except (OSError, RuntimeError):
         return function
     try:
         return casadi.external(function.name(), str(library))
@@ -72,7 +80,10 @@ def compile_functions(functions: list[Any]) -> list[Path]:
             f"there is no C compiler {compiler[0]!r} on this machine; install one (gcc or clang), or name it in $CC. "
             "Everything works without it"
         )
-    folder = code_folder()
+    try:
+        folder = code_folder()
+    except RuntimeError as error:
+        raise CompilerError(f"no place to keep what is compiled ({error}); name one in $XDG_CACHE_HOME") from error
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as workshop:
