@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 import shapephase as sp
 from conftest import joint, link, urdf
-from independent import apart, mujoco_motion, pinocchio_motion
+from independent import apart, pinocchio_motion
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, PlanNotFound, ShapeError, UnknownNameError
 from shapephase.optimal_control.extremals import wong_residual
@@ -233,45 +232,6 @@ def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
     start = fitted.x[:2]
     energy = 0.5 * start @ metric(plan.path.shape(0.0)).full() @ start
     assert plan.cost == pytest.approx(energy * period, rel=1e-6)
-
-
-class _AsSplined:
-    """A plan's path as MuJoCo's integration wants it: one time after another, with accelerations."""
-
-    def __init__(self, path):
-        self.duration = path.duration
-        self._spline = CubicSpline(path.breaks, path.shape(path.breaks))
-
-    def shape(self, t):
-        return self._spline(min(t, self.duration))
-
-    def rate(self, t):
-        return self._spline(min(t, self.duration), 1)
-
-    def acceleration(self, t):
-        return self._spline(min(t, self.duration), 2)
-
-
-@pytest.mark.full
-def test_a_somersault_with_a_full_twist():
-    """The diver leaves upright with both arms up and moves nothing but them; MuJoCo turns it just so."""
-    body = sp.load_body("diver")
-    momentum = [0.0, 37.6, 0.0]
-    plan = plan_reorientation(
-        body, momentum=momentum, duration=1.5, somersaults=1, half_twists=2, end="free", cost="rate", pieces=20
-    )
-    assert plan.miss < 1e-8
-    times = np.linspace(0.0, 1.5, 401)
-    truth = mujoco_motion("diver", body.joint_names, _AsSplined(plan.path), momentum, None, times).attitude
-    assert apart(truth, plan.motion.attitude(times)) < 1e-6
-    assert apart(truth[-1], np.eye(3)) < 1e-6
-    # Counted by hand: the body's long axis goes once round the momentum, and its side once round the long axis.
-    nose, side = truth[:, :, 2], truth[:, :, 1]
-    around = np.unwrap(np.arctan2(nose[:, 0], nose[:, 2]))
-    assert around[-1] - around[0] == pytest.approx(2.0 * np.pi, abs=1e-5)
-    level = so3.normalised(np.cross(np.array([0.0, 1.0, 0.0]), nose))
-    turned = np.unwrap(np.arctan2(np.sum(-side * level, axis=1), np.sum(side * np.cross(nose, level), axis=1)))
-    assert abs(turned[-1] - turned[0]) == pytest.approx(2.0 * np.pi, abs=1e-5)
 
 
 @pytest.mark.parametrize(
