@@ -49,11 +49,13 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("no_such_cat", "--rotate", 90), 2, "no_such_cat"),
     ],
 )
-def test_what_cannot_be_planned_is_refused_in_one_line(arguments, code, words):
-    failed = ran(*arguments)
-    assert failed.returncode == code
-    assert words in failed.stderr
-    assert failed.stderr.count("\n") == 1
+def test_what_cannot_be_planned_is_refused_in_one_line(arguments, code, words, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", *map(str, arguments)])
+    assert ended.value.code == code
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):

@@ -47,7 +47,7 @@ def sizes_in(target: Path, kind: str) -> float:
     return float(np.round(rows["hinge"][0] - 0.1, 9))
 
 
-@pytest.mark.parametrize("kind", ["save", "csv", "path"])
+@pytest.mark.parametrize("kind", ["save", *(pytest.param(kind, marks=pytest.mark.full) for kind in ("csv", "path"))])
 def test_a_killed_writer_leaves_a_whole_file(kind: str, tmp_path: Path):
     target = tmp_path / ("motion.npz" if kind == "save" else "motion.csv")
     rng = np.random.default_rng(3)
