@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase import compiled, growth, machine_code, march
+from shapephase import machine_code, march
 from shapephase.cli import main
 from shapephase.errors import CompilerError
 from shapephase.scenarios import MOTIONS
+from shapephase.step_code import forget_functions
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler on this machine")
 
@@ -23,17 +24,13 @@ def folder(tmp_path, monkeypatch):
     """An empty place for compiled functions; nothing compiled is left in this process."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("CC", raising=False)
-    forget()
+    forget_functions()
     yield tmp_path / "shapephase"
-    forget()
-
-
-def forget():
-    for module in (compiled, march, growth):
-        module.forget_functions()
+    forget_functions()
 
 
 def is_compiled():
+    forget_functions()
     return machine_code.in_machine_code(march.rest_step_function()).class_name() == "External"
 
 

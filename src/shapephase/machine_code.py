@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import warnings
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,12 @@ def code_folder() -> Path:
     return (named if named.is_absolute() else Path.home() / ".cache") / "shapephase"
 
 
+@lru_cache(maxsize=64)
 def in_machine_code(function: Any) -> Any:
-    """The compiled twin of a CasADi function if there is one in `code_folder`, else the function itself."""
+    """The compiled twin of a CasADi function if there is one in `code_folder`, else the function itself.
+
+    Looked for once.
+    """
     import casadi
 
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from . import compiled, growth, march
-from .machine_code import compile_functions
+from .machine_code import compile_functions, in_machine_code
 from .spectrum import inverted
 
 
@@ -37,6 +37,12 @@ def compile_steps() -> list[Path]:
             compiled.row_function(inverted, 12),
         ]
     )
+    forget_functions()
+    return written
+
+
+def forget_functions() -> None:
+    """Look for compiled functions anew when they are next needed."""
+    in_machine_code.cache_clear()
     for module in (compiled, march, growth):
         module.forget_functions()
-    return written
