@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+
+# The workers share the cores: threads of their own would get in each other's way.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 
