@@ -400,7 +400,6 @@ def test_what_a_watch_raises_comes_through(error):
         plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, pieces=10, watch=watch)
 
 
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="the system has no timers that interrupt")
 @pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])
 def test_ctrl_c_is_not_taken_for_a_failed_search(seconds):
     body = sp.load_body("cat_two_halves")
