@@ -104,7 +104,8 @@ class ReducedProgram:
 
         low, high = (np.broadcast_to(limit, guess.shape)[free] / unit for limit in (task.lower, task.upper))
         constraints: list[dict[str, Any]] = [{"type": "eq", "fun": lambda x: end(x)[0], "jac": lambda x: end(x)[1]}]
-        if np.isfinite(task.rates).any():
+        limited = bool(np.isfinite(task.rates).any())
+        if limited:
             constraints.append(self._within_rates(guess, free, unit, duration))
         followed = Followed(watch)
 
@@ -120,9 +121,10 @@ class ReducedProgram:
 
         def heard(x: Array) -> None:
             residual, missed = left(x)
-            asked = followed.stops(x.copy(), cost(x)[0] * scale, missed)
-            if asked or max(residual, missed) < _SETTLED * tolerance:
-                raise _EnoughError(x, _STOPPED if asked else "conditions of optimality met")
+            here = x.copy()
+            asked = followed.stops(here, cost(x)[0] * scale, missed)
+            if asked or (not limited and max(residual, missed) < _SETTLED * tolerance):
+                raise _EnoughError(here, _STOPPED if asked else "conditions of optimality met")
 
         try:
             found = minimize(

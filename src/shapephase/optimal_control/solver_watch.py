@@ -37,7 +37,8 @@ class Followed:
 
     def stops(self, unknowns: Array, cost: float, infeasibility: float) -> bool:
         """Whether to stop at this iterate."""
-        if (max(infeasibility, _FEASIBLE), cost) < (max(self.infeasibility, _FEASIBLE), self.cost):
+        better = (max(infeasibility, _FEASIBLE), cost) < (max(self.infeasibility, _FEASIBLE), self.cost)
+        if better or not len(self.unknowns):
             self.unknowns, self.cost, self.infeasibility = unknowns, cost, infeasibility
         self.stopped = self._watch is not None and self._watch(self.iterations, cost, infeasibility)
         self.iterations += 1
