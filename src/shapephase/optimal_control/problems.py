@@ -110,8 +110,9 @@ def plan_reorientation(
     starts : local searches from different guesses; the cheapest plan is returned
     method : "collocation", the attitude by Gauss collocation, the whole a sparse program with exact second derivatives
         for IPOPT; or "reduced", the path's coefficients alone, with the exact derivative of the integrator's attitude
-        (no cost "time"). On equal splines both come to the same costs within 1.5 %, of the cat in 16 and 10 s, of the
-        astronaut in 27 and 23 s; the first leaves a KKT residual of 1e-9, the second of 1e-6: the first is the default
+        (no cost "time"). On equal splines both come to the same costs within 1.5 %, of the cat in 14 and 11 s; the
+        first leaves a KKT residual of 1e-9, the second of some 1e-6, and for the astronaut it may want more than 300
+        iterations: the first is the default
     pieces : of the spline, six or more; None: 160 for up to four free joints and the costs
         kinetic and rate, else 40 for up to eight, 20 for more
     iterations : of the solver, for each start
