@@ -49,6 +49,15 @@ def check_reach(array: Array, name: str) -> None:
         raise ShapeError(f"{name}: entry {list(where)} is {array[where]:.6g}; joints go up to {FARTHEST:g} rad, m (/s)")
 
 
+def common_shape(**arrays: Array) -> tuple[int, ...]:
+    """The shape that arguments have together. Raises ShapeError, which names them, if they do not go together."""
+    try:
+        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
+
+
 def real_array(value: Any, name: str, unit: str = "") -> Array:
     """A float64 array in native byte order of any shape. Raises ShapeError for what holds no real numbers."""
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import elliprc, elliprd, elliprf, elliprj
 
-from .arrays import Array, Mask, finite_array
+from .arrays import Array, Mask, common_shape, finite_array
 from .errors import ShapeError
 
 _SMALL_ARGUMENT = 1e-9
@@ -169,11 +169,7 @@ def _arguments(**values: ArrayLike) -> tuple[Array, ...]:
     if "n" in arrays:
         _refuse(arrays["n"] >= 1.0, arrays["n"], "n", "the characteristic must be below 1, else the integral has poles")
         _refuse(arrays["n"] < -_CHARACTERISTIC, arrays["n"], "n", f"the least one taken is -{_CHARACTERISTIC:g}")
-    try:
-        np.broadcast_shapes(*(array.shape for array in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
+    common_shape(**arrays)
     return tuple(arrays.values())
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic
-from ..arrays import Array, finite_array
+from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import moments_argument
 from .serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants
@@ -242,9 +242,5 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
 def _together(**values: ArrayLike) -> list[Array]:
     """Checked arguments, of shapes that go together."""
     arrays = {name: finite_array(value, name) for name, value in values.items()}
-    try:
-        np.broadcast_shapes(*(array.shape for array in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
+    common_shape(**arrays)
     return list(arrays.values())

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, finite_array
+from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import moments_argument
 from .pendulum import rigid_body_pendulum
@@ -128,12 +128,8 @@ def andoyer_pendulum(moments: ArrayLike) -> AndoyerPendulum:
 
 def _variables(magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> tuple[Array, Array, Array]:
     size, y, p_y = (finite_array(v, name) for v, name in ((magnitude, "magnitude"), (y, "y"), (p_y, "p_y")))
-    try:
-        size, y, p_y = np.broadcast_arrays(size, y, p_y)
-    except ValueError:
-        raise ShapeError(
-            f"magnitude {size.shape}, y {y.shape}, p_y {p_y.shape}: the shapes cannot be broadcast together"
-        ) from None
+    common_shape(magnitude=size, y=y, p_y=p_y)
+    size, y, p_y = np.broadcast_arrays(size, y, p_y)
     if np.any(np.abs(p_y) > size):
         where = tuple(int(i) for i in np.argwhere(np.abs(p_y) > size)[0])
         raise ShapeError(f"p_y: entry {list(where)} is {p_y[where]:.9g}, beyond the momentum's size {size[where]:.9g}")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, finite_array
+from ..arrays import Array, common_shape, finite_array
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
 from .momentum_orbit import momentum_orbit
@@ -84,16 +84,10 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
         As `half_twist`.
     """
     inertia = np.sort(_moments(moments), axis=-1)
-    values = (
-        finite_array(magnitude, "magnitude", unit="kg m^2/s"),
-        finite_array(tilt, "tilt", unit="rad"),
-        finite_array(azimuth, "azimuth", unit="rad"),
-    )
-    try:
-        size, lean, towards = np.broadcast_arrays(*values)
-    except ValueError:
-        shapes = ", ".join(str(v.shape) for v in values)
-        raise ShapeError(f"magnitude, tilt, azimuth: shapes {shapes} cannot be broadcast together") from None
+    size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
+    lean, towards = finite_array(tilt, "tilt", unit="rad"), finite_array(azimuth, "azimuth", unit="rad")
+    common_shape(magnitude=size, tilt=lean, azimuth=towards)
+    size, lean, towards = np.broadcast_arrays(size, lean, towards)
     across = size * np.sin(lean)
     momentum = np.stack([across * np.cos(towards), size * np.cos(lean), across * np.sin(towards)], axis=-1)
     return half_twist(inertia, momentum)
@@ -174,8 +168,5 @@ def _moments(moments: ArrayLike) -> Array:
 
 
 def _broadcast(moments: Array, momentum: Array) -> tuple[Array, Array]:
-    try:
-        shape = np.broadcast_shapes(moments.shape, momentum.shape)
-    except ValueError:
-        raise ShapeError(f"moments {moments.shape}, momentum {momentum.shape}: cannot be broadcast together") from None
+    shape = common_shape(moments=moments, momentum=momentum)
     return np.broadcast_to(moments, shape), np.broadcast_to(momentum, shape)

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprf
 
 from .. import elliptic
-from ..arrays import Array, finite_array
+from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import moments_argument
 
@@ -351,8 +351,5 @@ def _root(value: Fraction) -> float:
 
 def _scalars(**values: ArrayLike) -> tuple[Array, ...]:
     arrays = {name: finite_array(value, name) for name, value in values.items()}
-    try:
-        return tuple(np.broadcast_arrays(*arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
+    shape = common_shape(**arrays)
+    return tuple(np.broadcast_to(array, shape) for array in arrays.values())
