@@ -60,6 +60,7 @@ def computed_for_many():
         yield motion.attitude(times)
         yield motion.dynamic_phase(times)
         yield motion.solid_angle(times)
+        yield motion.propagator
 
 
 def test_compiled_steps_give_the_same_bits(folder, capsys):

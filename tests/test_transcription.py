@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi
 import numpy as np
 import pytest
@@ -319,3 +321,19 @@ def test_the_reduced_form_has_no_time_to_choose():
 def test_what_makes_no_sense_is_refused(target, changes, error, match):
     with pytest.raises(error, match=match):
         reorientation(sp.load_body("cat_two_halves"), target, **PLAIN | changes)
+
+
+def test_the_residual_of_the_reduced_method_knows_its_limits():
+    """With limits that bind: none is left of the conditions of optimality, and the other method costs the same."""
+    task, basis = task_of("kinetic"), SplineBasis(12)
+    task = replace(task, lower=np.full(3, -1.0), upper=np.full(3, 1.0))
+    guess = guesses(task, basis, 0, 1)[0]
+    turn = task.turn(guess.motion.final_attitude)
+    found, other = (
+        program.solve(guess.control, task.duration, lambda places: guess.quaternions(places, turn), iterations=300)
+        for program in (ReducedProgram(task, basis), CollocationProgram(task, basis))
+    )
+    assert np.any(np.abs(found.control) > 1.0 - 1e-9)
+    assert found.converged
+    assert found.kkt_residual < 1e-5
+    assert found.cost == pytest.approx(other.cost, rel=1e-3)
