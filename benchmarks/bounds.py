@@ -19,9 +19,9 @@ from collections import defaultdict
 import numpy as np
 from tests.random_deformations import KINDS, random_case
 
-from shapephase.estimates import bounds
-from shapephase.reconstruction import reconstruct
-from shapephase.regimes import regime_certificate
+from shapephase.bounds.all_bounds import bounds
+from shapephase.bounds.regimes import regime_certificate
+from shapephase.reconstruction.reconstruction import reconstruct
 
 COUNT = 450
 

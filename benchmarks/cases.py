@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import shapephase as sp
-from shapephase.scenarios import cat_righting
+from shapephase.examples.scenarios import cat_righting
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,10 @@ from functools import partial
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from shapephase.geodesics.conjugate_locus import conjugate_locus, conjugate_points
-from shapephase.geodesics.ellipsoid import ellipsoid
-from shapephase.geodesics.metric_profile import surface_of_metric
-from shapephase.geodesics.surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
+from shapephase.rigid_body.geodesics.conjugate_locus import conjugate_locus, conjugate_points
+from shapephase.rigid_body.geodesics.ellipsoid import ellipsoid
+from shapephase.rigid_body.geodesics.metric_profile import surface_of_metric
+from shapephase.rigid_body.geodesics.surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 POINTS, RUNS = 400, 3
 ASPECT = 0.6

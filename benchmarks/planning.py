@@ -18,8 +18,8 @@ import numpy as np
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import PlanNotFound
-from shapephase.optimal_control.problems import path_cost, plan_reorientation
-from shapephase.scenarios import kane_scher
+from shapephase.examples.scenarios import kane_scher
+from shapephase.optimal_control.planning import path_cost, plan_reorientation
 
 # Body, turn [rad], the time aimed at [s].
 TURNS = (

@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import shapephase as sp
-from shapephase.report import write_report
-from shapephase.viewer import motion_page
+from shapephase.plotting.report import write_report
+from shapephase.plotting.viewer import motion_page
 
 
 def main() -> None:

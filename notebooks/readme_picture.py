@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.catalog import robots_folder
-from shapephase.scenarios import cat_righting
+from shapephase.body.catalog import robots_folder
+from shapephase.examples.scenarios import cat_righting
 
 FRAMES = 7
 SCALE = 330.0

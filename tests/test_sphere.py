@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from independent import apart, geodesic_turn, random_rotation, turn
 from shapephase import so3, sphere
 from shapephase.errors import AccuracyNotReached
+from support.independent import apart, geodesic_turn, random_rotation, turn
 
 X, Y, Z = np.eye(3)
 TURN = 2.0 * np.pi

@@ -3,27 +3,16 @@
 from __future__ import annotations
 
 from . import errors
-from .body import Body
-from .cards import ModelCard, PathCard, model_card, path_card
-from .catalog import load_body, robot_names
-from .connection import (
-    HorizontalLift,
-    curvature,
-    holonomy,
-    holonomy_derivative,
-    horizontal_lift,
-    mechanical_connection,
-)
-from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
-from .deformation import Deformation, articulated, particles, prescribed, rigid
+from .body.body import Body
+from .body.catalog import load_body, robot_names
+from .body.link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
+from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
+from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .errors import ShapePhaseError
-from .gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
-from .link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
-from .machine_code import MachineCodeWarning
-from .many_paths import FinalAttitudes, final_attitudes
-from .motion_files import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
-from .orbit_branch import OrbitBranch, continued_orbits
-from .phases import (
+from .integrator.compilation import MachineCodeWarning
+from .integrator.compiled_steps import compile_steps
+from .phases.continuation import OrbitBranch, continued_orbits
+from .phases.phases import (
     ArcPhases,
     PhaseSplit,
     RunningPhases,
@@ -33,15 +22,26 @@ from .phases import (
     running_phases,
     split,
 )
-from .reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
-from .recorded_base import BaseDifference, base_difference
-from .recording import TrajectoryWarning
-from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
-from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
+from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .plotting.viewer import motion_page, view
+from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
+from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body.euler_top import EulerTop
-from .shape_path import ShapePath
-from .step_code import compile_steps
-from .viewer import motion_page, view
+from .shape_space.connection import (
+    HorizontalLift,
+    curvature,
+    holonomy,
+    holonomy_derivative,
+    horizontal_lift,
+    mechanical_connection,
+)
+from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
+from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
+from .shape_space.files.recording import TrajectoryWarning
+from .shape_space.many_paths import FinalAttitudes, final_attitudes
+from .shape_space.shape_path import ShapePath
+from .shape_space.summaries import ModelCard, PathCard, model_card, path_card
 
 __version__ = "0.1.0"
 

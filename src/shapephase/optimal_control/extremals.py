@@ -16,12 +16,12 @@ from scipy.integrate import solve_ivp
 
 from .. import so3
 from ..arrays import Array, check_reach, finite_array
-from ..body import Body
-from ..compiled import called
-from ..connection import connection_slopes, horizontal_lift, mechanical_connection
+from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError, unknown_name
-from ..shape_path import ShapePath, positive_argument, times_argument
-from ..stepping import tolerance_argument
+from ..integrator.casadi_calls import called
+from ..integrator.integrate import tolerance_argument
+from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
+from ..shape_space.shape_path import ShapePath, positive_argument, times_argument
 from .symbolic import solved, symbolic_body
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)

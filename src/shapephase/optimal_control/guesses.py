@@ -8,13 +8,13 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..connection import curvature, mechanical_connection
-from ..deformation import articulated
+from ..deformation.deformation import articulated
 from ..errors import PlanNotFound, ShapePhaseError
-from ..reconstruction import Motion, reconstruct
-from .reorientation import Reorientation
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.connection import curvature, mechanical_connection
 from .spline_basis import SplineBasis
 from .symbolic import symbolic_body
+from .task import Reorientation
 
 PLACES = np.linspace(0.0, 1.0, 101)
 _SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)

@@ -11,21 +11,13 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array
-from ..body import Body
-from ..compiled import called
-from ..connection import horizontal_lift, mechanical_connection
+from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError
-from ..shape_path import ShapePath, positive_argument
-from ..stepping import tolerance_argument
-from .extremals import (
-    Extremal,
-    extremal,
-    hamiltonian,
-    initial_state,
-    integrated,
-    natural_sizes,
-    wong_residual,
-)
+from ..integrator.casadi_calls import called
+from ..integrator.integrate import tolerance_argument
+from ..shape_space.connection import horizontal_lift, mechanical_connection
+from ..shape_space.shape_path import ShapePath, positive_argument
+from .extremals import Extremal, extremal, hamiltonian, initial_state, integrated, natural_sizes, wong_residual
 
 _STEPS = 40
 # First to here by steps this accurate, which takes a fraction of the time.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arrays import Array
-from ..body import Body
-from ..reconstruction import Motion
-from ..shape_path import ShapePath
+from ..body.body import Body
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.shape_path import ShapePath
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
-from ..deformation import articulated
+from ..deformation.deformation import articulated
 from ..inertia_tensor import inverse_inertia
-from ..reconstruction import Motion, reconstruct
-from ..shape_path import ShapePath
-from .reorientation import Reorientation
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.shape_path import ShapePath
+from .collocation import gauss_tableau
 from .spline_basis import SplineBasis
-from .transcription import gauss_tableau
+from .task import Reorientation
 
 TOLERANCE = 1e-10
 REACHED = 1e-8

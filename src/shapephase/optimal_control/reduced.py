@@ -9,17 +9,17 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
-from ..deformation import articulated
+from ..deformation.deformation import articulated
 from ..errors import unknown_name
-from ..reconstruction import Motion, reconstruct
-from ..shape_path import ShapePath
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.shape_path import ShapePath
+from .collocation import Solved, gauss_tableau
 from .guesses import start_metric
 from .polish import end_derivative, movable_points
-from .reorientation import COSTS, Reorientation
 from .solver_watch import Followed, Watch
 from .spline_basis import SplineBasis
 from .symbolic import symbolic_body
-from .transcription import Solved, gauss_tableau
+from .task import COSTS, Reorientation
 
 _TOLERANCE = 1e-9
 _STAGES = 4

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Array
-from ..shape_path import ShapePath
+from ..shape_space.shape_path import ShapePath
 
 _DEGREE = 3
 

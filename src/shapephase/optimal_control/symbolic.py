@@ -10,9 +10,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..arrays import Array
-from ..body import Body
+from ..body.body import Body
+from ..body.joint_chain import JointChain
 from ..errors import unknown_name
-from ..joint_chain import JointChain
 
 QUANTITIES = ("inertia", "momentum_matrix", "connection", "centre_of_mass", "shape_metric")
 

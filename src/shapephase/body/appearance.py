@@ -1,0 +1,371 @@
+"""What a body looks like: the shapes and meshes of its file by link, and boxes of the same inertia elsewhere."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from ..arrays import Array, Integers
+from ..errors import InputFileNotFoundError, ModelFileError
+from ..inertia_tensor import principal_axes, second_moment
+from .body import Body, MovingPart
+from .catalog import example_folder
+from .mjcf import Placed, contents_of, settings_of, with_defaults
+from .mjcf_geometry import placed_geom
+from .urdf import rpy_matrix
+from .xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
+
+Colour = tuple[float, float, float, float]
+
+PLAIN: Colour = (0.72, 0.74, 0.78, 1.0)
+BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)
+"""Of what the file gives no colour, and of inertia boxes (the sky blue of Okabe and Ito)."""
+_MUJOCO_GREY: Colour = (0.5, 0.5, 0.5, 1.0)
+_MESHES = (".stl", ".obj", ".dae", ".ply")
+_MOST_BYTES = 64 * 2**20
+_MOST_NAMED = 10
+_THINNEST = 0.01
+_WATER = 1000.0
+# MuJoCo's own viewer shows these groups of geoms; the others are for collisions.
+_SHOWN_GROUPS = (0.0, 1.0, 2.0)
+
+
+class VisualWarning(UserWarning):
+    """Something of a body's looks is not shown as its file has it: a mesh, a faulty element, or a changed file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visual:
+    """One shape to draw.
+
+    Attributes
+    ----------
+    link : the link that carries it
+    kind : "box", "cylinder", "capsule", "sphere", "ellipsoid" or "mesh"
+    size : edges of a box; radius and length of a cylinder or of the barrel of a capsule, along z; radius of a sphere;
+        semi-axes of an ellipsoid [m]; scale of a mesh
+    pose : (4, 4) from the axes of the shape to those of the link
+    colour : red, green, blue, opacity, each from 0 to 1
+    mesh : the file of a mesh, else None
+    vertices, faces : (V, 3) [m] and (F, 3) of a mesh, its scale applied; empty otherwise
+    """
+
+    link: str
+    kind: str
+    size: tuple[float, ...]
+    pose: Array
+    colour: Colour
+    mesh: Path | None = None
+    vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    faces: Integers = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+
+
+def visuals(body: Body) -> tuple[Visual, ...]:
+    """The shapes to draw of a body, by link.
+
+    From its file, read anew: the <visual> elements of a URDF, the primitive geoms of an MJCF. A moving part with mass
+    that has nothing to show there, and every one of a body made from a `pinocchio.Model`, gets the box of uniform
+    density that has the same mass and inertia.
+
+    Warns
+    -----
+    VisualWarning
+        If the file is gone or no longer the one that was loaded (all is drawn as boxes then), or something in it cannot
+        be shown: a mesh that is not found or cannot be read, a faulty element.
+    """
+    looks = _Looks(body.file.parent if body.file else Path())
+    root = _unchanged(body, looks.doubts)
+    if root is not None:
+        (_read_mjcf if root.tag == "mujoco" else _read_urdf)(root, looks)
+    shown = {shape.link for shape in looks.found}
+    boxes = [_part_box(part) for part in body.moving_parts if part.mass > 0.0 and shown.isdisjoint(part.links)]
+    if looks.doubts:
+        more = len(looks.doubts) - _MOST_NAMED
+        text = "; ".join(looks.doubts[:_MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
+        warnings.warn(f"{text}. Parts with nothing to show are drawn as inertia boxes", VisualWarning, stacklevel=2)
+    return (*looks.found, *boxes)
+
+
+def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
+    """The box of uniform density with a given mass and inertia about its centre.
+
+    Parameters
+    ----------
+    mass : [kg]
+    inertia : (..., 3, 3) [kg m^2]
+
+    Returns
+    -------
+    edges : (..., 3) [m]; zero along an axis where no mass distribution has so large a moment
+    axes : (..., 3, 3) its axes as columns, a proper rotation
+
+    A box has the second moment m a^2 / 12 along an edge a.
+    """
+    moments, axes = principal_axes(second_moment(inertia))
+    return np.sqrt(12.0 * np.maximum(moments, 0.0) / mass), axes
+
+
+@dataclass
+class _Looks:
+    """What is found on the way through a file that lies in `folder`."""
+
+    folder: Path
+    found: list[Visual] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    meshes: dict[Path, list[tuple[Array, Integers, Colour | None]]] = field(default_factory=dict)
+
+    def attempt(self, shapes: Callable[[], list[Visual]]) -> None:
+        """Take what can be read; what is faulty spoils the picture only."""
+        try:
+            self.found += shapes()
+        except ModelFileError as error:
+            self.doubts.append(str(error))
+
+
+def _unchanged(body: Body, doubts: list[str]) -> Node | None:
+    """The root element of the body's file, or None if there is no file, or no longer the same."""
+    if body.file is None:
+        return None
+    try:
+        content = read_file(body.file)
+    except (InputFileNotFoundError, ModelFileError) as error:
+        doubts.append(str(error))
+        return None
+    if hashlib.sha256(content).hexdigest() != body.sha256:
+        doubts.append(f"{body.file} has changed since {body.name} was loaded from it; load it again to see it")
+        return None
+    return xml_tree(content, str(body.file))
+
+
+def _part_box(part: MovingPart) -> Visual:
+    edges, axes = inertia_box(part.mass, part.inertia)
+    pose = _pose(part.centre, axes)
+    longest = float(edges.max())
+    if longest == 0.0:
+        # A point mass has no box: a ball of water.
+        radius = (0.75 * part.mass / (math.pi * _WATER)) ** (1.0 / 3.0)
+        return Visual(part.links[0], "sphere", (radius,), pose, BOX_COLOUR)
+    size = tuple(np.maximum(edges, _THINNEST * longest).tolist())
+    return Visual(part.links[0], "box", size, pose, BOX_COLOUR)
+
+
+def _pose(place: Array, turn: Array) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, place
+    return pose
+
+
+# ---- URDF -----------------------------------------------------------------------------------------------------------
+
+
+def _read_urdf(root: Node, looks: _Looks) -> None:
+    named = [(material, material.get("name")) for node in root.walk() for material in node.all("material")]
+    materials: dict[str, Node] = {name: material for material, name in named if name and material.all("color")}
+    for link in root.all("link"):
+        for node in link.all("visual"):
+            looks.attempt(lambda link=link, node=node: _urdf_shape(link, node, materials, looks))
+
+
+def _urdf_shape(link: Node, node: Node, materials: dict[str, Node], looks: _Looks) -> list[Visual]:
+    name = name_of(link)
+    owner = f"link {name!r}"
+    origin = child_of(node, "origin", owner)
+    place, turn = np.zeros(3), np.eye(3)
+    if origin is not None:
+        place = np.array(vector(origin, "xyz", owner)) if origin.get("xyz") is not None else place
+        turn = rpy_matrix(np.array(vector(origin, "rpy", owner))) if origin.get("rpy") is not None else turn
+    written = child_of(node, "material", owner)
+    colour = None if written is None else _urdf_colour(written, materials, owner)
+    shape, kind = _geometry(needed_child(node, "geometry", owner), owner)
+    pose = _pose(place, turn)
+    if kind == "mesh":
+        scale = np.array(vector(shape, "scale", owner)) if shape.get("scale") is not None else np.ones(3)
+        empty = Visual(name, kind, tuple(scale.tolist()), pose, colour or PLAIN)
+        return _mesh_shapes(shape, empty, colour, owner, looks)
+    size = {
+        "box": lambda: vector(shape, "size", owner),
+        "sphere": lambda: [number(shape, "radius", owner)],
+        "cylinder": lambda: [number(shape, key, owner) for key in ("radius", "length")],
+        "capsule": lambda: [number(shape, key, owner) for key in ("radius", "length")],
+    }[kind]()
+    if not all(value > 0.0 for value in size):
+        raise shape.fault(owner, f"<{kind}> of size {size}; sizes are above zero")
+    return [Visual(name, kind, tuple(size), pose, colour or PLAIN)]
+
+
+def _geometry(node: Node, owner: str) -> tuple[Node, str]:
+    """The shape in a <geometry>, and its kind; extensions have a namespace before it."""
+    valid = ("box", "cylinder", "sphere", "capsule", "mesh")
+    found = [(child, child.tag.rpartition("}")[2].rpartition(":")[2]) for child in node.children]
+    if len(found) != 1 or found[0][1] not in valid:
+        tags = ", ".join(f"<{quoted(child.tag)}>" for child, _ in found) or "nothing"
+        raise node.fault(owner, f"<geometry> holds {tags}; one of {', '.join(valid)} can be shown")
+    return found[0]
+
+
+def _urdf_colour(material: Node, materials: dict[str, Node], owner: str) -> Colour | None:
+    source = material if material.all("color") else materials.get(material.get("name") or "")
+    colour = None if source is None else child_of(source, "color", owner)
+    return None if colour is None else _rgba(colour, owner)
+
+
+def _rgba(node: Node, owner: str) -> Colour:
+    red, green, blue, opacity = (min(max(value, 0.0), 1.0) for value in vector(node, "rgba", owner, 4))
+    return red, green, blue, opacity
+
+
+# ---- Meshes ---------------------------------------------------------------------------------------------------------
+
+
+def _mesh_shapes(node: Node, empty: Visual, colour: Colour | None, owner: str, looks: _Looks) -> list[Visual]:
+    """A mesh, in pieces of one colour each."""
+    name = node.get("filename") or ""
+    path = next((p for p in _mesh_places(name, looks.folder) if _is_file(p)), None)
+    if path is None:
+        raise node.fault(owner, f"the mesh {quoted(name)!r} is not found")
+    if path.suffix.lower() not in _MESHES:
+        raise node.fault(owner, f"the mesh {quoted(name)!r}: files {', '.join(_MESHES)} can be read")
+    if path not in looks.meshes:
+        looks.meshes[path] = _mesh_pieces(path, node, owner)
+    scale = np.array(empty.size)
+    pieces = []
+    for vertices, faces, own in looks.meshes[path]:
+        # A mirror image has its faces the other way round.
+        turned = faces if np.prod(scale) > 0.0 else faces[:, ::-1]
+        look = colour or own or PLAIN
+        pieces.append(replace(empty, colour=look, mesh=path, vertices=vertices * scale, faces=turned))
+    return pieces
+
+
+def _mesh_places(name: str, folder: Path) -> Iterator[Path]:
+    """Where a mesh may be: in a package that lies around the URDF or in example-robot-data, or beside the URDF."""
+    scheme, _, rest = name.partition("://") if "://" in name else ("", "", name)
+    around = [folder, *folder.parents]
+    if scheme == "file":
+        yield Path(unquote(rest))
+    elif scheme:
+        inside = rest.lstrip("/")
+        yield from (place / inside for place in around)
+        examples = example_folder()
+        if examples is not None:
+            yield examples.parent / inside
+        # A package in a folder with another name.
+        yield from (place / inside.partition("/")[2] for place in around)
+    else:
+        yield folder / rest
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
+def _mesh_pieces(path: Path, node: Node, owner: str) -> list[tuple[Array, Integers, Colour | None]]:
+    """Vertices, faces and colour of each piece."""
+    missing = {"trimesh": "trimesh", **({"collada": "pycollada"} if path.suffix.lower() == ".dae" else {})}
+    for module, package in missing.items():
+        if importlib.util.find_spec(module) is None:
+            raise node.fault(owner, f"the mesh {path.name} needs {package}: pip install 'shapephase[viz]'")
+    import trimesh
+
+    if path.stat().st_size > _MOST_BYTES:
+        raise node.fault(owner, f"the mesh {path.name} is larger than {_MOST_BYTES >> 20} MiB")
+    try:
+        scene: Any = trimesh.load_scene(path, skip_materials=path.suffix.lower() == ".obj")
+        if path.suffix.lower() == ".dae":
+            # Its unit counts, its upward axis does not, as in other viewers of URDF.
+            scene = scene.convert_units("meters")
+        pieces = [piece for piece in scene.dump() if isinstance(piece, trimesh.Trimesh) and len(piece.faces)]
+    except Exception as error:
+        # A reader of foreign files fails in every way there is.
+        raise node.fault(owner, f"the mesh {path.name} cannot be read ({type(error).__name__}: {error})") from None
+    if not pieces or not all(np.isfinite(piece.vertices).all() for piece in pieces):
+        raise node.fault(owner, f"the mesh {path.name} has no faces, or vertices that are no numbers")
+    return [(np.asarray(p.vertices, float), np.asarray(p.faces, np.int64), _own_colour(p)) for p in pieces]
+
+
+def _own_colour(mesh: Any) -> Colour | None:
+    """The colour that a mesh brings along, where it has one."""
+    kind = mesh.visual.kind
+    if kind is None:
+        return None
+    rgba = mesh.visual.material.main_color if kind == "texture" else mesh.visual.main_color
+    red, green, blue, opacity = (float(value) / 255.0 for value in rgba)
+    return red, green, blue, opacity
+
+
+# ---- MJCF -----------------------------------------------------------------------------------------------------------
+
+
+def _read_mjcf(root: Node, looks: _Looks) -> None:
+    """The primitive geoms that MuJoCo's viewer would show; of a body that has none of those, the others."""
+    reading = settings_of(root)
+    colours = {
+        material.get("name"): material
+        for asset in root.all("asset")
+        for material in asset.all("material")
+        if material.get("rgba") is not None
+    }
+    world = needed_child(root, "worldbody", "<mujoco>")
+    start = Placed(world, np.zeros(3), np.eye(3), "main")
+    held = contents_of(reading, world, start, "<worldbody>", ("body", "geom"))
+    waiting = [each for each in held if each.node.tag == "body"]
+    count = 0
+    while waiting:
+        placed = waiting.pop(0)
+        node, count = placed.node, count + 1
+        name = name_of(node) if node.get("name") else f"body{count}"
+        owner = f"body {name!r}"
+        own = Placed(node, np.zeros(3), np.eye(3), node.get("childclass") or placed.surrounding)
+        held = contents_of(reading, node, own, owner, ("inertial", "joint", "freejoint", "geom", "body"))
+        geoms = [
+            (each, with_defaults(reading, each.node, each.surrounding, owner))
+            for each in held
+            if each.node.tag == "geom"
+        ]
+        for drawn in _drawn(geoms, owner):
+            looks.attempt(lambda drawn=drawn, name=name: [_geom_shape(*drawn, name, reading.orientation, colours)])
+        # Depth first, as the bodies without a name are counted.
+        waiting[:0] = [each for each in held if each.node.tag == "body"]
+
+
+def _drawn(geoms: list[tuple[Any, Node]], owner: str) -> list[tuple[Any, Node]]:
+    """Of the geoms of a body, those to be shown."""
+    solid = [pair for pair in geoms if pair[1].get("type", "sphere") not in ("plane", "hfield")]
+    seen = [pair for pair in solid if number(pair[1], "group", owner, default="0") in _SHOWN_GROUPS]
+    primitive = [pair for pair in seen if not _is_mesh(pair[1])]
+    # Meshes are not read: what is there for collisions stands for them.
+    return primitive or [pair for pair in solid if not _is_mesh(pair[1])] or seen
+
+
+def _is_mesh(geom: Node) -> bool:
+    return geom.get("mesh") is not None or geom.get("type") in ("mesh", "sdf")
+
+
+def _geom_shape(placed: Any, geom: Node, link: str, orientation: Any, colours: dict[str | None, Node]) -> Visual:
+    owner = f"body {link!r}"
+    kind = geom.get("type", "sphere") or "sphere"
+    if _is_mesh(geom):
+        raise geom.fault(owner, "a geom that is a mesh is not shown")
+    if kind not in ("sphere", "capsule", "cylinder", "box", "ellipsoid"):
+        raise geom.fault(owner, f"a geom of type {quoted(kind)!r} is not shown")
+    place, turn, size = placed_geom(geom, kind, orientation, owner)
+    if kind == "box":
+        size = [2.0 * value for value in size]
+    elif kind in ("capsule", "cylinder"):
+        size = [size[0], 2.0 * size[1]]
+    source = geom if geom.get("rgba") is not None else colours.get(geom.get("material"))
+    colour = _MUJOCO_GREY if source is None else _rgba(source, owner)
+    pose = _pose(placed.place + placed.turn @ place, placed.turn @ turn)
+    return Visual(link, kind, tuple(float(value) for value in size), pose, colour)

@@ -1,0 +1,446 @@
+"""A free-floating body: its locked inertia and the angular momentum that its joint motions carry."""
+
+from __future__ import annotations
+
+# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# pyright: reportAttributeAccessIssue=false
+import math
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, check_reach, finite_array
+from ..errors import ShapeError, unknown_name
+from ..inertia_tensor import second_moment
+from .joint_chain import joint_chain
+from .joint_map import JointMap
+from .link_tree import Mimic
+
+_BASE = 6  # velocities of the free-flyer in Pinocchio's order
+
+
+@dataclass(frozen=True, eq=False)
+class MovingPart:
+    """Links that are fixed to each other, and their inertia together, in the axes of the first.
+
+    Attributes
+    ----------
+    links : their names
+    mass : [kg]
+    centre : (3,) centre of mass [m]
+    inertia : (3, 3) about the centre of mass [kg m^2]
+    """
+
+    links: tuple[str, ...]
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+class Body:
+    """A tree of rigid links that floats freely; its shape is the vector of its independent joints.
+
+    Made by `load_body`. All quantities are in base axes, about the centre of mass of the whole body where
+    that matters (theory.md section 1). Shapes may have any leading axes. A Body can be pickled and used from
+    several threads.
+
+    Attributes
+    ----------
+    name : str
+    sha256, file : of the file it was loaded from, and where that was; None without a file
+    joint_names : tuple of the independent joints, in the order of the shape vector
+    n_shape : number of independent joints
+    mass : [kg]
+    joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
+    joint_units : "rad" or "m" for each joint
+    continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
+    chain : its links and joints as plain numbers
+    """
+
+    def __init__(self, model: pin.Model, name: str, mimics: Mapping[str, Mimic] | None = None) -> None:
+        self._model = model
+        self._local = threading.local()
+        self.name = name
+        self.sha256: str | None = None
+        self.file: Path | None = None
+        self.mass = float(pin.computeTotalMass(model))
+        self._joints = JointMap(model, pin.neutral(model), dict(mimics or {}))
+        self.chain = joint_chain(model, dict(mimics or {}))
+        self.joint_names, self.joint_units = self._joints.names, self._joints.units
+        self.joint_limits, self.continuous = self._joints.limits, self._joints.continuous
+
+    @property
+    def n_shape(self) -> int:
+        """The number of independent joints."""
+        return len(self.joint_names)
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """The names of all links, those fixed to others included."""
+        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
+
+    @property
+    def moving_parts(self) -> tuple[MovingPart, ...]:
+        """The base and what each joint moves, in Pinocchio's order, as far as they have links."""
+        frames: dict[int, list[Any]] = {}
+        for frame in self._model.frames:
+            if frame.type == pin.FrameType.BODY:
+                frames.setdefault(frame.parentJoint, []).append(frame)
+        parts = []
+        for joint, inertia in enumerate(self._model.inertias.tolist()):
+            if joint in frames:
+                seen = frames[joint][0].placement.actInv(inertia)
+                names = tuple(frame.name for frame in frames[joint])
+                parts.append(MovingPart(names, seen.mass, np.array(seen.lever), np.array(seen.inertia)))
+        return tuple(parts)
+
+    def __repr__(self) -> str:
+        """One line for people."""
+        return f"Body({self.name!r}, {self.n_shape} joints, {self.mass:.6g} kg)"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the per-thread work space."""
+        return {key: value for key, value in self.__dict__.items() if key != "_local"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore, with a fresh work space."""
+        self.__dict__.update(state)
+        self._local = threading.local()
+
+    def shape(self, joints: Mapping[str, float] | None = None) -> Array:
+        """The shape with the named joints at the given coordinates and all others neutral: -> (n,) [rad or m].
+
+        Raises
+        ------
+        UnknownNameError
+            If a name is not one of `joint_names`.
+        """
+        if joints is not None and not isinstance(joints, Mapping):
+            raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {joints!r}")
+        shape = np.zeros(self.n_shape)
+        for name, value in (joints or {}).items():
+            coordinate = finite_array(value, f"joint {name}")
+            if coordinate.ndim:
+                raise ShapeError(f"joint {name}: one number is needed, got an array of shape {coordinate.shape}")
+            shape[self.joint_index(name)] = coordinate
+        return shape
+
+    def joint_index(self, name: str) -> int:
+        """The place of a joint in the shape vector. Raises UnknownNameError."""
+        if name not in self.joint_names:
+            raise unknown_name(f"joint of {self.name}", name, self.joint_names)
+        return self.joint_names.index(name)
+
+    def locked_inertia(self, shape: ArrayLike) -> Array:
+        """Inertia of the body frozen in a shape, about its centre of mass, base axes.
+
+        Parameters
+        ----------
+        shape : (..., n) [rad or m]
+
+        Returns
+        -------
+        (..., 3, 3) [kg m^2]
+
+        Raises
+        ------
+        ShapeError
+            If the last axis is not the body's n joints, or an entry is not finite.
+
+        Source: Cabrera 2006, section 2.3; theory.md A3.
+        """
+        r = self._checked(shape)
+        return self._angular_map(self._rows(r))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
+
+    def momentum_matrix(self, shape: ArrayLike) -> Array:
+        """J(r), the angular momentum per unit joint rate with the base at rest: L_o = J(r) rate.
+
+        Parameters
+        ----------
+        shape : (..., n) [rad or m]
+
+        Returns
+        -------
+        (..., 3, n) about the centre of mass, base axes [kg m^2/s per unit of joint rate]
+
+        Raises as `locked_inertia`. Source: theory.md A7.
+        """
+        r = self._checked(shape)
+        return self._angular_map(self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
+
+    def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """Angular momentum of a joint motion about the centre of mass with the base at rest.
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]; leading axes broadcast
+
+        Returns
+        -------
+        (..., 3) base axes [kg m^2/s]
+
+        Raises as `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
+        """
+        r, v = self._checked(shape), self._checked(rate, "rate")
+        self._batch(r.shape[:-1], v.shape[:-1])
+        return (self.momentum_matrix(r) @ v[..., None])[..., 0]
+
+    def inertia_gradient(self, shape: ArrayLike) -> Array:
+        """dI/dr_k, exact: (..., n) -> (..., n, 3, 3) [kg m^2 per unit of joint].
+
+        Source: numerics.md section 4 (rate of the centroidal map at unit joint rates).
+        """
+        return self._gradient(shape)[..., :3]
+
+    def momentum_matrix_gradient(self, shape: ArrayLike) -> Array:
+        """dJ/dr_k, exact: (..., n) -> (..., n, 3, n), the first n counts k. Source: as `inertia_gradient`."""
+        return self._gradient(shape)[..., 3:]
+
+    def inertia_rate(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """dI/dt along a joint motion, exact: (..., n), (..., n) -> (..., 3, 3) [kg m^2/s]."""
+        r, v = self._pair(shape, rate)
+        flat = self._angular_map_rate(self._rows(r), self._rows(v))
+        return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
+
+    def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
+        """How the angular momentum I w + J rate changes with each joint while w and the rates stay the same, exact.
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]
+        base_rate : (..., 3) w, angular velocity of the base, base axes [rad/s]
+
+        Returns
+        -------
+        (..., n, 3) dI/dr_k w + dJ/dr_k rate, base axes [kg m^2/s per unit of joint]
+
+        One call of Pinocchio for all joints (its derivatives of the centroidal momentum), where `inertia_gradient`
+        and `momentum_matrix_gradient` take one for each.
+        """
+        w = finite_array(base_rate, "base_rate", (3,), unit="rad/s")
+        r, v = self._pair(shape, rate)
+        if self._batch(r.shape[:-1], w.shape[:-1]) != r.shape[:-1]:
+            raise ShapeError(f"base_rate: (3,) or one for each shape {r.shape} is needed, got {w.shape}")
+        w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
+        model, data = self._model, self._data()
+        velocities = self._joints.velocities(self._rows(v))
+        velocities[:, 3:6] = w
+        none = np.zeros(model.nv)
+        gradients = np.empty((len(velocities), 3, model.nv))
+        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), velocities, strict=True)):
+            gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
+        joints = self._joints.columns(gradients[:, :, _BASE:])
+        return np.swapaxes(joints, -1, -2).reshape(*r.shape, 3)
+
+    def centre_of_mass(self, shape: ArrayLike) -> Array:
+        """Centre of mass of the whole body from the base origin, base axes: (..., n) -> (..., 3) [m]."""
+        r = self._checked(shape)
+        model, data = self._model, self._data()
+        configurations = self._joints.configurations(self._rows(r))
+        centres = np.empty((len(configurations), 3))
+        for row, q in enumerate(configurations):
+            centres[row] = pin.centerOfMass(model, data, q)
+        return centres.reshape(*r.shape[:-1], 3)
+
+    def link_pose(self, shape: ArrayLike, link: str) -> Array:
+        """Pose of a link in base axes from the base origin: (..., n) -> (..., 4, 4).
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such link.
+        """
+        frame = self._link_frame(link)
+        r = self._checked(shape)
+        model, data = self._model, self._data()
+        configurations = self._joints.configurations(self._rows(r))
+        poses = np.empty((len(configurations), 4, 4))
+        for row, q in enumerate(configurations):
+            pin.forwardKinematics(model, data, q)
+            poses[row] = pin.updateFramePlacement(model, data, frame).homogeneous
+        return poses.reshape(*r.shape[:-1], 4, 4)
+
+    def link_angular_velocity(self, shape: ArrayLike, rate: ArrayLike, link: str) -> Array:
+        """How a link turns as seen from the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
+
+        Raises as `link_pose`.
+        """
+        frame = self._link_frame(link)
+        r, v = self._pair(shape, rate)
+        model, data = self._model, self._data()
+        velocities = self._joints.velocities(self._rows(v))
+        turning = np.empty((len(velocities), 3))
+        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), velocities, strict=True)):
+            pin.forwardKinematics(model, data, q, full)
+            turning[row] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).angular
+        return turning.reshape(*r.shape[:-1], 3)
+
+    def mass_correlation(self, shape: ArrayLike, rate: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
+        """The second moment of the mass between a shape and a reference shape, and its rate.
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]
+        reference : (n,)
+
+        Returns
+        -------
+        correlation, its rate : (..., 3, 3) integral of r r_reference^T dm, each r from its own centre of mass, base
+            axes [kg m^2], [kg m^2/s]
+        """
+        r, v = self._pair(shape, rate)
+        still = self._checked(reference, "reference")
+        if still.ndim != 1:
+            raise ShapeError(f"reference: one shape ({self.n_shape},) is needed, got {still.shape}")
+        links = self._model.inertias.tolist()[1:]
+        masses = np.array([link.mass for link in links])
+        moments = second_moment(np.array([link.inertia for link in links]))
+        (turns0,), (centres0,), _, _ = self._links(still[None], np.zeros((1, self.n_shape)))
+        turns, centres, turning, speeds = self._links(self._rows(r), self._rows(v))
+        there = moments @ np.swapaxes(turns0, -1, -2)
+        weighted = masses[:, None] * centres0
+        correlation = np.swapaxes(centres, -1, -2) @ weighted + (turns @ there).sum(axis=1)
+        slope = np.swapaxes(speeds, -1, -2) @ weighted + (so3.hat(turning) @ turns @ there).sum(axis=1)
+        matrix = (*r.shape[:-1], 3, 3)
+        return correlation.reshape(matrix), slope.reshape(matrix)
+
+    def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """Kinetic energy of a joint motion and a turn of the base, about the centre of mass: -> (...) [J].
+
+        Parameters
+        ----------
+        shape, rate : (..., n) [rad or m], [rad/s or m/s]
+        angular_velocity : (..., 3) of the base, base axes [rad/s]; at rest it is T_0
+
+        Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
+        """
+        r, v = self._pair(shape, rate)
+        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
+        batch = self._batch(r.shape[:-1], omega.shape[:-1])
+        r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+        model, data = self._model, self._data()
+        rates = self._joints.velocities(self._rows(v))
+        rates[:, 3:6] = np.broadcast_to(omega, (*batch, 3)).reshape(-1, 3)
+        energies = np.empty(len(rates))
+        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), rates, strict=True)):
+            pin.ccrba(model, data, q, full)
+            whole = pin.computeKineticEnergy(model, data, q, full)
+            energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / self.mass
+        return energies.reshape(batch)
+
+    def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
+        """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3).
+
+        Unchecked and in one pass: the library's own hot path.
+        """
+        whole = self._full_map(shape)
+        return whole[:, :, :3], (whole[:, :, 3:] @ self._joints.velocities(rate)[:, _BASE:, None])[..., 0]
+
+    def sample_rates(self, shape: Array, rate: Array) -> tuple[Array, Array, Array, Array]:
+        """I, J, dI/dt and dJ/dt along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3, n) and once more. Unchecked."""
+        whole, slope = self._angular_map(shape), self._angular_map_rate(shape, rate)
+        return whole[:, :, :3], whole[:, :, 3:], slope[:, :, :3], slope[:, :, 3:]
+
+    def _links(self, shapes: Array, rates: Array) -> tuple[Array, Array, Array, Array]:
+        """Of each link that carries mass: orientation (N, k, 3, 3), centre of mass from that of the whole (N, k, 3),
+        angular velocity and speed of that centre (N, k, 3), base axes."""
+        model, data = self._model, self._data()
+        levers = np.array([link.lever for link in model.inertias.tolist()[1:]])
+        masses = np.array([link.mass for link in model.inertias.tolist()[1:]]) / self.mass
+        count = model.njoints - 1
+        turns, places = np.empty((len(shapes), count, 3, 3)), np.empty((len(shapes), count, 3))
+        motions = np.empty((len(shapes), count, 6))
+        states = zip(self._joints.configurations(shapes), self._joints.velocities(rates), strict=True)
+        for row, (q, v) in enumerate(states):
+            pin.forwardKinematics(model, data, q, v)
+            for link in range(count):
+                place = data.oMi[link + 1]
+                turns[row, link], places[row, link] = place.rotation, place.translation
+                motions[row, link] = data.v[link + 1].vector
+        centres = places + so3.apply(turns, levers)
+        turning = so3.apply(turns, motions[..., 3:])
+        speeds = so3.apply(turns, motions[..., :3] + np.cross(motions[..., 3:], levers))
+        return (
+            turns,
+            centres - (masses @ centres)[:, None],
+            turning,
+            speeds - (masses @ speeds)[:, None],
+        )
+
+    def _link_frame(self, link: str) -> int:
+        if link not in self.link_names:
+            raise unknown_name(f"link of {self.name}", link, self.link_names)
+        return self._model.getFrameId(link, pin.FrameType.BODY)
+
+    def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
+        array = finite_array(shape, name)
+        if array.ndim == 0 or array.shape[-1] != self.n_shape:
+            raise ShapeError(
+                f"{name}: expected (..., {self.n_shape}), one entry per joint of {self.name} "
+                f"({', '.join(self.joint_names)}), got shape {array.shape}"
+            )
+        check_reach(array, name)
+        return array
+
+    def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
+        """Shape and rate with the same leading axes."""
+        r, v = self._checked(shape), self._checked(rate, "rate")
+        batch = self._batch(r.shape[:-1], v.shape[:-1])
+        return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+
+    def _batch(self, *shapes: tuple[int, ...]) -> tuple[int, ...]:
+        try:
+            return np.broadcast_shapes(*shapes)
+        except ValueError:
+            raise ShapeError(f"leading axes {' and '.join(map(str, shapes))} do not go together") from None
+
+    def _rows(self, array: Array) -> Array:
+        """(..., n) -> (N, n); a body without joints has rows too."""
+        return array.reshape(math.prod(array.shape[:-1]), self.n_shape)
+
+    def _angular_map(self, shapes: Array) -> Array:
+        """[I, J] for each shape: (N, n) -> (N, 3, 3 + n)."""
+        return self._independent(self._full_map(shapes))
+
+    def _full_map(self, shapes: Array) -> Array:
+        """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
+        model, data = self._model, self._data()
+        centroidal_map = pin.computeCentroidalMap
+        # Each call returns a copy: all at once are put together sooner than one by one.
+        maps = [centroidal_map(model, data, q) for q in self._joints.configurations(shapes)]
+        return np.array(maps).reshape(-1, 6, model.nv)[:, 3:, 3:]
+
+    def _angular_map_rate(self, shapes: Array, rates: Array) -> Array:
+        """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""
+        model, data = self._model, self._data()
+        velocities = self._joints.velocities(rates)
+        whole = np.empty((len(shapes), 3, model.nv - 3))
+        for row, (q, v) in enumerate(zip(self._joints.configurations(shapes), velocities, strict=True)):
+            pin.dccrba(model, data, q, v)
+            whole[row] = data.dAg[3:, 3:]
+        return self._independent(whole)
+
+    def _gradient(self, shape: ArrayLike) -> Array:
+        r = self._checked(shape)
+        n = self.n_shape
+        shapes = np.repeat(self._rows(r), n, axis=0)
+        rates = np.tile(np.eye(n), (math.prod(r.shape[:-1]), 1))
+        return self._angular_map_rate(shapes, rates).reshape(*r.shape[:-1], n, 3, 3 + n)
+
+    def _independent(self, whole: Array) -> Array:
+        """Columns of the full joints folded into those of the independent ones."""
+        return np.concatenate([whole[:, :, :3], self._joints.columns(whole[:, :, 3:])], axis=-1)
+
+    def _data(self) -> pin.Data:
+        try:
+            return self._local.data
+        except AttributeError:
+            self._local.data = self._model.createData()
+            return self._local.data

@@ -1,0 +1,216 @@
+"""Names to bodies: those we ship, those of example-robot-data, and any URDF or MJCF file."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+from ..errors import MissingExtraError, ModelFileError, ShapePhaseError, unknown_name
+from .body import Body
+from .cross_check import check_against_file
+from .link_tree import IgnoredElementWarning, UnphysicalInertiaWarning, inertia_warnings, massless_warning
+from .mjcf import mjcf_tree
+from .model_tree import checked_model, model_of
+from .urdf import urdf_tree
+from .xml_text import quoted, read_file, xml_tree
+
+_EXAMPLE = "example:"
+# The largest body takes 300 MiB.
+_CHILD_SECONDS, _CHILD_MEMORY, _NO_MEMORY = 20, 640 * 2**20, 3
+
+
+def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "error", isolate: bool = False) -> Body:
+    """Load a free-floating body.
+
+    What comes back has been compared with the numbers of the file: mass, links, joints, and the locked inertia and
+    internal momentum at a random shape, computed without Pinocchio, to 1e-12.
+
+    Parameters
+    ----------
+    source : a path to a URDF or MJCF file; a name from `robot_names()` such as "cat"; "example:human", a body of the
+        installed example-robot-data; or a `pinocchio.Model` whose root joint is a free-flyer
+    on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
+    isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
+        is an error; names of bodies that are installed are trusted
+
+    Raises
+    ------
+    InputFileNotFoundError, UnknownNameError
+        If there is no such file, or no such name.
+    ModelFileError, UnphysicalInertiaError
+        If the file cannot be used, or a link cannot exist; the message begins with file and line.
+    MissingExtraError
+        For "example:..." without example-robot-data.
+
+    Warns
+    -----
+    UnphysicalInertiaWarning
+        Once for each kind of doubt about inertias, with the names of the links.
+    IgnoredElementWarning
+        For what the file says and a free body of joints does not take up.
+    """
+    if on_unphysical not in ("error", "warn"):
+        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
+    if isinstance(source, str | os.PathLike):
+        path, installed = _path_of(os.fspath(source))
+        content = read_file(path)
+        if isolate and not installed:
+            _try_in_child(content, str(path), on_unphysical)
+        try:
+            body, doubts = _from_file(content, path, on_unphysical)
+        except MemoryError:
+            raise ModelFileError(f"{path}:1: there is not enough memory to load it") from None
+    else:
+        body, doubts = _from_model(source, on_unphysical)
+    for category, message in doubts:
+        warnings.warn(message, category, stacklevel=2)
+    return body
+
+
+def robots_folder() -> Path:
+    """The folder of the bodies and motions that come with the library, in a wheel as in a checkout."""
+    inside = Path(__file__).parents[1] / "robots"
+    return inside if inside.is_dir() else Path(__file__).parents[3] / "robots"
+
+
+def robot_names() -> tuple[str, ...]:
+    """The names of the bodies that come with the library."""
+    return tuple(sorted(p.stem for p in robots_folder().glob("*.urdf")))
+
+
+def example_names() -> tuple[str, ...]:
+    """The names of the bodies of example-robot-data, where it is installed; otherwise none."""
+    return tuple(sorted(_example_files()))
+
+
+def example_file(name: str) -> Path:
+    """The URDF file of a body of example-robot-data. Raises MissingExtraError, UnknownNameError."""
+    files = _example_files()
+    if not files:
+        raise MissingExtraError(
+            f"'example:{name}' needs the example-robot-data package: pip install 'shapephase[robots]'"
+        )
+    if name not in files:
+        raise unknown_name("body of example-robot-data", name, sorted(files))
+    return files[name]
+
+
+def example_folder() -> Path | None:
+    """The folder of example-robot-data, where it is installed."""
+    folders = (Path(entry) / "cmeel.prefix" / "share" / "example-robot-data" for entry in sys.path)
+    return next((folder for folder in folders if (folder / "robots").is_dir()), None)
+
+
+def _example_files() -> dict[str, Path]:
+    folder = example_folder()
+    if folder is None:
+        return {}
+    return {path.stem: path for path in sorted((folder / "robots").rglob("*.urdf"), reverse=True)}
+
+
+def _path_of(source: str | bytes) -> tuple[Path, bool]:
+    """The file of a source, and whether it comes with an installed package."""
+    text = os.fsdecode(source)
+    if text.startswith(_EXAMPLE):
+        return example_file(text.removeprefix(_EXAMPLE)), True
+    names = robot_names()
+    if text in names and not os.path.isfile(text):
+        return robots_folder() / f"{text}.urdf", True
+    name = bool(text) and "\0" not in text and os.sep not in text and not text.endswith((".urdf", ".xml"))
+    if name and not os.path.exists(text):
+        raise unknown_name("body (no such file either)", quoted(text), (*names, "example:<name>"))
+    return Path(text), False
+
+
+def _try_in_child(content: bytes, where: str, on_unphysical: str) -> None:
+    """Load in a child process, with limits; what kills the child is named here, what it refuses the parent refuses."""
+    # The folder that the caller happens to be in is no place to import from.
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    command = [sys.executable, "-P", "-c", "from shapephase.body import catalog; catalog.load_from_input()"]
+    try:
+        child = subprocess.run(
+            [*command, where, on_unphysical],
+            input=content,
+            capture_output=True,
+            timeout=_CHILD_SECONDS,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": path},
+        )
+    except subprocess.TimeoutExpired:
+        raise ModelFileError(f"{where}:1: loading it took more than {_CHILD_SECONDS} s and was stopped") from None
+    if child.returncode < 0:
+        raise ModelFileError(f"{where}:1: the parser crashed on it, signal {-child.returncode}")
+    if child.returncode == _NO_MEMORY:
+        raise ModelFileError(f"{where}:1: loading it took more than {_CHILD_MEMORY >> 20} MiB and was stopped")
+    if child.returncode:
+        said = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise ModelFileError(f"{where}:1: loading it in a process of its own failed: {''.join(said)}")
+
+
+def load_from_input() -> None:
+    """What a child process does: limits itself, then loads the file that comes through standard input."""
+    where, on_unphysical = sys.argv[1:3]
+    _limit_this_process()
+    try:
+        _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical)
+    except MemoryError:
+        sys.exit(_NO_MEMORY)
+    except ShapePhaseError:
+        # The parent reads the same bytes and says the same.
+        pass
+
+
+def _limit_this_process() -> None:
+    """No core dump, and little more memory than what the imports took, where the system can do that."""
+    try:
+        import resource
+    except ImportError:
+        return
+    try:
+        size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    except OSError:
+        size = 0
+    for kind, limit in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_AS, size + _CHILD_MEMORY)):
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(kind, (limit, resource.getrlimit(kind)[1]))
+
+
+def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:
+    where = str(path)
+    root = xml_tree(content, where)
+    tree = mjcf_tree(root) if root.tag == "mujoco" else urdf_tree(root)
+    doubts = inertia_warnings(tree.links.values(), on_unphysical)
+    body = Body(model_of(tree, where), path.stem, tree.mimics)
+    body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
+    check_against_file(body, tree, where)
+    doubts += massless_warning(tree)
+    found: list[tuple[type[Warning], str]] = [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
+    if tree.notes:
+        found.append((IgnoredElementWarning, "; ".join(tree.notes)))
+    return body, found
+
+
+def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:
+    import pinocchio
+
+    if not isinstance(model, pinocchio.Model):  # pyright: ignore[reportAttributeAccessIssue]
+        raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(model).__name__}")
+    checked, doubts = checked_model(model, f"model {model.name!r}", on_unphysical)
+    _name_bare_parts(checked)
+    return Body(checked, model.name), [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
+
+
+def _name_bare_parts(model: Any) -> None:
+    """A link for whatever a joint moves and nobody has named, called after the joint, so that it can be asked for."""
+    import pinocchio
+
+    pin: Any = pinocchio
+    named = {frame.parentJoint for frame in model.frames if frame.type == pin.FrameType.BODY}
+    for joint in range(1, model.njoints):
+        if joint not in named and not model.existFrame(model.names[joint], pin.FrameType.BODY):
+            model.addBodyFrame(model.names[joint], joint, pin.SE3.Identity(), 0)

@@ -1,0 +1,144 @@
+"""A body against the numbers of its file: mass, links, joints, and one I(q), L_o computed without Pinocchio.
+
+Whatever a parser drops, lumps or turns the wrong way shows here, and no such body leaves `load_body`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import ModelFileError
+from .body import Body
+from .link_tree import LinkTree
+
+_TOLERANCE = 1e-12
+_SEED = 20060518
+
+
+def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
+    """Compare a body with the tree of links that its file has.
+
+    Raises
+    ------
+    ModelFileError
+        If mass, links, joints, or inertia and momentum at a random shape and rate differ by more than rounding, or
+        if nothing in the file has mass.
+    """
+    if not body.mass > 0.0:
+        first = next(iter(tree.links.values()))
+        raise ModelFileError(f"{first.where}: link {first.name!r}: neither it nor any other link has mass")
+    wanted = {name for name in tree.links if name not in tree.frames}
+    moving = {joint.name for joint in tree.joints if joint.kind != "fixed"}
+    _compare_names(set(body.link_names), wanted, "links", where)
+    _compare_names(set(body.joint_names), moving - set(tree.mimics), "joints", where)
+    mass = sum(link.mass for link in tree.links.values())
+    if abs(body.mass - mass) > _TOLERANCE * mass:
+        raise _differs(where, "mass", f"{body.mass!r} kg", f"{mass!r} kg")
+    random = np.random.default_rng(_SEED)
+    shape, rate = random.uniform(-1.0, 1.0, (2, body.n_shape))
+    by_name = [dict(zip(body.joint_names, values, strict=True)) for values in (shape.tolist(), rate.tolist())]
+    inertia, momentum, extent, motion = inertia_and_momentum(tree, *by_name)
+    found = (body.locked_inertia(shape), body.internal_momentum(shape, rate))
+    for what, got, want, size in zip(
+        ("inertia", "momentum"), found, (inertia, momentum), (extent, motion), strict=True
+    ):
+        # A comparison that NaN fails.
+        if not np.all(np.abs(got - want) <= _TOLERANCE * size):
+            raise _differs(where, what + " at a random shape", got.tolist(), want.tolist())
+
+
+def inertia_and_momentum(
+    tree: LinkTree, shape: dict[str, float], rate: dict[str, float]
+) -> tuple[Array, Array, float, float]:
+    """Locked inertia and internal momentum from the definitions, link by link.
+
+    Parameters
+    ----------
+    shape, rate : coordinates and rates of the independent joints by name [rad or m], [rad/s or m/s]
+
+    Returns
+    -------
+    inertia, momentum : (3, 3) [kg m^2], (3,) [kg m^2/s] about the centre of mass, axes of the root link
+    extent, motion : the size of the terms they are sums of, seen from the root link; rounding is a share of it
+
+    Source: theory.md A3, A7.
+    """
+    names = list(tree.links)
+    place = {name: number for number, name in enumerate(names)}
+    parents = [place[joint.parent] for joint in tree.joints]
+    children = [place[joint.child] for joint in tree.joints]
+    angles, rates = np.array(
+        [
+            [_coordinate(tree, joint.name, values, k == 0) for joint in tree.joints]
+            for k, values in enumerate((shape, rate))
+        ]
+    ).reshape(2, -1)
+    sliding = np.array([joint.kind == "prismatic" for joint in tree.joints], dtype=bool)
+    stacked = [np.array([getattr(j, what) for j in tree.joints]) for what in ("axis", "place", "after", "turn")]
+    axes, places, afters = (each.reshape(-1, 3) for each in stacked[:3])
+    axes = axes / np.sqrt((axes**2).sum(axis=-1, keepdims=True))
+    turns = stacked[3].reshape(-1, 3, 3)
+    moved = turns @ _about(axes, np.where(sliding, 0.0, angles))
+    slides = places + (turns @ (axes * np.where(sliding, angles, 0.0)[:, None])[..., None])[..., 0]
+    slides += (moved @ afters[..., None])[..., 0]
+    pose_turn, pose_place = np.zeros((len(names), 3, 3)), np.zeros((len(names), 3))
+    pose_turn[0] = np.eye(3)
+    for number, (parent, child) in enumerate(zip(parents, children, strict=True)):
+        pose_turn[child] = pose_turn[parent] @ moved[number]
+        pose_place[child] = pose_place[parent] + pose_turn[parent] @ slides[number]
+    # How each link moves: omega, and the velocity of its origin.
+    directions = (pose_turn[parents] @ (turns @ axes[..., None]))[..., 0] * rates[:, None]
+    omega, velocity = np.zeros((len(names), 3)), np.zeros((len(names), 3))
+    for number, (parent, child) in enumerate(zip(parents, children, strict=True)):
+        omega[child] = omega[parent] + (0.0 if sliding[number] else directions[number])
+    hinges = pose_place[children] - (pose_turn[children] @ afters[..., None])[..., 0]
+    steps = np.cross(omega[parents], hinges - pose_place[parents])
+    steps += np.cross(omega[children], pose_place[children] - hinges) + np.where(sliding[:, None], directions, 0.0)
+    for number, (parent, child) in enumerate(zip(parents, children, strict=True)):
+        velocity[child] = velocity[parent] + steps[number]
+    links = tree.links.values()
+    masses = np.array([link.mass for link in links])
+    offsets = (pose_turn @ np.array([link.centre for link in links])[..., None])[..., 0]
+    tensors = pose_turn @ np.array([link.inertia for link in links]) @ np.swapaxes(pose_turn, -1, -2)
+    centres, speeds = pose_place + offsets, velocity + np.cross(omega, offsets)
+    # Of every sum the largest term, and with it the rounding, is that of the farthest part at the fastest rate.
+    distances = np.sqrt((centres**2).sum(axis=-1))
+    extent = float(masses @ distances**2 + np.abs(tensors).sum())
+    motion = float(distances.max() * (masses @ np.sqrt((speeds**2).sum(axis=-1))))
+    motion += extent * float(np.abs(rates).max(initial=0.0))
+    centres = centres - masses @ centres / masses.sum()
+    speeds = speeds - masses @ speeds / masses.sum()
+    squares = (centres**2).sum(axis=-1)[:, None, None] * np.eye(3) - centres[:, :, None] * centres[:, None, :]
+    inertia = (tensors + masses[:, None, None] * squares).sum(axis=0)
+    momentum = masses @ np.cross(centres, speeds) + (tensors @ omega[..., None])[..., 0].sum(axis=0)
+    return inertia, momentum, extent, motion
+
+
+def _coordinate(tree: LinkTree, name: str, values: dict[str, float], with_offset: bool) -> float:
+    """The coordinate or rate of a joint, followers by their rules; of a fixed joint zero."""
+    rule = tree.mimics.get(name)
+    if rule is None:
+        return values.get(name, 0.0)
+    return rule.multiplier * _coordinate(tree, rule.leader, values, with_offset) + (rule.offset if with_offset else 0.0)
+
+
+def _about(axes: Array, angles: Array) -> Array:
+    """Rotations about unit axes: (N, 3), (N,) -> (N, 3, 3), cos + (1 - cos) a a^T + sin a x."""
+    cosine, sine = np.cos(angles)[:, None, None], np.sin(angles)[:, None]
+    x, y, z = np.moveaxis(axes * sine, -1, 0)
+    none = np.zeros_like(x)
+    skew = np.moveaxis(np.array([[none, -z, y], [z, none, -x], [-y, x, none]]), -1, 0)
+    return cosine * np.eye(3) + (1.0 - cosine) * axes[:, :, None] * axes[:, None, :] + skew
+
+
+def _compare_names(found: set[str], wanted: set[str], what: str, where: str) -> None:
+    if found != wanted:
+        raise _differs(where, what, f"lost {sorted(wanted - found)}", f"gained {sorted(found - wanted)}")
+
+
+def _differs(where: str, what: str, found: object, wanted: object) -> ModelFileError:
+    return ModelFileError(
+        f"{where}:1: the body made from this file has another {what} than the file: {found} against {wanted}; "
+        "please report this file"
+    )

@@ -1,0 +1,87 @@
+"""A body's links and joints as plain numbers, for those who write its mechanics down in symbols."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from .link_tree import Mimic
+from .model_tree import mimic_map, moving_joints
+
+_BASE = 1  # Pinocchio's number of the free-flyer
+
+
+@dataclass(frozen=True, eq=False)
+class JointChain:
+    """Frame 0 is the base; frame k + 1 hangs on joint k, later in the list than its parent, with links fixed to it.
+
+    The coordinate q_k of joint k moves frame k + 1 by a screw of constant axis: in the parent's axes its orientation is
+    turns[k] rot(q_k axes[k]) and its origin places[k] + turns[k] slides[k] q_k.
+
+    Attributes
+    ----------
+    names : of the k joints, those that follow others included
+    parents : (k,) number of the frame that each hangs on
+    turns, places : (k, 3, 3), (k, 3) pose in the parent's axes at coordinate zero [m]
+    axes : (k, 3) unit vector of a joint that turns, else zero
+    slides : (k, 3) unit vector of one that slides, for a screw its lead along the axis [m/rad], else zero
+    masses, centres, inertias : (k + 1,), (k + 1, 3), (k + 1, 3, 3) of what moves with each frame, in its axes; the
+        inertia about the centre of mass [kg], [m], [kg m^2]
+    matrix, offset : (k, n), (k,) coordinates of all joints from the shape, matrix @ shape + offset
+    link_frames : number of the frame that each link moves with, and its pose there, (4, 4)
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    turns: Array
+    places: Array
+    axes: Array
+    slides: Array
+    masses: Array
+    centres: Array
+    inertias: Array
+    matrix: Array
+    offset: Array
+    link_frames: Mapping[str, tuple[int, Array]]
+
+
+def joint_chain(model: Any, mimics: Mapping[str, Mimic]) -> JointChain:
+    """The numbers of a Pinocchio model with a free-flyer, whose joints have one axis each."""
+    moving = moving_joints(model)
+    names = tuple(moving)
+    poses, screws = [], []
+    for name in names:
+        joint = model.joints[moving[name]]
+        data = joint.createData()
+        neutral = np.zeros(model.nq)
+        # A joint without end is kept as (cos, sin).
+        neutral[joint.idx_q] = float(joint.nq == 2)
+        joint.calc(data, neutral)
+        poses.append((model.jointPlacements[moving[name]] * data.M).homogeneous)
+        screws.append(np.array(data.S).reshape(6))
+    pose, screw = np.array(poses).reshape(-1, 4, 4), np.array(screws).reshape(-1, 6)
+    carried = model.inertias.tolist()[_BASE:]
+    independent = tuple(name for name in names if name not in mimics)
+    matrix, offset = mimic_map(list(names), independent, mimics)
+    return JointChain(
+        names,
+        tuple(int(model.parents[moving[name]]) - _BASE for name in names),
+        pose[:, :3, :3],
+        pose[:, :3, 3],
+        screw[:, 3:],
+        screw[:, :3],
+        np.array([inertia.mass for inertia in carried]),
+        np.array([inertia.lever for inertia in carried]),
+        np.array([inertia.inertia for inertia in carried]),
+        matrix,
+        offset,
+        {
+            frame.name: (int(frame.parentJoint) - _BASE, np.array(frame.placement.homogeneous))
+            for frame in model.frames
+            if frame.type.name == "BODY"
+        },
+    )

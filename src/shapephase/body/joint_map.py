@@ -1,0 +1,74 @@
+"""From the independent joints of a body to the configuration and velocity vectors of its Pinocchio model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from .link_tree import Mimic
+from .model_tree import mimic_map, moving_joints
+
+_BASE = 6  # velocities of the free-flyer in Pinocchio's order
+
+
+class JointMap:
+    """Where each joint stands in Pinocchio's vectors, mimic joints and joints kept as (cos, sin) included.
+
+    Attributes
+    ----------
+    names : tuple of the independent joints
+    continuous : (n,) True for a joint that turns without end
+    limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
+    units : "rad" or "m" for each joint
+    """
+
+    def __init__(self, model: Any, neutral: Array, mimics: Mapping[str, Mimic]) -> None:
+        moving = moving_joints(model)
+        self.names = tuple(n for n in moving if n not in mimics)
+        self._map, self._offset = mimic_map(list(moving), self.names, mimics)
+        self._plain = len(self.names) == len(moving)
+        kinds = [model.joints[i] for i in moving.values()]
+        turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
+        self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
+        self._velocity_index = np.array([kind.idx_v for kind in kinds], dtype=int) - _BASE
+        self._turning = turning
+        self._any_turning = bool(turning.any())
+        self._neutral = neutral
+        self._nv = model.nv
+        independent = [list(moving).index(n) for n in self.names]
+        self.continuous = turning[independent]
+        limits = np.stack([model.lowerPositionLimit, model.upperPositionLimit], axis=-1)
+        self.limits = limits[self._configuration_index[independent]].reshape(-1, 2)
+        self.limits[self.continuous] = [-np.inf, np.inf]
+        self.limits.setflags(write=False)
+        sliding = [kind.shortname().startswith("JointModelP") for kind in kinds]
+        self.units = tuple("m" if sliding[i] else "rad" for i in independent)
+
+    def configurations(self, shapes: Array) -> Array:
+        """Pinocchio's configurations with the base at the origin: (N, n) -> (N, nq)."""
+        full = shapes if self._plain else shapes @ self._map.T + self._offset
+        q = np.empty((len(shapes), len(self._neutral)))
+        q[:] = self._neutral
+        if self._any_turning:
+            turning = self._configuration_index[self._turning]
+            fixed = self._configuration_index[~self._turning]
+            q[:, fixed] = full[:, ~self._turning]
+            q[:, turning] = np.cos(full[:, self._turning])
+            q[:, turning + 1] = np.sin(full[:, self._turning])
+        else:
+            q[:, self._configuration_index] = full
+        return q
+
+    def velocities(self, rates: Array) -> Array:
+        """Pinocchio's velocities with the base at rest: (N, n) -> (N, nv)."""
+        v = np.zeros((len(rates), self._nv))
+        v[:, _BASE + self._velocity_index] = rates if self._plain else rates @ self._map.T
+        return v
+
+    def columns(self, joints: Array) -> Array:
+        """Columns of all of Pinocchio's joints, base left out, folded into the independent: (..., m) -> (..., n)."""
+        kept = joints[..., self._velocity_index]
+        return kept if self._plain else kept @ self._map

@@ -1,0 +1,233 @@
+"""Links and joints as a file has them, whatever its format, and what no tree of real links can be.
+
+A `LinkTree` is plain numbers: the model for Pinocchio is made from it, and the check of that model, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import ModelFileError, UnphysicalInertiaError, unknown_name
+
+# Pinocchio's work space grows with the cube of the joints: 0.3 GB for 200 of them.
+MOST_LINKS, MOST_JOINTS, MOST_DEPTH = 2000, 200, 200
+# Pinocchio's sums of inertias are wrong, without a word, for masses below the rounding of one.
+LEAST_MASS = 1e-15
+# The squares of masses and moments are still numbers.
+MOST_MASS = 1e30
+_TRIANGLE, _NEGATIVE, _ROUNDING = 1e-3, 1e-9, 1e-12
+_LEAST_RADIUS, _MOST_RADIUS, _HEAVY = 1e-4, 10.0, 1e5
+
+
+class UnphysicalInertiaWarning(UserWarning):
+    """Links whose inertia is doubtful, accepted because the caller asked so or because it does no harm."""
+
+
+class IgnoredElementWarning(UserWarning):
+    """Something a file says that a free-floating body of joints does not take up, named."""
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint that follows another: angle = multiplier * (angle of `leader`) + offset."""
+
+    leader: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Link:
+    """One link.
+
+    Attributes
+    ----------
+    name, where : what it is called, and "file:line"
+    mass : [kg]
+    centre : (3,) centre of mass in link axes [m]
+    inertia : (3, 3) about the centre of mass, link axes [kg m^2]
+    """
+
+    name: str
+    where: str
+    mass: float = 0.0
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: the child's axes are the parent's, moved by (place, turn), then by the joint, then by `after`.
+
+    Attributes
+    ----------
+    kind : "revolute", "continuous", "prismatic" or "fixed"
+    place, turn : (3,) [m], (3, 3) the joint's axes in those of the parent
+    axis : (3,) in the joint's axes, of any length
+    after : (3,) the origin of the child in the joint's axes [m]
+    limits : lower and upper [rad or m]
+    """
+
+    name: str
+    where: str
+    kind: str
+    parent: str
+    child: str
+    place: Array
+    turn: Array
+    axis: Array
+    after: Array
+    limits: tuple[float, float] = (-np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class LinkTree:
+    """All links and joints of a body, parents before children.
+
+    Attributes
+    ----------
+    name : of the robot
+    links : by name, the root first
+    joints : in the order in which they were found on the way down from the root
+    mimics : the joints that follow others
+    frames : names of links that are mere steps between the axes of one joint and the next
+    notes : what the file says and is not taken up
+    text : the URDF that was checked, written anew; None for other formats
+    """
+
+    name: str
+    links: dict[str, Link]
+    joints: tuple[Joint, ...]
+    mimics: dict[str, Mimic] = field(default_factory=dict)
+    frames: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = ()
+    text: str | None = None
+
+
+def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:
+    """The root link, and the joints sorted so that parents come before children.
+
+    Raises
+    ------
+    ModelFileError
+        If there is not one root, a link has two parents or none of the tree, or there are too many or too deep.
+    """
+    joints = tuple(joints)
+    moving = sum(joint.kind != "fixed" for joint in joints)
+    for count, most, kind in ((len(links), MOST_LINKS, "links"), (moving, MOST_JOINTS, "moving joints")):
+        if count > most:
+            raise ModelFileError(f"{where}:1: the body has {count} {kind}; up to {most} are supported")
+    above: dict[str, Joint] = {}
+    below: dict[str, list[Joint]] = {name: [] for name in links}
+    for joint in joints:
+        for end, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in links:
+                raise ModelFileError(f"{joint.where}: joint {joint.name!r}: its {end} link {link!r} does not exist")
+        if joint.child in above:
+            other = above[joint.child]
+            raise ModelFileError(
+                f"{joint.where}: joint {joint.name!r}: link {joint.child!r} has two parents, joints {other.name!r} "
+                f"({other.where}) and {joint.name!r}; keep one"
+            )
+        above[joint.child] = joint
+        below[joint.parent].append(joint)
+    roots = [name for name in links if name not in above]
+    if len(roots) > 1:
+        raise ModelFileError(
+            f"{links[roots[1]].where}: link {roots[1]!r}: {len(roots)} links have no parent, one is allowed: "
+            f"{_listed(roots)}; join them with joints"
+        )
+    sorted_joints: list[Joint] = []
+    level, depth, reached = roots, 0, set(roots)
+    while level:
+        depth += 1
+        if depth > MOST_DEPTH:
+            raise ModelFileError(f"{links[level[0]].where}: link {level[0]!r}: a chain of more than {MOST_DEPTH} links")
+        found = [joint for parent in level for joint in below[parent]]
+        sorted_joints += found
+        level = [joint.child for joint in found]
+        reached.update(level)
+    lost = [name for name in links if name not in reached]
+    if lost:
+        raise ModelFileError(
+            f"{links[lost[0]].where}: link {lost[0]!r}: links that hang on each other in a circle: {_listed(lost)}"
+        )
+    return roots[0], tuple(sorted_joints)
+
+
+def inertia_warnings(links: Iterable[Link], on_unphysical: str, called: str = "link {!r}") -> list[str]:
+    """What is doubtful about the inertia of links, one message for each kind.
+
+    Negative moments; moments that break the triangle inequality by more than 0.1 %; a mass or a radius of gyration
+    that speaks of wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
+    no fault. `called` is what people call the links.
+
+    Raises
+    ------
+    UnphysicalInertiaError
+        For what is not finite, a negative mass, or (unless `on_unphysical` is "warn") a negative moment.
+    """
+    if on_unphysical not in ("error", "warn"):
+        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
+    links = list(links)
+    for link in links:
+        if not (np.isfinite(link.mass) and np.isfinite(link.inertia).all() and link.mass >= 0.0):
+            numbers = f"mass {link.mass} kg and inertia {link.inertia.tolist()} kg m^2"
+            raise UnphysicalInertiaError(f"{link.where}: {called.format(link.name)}: no real body has {numbers}")
+    masses = np.array([link.mass for link in links])
+    moments = np.linalg.eigvalsh(np.array([link.inertia for link in links]).reshape(-1, 3, 3))
+    offsets = np.array([link.centre for link in links]).reshape(-1, 3)
+    floor = _ROUNDING * np.max(moments[:, 2] + masses * (offsets**2).sum(axis=-1), initial=0.0)
+    negative = moments[:, 0] < -_NEGATIVE * np.maximum(moments[:, 2], 0.0) - floor
+    if negative.any() and on_unphysical == "error":
+        first = int(np.argmax(negative))
+        others = [called.format(links[i].name) for i in np.flatnonzero(negative)[1:]]
+        also = f" (also {_listed(others)})" if others else ""
+        raise UnphysicalInertiaError(
+            f"{links[first].where}: {called.format(links[first].name)} has principal moments {moments[first]} "
+            f"kg m^2, one of them negative{also}; mend the file, or load it with on_unphysical='warn'"
+        )
+    broken = ~negative & (moments[:, 2] - moments[:, 1] - moments[:, 0] > _TRIANGLE * moments[:, 2] + floor)
+    # A radius from the largest moment: a rod may be as thin as it likes.
+    radius = np.sqrt(np.maximum(moments[:, 2], 0.0) / np.where(masses > 0.0, masses, np.inf))
+    real = (masses > 0.0) & (moments[:, 2] > floor)
+    strange = (real & ((radius > _MOST_RADIUS) | (radius < _LEAST_RADIUS))) | (masses > _HEAVY)
+    kinds = (
+        (negative, "a negative principal moment"),
+        (broken, "principal moments that break the triangle inequality: no distribution of mass has them"),
+        (
+            strange,
+            f"a mass above {_HEAVY:g} kg, or a radius of gyration above {_MOST_RADIUS:g} m or below "
+            f"{_LEAST_RADIUS:g} m; the units are kg, m and kg m^2",
+        ),
+    )
+    found = []
+    for which, text in kinds:
+        if which.any():
+            bad = [links[i] for i in np.flatnonzero(which)]
+            found.append(f"{bad[0].where}: {_listed([called.format(link.name) for link in bad])}: {text}")
+    return found
+
+
+def massless_warning(tree: LinkTree) -> list[str]:
+    """The links that a joint moves although neither they nor anything that hangs on them has mass."""
+    carried = {name: link.mass for name, link in tree.links.items()}
+    for joint in reversed(tree.joints):
+        carried[joint.parent] += carried[joint.child]
+    idle = [
+        j.child for j in tree.joints if j.kind != "fixed" and carried[j.child] == 0.0 and j.child not in tree.frames
+    ]
+    if not idle:
+        return []
+    where = tree.links[idle[0]].where
+    named = _listed([f"link {name!r}" for name in idle])
+    return [f"{where}: {named}: moved by a joint, but without mass, and nothing with mass hangs on it"]
+
+
+def _listed(names: list[str]) -> str:
+    shown = ", ".join(names[:50])
+    return shown if len(names) <= 50 else f"{shown} and {len(names) - 50} more"

@@ -1,0 +1,134 @@
+"""From a checked tree of links to a Pinocchio model, and what a model must be like to be a body."""
+
+from __future__ import annotations
+
+# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# pyright: reportAttributeAccessIssue=false
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+from .. import so3
+from ..arrays import Array
+from ..errors import ModelFileError
+from .link_tree import Link, LinkTree, Mimic, inertia_warnings
+
+_ROOT = "shapephase_free_flyer"
+
+
+def model_of(tree: LinkTree, where: str) -> pin.Model:
+    """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF, else joint by joint.
+
+    Raises
+    ------
+    ModelFileError
+        If Pinocchio cannot build a model from it.
+    """
+    root = _ROOT
+    taken = {*tree.links, *(joint.name for joint in tree.joints)}
+    while root in taken:
+        root += "_"
+    try:
+        if tree.text is not None:
+            return pin.buildModelFromXML(tree.text, pin.JointModelFreeFlyer(), root)
+        return _built(tree, root)
+    except (ValueError, RuntimeError) as error:
+        raise ModelFileError(f"{where}:1: robot {tree.name!r}: Pinocchio does not accept it: {error}") from None
+
+
+def checked_model(model: pin.Model, where: str, on_unphysical: str) -> tuple[pin.Model, list[str]]:
+    """A copy of a Pinocchio model whose root joint is a free-flyer, and what is doubtful about its inertias.
+
+    Raises
+    ------
+    ModelFileError
+        If the root joint is no free-flyer, or there is no mass.
+    UnphysicalInertiaError
+        As `inertia_warnings`.
+    """
+    if model.njoints < 2 or model.joints[1].shortname() != "JointModelFreeFlyer":
+        raise ModelFileError(
+            f"{where}: the model's root joint is no free-flyer, so the mass of its root link is lost; build it with "
+            "pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())"
+        )
+    moved = [
+        Link(name, where, inertia.mass, np.array(inertia.lever), np.array(inertia.inertia))
+        for name, inertia in zip(list(model.names)[1:], model.inertias.tolist()[1:], strict=True)
+    ]
+    doubts = inertia_warnings(moved, on_unphysical, "what joint {!r} moves")
+    if not any(link.mass for link in moved):
+        raise ModelFileError(f"{where}: nothing in it has mass")
+    return model.copy(), doubts
+
+
+def moving_joints(model: pin.Model) -> dict[str, int]:
+    """Names and numbers of the joints below the free-flyer, in Pinocchio's order."""
+    moving = {}
+    for number in range(2, model.njoints):
+        joint = model.joints[number]
+        kind = joint.shortname()
+        single = joint.nv == 1 and (joint.nq == 1 or kind.startswith("JointModelRUB") or "Unbounded" in kind)
+        if not single or "Mimic" in kind:
+            raise ModelFileError(
+                f"joint {model.names[number]!r} is a {kind}; joints of one axis are supported (revolute, continuous, "
+                "prismatic): replace it by a chain of those"
+            )
+        moving[model.names[number]] = number
+    return moving
+
+
+def mimic_map(moving: list[str], independent: tuple[str, ...], mimics: Mapping[str, Mimic]) -> tuple[Array, Array]:
+    """S and q0 of full = S independent + q0, followers of followers resolved."""
+    place = {name: column for column, name in enumerate(independent)}
+    matrix = np.zeros((len(moving), len(independent)))
+    offset = np.zeros(len(moving))
+    for row, name in enumerate(moving):
+        factor, leader = 1.0, name
+        while leader in mimics:
+            rule = mimics[leader]
+            offset[row] += factor * rule.offset
+            factor *= rule.multiplier
+            leader = rule.leader
+        if leader in place:
+            matrix[row, place[leader]] = factor
+        elif leader != name:
+            raise ModelFileError(f"joint {name!r} mimics {leader!r}, which is fixed or not part of the body")
+    return matrix, offset
+
+
+def _built(tree: LinkTree, root: str) -> pin.Model:
+    """A model made joint by joint, in the order of the tree."""
+    model = pin.Model()
+    model.name = tree.name
+    number = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), root)
+    # Every link hangs on a joint of the model, somewhere.
+    hangs = {next(iter(tree.links)): (number, pin.SE3.Identity())}
+    for joint in tree.joints:
+        number, pose = hangs[joint.parent]
+        pose, after = pose * pin.SE3(joint.turn, joint.place), pin.SE3(np.eye(3), joint.after)
+        if joint.kind != "fixed":
+            axis = joint.axis / np.linalg.norm(joint.axis)
+            lower, upper, none = np.array([joint.limits[0]]), np.array([joint.limits[1]]), np.zeros(1)
+            sliding = joint.kind == "prismatic"
+            moving = (pin.JointModelPrismaticUnaligned if sliding else pin.JointModelRevoluteUnaligned)(axis)
+            if joint.kind == "continuous":
+                # Pinocchio's joint without end about any axis cannot be given one: its x turned to the axis.
+                turned = pin.SE3(so3.between(np.array([1.0, 0.0, 0.0]), axis), np.zeros(3))
+                moving, pose, after = pin.JointModelRUBX(), pose * turned, turned.inverse() * after
+                lower, upper = -np.ones(2), np.ones(2)
+            number = model.addJoint(number, moving, pose, joint.name, none, none, lower, upper)
+            pose = pin.SE3.Identity()
+        hangs[joint.child] = number, pose * after
+    for name, (number, pose) in hangs.items():
+        if name not in tree.frames:
+            model.appendBodyToJoint(number, _inertia(tree.links[name]), pose)
+            model.addBodyFrame(name, number, pose, 0)
+    return model
+
+
+def _inertia(link: Link) -> pin.Inertia:
+    # Entry by entry: the constructor refuses what `on_unphysical` may allow.
+    inertia = pin.Inertia.Zero()
+    inertia.mass, inertia.lever, inertia.inertia = link.mass, link.centre, link.inertia
+    return inertia

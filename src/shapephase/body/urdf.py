@@ -1,0 +1,247 @@
+"""URDF: every element checked before Pinocchio sees it.
+
+Pinocchio drops what it cannot read (a mass with a unit behind it, an inertia without all six entries, links that hang
+on nothing) without a word. So every number is read here first, and Pinocchio gets a text written anew from what
+was read: links with their inertia and joints, nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import ModelFileError
+from .link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, Mimic, from_the_root
+from .xml_text import (
+    Node,
+    child_of,
+    known_attributes,
+    name_of,
+    needed_child,
+    no_misspelt_children,
+    number,
+    quoted,
+    vector,
+)
+
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_AXIS_JOINTS = ("revolute", "continuous", "prismatic")
+_ROBOT_PARTS = ("link", "joint")
+_LINK_PARTS = ("inertial", "visual", "collision")
+_JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+_NONE = np.zeros(3)
+_FORMATS = {
+    "sdf": "an SDF model; convert it to URDF first (sdf2urdf of the ROS package pysdf)",
+    "html": "an HTML page, not the file itself; download the raw file",
+    "mujocoinclude": "a part of an MJCF model; load the file that includes it",
+    "COLLADA": "a mesh; load the robot's URDF",
+}
+
+
+@dataclass
+class _Reading:
+    """What is found on the way through the file."""
+
+    text: list[str] = field(default_factory=list)
+    mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def urdf_tree(root: Node) -> LinkTree:
+    """Check a URDF from its root element.
+
+    Raises
+    ------
+    ModelFileError
+        If it is no URDF, needs xacro, or a link or joint is faulty.
+    """
+    if root.tag != "robot":
+        tag = root.tag.rpartition("}")[2]
+        said = _FORMATS.get(tag, "neither a URDF nor an MJCF model")
+        raise root.fault(f"<{quoted(tag)}>", f"expected <robot>: this is {said}")
+    _check_xacro(root)
+    no_misspelt_children(root, _ROBOT_PARTS, "<robot>")
+    name = name_of(root) if root.get("name") else "robot"
+    reading = _Reading()
+    links = {key: _link(key, node, reading) for key, node in _named(root, "link").items()}
+    if not links:
+        raise root.fault(f"robot {name!r}", "has no links; a body needs at least one <link>")
+    joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint").items()}
+    first, ordered = from_the_root(links, joints.values(), root.file)
+    _check_mimics(reading.mimics, joints)
+    found = {first: links[first]} | {joint.child: links[joint.child] for joint in ordered}
+    text = f"<robot name={quoteattr(name)}>{''.join(reading.text)}</robot>"
+    mimics = {key: rule for key, (_, rule) in reading.mimics.items()}
+    return LinkTree(name, found, ordered, mimics, notes=tuple(reading.notes), text=text)
+
+
+def rpy_matrix(rpy: Array) -> Array:
+    """The rotation by fixed-axes angles: about x, then y, then z: (..., 3) -> (..., 3, 3)."""
+    (cx, cy, cz), (sx, sy, sz) = np.moveaxis(np.cos(rpy), -1, 0), np.moveaxis(np.sin(rpy), -1, 0)
+    rows = [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def _check_xacro(root: Node) -> None:
+    """Macros or expressions that are left; an unused xacro namespace on <robot> is harmless."""
+    for top in root.children:
+        read = top.tag in _ROBOT_PARTS
+        for node in top.walk():
+            left = "wiki/xacro}" in node.tag or "xacro:" in node.tag
+            if left or (read and any("${" in value or "$(" in value for value in node.attributes.values())):
+                tag = quoted(node.tag.rpartition("}")[2])
+                raise node.fault(
+                    f"<{tag}>", f"an unprocessed xacro file; run `xacro {root.file} > robot.urdf` and load that"
+                )
+
+
+def _named(root: Node, kind: str) -> dict[str, Node]:
+    """The links or joints by name."""
+    found: dict[str, Node] = {}
+    nodes = root.all(kind)
+    if len(nodes) > MOST_LINKS:
+        raise nodes[MOST_LINKS].fault(
+            f"<{kind}>", f"the body has {len(nodes)} {kind}s; up to {MOST_LINKS} are supported"
+        )
+    for node in nodes:
+        name = name_of(node)
+        if name in found:
+            raise node.fault(
+                f"{kind} {name!r}",
+                f"two <{kind}> elements are called so, the first in line {found[name].line}; rename one",
+            )
+        found[name] = node
+    return found
+
+
+def _link(name: str, node: Node, reading: _Reading) -> Link:
+    owner, where = f"link {name!r}", f"{node.file}:{node.line}"
+    no_misspelt_children(node, _LINK_PARTS, owner)
+    inertial = child_of(node, "inertial", owner)
+    if inertial is None:
+        reading.text.append(f"<link name={quoteattr(name)}/>")
+        return Link(name, where)
+    for part in inertial.children:
+        if part.tag not in ("origin", "mass", "inertia"):
+            raise part.fault(owner, f"<inertial> holds <origin>, <mass> and <inertia>, not <{quoted(part.tag)}>")
+    written = needed_child(inertial, "mass", owner)
+    known_attributes(written, ("value",), owner)
+    mass = number(written, "value", owner, most=MOST_MASS)
+    if mass < 0.0:
+        raise written.fault(owner, f"negative mass {mass:g} kg; a mass is at least zero")
+    if 0.0 < mass < LEAST_MASS:
+        raise written.fault(owner, f"mass {mass:g} kg is too small to be summed; give {LEAST_MASS:g} kg or more, or 0")
+    written = needed_child(inertial, "inertia", owner)
+    known_attributes(written, _INERTIA, owner)
+    xx, xy, xz, yy, yz, zz = values = [number(written, key, owner, most=MOST_MASS) for key in _INERTIA]
+    place, turn, origin = _origin(inertial, owner)
+    entries = " ".join(f'{key}="{value!r}"' for key, value in zip(_INERTIA, values, strict=True))
+    reading.text.append(
+        f'<link name={quoteattr(name)}><inertial>{origin}<mass value="{mass!r}"/><inertia {entries}/></inertial></link>'
+    )
+    inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    return Link(name, where, mass, place, 0.5 * (inertia + inertia.T))
+
+
+def _joint(name: str, node: Node, reading: _Reading) -> Joint:
+    owner = f"joint {name!r}"
+    no_misspelt_children(node, _JOINT_PARTS, owner)
+    kind = node.get("type") or ""
+    if kind not in (*_AXIS_JOINTS, "fixed"):
+        raise node.fault(
+            owner,
+            f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)} or fixed, several in a row for "
+            "a joint of several axes",
+        )
+    ends = {end: needed_child(node, end, owner) for end in ("parent", "child")}
+    for end in ends.values():
+        known_attributes(end, ("link",), owner)
+    parent, child = (name_of(end, "link") for end in ends.values())
+    place, turn, parts = _origin(node, owner)
+    parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
+    axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
+    if kind != "fixed":
+        written = child_of(node, "axis", owner)
+        if written is not None:
+            known_attributes(written, ("xyz",), owner)
+            axis = vector(written, "xyz", owner)
+            if math.hypot(*axis) < 1e-9:
+                raise written.fault(owner, f"the axis {axis} points nowhere; give it a length")
+        parts += f'<axis xyz="{_text(axis)}"/>'
+    if kind in ("revolute", "prismatic"):
+        limits = _limits(node, kind, owner)
+        # Effort and velocity are for motors; Pinocchio insists on them, this library has no use for them.
+        parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="0" velocity="0"/>'
+    reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
+    _mimic(name, kind, node, reading)
+    where = f"{node.file}:{node.line}"
+    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NONE, limits)
+
+
+def _limits(node: Node, kind: str, owner: str) -> tuple[float, float]:
+    limit = child_of(node, "limit", owner)
+    if limit is None:
+        raise node.fault(owner, f"a {kind} joint needs <limit lower upper effort velocity>; add it")
+    lower, upper = (number(limit, key, owner, default="0", most=math.inf) for key in ("lower", "upper"))
+    if lower > upper:
+        raise limit.fault(owner, f"the lower limit {lower:g} is above the upper one, {upper:g}; exchange them")
+    return lower, upper
+
+
+def _origin(node: Node, owner: str) -> tuple[Array, Array, str]:
+    """Place, rotation and the element written anew."""
+    origin = child_of(node, "origin", owner)
+    if origin is None:
+        return _NONE, np.eye(3), ""
+    known_attributes(origin, ("xyz", "rpy"), owner)
+    parts = {key: vector(origin, key, owner) for key in ("xyz", "rpy") if origin.get(key) is not None}
+    written = " ".join(f'{key}="{_text(values)}"' for key, values in parts.items())
+    rpy = parts.get("rpy")
+    turn = np.eye(3) if rpy is None or not any(rpy) else rpy_matrix(np.array(rpy))
+    return np.array(parts.get("xyz", _NONE)), turn, f"<origin {written}/>"
+
+
+def _text(values: list[float]) -> str:
+    return " ".join(map(repr, values))
+
+
+def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
+    owner = f"joint {name!r}"
+    element = child_of(node, "mimic", owner)
+    if element is None:
+        return
+    if kind == "fixed":
+        reading.notes.append(f"{element.file}:{element.line}: {owner}: <mimic> of a fixed joint is ignored")
+        return
+    known_attributes(element, ("joint", "multiplier", "offset"), owner)
+    multiplier, offset = (number(element, k, owner, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
+    reading.mimics[name] = (element, Mimic(name_of(element, "joint"), multiplier, offset))
+
+
+def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint]) -> None:
+    """Every leader exists and is of the follower's kind, and nobody follows itself."""
+    for name, (element, rule) in mimics.items():
+        owner, leader = f"joint {name!r}", joints.get(rule.leader)
+        if leader is None:
+            raise _mimic_fault(element, owner, f"mimics joint {rule.leader!r}, which does not exist")
+        kinds = joints[name].kind, leader.kind
+        if kinds[1] == "fixed" or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
+            raise _mimic_fault(element, owner, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
+        seen, follower = {name}, name
+        while follower in mimics:
+            follower = mimics[follower][1].leader
+            if follower in seen:
+                raise _mimic_fault(element, owner, "mimic joints follow each other in a circle")
+            seen.add(follower)
+
+
+def _mimic_fault(element: Node, owner: str, message: str) -> ModelFileError:
+    return element.fault(owner, f"{message}; remove the <mimic> or name another joint")

@@ -1,0 +1,169 @@
+"""The energy E_t = Pi.I^-1 Pi/2 along a motion, its rate, and its level sets on the sphere of momenta.
+
+E_t is not the kinetic energy T where the shape moves: with T_0 that of the shape motion alone,
+
+    T = omega.I omega/2 + L_o.omega + T_0,    E_t = T - T_0 + L_o.I^-1 L_o/2.
+
+Sources: Cabrera 2006, equation (4) with the missing half (theory.md C-E1) and section 4.1 with L_o for what is
+misprinted there (C-E9); theory.md E1 to E5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..deformation.deformation import Deformation
+from ..errors import ShapeError
+from ..inertia_tensor import inverse_inertia
+from ..reconstruction.reconstruction import Motion
+from ..rigid_body.euler_top import EulerTop
+from ..shape_space.shape_path import times_argument
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyRate:
+    """Why E_t changes; fields are batch + t.shape [W].
+
+    Attributes
+    ----------
+    by_inertia : Pi.(I^-1)' Pi/2, all there is without internal momentum
+    by_internal_momentum : (Pi x I^-1 Pi).I^-1 L_o
+    """
+
+    by_inertia: Array
+    by_internal_momentum: Array
+
+    @property
+    def total(self) -> Array:
+        """dE_t/dt [W]."""
+        return self.by_inertia + self.by_internal_momentum
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenPolhode:
+    """Where a rigid body with the inertia of one moment would take Pi from where it is.
+
+    Attributes
+    ----------
+    points : (N, 3) of the curve from the start round to it [kg m^2/s]; on the separatrix it is not closed, but the
+        half circle through the start between the two directions of the intermediate axis
+    energy : E_t on it [J]
+    homoclinic_energy : E_t of the separatrix [J]
+    period : after which that body's momentum is back [s]; infinite on the separatrix and where it stands still
+    regime : as `EulerTop.regime`
+    """
+
+    points: Array
+    energy: float
+    homoclinic_energy: float
+    period: float
+    regime: str
+
+
+def momentum_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
+    """E = Pi.I^-1 Pi/2: (..., 3, 3) [kg m^2], (..., 3) body axes [kg m^2/s] -> (...) [J]; leading axes broadcast.
+
+    Raises ShapeError, SingularInertiaError. Source: theory.md E1.
+    """
+    tensor, pi = finite_array(inertia, "inertia", (3, 3)), finite_array(momentum, "momentum", (3,))
+    return 0.5 * np.sum(pi * so3.apply(inverse_inertia(tensor), pi), axis=-1)
+
+
+def energy_along(motion: Motion, t: ArrayLike) -> Array:
+    """E_t of a motion: times (...) -> batch + (...) [J]. Source: theory.md E1."""
+    times, inverse, _, pi = _along(motion, t)
+    energy = 0.5 * np.sum(pi * so3.apply(inverse, pi), axis=-1)
+    return energy.reshape((*motion.batch, *times.shape))[()]
+
+
+def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
+    """dE_t/dt of a motion, in its two parts: times (...) -> batch + (...) [W].
+
+    Source: Cabrera 2006, section 4.1, where L_o stands for what is printed L(d_0) (theory.md C-E9); E3.
+    """
+    times, inverse, drift, pi = _along(motion, t)
+    inverse_rate = -inverse @ motion.deformation.source.inertia_rate(times.ravel()) @ inverse
+    shape = (*motion.batch, *times.shape)
+    by_inertia = 0.5 * np.sum(pi * so3.apply(inverse_rate, pi), axis=-1)
+    by_drift = np.sum(np.cross(pi, so3.apply(inverse, pi)) * drift, axis=-1)
+    return EnergyRate(by_inertia.reshape(shape)[()], by_drift.reshape(shape)[()])
+
+
+def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
+    """T = omega.I omega/2 + L_o.omega + T_0 about the centre of mass: times (...) -> batch + (...) [J].
+
+    Raises GaugeError if the deformation is known by its inertia only.
+    Source: Cabrera 2006, equation (4), with the half it lacks (theory.md C-E1); A6.
+    """
+    times = times_argument(t, motion.duration)
+    flat = times.ravel()
+    inertia, internal = motion.deformation.source.sample(flat)
+    omega = motion.angular_velocity(flat).reshape(-1, flat.size, 3)
+    turning = np.sum(omega * (0.5 * so3.apply(inertia, omega) + internal), axis=-1)
+    shape_only = motion.deformation.source.kinetic_energy(flat, np.zeros((1, flat.size, 3)))
+    return (turning + shape_only).reshape((*motion.batch, *times.shape))[()]
+
+
+def homoclinic_energy(deformation: Deformation, t: ArrayLike, size: float) -> Array:
+    """l^2/(2 I_2(t)), the energy on the separatrix of the body frozen at each time: times (...) -> (...) [J].
+
+    Parameters
+    ----------
+    size : l, the momentum's size [kg m^2/s]
+
+    Source: Cabrera 2006, section 4.1.1, with the half it lacks (theory.md C-E5); E5.
+    """
+    length = float(finite_array(size, "size"))
+    times = times_argument(t, deformation.duration)
+    middle = np.linalg.eigvalsh(deformation.inertia(times))[..., 1]
+    return np.asarray(0.5 * length * length / middle, dtype=np.float64)[()]
+
+
+def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, count: int = 200) -> FrozenPolhode:
+    """The level set of E_t through a point: the polhode of the rigid body that the deforming one is at time t.
+
+    Parameters
+    ----------
+    momentum : (3,) Pi(t), base axes [kg m^2/s]
+    count : how many points
+
+    Source: Cabrera 2006, section 4.1; theory.md E4.
+    """
+    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:
+        raise ShapeError(f"count: a whole number of 2 or more is needed, got {count!r}")
+    inertia = deformation.inertia(float(finite_array(t, "t", unit="s")))
+    top = EulerTop(inertia, momentum)
+    orbit = top.orbit
+    directions = np.broadcast_to(orbit.direction, (count, 3))
+    if orbit.rate:
+        # By the angle about the axis circled and not by time, which has no end on the separatrix.
+        seen = orbit.start / orbit.size / np.where(orbit.amplitudes == 0.0, 1.0, orbit.amplitudes)
+        half, begin = orbit.regime == "separatrix", float(np.arctan2(seen[1], seen[orbit.other]))
+        am = np.linspace(-0.5 * np.pi, 0.5 * np.pi, count) if half else begin + np.linspace(0.0, 2.0 * np.pi, count)
+        sine, cosine = np.sin(am), np.cos(am)
+        directions = np.empty((count, 3))
+        directions[:, 1], directions[:, orbit.other] = sine, cosine
+        directions[:, orbit.circled] = np.sqrt(cosine * cosine + orbit.complement * sine * sine)
+        directions *= orbit.amplitudes
+    return FrozenPolhode(
+        points=orbit.size * (directions @ top.axes.T),
+        energy=top.energy,
+        homoclinic_energy=0.5 * orbit.size * orbit.size / float(top.moments[1]),
+        period=top.period,
+        regime=top.regime,
+    )
+
+
+def _along(motion: Motion, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
+    """Times, I^-1 (N, 3, 3), w (N, 3) and Pi (B, N, 3)."""
+    times = times_argument(t, motion.duration)
+    flat = times.ravel()
+    inertia, internal = motion.deformation.source.sample(flat)
+    inverse = inverse_inertia(inertia, flat)
+    pi = motion.body_momentum(flat).reshape(-1, flat.size, 3)
+    return times, inverse, so3.apply(inverse, internal), pi

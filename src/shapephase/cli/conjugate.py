@@ -1,0 +1,99 @@
+"""`shapephase conjugate`: conjugate points of the Serret-Andoyer metric of a free rigid body."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from cyclopts import Parameter
+
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+from ..files import write_whole
+from .text import Outcome, check_writable
+
+_ENDINGS = (".svg", ".pdf", ".png")
+_PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
+"""The p listed without being asked for, in parts of the way from sqrt(I_2) to sqrt(I_1)."""
+
+
+def conjugate_command(
+    i1: float,
+    i2: float,
+    i3: float,
+    /,
+    *,
+    momenta: Annotated[tuple[float, ...], Parameter(consume_multiple=True, negative_iterable="")] = (),
+    order: int = 1,
+    out: Path | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+) -> Outcome:
+    """List conjugate points of the free rigid body's Serret-Andoyer metric, and draw their locus.
+
+    Parameters
+    ----------
+    i1
+        the largest principal moment [kg m^2]
+    i2
+        the middle one
+    i3
+        the least one
+    momenta
+        p = |Pi|/sqrt(2 E) of the geodesics, sqrt(i2) < p <= sqrt(i1); without it six of them
+    order
+        which conjugate point of each geodesic, 1 the first
+    out
+        write the figure to this file, .svg, .pdf or .png
+    json
+        print JSON
+    """
+    from ..rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
+
+    check_writable(out, "--out", *_ENDINGS)
+    metric = serret_andoyer_metric((i1, i2, i3))
+    low, high = float(np.sqrt(metric.moments[1])), metric.largest_momentum
+    p = finite_array(momenta if momenta else [low + part * (high - low) for part in _PARTS], "--momenta", (None,))
+    p = p if momenta else np.minimum(p, high)
+    if np.any((p <= low) | (p > high)):
+        raise ShapeError(
+            f"--momenta: only geodesics with {low:.6g} < p <= {high:.6g} have conjugate points and are listed, got "
+            + " ".join(f"{value:g}" for value in p)
+        )
+    family = metric.geodesics(p)
+    found = family.conjugate_points(order)
+    if out is not None:
+        _draw(out, (i1, i2, i3), order, p)
+    rows = zip(p, family.period, family.first_return, found.time, found.phi, found.theta, strict=True)
+    lines = [
+        f"Serret-Andoyer metric of moments {i1:g} {i2:g} {i3:g} kg m^2, conjugate points of order {order}",
+        f"asymptote at phi = {metric.crest:.9f} sqrt(kg) m either side, as p falls to {low:.9f}",
+        "",
+        "".join(f"{name:>16}" for name in ("p", "T", "R [rad]", "time", "phi", "theta [rad]")),
+        *("".join(f"{value:16.9f}" for value in np.round(row, 9) + 0.0) for row in rows),
+        "",
+        "p, T, time and phi in sqrt(kg) m; of geodesics that start upward, the others are mirror images",
+    ]
+    if out is not None:
+        lines.append(f"wrote {out}")
+    data = {
+        "moments_kg_m2": [i1, i2, i3],
+        "order": order,
+        "crest": metric.crest,
+        "p": p.tolist(),
+        "period": family.period.tolist(),
+        "first_return_rad": family.first_return.tolist(),
+        "conjugate_time": found.time.tolist(),
+        "phi": found.phi.tolist(),
+        "theta_rad": found.theta.tolist(),
+        "figure": None if out is None else str(out),
+    }
+    return Outcome("\n".join(lines), data)
+
+
+def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
+    from ..plotting.geodesic_plots import plot_conjugate_locus
+    from ..plotting.plot_style import axes_image, column_axes
+
+    image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:])
+    write_whole(out, lambda stream: stream.write(image))

@@ -1,0 +1,205 @@
+"""`shapephase plan`: the joint motion that turns a body as asked."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import numpy as np
+from cyclopts import Parameter
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..body.catalog import load_body
+from ..errors import PlanNotFound, ShapeError
+from ..phases.phases import split
+from ..shape_space.files.read import write_shape_path
+from .progress import Steps, steps
+from .text import Outcome, check_writable, rotation_line
+
+if TYPE_CHECKING:
+    from ..optimal_control.plan import Plan, Progress
+
+_SAMPLES = 2001
+_STOPPED = 130
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+
+
+def plan_command(
+    body: str,
+    /,
+    *,
+    rotate: float | None = None,
+    about: str = "x",
+    momentum: Annotated[tuple[float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0),
+    duration: float = 1.0,
+    somersaults: float | None = None,
+    half_twists: float | None = None,
+    cost: str = "kinetic",
+    starts: int = 1,
+    seed: int = 0,
+    out: Path | None = None,
+    html: Path | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+) -> Outcome:
+    """Find the cheapest motion of the joints that turns a body as asked, and compute what it does.
+
+    Ctrl-C ends the search; the best motion so far is told and written, and the exit code is 130.
+
+    Parameters
+    ----------
+    body
+        as for split
+    rotate
+        angle of the turn [degrees]
+    about
+        its axis, x, y or z of the base at the start, or three numbers with commas between them
+    momentum
+        angular momentum about the centre of mass, inertial axes [kg m^2/s]
+    duration
+        [s]; for the cost "time" the longest allowed
+    somersaults
+        instead of --rotate, turns about the momentum, with --half-twists about the z axis of the base
+    half_twists
+        see --somersaults
+    cost
+        kinetic, rate, acceleration or time
+    starts
+        searches from different guesses
+    seed
+        of the guesses
+    out
+        write the joint motion to this CSV file
+    html
+        write a report with animation and figures to this HTML file
+    json
+        print JSON
+    """
+    from ..optimal_control.planning import plan_reorientation
+
+    check_writable(out, "--out", ".csv")
+    check_writable(html, "--html", ".html")
+    if (rotate is None) == (somersaults is None and half_twists is None):
+        raise ShapeError("what to do: give --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
+    with steps(12 if html else 2) as work:
+        work.begin("loading")
+        loaded = load_body(body, isolate=True)
+        target = None if rotate is None else so3.exp(np.radians(rotate) * _axis(about))
+        work.begin("searching")
+        with _stoppable(work) as search:
+            try:
+                found = plan_reorientation(
+                    loaded,
+                    target,
+                    momentum=momentum,
+                    duration=duration,
+                    somersaults=somersaults,
+                    half_twists=half_twists,
+                    cost=cost,
+                    starts=starts,
+                    seed=seed,
+                    watch=search.watch,
+                )
+            except PlanNotFound as failure:
+                if not search.stopped or failure.best is None:
+                    raise
+                found = cast("Plan", failure.best)
+                warnings.warn(str(failure), stacklevel=2)
+        if out is not None:
+            # So dense that a reader who joins the ends smoothly, as closed samples are read, changes next to nothing.
+            write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
+        if html is not None:
+            from ..plotting.report import write_report
+
+            title = f"{loaded.name} turns itself"
+            write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
+    turned = found.motion.final_attitude
+    lines = [
+        _heading(loaded, found.path.duration, momentum),
+        "",
+        rotation_line("turned", turned),
+        f"{'off the goal':24}{found.miss:16.2e} rad",
+        f"{'cost':24}{found.cost:16.9g}   {found.cost_name}",
+        f"{'KKT residual':24}{found.kkt_residual:16.2e}",
+        f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
+    ]
+    data = {
+        "body": loaded.name,
+        "duration_s": found.path.duration,
+        "momentum_kg_m2_s": list(momentum),
+        "final_attitude_quat_xyzw": so3.quat_from_matrix(turned).tolist(),
+        "miss_rad": found.miss,
+        "cost": found.cost,
+        "cost_name": found.cost_name,
+        "kkt_residual": found.kkt_residual,
+        "iterations": found.iterations,
+    }
+    return Outcome("\n".join(lines), data, code=_STOPPED if search.stopped else 0)
+
+
+class _Search:
+    """A search on the terminal.
+
+    Attributes
+    ----------
+    begun : whether there is something to keep
+    stopped : whether Ctrl-C was pressed since
+    """
+
+    def __init__(self, work: Steps) -> None:
+        self._work = work
+        self.begun = self.stopped = False
+
+    def watch(self, now: Progress) -> bool:
+        """Shows where the search stands, and stops it when asked."""
+        which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
+        self._work.say(
+            f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
+        )
+        self.begun = True
+        return self.stopped
+
+    def interrupted(self, *_: Any) -> None:
+        """Ctrl-C: the search ends after this iteration; pressed again, at once."""
+        if self.stopped or not self.begun:
+            raise KeyboardInterrupt
+        self.stopped = True
+        self._work.say("stopping, to keep the best so far (Ctrl-C again gives it up)")
+
+
+@contextmanager
+def _stoppable(work: Steps) -> Iterator[_Search]:
+    """A search that Ctrl-C stops."""
+    search = _Search(work)
+    if threading.current_thread() is not threading.main_thread():
+        # Python hands Ctrl-C to the main thread alone.
+        yield search
+        return
+    before = signal.signal(signal.SIGINT, search.interrupted)
+    try:
+        yield search
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:
+    numbers = " ".join(f"{value:g}" for value in momentum)
+    return f"{body.name}: {duration:g} s, {body.n_shape} joints, momentum ({numbers}) kg m^2/s"
+
+
+def _axis(text: str) -> Array:
+    if text in _AXES:
+        return np.array(_AXES[text])
+    try:
+        axis = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        axis = np.zeros(0)
+    if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
+        raise ShapeError(f"--about: x, y, z or three numbers such as 1,0,0 are needed, got {text!r}")
+    return so3.normalised(axis)

@@ -1,0 +1,219 @@
+"""What the command line says of its results, for people and for programs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..errors import InputFileNotFoundError, UnknownNameError
+from ..phases.phases import PhaseSplit
+from ..phases.return_map import FixedPoints
+from ..reconstruction.reconstruction import Motion
+from ..reconstruction.recorded_base import base_difference
+from ..shape_space.files.read import RecordedMotion
+from ..shape_space.summaries import ModelCard, PathCard
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command has to say, for people and for programs, and its exit code."""
+
+    text: str
+    data: dict[str, Any]
+    judged: bool = False
+    code: int = 0
+
+
+def check_writable(out: Path | None, option: str, *endings: str) -> None:
+    """Before anything is computed."""
+    if out is None:
+        return
+    if out.suffix not in endings:
+        raise UnknownNameError(f"{option}: the file's name must end in {' or '.join(endings)}, got {str(out)!r}")
+    if not out.absolute().parent.is_dir():
+        raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
+
+
+def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> list[str]:
+    """A split for people."""
+    momentum = " ".join(f"{v:g}" for v in motion.momentum)
+    lines = [
+        f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_shape} joints, {body.mass:.6g} kg, "
+        f"momentum ({momentum}) kg m^2/s",
+        "",
+        f"{'':24}{'angle [deg]':>16}   axis (inertial)",
+        rotation_line("total rotation", result.total_rotation),
+        rotation_line("  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy),
+        rotation_line("  dynamical rotation", result.dynamical_rotation),
+        "",
+    ]
+    if result.has_phase:
+        lines += [
+            f"{f'seen in the {result.gauge} gauge':24}{'[deg]':>16}{'[rad]':>20}",
+            _phase_line("Montgomery phase", result.montgomery_phase),
+            _phase_line("  dynamic phase", result.dynamic_phase),
+            _phase_line("  geometric phase", result.geometric_phase),
+            rotation_line("tilt", result.tilt),
+            f"{'momentum gap':24}{np.degrees(result.momentum_gap):16.6f} deg",
+            f"{'residual':24}{result.residual:16.2e} rad   (phase by formula against attitude)",
+        ]
+    else:
+        lines.append("no angular momentum: the shape alone turns the body, there is no Montgomery phase")
+    if not result.is_loop:
+        lines.append(f"{'shape gap':24}{result.shape_gap:16.6g}       (the shape does not return: no holonomy)")
+    lines += [
+        f"{'error estimate':24}{motion.error_estimate:16.2e} rad",
+        f"{'evaluations':24}{motion.evaluations:16d}",
+    ]
+    return lines
+
+
+def rotation_line(name: str, rotation: Array) -> str:
+    """Angle and axis of a rotation."""
+    vector = so3.log(rotation)
+    turn = float(np.linalg.norm(vector))
+    axis = "" if turn < 1e-12 else "   (" + " ".join(f"{v + 0.0:9.6f}" for v in np.round(vector / turn, 6)) + ")"
+    return f"{name:24} {np.degrees(turn):15.6f}{axis}"
+
+
+def _phase_line(name: str, phase: Array) -> str:
+    return f"{name:24}{np.degrees(phase):16.6f}{phase:20.9f}"
+
+
+def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> dict[str, Any]:
+    """A split for programs."""
+    return {
+        "body": body.name,
+        "motion": motion_name,
+        "duration_s": motion.duration,
+        "momentum_kg_m2_s": motion.momentum.tolist(),
+        "final_attitude_quat_xyzw": motion.quat_xyzw(motion.duration).tolist(),
+        **plain(result),
+        "error_estimate_rad": float(motion.error_estimate),
+        "evaluations": motion.evaluations,
+        "sha256": dict(motion.deformation.inputs),
+    }
+
+
+def orbit_lines(
+    body: Body, motion_name: str, gauge: str, found: FixedPoints, starts: Array, splits: list[PhaseSplit]
+) -> list[str]:
+    """Closed orbits and their phases for people."""
+    certain = "all: their indices sum to 2" if found.complete else f"perhaps not all: indices sum to {found.index_sum}"
+    lines = [
+        f"{body.name} along {motion_name}, momentum {found.magnitude:g} kg m^2/s, {gauge} gauge: "
+        f"{len(splits)} closed orbits",
+        certain,
+        "",
+        f"{'momentum at the start (base axes)':>36}{'index':>7}{'Montgomery [deg]':>20}{'dynamic':>14}{'geometric':>14}"
+        "  stability",
+    ]
+    for direction, index, kind, result in zip(starts, found.index, found.stability, splits, strict=True):
+        place = " ".join(f"{v:11.7f}" for v in direction)
+        first, second, third = np.degrees([result.montgomery_phase, result.dynamic_phase, result.geometric_phase])
+        lines.append(f"{place:>36}{index:+7d}{first:20.6f}{second:14.6f}{third:14.6f}  {kind}")
+    return lines
+
+
+def orbit_data(
+    body: Body, motion_name: str, gauge: str, found: FixedPoints, starts: Array, splits: list[PhaseSplit]
+) -> dict[str, Any]:
+    """Closed orbits and their phases for programs."""
+    rows = zip(starts.tolist(), found.index.tolist(), found.trace.tolist(), found.stability, splits, strict=True)
+    names = ("momentum_direction_at_start", "index", "trace", "stability")
+    orbits = [dict(zip(names, row[:4], strict=True)) | plain(row[4]) | {"gauge": gauge} for row in rows]
+    return {
+        "body": body.name,
+        "motion": motion_name,
+        "momentum_kg_m2_s": found.magnitude,
+        "gauge": gauge,
+        "complete": found.complete,
+        "index_sum": found.index_sum,
+        "orbits": orbits,
+    }
+
+
+def body_lines(card: ModelCard) -> list[str]:
+    """The card of a body for people."""
+    width = max(map(len, ("joint", *(joint.name for joint in card.joints))))
+    lines = [
+        f"{card.name}: {card.mass:.6g} kg, {len(card.links)} links, {len(card.joints)} joints",
+        f"{'centre of mass':24}{_numbers(card.centre_of_mass)}   m, base axes, neutral shape",
+        f"{'principal moments':24}{_numbers(card.principal_moments)}   kg m^2",
+        f"{'sha256':24}{card.sha256 or 'none: not from a file'}",
+        "",
+        f"{'joint':<{width}}  {'kind':<10}{'lower':>12}{'upper':>12}",
+    ]
+    for joint in card.joints:
+        limits = "".join(f"{_limit(value):>12}" for value in (joint.lower, joint.upper))
+        lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {joint.unit}")
+    return lines
+
+
+def path_lines(body: Body, name: str, card: PathCard, recorded: RecordedMotion | None) -> list[str]:
+    """The card of a joint motion for people."""
+    worst = int(np.argmax(np.abs(card.gap))) if len(card.gap) else 0
+    closes = "yes" if card.is_loop else f"no: {body.joint_names[worst]} ends {card.gap[worst]:.6g} from its start"
+    lines = [f"{name}: {card.duration:g} s, {card.breaks} breaks", f"{'closes':24}{closes}"]
+    if recorded is not None:
+        lines.insert(1, f"{'recorded':24}{len(recorded.times)} samples, {recorded.format}")
+        if recorded.residual.any():
+            joint = int(np.argmax(recorded.residual))
+            lines.append(f"{'largest residual':24}{recorded.residual[joint]:.3g} rms, {body.joint_names[joint]}")
+        if recorded.base_attitude is not None:
+            lines.append(f"{'base':24}recorded too")
+    for title, names in (("beyond their limits", card.beyond), ("at rest", card.resting)):
+        lines += [f"{title:24}{', '.join(names)}"] if names else []
+    return lines
+
+
+def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
+    """What a file said of itself, for programs."""
+    if recorded is None:
+        return {}
+    return {
+        "format": recorded.format,
+        "samples": len(recorded.times),
+        "residual_rms": dict(zip(body.joint_names, recorded.residual.tolist(), strict=True)),
+        "base_recorded": recorded.base_attitude is not None,
+    }
+
+
+def base_said(motion: Motion, recorded: RecordedMotion | None) -> tuple[list[str], dict[str, Any]]:
+    """How far a base that was recorded is from the reconstructed one, for people and for programs."""
+    if recorded is None or recorded.base_attitude is None:
+        return [], {}
+    found = base_difference(motion, recorded.times, recorded.base_attitude)
+    worst = int(np.argmax(found.angle))
+    angle, when = float(found.angle[worst]), float(found.times[worst])
+    text = f"{'base as recorded':24}{np.degrees(angle):16.6f} deg at most from this one, at {when:g} s"
+    return [text], {"recorded_base_difference_rad": angle, "recorded_base_difference_time_s": when}
+
+
+def plain(result: Any) -> dict[str, Any]:
+    """The fields of a result as JSON can hold them; infinite limits become null."""
+    return {key: _as_json(value) for key, value in asdict(result).items()}
+
+
+def _as_json(value: Any) -> Any:
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, dict):
+        return {key: _as_json(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_as_json(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{value:12.6g}" for value in values)
+
+
+def _limit(value: float) -> str:
+    return f"{value:.6g}" if math.isfinite(value) else "none"

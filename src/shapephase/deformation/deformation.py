@@ -1,0 +1,283 @@
+"""Deformations: a body's locked inertia and internal momentum as functions of time, whatever they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import ShapeError, SingularInertiaError
+from ..inertia_tensor import inertia_argument, triangle_defect
+from ..integrator.interpolant import Interpolant
+from ..integrator.sampling import Sampler
+from ..shape_space.connection import CLOSED, path_gap
+from ..shape_space.shape_path import ShapePath, breaks_argument, positive_argument, times_argument
+from .descriptions import (
+    ArticulatedSource,
+    ParticlePath,
+    ParticleSource,
+    PrescribedSource,
+    RigidSource,
+    SampledSource,
+    Source,
+)
+from .physical_validity import check_never_on_a_line, check_triangle, least_over, on_unphysical_argument
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """A free body that changes its shape in a known way, seen from its base frame.
+
+    Made by `articulated`, `particles`, `assembly`, `prescribed` or `rigid`, or from another by a gauge.
+
+    Attributes
+    ----------
+    source : the functions themselves
+    duration : [s]
+    breaks : (M,) times between which all is smooth, first 0, last `duration` [s]
+    closure : (3, 3) where the shape at the end is the one at the start turned by it (the identity for a closed
+        joint path seen from the base), else None
+    shape_gap : how far the end shape is from the start shape [largest joint difference, or relative change]
+    label : what it is, for people
+    loops : the deformation is its first `duration / loops` seconds, this many times
+    inputs : SHA-256 of the files it was made from, "body" and "path", as far as there are any
+    """
+
+    source: Source
+    duration: float
+    breaks: Array
+    closure: Array | None
+    shape_gap: float
+    label: str
+    loops: int = 1
+    inputs: Mapping[str, str] = field(default_factory=dict)
+
+    def inertia(self, t: ArrayLike) -> Array:
+        """Locked inertia: times (...) -> (..., 3, 3), base axes, about the centre of mass [kg m^2]."""
+        times = times_argument(t, self.duration)
+        return self.source.sample(times.ravel())[0].reshape(*times.shape, 3, 3)
+
+    def internal_momentum(self, t: ArrayLike) -> Array:
+        """L_o, angular momentum with the base at rest: times (...) -> (..., 3), base axes [kg m^2/s]."""
+        times = times_argument(t, self.duration)
+        return self.source.sample(times.ravel())[1].reshape(*times.shape, 3)
+
+    def inertia_rate(self, t: ArrayLike) -> Array:
+        """Rate of the locked inertia: times (...) -> (..., 3, 3) [kg m^2/s]."""
+        times = times_argument(t, self.duration)
+        return self.source.inertia_rate(times.ravel()).reshape(*times.shape, 3, 3)
+
+    def frame(self, t: ArrayLike) -> Array:
+        """U(t), this description's frame in the original one, d_here = U d: times (...) -> (..., 3, 3)."""
+        times = times_argument(t, self.duration)
+        return self.source.frame(times.ravel()).reshape(*times.shape, 3, 3)
+
+    def centre_of_mass(self, t: ArrayLike) -> Array:
+        """Centre of mass from the base origin: times (...) -> (..., 3), this description's axes [m]."""
+        times = times_argument(t, self.duration)
+        return self.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
+
+    def kinetic_energy(self, t: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """Kinetic energy about the centre of mass while this frame turns: times (...) -> (...) [J].
+
+        Parameters
+        ----------
+        angular_velocity : (3,) or t.shape + (3,) of this frame, its own axes [rad/s]; at rest it is T_0
+
+        Raises
+        ------
+        GaugeError
+            If only the inertia is known, not the masses (`prescribed`, or a motion read from a file).
+
+        Source: Cabrera 2006, equation (4); theory.md A6.
+        """
+        times = times_argument(t, self.duration)
+        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
+        if omega.ndim > 1 and omega.shape != (*times.shape, 3):
+            raise ShapeError(
+                f"angular_velocity: (3,) or one for each time, {(*times.shape, 3)}, is needed, got {omega.shape}"
+            )
+        turning = np.broadcast_to(omega, (*times.shape, 3)).reshape(1, -1, 3)
+        return self.source.kinetic_energy(times.ravel(), turning).reshape(times.shape)[()]
+
+    def triangle_defect(self) -> tuple[float, float]:
+        """By how much the triangle inequality fails at worst, relative to the largest moment, and when [s].
+
+        Negative where every inertia of [0, duration] is that of some distribution of mass. Found at 65 points
+        between any two breaks and around the worst of them. Source: theory.md A4.
+        """
+        least, when = least_over(lambda t: -triangle_defect(self.source.sample(t)[0]), self.breaks)
+        return -least, when
+
+    def sampler(self) -> Sampler:
+        """A fresh sampler for the integrator."""
+        return self.source.sampler(self.breaks)
+
+
+def articulated(body: Body, path: ShapePath) -> Deformation:
+    """The deformation of a body whose joints follow a path.
+
+    Joints are matched by name where the path has names, else by order.
+
+    Raises
+    ------
+    UnknownNameError, TrajectoryError
+        If the path has other joints than the body.
+    """
+    route = path.matched(body.joint_names, body.name)
+    gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
+    closure = np.eye(3) if gap <= CLOSED else None
+    source = ArticulatedSource(body, route)
+    files = {"body": body.sha256, "path": route.sha256}
+    inputs = {name: digest for name, digest in files.items() if digest}
+    label = f"{body.name} along a path"
+    return Deformation(source, route.duration, route.breaks, closure, gap, label, route.loops, inputs)
+
+
+def rigid(inertia: ArrayLike, duration: float) -> Deformation:
+    """A rigid body: constant inertia (3, 3) [kg m^2], no internal momentum, for `duration` [s].
+
+    Source: Cabrera 2006, example 2.6; theory.md A10.
+    """
+    tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3))[None])[0]
+    length = positive_argument(duration)
+    return Deformation(RigidSource(tensor), length, np.array([0.0, length]), np.eye(3), 0.0, "rigid body")
+
+
+def prescribed(
+    inertia: Callable[[Array], ArrayLike],
+    internal_momentum: Callable[[Array], ArrayLike] | None,
+    duration: float,
+    breaks: ArrayLike = (),
+    *,
+    on_unphysical: str = "allow",
+) -> Deformation:
+    """A deformation given by functions of time.
+
+    Parameters
+    ----------
+    inertia : times (N,) -> (N, 3, 3) [kg m^2], symmetric positive definite
+    internal_momentum : times (N,) -> (N, 3) [kg m^2/s]; None: zero
+    duration : [s]
+    breaks : interior times where a derivative jumps [s]
+    on_unphysical : what to do with tensors that break the triangle inequality, as no distribution of mass does:
+        "allow" them, "warn" or "error". The last two search all times when the deformation is made, and "error" checks
+        whatever is evaluated later, too. The equations of motion need only positive definite tensors
+
+    The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9.
+
+    Raises
+    ------
+    ShapeError, UnphysicalInertiaError
+        If a function returns the wrong shape, a tensor that is not symmetric or, with "error", one that breaks the
+        triangle inequality.
+
+    Warns
+    -----
+    UnphysicalInertiaWarning
+        With "warn", for tensors that break the triangle inequality; the message has the worst time.
+    """
+    length = positive_argument(duration)
+    edges = breaks_argument(breaks, length)
+    source = PrescribedSource(inertia, internal_momentum, edges)
+    ends = source.sample(np.array([0.0, length]))[0]
+    if on_unphysical_argument(on_unphysical) != "allow":
+        _, worst = least_over(lambda t: -triangle_defect(source.sample(t)[0]), edges)
+        check_triangle(source.sample(np.array([worst]))[0], np.array([worst]), on_unphysical)
+        source = replace(source, on_unphysical=on_unphysical)
+    gap = float(np.max(np.abs(ends[1] - ends[0])) / np.max(np.abs(ends[0])))
+    return Deformation(source, length, edges, np.eye(3) if gap <= CLOSED else None, gap, "prescribed inertia")
+
+
+def particles(
+    masses: ArrayLike,
+    positions: Callable[[Array], tuple[ArrayLike, ArrayLike]] | tuple[ArrayLike, ArrayLike],
+    duration: float | None = None,
+    breaks: ArrayLike = (),
+) -> Deformation:
+    """A body of point masses that move in a known way as seen from a frame.
+
+    Parameters
+    ----------
+    masses : (m,) [kg], positive, two or more
+    positions : times (N,) -> positions (N, m, 3) [m], velocities (N, m, 3) [m/s]; or samples in time, the pair
+        times (K,) [s], positions (K, m, 3) [m], joined by a cubic spline whose knots become breaks (periodic when the
+        last sample equals the first to 1e-9, else not-a-knot; the first time is shifted to 0). Need not be centred
+    duration : [s]; of samples it is known
+    breaks : interior times where a derivative jumps [s]
+
+    The shape is a loop when the particles at the end are those at the start turned by some rotation, which
+    is then the closure.
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        If shapes of arrays disagree, a mass is not positive, or times do not ascend.
+    SingularInertiaError
+        If the particles are on one line at some time, which the message names: for samples at once, for a function
+        when the inertia or the motion is computed.
+
+    Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
+    """
+    weights = finite_array(masses, "masses", (None,), unit="kg")
+    if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
+        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {weights}")
+    if callable(positions):
+        if duration is None:
+            raise ShapeError("positions given by a function need a duration [s]")
+        length = positive_argument(duration)
+        edges = breaks_argument(breaks, length)
+        source = ParticleSource(weights, positions)
+    else:
+        path = _sampled_positions(positions, weights)
+        length = path.duration
+        if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
+            raise ShapeError(f"duration: the samples last {length:.9g} s, got {duration!r}; leave it out")
+        edges = np.union1d(path.breaks, breaks_argument(breaks, length))
+        source = ParticleSource(weights, ParticlePath(path), path.oscillations)
+    ends, _ = source.centred(np.array([0.0, length]))
+    turn = _best_turn(weights, ends[0], ends[1])
+    size = float(np.max(np.linalg.norm(ends[0], axis=-1)))
+    if size == 0.0:
+        raise SingularInertiaError("all particles are in one place: there is no inertia that could turn")
+    if not callable(positions):
+        check_never_on_a_line(source.moment, edges)
+    gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / size
+    closure = turn if gap <= CLOSED else None
+    return Deformation(source, length, edges, closure, gap, f"{len(weights)} particles")
+
+
+def _sampled_positions(samples: tuple[ArrayLike, ArrayLike], masses: Array) -> ShapePath:
+    """The spline through samples, each first moved to its centre of mass, which a spline lets through."""
+    if not isinstance(samples, tuple | list) or len(samples) != 2:
+        raise ShapeError("positions: a function of times, or the pair times (K,), positions (K, m, 3) is needed")
+    points = finite_array(samples[1], "positions", (None, len(masses), 3), unit="m")
+    if points.ndim != 3:
+        raise ShapeError(f"positions: samples (K, {len(masses)}, 3) are needed, got {points.shape}")
+    centred = points - ((masses / masses.sum()) @ points)[:, None]
+    return ShapePath.spline(samples[0], centred.reshape(len(points), -1))
+
+
+def sampled_deformation(
+    interpolant: Interpolant,
+    centre: Array,
+    breaks: Array,
+    closure: Array | None,
+    shape_gap: float,
+    label: str,
+    inputs: Mapping[str, str],
+) -> Deformation:
+    """A deformation known only by its interpolant, as kept in a file; `centre` are Chebyshev coefficients (P, n, 3)."""
+    source = SampledSource(interpolant, centre)
+    return Deformation(source, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs)
+
+
+def _best_turn(masses: Array, start: Array, end: Array) -> Array:
+    """The rotation that takes one set of points nearest to another (Kabsch 1976)."""
+    left, _, right = np.linalg.svd(np.einsum("m,mi,mj->ij", masses, end, start))
+    sign = np.sign(np.linalg.det(left @ right))
+    return left @ np.diag([1.0, 1.0, sign]) @ right

@@ -1,0 +1,286 @@
+"""What deformations are made of: joints that follow a path, particles, functions of time, samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import GaugeError, ShapeError
+from ..inertia_tensor import inertia_argument, inverse_inertia, second_moment
+from ..integrator.interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
+from ..integrator.sampling import Sampler, sampler
+from ..shape_space.connection import path_sampler
+from ..shape_space.shape_path import ShapePath
+from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
+
+
+class Source(Protocol):
+    """What a deformation is made of; all functions take times (N,) in [0, duration]."""
+
+    def sample(self, times: Array, /) -> tuple[Array, Array]:
+        """Locked inertia (N, 3, 3) [kg m^2] and internal momentum (N, 3) [kg m^2/s]."""
+        ...
+
+    def inertia_rate(self, times: Array, /) -> Array:
+        """Rate of the locked inertia (N, 3, 3) [kg m^2/s]."""
+        ...
+
+    def frame(self, times: Array, /) -> Array:
+        """This description's frame in the original one (N, 3, 3)."""
+        ...
+
+    def centre_of_mass(self, times: Array, /) -> Array:
+        """Centre of mass from the base origin, this description's axes (N, 3) [m]."""
+        ...
+
+    def correlation(self, times: Array, reference: float, /) -> tuple[Array, Array]:
+        """Integral of r(t) r(reference)^T dm (N, 3, 3) and its rate; GaugeError where the masses are not known."""
+        ...
+
+    def kinetic_energy(self, times: Array, turning: Array, /) -> Array:
+        """Energy with this frame turning at (B, N, 3) [rad/s]: -> (B, N) [J]; GaugeError as `correlation`."""
+        ...
+
+    def link_frames(self, times: Array, link: str, /) -> tuple[Array, Array]:
+        """Orientation (N, 3, 3) and angular velocity (N, 3) of a link in this frame; GaugeError without links."""
+        ...
+
+    def sampler(self, breaks: Array, /) -> Sampler:
+        """A fresh sampler of this source."""
+        ...
+
+
+class Original:
+    """The frame of a description that no gauge has turned, with its origin at the centre of mass; masses unknown."""
+
+    def frame(self, times: Array) -> Array:
+        return np.broadcast_to(np.eye(3), (len(times), 3, 3)).copy()
+
+    def centre_of_mass(self, times: Array) -> Array:
+        return np.zeros((len(times), 3))
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:  # noqa: ARG002
+        raise _unknown_masses("its mean frame")
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:  # noqa: ARG002
+        raise _unknown_masses("its kinetic energy")
+
+    def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:  # noqa: ARG002
+        raise GaugeError(f"there is no link {link!r}: only the deformation of an articulated body has links")
+
+
+def _unknown_masses(what: str) -> GaugeError:
+    return GaugeError(
+        f"of this deformation only the inertia is known, not where its masses are, and so not {what}; describe it by "
+        "`articulated`, `particles` or `assembly`"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ArticulatedSource(Original):
+    """An articulated body whose joints follow a path."""
+
+    body: Body
+    path: ShapePath
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        return self.body.sample(*self.path.curve(times))
+
+    def inertia_rate(self, times: Array) -> Array:
+        return self.body.inertia_rate(*self.path.curve(times))
+
+    def centre_of_mass(self, times: Array) -> Array:
+        return self.body.centre_of_mass(self.path.curve(times)[0])
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
+        return self.body.mass_correlation(*self.path.curve(times), self.path.curve(np.array([reference]))[0][0])
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:
+        return self.body.kinetic_energy(*self.path.curve(times), turning)
+
+    def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
+        shapes, rates = self.path.curve(times)
+        return self.body.link_pose(shapes, link)[:, :3, :3], self.body.link_angular_velocity(shapes, rates, link)
+
+    def sampler(self, breaks: Array) -> Sampler:  # noqa: ARG002 (the path's own)
+        return path_sampler(self.body, self.path)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidSource(Original):
+    """A tensor that stays as it is."""
+
+    tensor: Array
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        return np.broadcast_to(self.tensor, (len(times), 3, 3)).copy(), np.zeros((len(times), 3))
+
+    def inertia_rate(self, times: Array) -> Array:
+        return np.zeros((len(times), 3, 3))
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:  # noqa: ARG002
+        moment = np.broadcast_to(second_moment(self.tensor), (len(times), 3, 3))
+        return moment.copy(), np.zeros((len(times), 3, 3))
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:  # noqa: ARG002
+        return 0.5 * np.sum(turning * so3.apply(self.tensor, turning), axis=-1)
+
+    def sampler(self, breaks: Array) -> Sampler:
+        return sampler(self.sample, breaks, oscillations=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PrescribedSource(Original):
+    """Functions of time for the inertia and the internal momentum; `on_unphysical` "error" checks every tensor."""
+
+    inertia: Callable[[Array], ArrayLike]
+    momentum: Callable[[Array], ArrayLike] | None
+    breaks: Array
+    on_unphysical: str = "allow"
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        tensors = inertia_argument(_returned(self.inertia(times), "inertia", (len(times), 3, 3)), times)
+        if self.on_unphysical == "error":
+            check_triangle(tensors, times, "error")
+        if self.momentum is None:
+            return tensors, np.zeros((len(times), 3))
+        return tensors, _returned(self.momentum(times), "internal momentum", (len(times), 3))
+
+    def inertia_rate(self, times: Array) -> Array:
+        return rate_of(lambda t: self.sample(t)[0], times, self.breaks)
+
+    def sampler(self, breaks: Array) -> Sampler:
+        return sampler(self.sample, breaks)
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleSource(Original):
+    """Point masses that move as seen from a frame; `oscillations` as `sampler` has it."""
+
+    masses: Array
+    positions: Callable[[Array], tuple[ArrayLike, ArrayLike]]
+    oscillations: float | None = None
+
+    def centred(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities (N, m, 3) from the centre of mass."""
+        wanted = (len(times), len(self.masses), 3)
+        both = self.positions(times)
+        points, speeds = (
+            _returned(part, name, wanted) for name, part in zip(("positions", "velocities"), both, strict=True)
+        )
+        fraction = self.masses / self.masses.sum()
+        return points - (fraction @ points)[:, None], speeds - (fraction @ speeds)[:, None]
+
+    def moment(self, times: Array) -> Array:
+        """Sum of m r r^T about the centre of mass: (N,) -> (N, 3, 3) [kg m^2]."""
+        points, _ = self.centred(times)
+        return _moment(self.masses, points)
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        points, speeds = self.centred(times)
+        moment = _moment(self.masses, points)
+        check_not_on_a_line(moment, times)
+        momentum = np.einsum("m,nmi->ni", self.masses, np.cross(points, speeds))
+        return inertia_of(moment), momentum
+
+    def inertia_rate(self, times: Array) -> Array:
+        points, speeds = self.centred(times)
+        rate = np.einsum("m,nmi,nmj->nij", self.masses, points, speeds)
+        return inertia_of(rate + np.swapaxes(rate, -1, -2))
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
+        (points, speeds), (still, _) = self.centred(times), self.centred(np.array([reference]))
+        weighted = self.masses[:, None] * still[0]
+        return np.swapaxes(points, -1, -2) @ weighted, np.swapaxes(speeds, -1, -2) @ weighted
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:
+        points, speeds = self.centred(times)
+        total = np.cross(turning[:, :, None], points) + speeds
+        return 0.5 * np.einsum("m,bnmi,bnmi->bn", self.masses, total, total)
+
+    def sampler(self, breaks: Array) -> Sampler:
+        check_never_on_a_line(self.moment, breaks)
+        return sampler(self.sample, breaks, oscillations=self.oscillations)
+
+
+@dataclass(frozen=True, eq=False)
+class ParticlePath:
+    """A path of 3 m columns read as the positions of m particles."""
+
+    path: ShapePath
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities: (N,) -> (N, m, 3), (N, m, 3)."""
+        points, speeds = self.path.curve(times)
+        wanted = (len(times), self.path.n_shape // 3, 3)
+        return points.reshape(wanted), speeds.reshape(wanted)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledSource(Original):
+    """What a file keeps of a deformation: its interpolant, and the centre of mass."""
+
+    interpolant: Interpolant
+    centre: Array
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        inverse, drift = self.interpolant.inverse_and_drift(times)
+        inertia = inverse_inertia(inverse, times)
+        return inertia, so3.apply(inertia, drift)
+
+    def inertia_rate(self, times: Array) -> Array:
+        return rate_of(lambda t: self.sample(t)[0], times, self.interpolant.edges)
+
+    def centre_of_mass(self, times: Array) -> Array:
+        panel = self.interpolant.panel_of(times)
+        left, right = self.interpolant.edges[panel], self.interpolant.edges[panel + 1]
+        basis = chebyshev(np.clip((2.0 * times - left - right) / (right - left), -1.0, 1.0), self.centre.shape[1])
+        return np.einsum("nk,nkc->nc", basis, self.centre[panel % len(self.centre)])
+
+    def sampler(self, breaks: Array) -> Sampler:
+        edges = np.union1d(breaks, self.interpolant.edges)
+        return sampler(self.sample, edges, oscillations=0.5)
+
+
+def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> Array:
+    """Time derivative of a smooth function between breaks: (N,) -> (N, ...).
+
+    The slope of the polynomial through nine points around each time, on one side of every break; exact for
+    polynomials of degree eight, about 1e-11 relative for a motion of a few swings.
+    """
+    piece = np.clip(np.searchsorted(breaks, times, side="right") - 1, 0, len(breaks) - 2)
+    left, right = breaks[piece], breaks[piece + 1]
+    half = 0.01 * (right - left)
+    middle = np.clip(times, left + half, right - half)
+    nodes = unit_nodes(8)
+    first, last = inside(left, right)
+    points = np.clip(middle[:, None] + half[:, None] * nodes, first[:, None], last[:, None])
+    values = function(points.ravel())
+    values = values.reshape(len(times), 9, -1)
+    local = (times - middle) / half
+    derivative = np.polynomial.chebyshev.chebder(values_to_coefficients(8))
+    weights = np.polynomial.chebyshev.chebval(local, derivative).T / half[:, None]
+    return np.einsum("nk,nkc->nc", weights, values).reshape(len(times), *function(times[:1]).shape[1:])
+
+
+def _moment(masses: Array, points: Array) -> Array:
+    return np.einsum("m,nmi,nmj->nij", masses, points, points)
+
+
+def inertia_of(moment: Array) -> Array:
+    """tr(M) - M, from sums of m r r^T: (N, 3, 3) -> (N, 3, 3)."""
+    return np.trace(moment, axis1=-2, axis2=-1)[:, None, None] * np.eye(3) - moment
+
+
+def _returned(value: ArrayLike, name: str, wanted: tuple[int, ...]) -> Array:
+    array = finite_array(value, name)
+    if array.shape != wanted:
+        raise ShapeError(f"the function of the {name} must return {wanted} for these times, got {array.shape}")
+    return array

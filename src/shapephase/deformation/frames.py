@@ -1,0 +1,234 @@
+"""Frames in time: a gauge as the rotation U(t) and its body rates, wherever they come from.
+
+The frames of the horizontal gauge are those of the lift; the principal ones are in `principal_frame`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..errors import GaugeError, ShapeError, unknown_name
+from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.interpolant import chebyshev, inside, unit_nodes, values_to_coefficients
+from ..integrator.sampling import sampler
+from ..shape_space.shape_path import times_argument
+from .deformation import Deformation
+from .principal_frame import Frames, principal_frames
+
+GAUGES = ("horizontal", "base", "principal", "mean_body")
+
+_LINK = "link:"
+_LIFT_TOLERANCE = 1e-12
+_PIECES, _DEGREE, _SHORTEST = 4, 16, 1e-4
+
+
+def named_frames(deformation: Deformation, name: str) -> Frames:
+    """U(t) and its body rates of a gauge that is neither the base nor the horizontal one. Raises as `named_gauge`."""
+    if name == "principal":
+        return principal_frames(deformation)
+    if name == "mean_body":
+        return mean_body_frames(deformation)
+    if name.startswith(_LINK):
+        return link_frames(deformation, name.removeprefix(_LINK))
+    raise unknown_name("gauge", name, (*GAUGES, f"{_LINK}NAME"))
+
+
+def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> Frames:
+    """A user's U(t) with its rates, differentiated where it comes without. Raises as `in_gauge`."""
+    if not callable(u):
+        raise ShapeError(f"a gauge u is a function of times, got {u!r}")
+
+    def asked(times: Array) -> tuple[Array, Array | None]:
+        answer: Any = u(times)
+        turns, rates = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
+        turned = so3.rotation_argument(turns, "U")
+        rate = None if rates is None else finite_array(rates, "body rates of U", unit="rad/s")
+        if turned.shape != (len(times), 3, 3) or (rate is not None and rate.shape != (len(times), 3)):
+            raise ShapeError(
+                f"u must return U ({len(times)}, 3, 3) and body rates ({len(times)}, 3) for these times, got "
+                f"{turned.shape}" + ("" if rate is None else f" and {rate.shape}")
+            )
+        return turned, rate
+
+    if asked(breaks[:1])[1] is None:
+        return _differentiated(lambda times: asked(times)[0], breaks)
+
+    def frames(times: Array) -> tuple[Array, Array]:
+        turned, rate = asked(times)
+        if rate is None:
+            raise ShapeError("u returned body rates at the start, and U alone later on")
+        return turned, rate
+
+    _check_rates(frames, breaks)
+    return frames
+
+
+def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> Frames:
+    """Rotations with their rates: the slopes of Chebyshev series on panels so short that the series have an end."""
+    firsts, lasts = inside(breaks[:-1], breaks[1:])
+    ends = np.linspace(firsts, lasts, _PIECES + 1, axis=-1)
+    left, right = ends[:, :-1].ravel(), ends[:, 1:].ravel()
+    shortest = np.repeat(_SHORTEST * np.diff(breaks), _PIECES)
+    fastest = 1.0 / breaks[-1]
+    done: list[tuple[Array, Array, Array]] = []
+    while len(left):
+        middle, half = 0.5 * (left + right), 0.5 * (right - left)
+        times = np.clip(middle[:, None] + half[:, None] * unit_nodes(_DEGREE), left[:, None], right[:, None])
+        series = values_to_coefficients(_DEGREE) @ turns(times.ravel()).reshape(len(left), _DEGREE + 1, 9)
+        sizes = np.linalg.norm(series, axis=-1)
+        fastest = max(fastest, float(np.max(sizes[:, 1] / half)))
+        doubt = _DEGREE**2 * sizes[:, -3:].max(axis=1) / half
+        rough = doubt > 1e-9 * fastest
+        if np.any(rough & (half < shortest)):
+            row = int(np.argmax(np.where(rough & (half < shortest), doubt, 0.0)))
+            raise GaugeError(
+                f"U(t) is too rough near t = {middle[row]:.9g} s to be differentiated (its rate is uncertain by "
+                f"{doubt[row]:.3g} rad/s): return its body rates too, or let the deformation have a break there"
+            )
+        done.append((left[~rough], right[~rough], series[~rough]))
+        shortest = np.repeat(shortest[rough], 2)
+        left, right = (
+            np.stack([left[rough], middle[rough]], axis=-1).ravel(),
+            np.stack([middle[rough], right[rough]], axis=-1).ravel(),
+        )
+    left, right, series = (np.concatenate(parts) for parts in zip(*done))
+    order = np.argsort(left)
+    left, right, slopes = left[order], right[order], np.polynomial.chebyshev.chebder(series[order], axis=1)
+    starts = left.copy()
+    starts[np.searchsorted(left, breaks[:-1])] = breaks[:-1]
+
+    def frames(times: Array) -> tuple[Array, Array]:
+        turned = turns(times)
+        panel = np.searchsorted(starts, times, side="right") - 1
+        width = right[panel] - left[panel]
+        local = np.clip((2.0 * times - left[panel] - right[panel]) / width, -1.0, 1.0)
+        slope = (chebyshev(local, _DEGREE)[:, None, :] @ slopes[panel])[:, 0] * (2.0 / width)[:, None]
+        return turned, so3.vee(so3.transpose(turned) @ slope.reshape(-1, 3, 3))
+
+    return frames
+
+
+def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> Frames:
+    """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises as `in_gauge`."""
+
+    if not callable(rates):
+        raise ShapeError(f"the body rates of a gauge are a function of times, got {rates!r}")
+
+    def spins(times: Array) -> Array:
+        spin = finite_array(rates(times), "body rates of U", unit="rad/s")
+        if spin.shape != (len(times), 3):
+            raise ShapeError(f"rates must return ({len(times)}, 3) for these times, got {spin.shape}")
+        return spin
+
+    def source(times: Array) -> tuple[Array, Array]:
+        return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -spins(times)
+
+    first = np.eye(3) if start is None else so3.rotation_argument(start, "start")
+    if first.shape != (3, 3):
+        raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
+    turned = stepped_rotation(sampler(source, breaks), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    return lambda times: (first @ turned.rotation(times)[0], spins(times))
+
+
+def _check_rates(frames: Frames, breaks: Array) -> None:
+    """Compare body rates with differences of U at seven times of each piece."""
+    width = np.repeat(np.diff(breaks), 7)
+    middle = (breaks[:-1, None] + np.diff(breaks)[:, None] * (np.arange(7) + 0.381) / 7.0).ravel()
+    at, rates = frames(middle)
+    size = np.linalg.norm(rates, axis=-1)
+    # So short that a turn at this rate is told from its chord to a millionth.
+    step = np.minimum(1e-4 * width, 1e-3 / np.maximum(size, 1e-300))
+    before, after = (frames(t)[0] for t in (middle - step, middle + step))
+    slope = so3.vee(so3.transpose(at) @ (after - before)) / (2.0 * step[:, None])
+    wrong = np.linalg.norm(slope - rates, axis=-1) > 1e-3 * (size + 1.0 / breaks[-1])
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise ShapeError(
+            f"u gives the body rate {rates[row]} rad/s at {middle[row]:.6g} s, but its U turns at {slope[row]}; "
+            "the body rate is the vector of U^T U'"
+        )
+
+
+def lift_frames(lift: SteppedRotation) -> Frames:
+    """U(t) and its body rates of the horizontal gauge, from the integrated lift."""
+
+    def frames(times: Array) -> tuple[Array, Array]:
+        return lift.rotation(times)[0], -lift.inverse_and_drift(times)[1]
+
+    return frames
+
+
+def link_frames(deformation: Deformation, link: str) -> Frames:
+    """U(t) and its body rates of the frame of a link. Raises as `link_gauge`."""
+
+    def frames(times: Array) -> tuple[Array, Array]:
+        turned, turning = deformation.source.link_frames(times, link)
+        return so3.transpose(turned), -turning
+
+    frames(deformation.breaks[:1])
+    return frames
+
+
+def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames:
+    """U(t) and its body rates of the mean body. Raises GaugeError.
+
+    With C = integral of r r_reference^T dm, U C = S is symmetric: U is the polar factor, and the antisymmetric part
+    of the rate of U C gives (tr(S) - S) U omega.
+    """
+    time = times_argument(reference, deformation.duration)
+    if time.ndim:
+        raise ShapeError(f"reference: one time is needed, got an array of shape {time.shape}")
+    time = float(time)
+
+    def frames(times: Array) -> tuple[Array, Array]:
+        correlation, slope = deformation.source.correlation(times, time)
+        left, sizes, right = np.linalg.svd(correlation)
+        sign = np.sign(np.linalg.det(left @ right))
+        sizes[:, 2] *= sign
+        unique = sizes[:, 1] + sizes[:, 2] > 1e-6 * sizes[:, 0]
+        if not unique.all():
+            raise GaugeError(
+                f"at t = {times[np.argmin(unique)]:.9g} s no orientation of the body is nearest to that at "
+                f"{time:.9g} s; choose another reference time"
+            )
+        left[:, :, 2] *= sign[:, None]
+        turned = so3.transpose(left @ right)
+        # U C = V diag(sizes) V^T with the rows of `right` for V^T.
+        inverse = 1.0 / (sizes.sum(axis=-1, keepdims=True) - sizes)
+        asked = so3.apply(right, 2.0 * so3.vee(turned @ slope))
+        spin = -so3.apply(so3.transpose(right), inverse * asked)
+        return turned, so3.apply(so3.transpose(turned), spin)
+
+    _check_unbroken(frames, deformation, time)
+    return frames
+
+
+def _check_unbroken(frames: Frames, deformation: Deformation, reference: float) -> None:
+    """Follow a mean frame through the first loop: where the nearest orientation changes places with another one it
+    jumps by half a turn, between any two times however close."""
+    edges = deformation.breaks[deformation.breaks <= deformation.duration / deformation.loops * (1.0 + 1e-12)]
+    edges = np.union1d(edges, [deformation.duration / deformation.loops])
+    times = np.unique(np.concatenate([np.linspace(a, b, 33) for a, b in pairwise(edges)]))
+    turned = frames(times)[0]
+    while True:
+        wide = so3.angle(turned[1:] @ so3.transpose(turned[:-1])) > 0.5
+        if not wide.any():
+            return
+        gaps = np.diff(times)
+        if gaps[wide].min() < 1e-9 * deformation.duration:
+            at = times[:-1][wide & (gaps < 1e-9 * deformation.duration)][0]
+            raise GaugeError(
+                f"at t = {at:.9g} s the orientation of the body nearest to that at {reference:.9g} s changes by a "
+                "jump; choose another reference time"
+            )
+        middles = 0.5 * (times[:-1] + times[1:])[wide]
+        order = np.argsort(np.concatenate([times, middles]), kind="stable")
+        times = np.concatenate([times, middles])[order]
+        turned = np.concatenate([turned, frames(middles)[0]])[order]

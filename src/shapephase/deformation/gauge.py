@@ -1,0 +1,199 @@
+"""A deformation seen from a turned frame.
+
+A gauge U(t) turns the base frame: the body seen from there is d_here = U d. With hat(omega_U) = U^T U',
+    I_here = U I U^T,   L_o,here = U (I omega_U + L_o),   Pi_here = U Pi,   R_here = R U^T
+(theory.md B4; Cabrera 2006, remark 2.10, does not print the law).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array
+from ..errors import ShapeError
+from ..inertia_tensor import inverse_inertia
+from ..integrator.integrate import stepped_rotation
+from ..integrator.sampling import Sampler, sampler
+from .deformation import Deformation
+from .descriptions import Source
+from .frames import (
+    Frames,
+    frames_argument,
+    integrated_frames,
+    link_frames,
+    mean_body_frames,
+    named_frames,
+    principal_frames,
+)
+
+_LIFT_TOLERANCE = 1e-12
+
+
+def in_gauge(
+    deformation: Deformation,
+    u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None = None,
+    *,
+    rates: Callable[[Array], ArrayLike] | None = None,
+    start: ArrayLike | None = None,
+) -> Deformation:
+    """The deformation seen from the frame turned by U(t).
+
+    Parameters
+    ----------
+    u : times (N,) -> U (N, 3, 3), body rates of U (N, 3) [rad/s], hat(rate) = U^T U'; or U alone, which is then
+        differentiated (to about 1e-11 of its swings); smooth between breaks
+    rates : in the place of u: times (N,) -> body rates of U (N, 3) [rad/s]; U is integrated to 1e-12 rad
+    start : (3, 3) U(0) for `rates`; None: the identity
+
+    Returns
+    -------
+    a Deformation like any other; its closure is U(T) closure U(0)^T
+
+    Raises
+    ------
+    ShapeError
+        If neither or both of `u` and `rates` are given, or they return other shapes, or matrices that are no
+        rotations, or rates that are not those of U.
+    GaugeError
+        If U alone is given and is too rough to be differentiated.
+    AccuracyNotReached
+        If the rates are too rough to be integrated.
+
+    Source: theory.md B4.
+    """
+    if (u is None) == (rates is None) or (u is not None and start is not None):
+        raise ShapeError("a gauge is given either by u, or by its body rates and a start")
+    if rates is not None:
+        return _seen_from(deformation, integrated_frames(deformation.breaks, rates, start), "turned")
+    return _seen_from(deformation, frames_argument(u, deformation.breaks), "turned")
+
+
+def link_gauge(deformation: Deformation, link: str) -> Deformation:
+    """The deformation of an articulated body seen from a link's frame: another base.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such link.
+    GaugeError
+        If the deformation is not that of an articulated body.
+
+    Source: theory.md B4 with U = R_base_link^T.
+    """
+    return _seen_from(deformation, link_frames(deformation, link), f"link {link}")
+
+
+def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deformation:
+    """The deformation seen from the frame in which the masses are nearest to where they were at a reference time.
+
+    U(t) = argmin of the integral of |U r(t) - r(reference)|^2 dm, r from the centre of mass: the perturbation of the
+    body as a whole is the least. It depends on the shape alone, so it closes with the shape; near the reference
+    shape the internal momentum vanishes to first order, as in the horizontal gauge all along.
+
+    Raises
+    ------
+    GaugeError
+        If only the inertia is known, or the nearest orientation is not unique somewhere (a shape like a mirror
+        image of the reference).
+
+    Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
+    """
+    return _seen_from(deformation, mean_body_frames(deformation, reference), "mean body")
+
+
+def named_gauge(deformation: Deformation, name: str) -> Deformation:
+    """The deformation in one of `GAUGES` or "link:NAME". Raises UnknownNameError, and as the gauge itself."""
+    if name == "base":
+        return deformation
+    if name == "horizontal":
+        return horizontal_gauge(deformation)
+    return _seen_from(deformation, named_frames(deformation, name), name)
+
+
+def horizontal_gauge(deformation: Deformation) -> Deformation:
+    """The deformation seen from the frame that the shape motion alone would carry along: L_o vanishes there.
+
+    U(0) is the identity and U' = -U hat(I^-1 L_o). For a loop the closure is the holonomy (base axes at t = 0).
+    Source: Cabrera 2006, section 2.3.1 (a); theory.md B2.
+    """
+    lift = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
+
+    def frames(times: Array) -> tuple[Array, Array]:
+        inertia, momentum = deformation.source.sample(times)
+        return lift.rotation(times)[0], -so3.apply(inverse_inertia(inertia, times), momentum)
+
+    return _seen_from(deformation, frames, "horizontal")
+
+
+def principal_gauge(deformation: Deformation) -> Deformation:
+    """The deformation seen from its principal axes of inertia: the tensor is diagonal there, and the frame continuous.
+
+    Moments that cross are followed through; where they only come close the axes turn. Moments equal over an interval
+    turn the frame least. At t = 0 the moments ascend, the first two axes point along their largest base components,
+    and the third completes a proper frame. The closure of a loop, U(T) closure U(0)^T, is one of the 24 turns of an
+    octahedron: how the axes have changed places.
+
+    Raises
+    ------
+    GaugeError
+        If the inertia has no continuous frame of principal axes.
+
+    Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
+    """
+    return _seen_from(deformation, principal_frames(deformation), "principal")
+
+
+def _seen_from(deformation: Deformation, frames: Frames, name: str) -> Deformation:
+    closure = deformation.closure
+    if closure is not None:
+        ends, _ = frames(np.array([0.0, deformation.duration]))
+        closure = ends[1] @ closure @ ends[0].T
+    source = _Gauged(deformation.source, frames)
+    # U(t) need not come back with the loops.
+    return replace(deformation, source=source, closure=closure, loops=1, label=f"{deformation.label}, {name} gauge")
+
+
+@dataclass(frozen=True, eq=False)
+class _Gauged:
+    original: Source
+    frames: Frames
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        inertia, momentum = self.original.sample(times)
+        turn, rate = self.frames(times)
+        return turn @ inertia @ so3.transpose(turn), so3.apply(turn, so3.apply(inertia, rate) + momentum)
+
+    def inertia_rate(self, times: Array) -> Array:
+        inertia, _ = self.original.sample(times)
+        turn, rate = self.frames(times)
+        spin = so3.hat(rate)
+        return turn @ (self.original.inertia_rate(times) + spin @ inertia - inertia @ spin) @ so3.transpose(turn)
+
+    def frame(self, times: Array) -> Array:
+        return self.frames(times)[0] @ self.original.frame(times)
+
+    def centre_of_mass(self, times: Array) -> Array:
+        return so3.apply(self.frames(times)[0], self.original.centre_of_mass(times))
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
+        correlation, slope = self.original.correlation(times, reference)
+        turn, rate = self.frames(times)
+        still = self.frames(np.array([reference]))[0][0].T
+        return turn @ correlation @ still, turn @ (so3.hat(rate) @ correlation + slope) @ still
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:
+        turn, rate = self.frames(times)
+        return self.original.kinetic_energy(times, so3.apply(so3.transpose(turn), turning) + rate)
+
+    def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
+        turned, turning = self.original.link_frames(times, link)
+        turn, rate = self.frames(times)
+        return turn @ turned, so3.apply(turn, turning + rate)
+
+    def sampler(self, breaks: Array) -> Sampler:
+        return sampler(self.sample, breaks)

@@ -1,0 +1,364 @@
+"""The principal axes of inertia as a smooth frame in time, through every meeting of the principal moments.
+
+U(t) is a quaternion whose components are polynomials on panels of time. A panel is taken when its frame makes the
+inertia diagonal at and between the nodes, whatever the order of the moments; else it is halved. So moments that truly
+cross are passed straight on, since the frame that goes straight on is diagonal there. Where they only come close, that
+frame would show the coupling between the axes, and halving finds where these turn instead.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..errors import GaugeError
+from ..integrator.interpolant import chebyshev
+from .axis_panels import (
+    COUNT,
+    EQUAL,
+    NEARLY_DIAGONAL,
+    SEPARATE,
+    SPHERICAL,
+    SYMMETRIC,
+    AxisPanels,
+    cube_turns,
+    halves,
+    in_order,
+    inertia_in,
+    is_diagonal_at,
+    local_time,
+    moments_at,
+    nearest_cube_turn,
+    panel_nodes,
+    points_between,
+    resolved,
+    to_series,
+)
+from .deformation import Deformation
+
+Frames = Callable[[Array], tuple[Array, Array]]
+
+_PANELS_OF_A_LOOP = 4
+_INTERVAL = 1e-4  # part of a loop; moments that are equal for less than that meet at an instant
+_AT_JOINTS = 1e-11  # part of the trace; entries off the diagonal that are let pass where panels meet
+_SLOPPY = 1e-7  # the largest jump of the inertia, per trace, that is laid to inexact data
+_JUMP = 0.1  # [rad]
+_SPOT_CHECKS = np.array([-0.91, -0.43, 0.17, 0.71])
+_STILL = np.array([0.0, 0.0, 0.0, 1.0])
+_THIRD = np.array([0.0, 0.0, 1.0])
+
+
+def principal_frames(deformation: Deformation) -> Frames:
+    """A smooth frame of principal axes: times (N,) -> U (N, 3, 3) and its body rates (N, 3) [rad/s].
+
+    U I U^T is diagonal to 1e-11 of its trace, to some 2e-14 where nothing is sudden; hat(rate) = U^T U'.
+    U is continuous wherever the inertia has a continuous frame of principal axes. Where moments are equal over an
+    interval the frame turns least: with the distinct axis, and about it only if separate moments before and after the
+    interval ask for it, then uniformly.
+
+    Of the 24 frames one is chosen at t = 0: moments ascend (moments that meet there as just after they part), the first
+    two axes each point along their largest base component, the third completes a proper frame. If two moments are
+    equal for all time, one of their axes lies in the plane of the distinct axis and the base axis farthest from it, and
+    the one that lies along the earlier base axis comes first; if all three are, U is the identity.
+
+    Raises
+    ------
+    GaugeError
+        If the axes jump where moments meet, or turn by more than 2e8 rad per loop.
+
+    Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
+    """
+    panels, freedom = _joined(deformation)
+    panels = replace(panels, series=so3.quat_product(_settled(panels, freedom), panels.series))
+    panels = replace(panels, series=so3.quat_product(_labels_at_start(deformation, panels, freedom), panels.series))
+    return _track(panels)
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """Quaternions xyzw, not of length one, and their derivatives as Chebyshev series (P, n, 8) between edges."""
+
+    edges: Array
+    series: Array
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        frames, rates = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
+        for start in range(0, len(times), 20_000):
+            part = slice(start, start + 20_000)
+            panel = np.clip(np.searchsorted(self.edges, times[part], side="right") - 1, 0, len(self.series) - 1)
+            left, right = self.edges[panel], self.edges[panel + 1]
+            both = chebyshev(local_time(times[part], left, right), self.series.shape[1])[:, None] @ self.series[panel]
+            quat_xyzw, slope = both[:, 0, :4], both[:, 0, 4:] * (2.0 / (right - left))[:, None]
+            size = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
+            frames[part] = so3.matrix_from_quat(quat_xyzw / size)
+            rates[part] = so3.turn_of(quat_xyzw, slope) / size**2
+        return frames, rates
+
+
+def _track(panels: AxisPanels) -> _Track:
+    slopes = np.zeros_like(panels.series)
+    slopes[:, :-1] = np.polynomial.chebyshev.chebder(panels.series, axis=1)
+    return _Track(panels.edges, np.concatenate([panels.series, slopes], axis=-1))
+
+
+def _joined(deformation: Deformation) -> tuple[AxisPanels, _Freedom]:
+    """Continuous panels over the whole motion, and what equal moments leave open for all time. Raises GaugeError."""
+    panels = _over_loops(deformation)
+    shortest = _INTERVAL * deformation.duration / deformation.loops
+    while True:
+        oriented, freedom = _oriented(panels, shortest)
+        continuous, jumps = _continuous(deformation, oriented)
+        # Wide panels may hide between them an interval of equal moments, in which the axes can turn.
+        hiding = (np.append(jumps, 0.0) + np.append(0.0, jumps) > 0.0) & (panels.right - panels.left > shortest)
+        if not hiding.any():
+            break
+        split = panels.kept(hiding)
+        panels = in_order([panels.kept(~hiding), resolved(deformation, *halves(split.left, split.right))])
+    if jumps.any():
+        joint = int(np.argmax(jumps))
+        where = panels.left[joint + 1]
+        raise GaugeError(
+            f"the principal axes jump by {np.degrees(jumps[joint]):.3g} degrees at t = {where:.12g} s, "
+            f"{moments_at(deformation, where)}: no frame of principal axes is continuous there; use the "
+            "horizontal gauge"
+        )
+    return continuous, freedom
+
+
+def _over_loops(deformation: Deformation) -> AxisPanels:
+    """Panels for the whole motion; those of the first loop serve every loop in which they are diagonal, too."""
+    period = deformation.duration / deformation.loops
+    breaks = np.append(deformation.breaks[deformation.breaks < period * (1.0 - 1e-12)], period)
+    ends = np.linspace(breaks[:-1], breaks[1:], -(-_PANELS_OF_A_LOOP // (len(breaks) - 1)) + 1, axis=1)
+    left, right = ends[:, :-1].ravel(), ends[:, 1:].ravel()
+    first = resolved(deformation, left, right)
+    if deformation.loops == 1:
+        return first
+    starts = period * np.arange(deformation.loops)[:, None]
+    edges = np.append((starts + first.left).ravel(), deformation.duration)
+    panels = first.kept(np.tile(np.arange(len(first.left)), deformation.loops))
+    panels = replace(panels, left=edges[:-1], right=edges[1:])
+    good = is_diagonal_at(deformation, panels, _SPOT_CHECKS, np.array([NEARLY_DIAGONAL]))
+    same = good.reshape(deformation.loops, -1).all(axis=1)
+    if same.all():
+        return panels
+    left, right = starts[~same] + left, np.minimum(starts[~same] + right, deformation.duration)
+    anew = resolved(deformation, left.ravel(), right.ravel())
+    return in_order([panels.kept(np.repeat(same, len(first.left))), anew])
+
+
+# ---- From panel to panel --------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Freedom:
+    """By which turns the whole frame may still be turned from the left: all, those about an axis, or none."""
+
+    kind: int
+    axis: Array
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Panels `first` to `last` where moments are equal, all of one kind and one distinct axis."""
+
+    first: int
+    last: int
+    kind: int
+    axis: Array
+
+
+class _Orientation:
+    """The turn from the left of every panel, and the spins where moments are equal, found panel by panel."""
+
+    def __init__(self, panels: AxisPanels, shortest: float) -> None:
+        self._panels, self._shortest = panels, shortest
+        self.turns = np.tile(_STILL, (len(panels.left), 1))
+        self.spins: list[tuple[_Stretch, Array]] = []
+        self.freedom = _Freedom(int(panels.kind[0]), _THIRD)
+        self._stretches: list[_Stretch] = []
+        self._first, self._last = (so3.normalised(end) for end in _ends(panels.series))
+
+    def run(self) -> None:
+        kinds = self._panels.kind.tolist()
+        group, table = cube_turns()
+        steps = nearest_cube_turn(so3.quat_product(self._last[:-1], so3.quat_inverse(self._first[1:]))).tolist()
+        labels = table.tolist()
+        self._enter(0, kinds[0])
+        label = 0
+        for panel in range(1, len(kinds)):
+            if kinds[panel - 1] == kinds[panel] == SEPARATE:
+                label = labels[label][steps[panel - 1]]
+                self.turns[panel] = group[label]
+                continue
+            ideal = so3.quat_product(
+                so3.quat_product(self.turns[panel - 1], self._last[panel - 1]), so3.quat_inverse(self._first[panel])
+            )
+            if kinds[panel] == SEPARATE:
+                label = int(nearest_cube_turn(ideal))
+                self.turns[panel] = group[label]
+            elif kinds[panel] == SYMMETRIC:
+                # The distinct axis becomes one of the frame's.
+                seen = so3.matrix_from_quat(ideal) @ _THIRD
+                axis = np.sign(seen) * (np.arange(3) == np.argmax(np.abs(seen)))
+                self.turns[panel] = so3.quat_product(so3.quat_from_matrix(so3.between(seen, axis)), ideal)
+            else:
+                self.turns[panel] = ideal
+            self._absorb(so3.quat_product(self.turns[panel], so3.quat_inverse(ideal)), panel)
+            self._enter(panel, kinds[panel])
+
+    def _wide(self, stretch: _Stretch) -> bool:
+        return self._panels.right[stretch.last] - self._panels.left[stretch.first] >= self._shortest
+
+    def _absorb(self, excess: Array, panel: int) -> None:
+        """Turn the frames before this panel by what is missing, as far as equal moments leave it open."""
+        part = _part(excess, self.freedom.kind, self.freedom.axis)
+        if part is not None:
+            self.turns[:panel] = so3.quat_product(part, self.turns[:panel])
+            self.spins = [(stretch, so3.matrix_from_quat(part) @ spin) for stretch, spin in self.spins]
+            excess = so3.quat_product(excess, so3.quat_inverse(part))
+        for stretch in reversed(self._stretches):
+            part = _part(excess, stretch.kind, stretch.axis)
+            if part is not None and self._wide(stretch):
+                self.spins.append((stretch, so3.rotation_vector_from_quat(part)))
+                after = slice(stretch.last + 1, panel)
+                self.turns[after] = so3.quat_product(part, self.turns[after])
+                return
+            if stretch.kind == SYMMETRIC:
+                return
+
+    def _enter(self, panel: int, kind: int) -> None:
+        if kind == SEPARATE:
+            self._stretches, self.freedom = [], _Freedom(SEPARATE, _THIRD)
+            return
+        axis = np.round(so3.matrix_from_quat(self.turns[panel]) @ _THIRD)
+        first = panel
+        if self._stretches:
+            before = self._stretches[-1]
+            if before.kind == kind and abs(before.axis @ axis) > 0.5:
+                first, axis = self._stretches.pop().first, before.axis
+        self._stretches.append(_Stretch(first, panel, kind, axis))
+        if kind == SYMMETRIC:
+            if self.freedom.kind == SPHERICAL:
+                self.freedom = _Freedom(SYMMETRIC, axis)
+            elif abs(self.freedom.axis @ axis) < 0.5:
+                self.freedom = _Freedom(SEPARATE, _THIRD)
+
+
+def _part(turn: Array, kind: int, axis: Array) -> Array | None:
+    """The part (4,) of a turn that frames of a kind may make; None where that is nothing to speak of."""
+    if kind == SYMMETRIC:
+        turn = so3.quat_from_rotation_vector(2.0 * np.arctan2(turn[:3] @ axis, turn[3]) * axis)
+    return None if kind == SEPARATE or np.linalg.norm(turn[:3]) < 1e-9 else turn
+
+
+def _oriented(panels: AxisPanels, shortest: float) -> tuple[AxisPanels, _Freedom]:
+    """The panels turned from the left, as far as they may be, so that each goes on where the one before ends.
+
+    Moments that are equal for less than `shortest` [s] meet at an instant, in which the frame cannot turn.
+    """
+    found = _Orientation(panels, shortest)
+    found.run()
+    series = so3.quat_product(found.turns[:, None], panels.series)
+    for stretch, turn in found.spins:
+        rows = slice(stretch.first, stretch.last + 1)
+        left, right = panels.left[rows, None], panels.right[rows, None]
+        times = 0.5 * (left + right) + 0.5 * (right - left) * panel_nodes()
+        part = (times - left[0]) / (right[-1] - left[0])
+        spin = so3.quat_from_rotation_vector(part[..., None] * turn)
+        series[rows] = to_series() @ so3.quat_product(spin, chebyshev(panel_nodes(), COUNT) @ series[rows])
+    strength = so3.apply(so3.matrix_from_quat(found.turns) ** 2, panels.strength)
+    return replace(panels, series=series, strength=strength), found.freedom
+
+
+def _ends(series: Array) -> tuple[Array, Array]:
+    """Values of Chebyshev series (P, n, 4) at -1 and at 1: (P, 4) each."""
+    return np.einsum("pkc,k->pc", series, (-1.0) ** np.arange(series.shape[1])), series.sum(axis=1)
+
+
+def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanels, Array]:
+    """The panels with the gaps between neighbours spread over both, and those too wide for that (P - 1,) [rad]."""
+    series = panels.series
+    first, last = (so3.normalised(end) for end in _ends(series))
+    turn = so3.rotation_vector_from_quat(so3.quat_product(first[1:], so3.quat_inverse(last[:-1])))
+    size = np.linalg.norm(turn, axis=-1)
+    if np.any(size > _JUMP):
+        return panels, np.where(size > _JUMP, size, 0.0)
+    # The side that knows an axis better yields less. Turning from the left keeps what one axis yields from the others.
+    known = panels.strength**2 + 1e-40
+    share = known[1:] / (known[:-1] + known[1:])
+    common = so3.quat_product(so3.quat_from_rotation_vector(share * turn), last[:-1])
+    shift = np.zeros((2, len(series), 4))
+    for at, missing in (
+        (shift[0, 1:], so3.quat_product(common, so3.quat_inverse(first[1:]))),
+        (shift[1, :-1], so3.quat_product(common, so3.quat_inverse(last[:-1]))),
+    ):
+        at[:, :3] = missing[:, :3] / missing[:, 3:]
+    middle, slope = 0.5 * (shift[1] + shift[0])[:, None], 0.5 * (shift[1] - shift[0])[:, None]
+    longer = np.pad(series, ((0, 0), (0, 1), (0, 0)))
+    turned = so3.quat_product(slope, series)
+    longer[:, :-1] += so3.quat_product(middle, series)
+    longer[:, 1] += turned[:, 0]
+    longer[:, 2:] += 0.5 * turned[:, 1:]
+    longer[:, :-2] += 0.5 * turned[:, 1:]
+    moved = replace(panels, series=longer)
+    rows = np.flatnonzero(np.abs(shift).max(axis=(0, -1)) > 0.5 * NEARLY_DIAGONAL)
+    wrong = np.zeros(len(series), dtype=bool)
+    if len(rows):
+        limit = _AT_JOINTS + _jumps_of_inertia(deformation, panels)[rows, None]
+        wrong[rows] = ~is_diagonal_at(deformation, moved.kept(rows), points_between(), limit)
+    return moved, np.where(wrong[1:] | wrong[:-1], size, 0.0)
+
+
+def _jumps_of_inertia(deformation: Deformation, panels: AxisPanels) -> Array:
+    """By how much, per trace, the inertia of inexact data jumps at the ends of each panel: (P,)."""
+    _, inertia = inertia_in(deformation, panels.left, panels.right, np.array([-1.0, 1.0]))
+    jump = np.abs(inertia[1:, 0] - inertia[:-1, 1]).max(axis=(-1, -2))
+    jump = np.where(jump < _SLOPPY, 2.0 * jump, 0.0)
+    return np.append(jump, 0.0) + np.append(0.0, jump)
+
+
+# ---- The choice at the start ----------------------------------------------------------------------------------------
+
+
+def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
+    """The turn from the left that uses up what equal moments leave open for all time: (4,)."""
+    start = so3.normalised(_ends(panels.series[:1])[0])[0]
+    if freedom.kind == SPHERICAL:
+        return so3.quat_inverse(start)
+    if freedom.kind == SEPARATE:
+        return _STILL
+    axes = so3.matrix_from_quat(start)
+    distinct = freedom.axis @ axes
+    farthest = np.eye(3)[np.argmin(np.round(np.abs(distinct), 9))]
+    seen = axes @ (farthest - (farthest @ distinct) * distinct)
+    wanted = np.roll(np.abs(freedom.axis), 1)
+    angle = np.arctan2(np.cross(seen, wanted) @ freedom.axis, seen @ wanted)
+    return so3.quat_from_rotation_vector(angle * freedom.axis)
+
+
+def _labels_at_start(deformation: Deformation, panels: AxisPanels, freedom: _Freedom) -> Array:
+    """The one of the 24 turns from the left that names the axes at t = 0 by the rule of `principal_frames`: (4,)."""
+    if freedom.kind == SPHERICAL:
+        return _STILL
+    times = np.append(0.0, deformation.duration * 2.0 ** np.arange(-45.0, 0.5))
+    frames, _ = _track(panels)(times)
+    moments = np.einsum("tij,tjk,tik->ti", frames, deformation.inertia(times), frames)
+    moments /= moments.sum(axis=-1, keepdims=True)
+    size = np.abs(frames[0])
+    largest = np.argmax(size > size.max(axis=-1, keepdims=True) - 1e-9, axis=-1)
+    above = np.zeros(3)
+    for i, j in itertools.permutations(range(3), 2):
+        apart = moments[:, i] - moments[:, j]
+        told = np.flatnonzero(np.abs(apart) > 10.0 * EQUAL)
+        above[i] += apart[told[0]] > 0.0 if len(told) else largest[i] > largest[j]
+    order = np.argsort(above, kind="stable")
+    rows = np.eye(3)[order]
+    rows[:2] *= np.sign((rows @ frames[0])[[0, 1], largest[order[:2]]])[:, None]
+    rows[2] = np.cross(rows[0], rows[1])
+    return so3.quat_from_matrix(rows)

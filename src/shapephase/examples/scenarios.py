@@ -1,0 +1,275 @@
+"""Named, ready motions of the bodies we ship, each with its source and its known answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Array
+from ..body.catalog import load_body
+from ..deformation.deformation import articulated
+from ..deformation.gauge import horizontal_gauge
+from ..errors import TrajectoryError, unknown_name
+from ..phases.return_map import closed_orbits
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.shape_path import ShapePath, positive_argument
+
+_WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
+
+
+@dataclass(frozen=True)
+class NamedMotion:
+    """A motion that comes with the library: the body it is for, how to make it, and what it does."""
+
+    body: str
+    path: Callable[[], ShapePath]
+    about: str
+
+
+def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
+    """The righting of the two-half cat `cat_two_halves`: bend without twist, the bend going once around.
+
+    The rear half's axis b goes round a cone of half angle `beta` about a line that leans by `alpha` from the
+    front half's axis towards the belly; the waist does not twist. The bend goes from alpha + beta (belly)
+    over the right side to beta - alpha (back) and over the left.
+
+    Parameters
+    ----------
+    alpha, beta : [rad], 0 <= alpha < beta < pi/2
+    duration : of one loop [s]
+
+    With axial to transverse inertia 0.25 the cat turns by 180 degrees about the bisector of the two half axes at
+    (alpha, beta) = (0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222),
+    (60, 77.132402) degrees, and at (20, 40) by 259.512497 degrees, counted through the motion.
+
+    Source: Kane and Scher 1969, equation (5).
+    """
+    if not 0.0 <= alpha < beta < 0.5 * np.pi:
+        raise TrajectoryError(f"0 <= alpha < beta < pi/2 [rad] is needed, got alpha = {alpha!r}, beta = {beta!r}")
+    return replace(_loop(_KaneScher(float(alpha), float(beta), float(duration)), duration, _WAIST), smooth_loop=True)
+
+
+def cat_righting(duration: float = 0.5) -> ShapePath:
+    """The realistic `cat` rights itself from rest to rest: 180 degrees about its long axis at zero momentum.
+
+    The bend of the untwisted waist rises, its direction goes once around, and it falls, with the legs tucked and
+    neck and tail bending along. Two numbers, the largest bend and the tail's share, are solved for; a loop that
+    is its own mirror image run backwards turns about an axis in the plane of symmetry, so two are enough.
+    """
+    names = load_body("cat").joint_names
+    return _loop(_CatRighting(float(duration), names), duration, names)
+
+
+def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
+    """One circle of both arms of the `astronaut`: 11.860224 degrees nose down at zero momentum.
+
+    The arms go up in front of the body, close together, and come down spread at the sides.
+    In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
+    """
+    abduction = (0.75, 0.0, -0.75)
+    return _one_harmonic(
+        "astronaut",
+        duration,
+        {
+            "left_shoulder_flexion": (-1.05, 2.05, 0.0),
+            "right_shoulder_flexion": (-1.05, 2.05, 0.0),
+            "left_shoulder_abduction": abduction,
+            "right_shoulder_abduction": tuple(-value for value in abduction),
+        },
+    )
+
+
+def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
+    """One swing of legs and trunk of the `astronaut`: 12.297356 degrees nose down at zero momentum.
+
+    The legs swing forward stretched and come back bent, the trunk bends along.
+    In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
+    """
+    return _one_harmonic(
+        "astronaut",
+        duration,
+        {
+            "left_hip_flexion": (-0.75, 1.2, 0.0),
+            "right_hip_flexion": (-0.75, 1.2, 0.0),
+            "left_knee": (1.15, 0.0, -1.15),
+            "right_knee": (1.15, 0.0, -1.15),
+            "lumbar_flexion": (0.25, -0.5, 0.0),
+        },
+    )
+
+
+def antenna_deployment(duration: float = 60.0) -> ShapePath:
+    """The boom of the `satellite` extends from its lower to its upper limit, from rest to rest: an open path."""
+    body = load_body("satellite")
+    lower, upper = body.joint_limits[body.joint_index("boom_extension")]
+    ends = [body.shape({"boom_extension": float(length)}) for length in (lower, upper)]
+    return ShapePath.waypoints([0.0, duration], ends, joint_names=body.joint_names)
+
+
+def satellite_sweep(duration: float = 60.0) -> ShapePath:
+    """One sweep of the `satellite`: the boom goes out and in while its arm swings to and fro, a quarter behind.
+
+    At zero momentum it turns by 5.405499 degrees, most of it about the z axis. The numbers are our own.
+    """
+    return _one_harmonic(
+        "satellite",
+        duration,
+        {"boom_extension": (0.9, -0.9, 0.0), "arm_1": (0.0, 0.0, 1.2), "arm_2": (0.9, 0.0, 0.0)},
+    )
+
+
+MOTIONS: Mapping[str, NamedMotion] = {
+    "kane_scher": NamedMotion(
+        "cat_two_halves",
+        lambda: kane_scher(np.radians(20.0), np.radians(61.813873)),
+        "the cat of Kane and Scher rights itself, bend 81.8 to 41.8 degrees",
+    ),
+    "cat_righting": NamedMotion("cat", cat_righting, "a realistic cat rights itself, legs tucked, rest to rest"),
+    "astronaut_arm_circles": NamedMotion("astronaut", astronaut_arm_circles, "pitch turn by one circle of the arms"),
+    "astronaut_leg_swing": NamedMotion("astronaut", astronaut_leg_swing, "pitch turn by one swing of legs and trunk"),
+    "antenna_deployment": NamedMotion("satellite", antenna_deployment, "the boom antenna comes out, an open path"),
+    "satellite_sweep": NamedMotion("satellite", satellite_sweep, "boom out and in, arm to and fro: turn about z"),
+}
+
+CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
+    "cat": ("cat_righting", 0.02),
+    "astronaut": ("astronaut_leg_swing", 2.0),
+    "satellite": ("satellite_sweep", 1.0),
+}
+"""Ready motions whose shape and momentum close together: the loop of shapes, the size of the momentum [kg m^2/s]."""
+
+
+def named_motion(name: str) -> ShapePath:
+    """The path of one of `MOTIONS`. Raises UnknownNameError."""
+    if name not in MOTIONS:
+        raise unknown_name("motion", name, MOTIONS)
+    return MOTIONS[name].path()
+
+
+def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
+    """A motion of `CLOSED_ORBITS`: shape and momentum close together, so that all of its split is phase and holonomy.
+
+    Parameters
+    ----------
+    gauge : where the momentum closes: "horizontal", where total_rotation = exp(montgomery_phase hat(mu)) holonomy,
+        or "base", where total_rotation = exp(montgomery_phase hat(mu))
+
+    Returns
+    -------
+    the first of `closed_orbits`, seen from the base: `split(closed_orbit("cat"))` has no tilt
+
+    Raises
+    ------
+    UnknownNameError
+        For another name or gauge.
+    """
+    if name not in CLOSED_ORBITS:
+        raise unknown_name("closed orbit", name, CLOSED_ORBITS)
+    if gauge not in ("horizontal", "base"):
+        raise unknown_name("gauge of a closed orbit", gauge, ("horizontal", "base"))
+    motion, size = CLOSED_ORBITS[name]
+    deformation = articulated(load_body(MOTIONS[motion].body), named_motion(motion))
+    seen = horizontal_gauge(deformation) if gauge == "horizontal" else deformation
+    start = closed_orbits(seen, size)[0].initial_attitude
+    return reconstruct(deformation, [0.0, 0.0, size], start, tolerance=1e-11)
+
+
+@dataclass(frozen=True)
+class _KaneScher:
+    alpha: float
+    beta: float
+    duration: float
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        pace = 2.0 * np.pi / self.duration
+        c, s = np.cos(pace * times), np.sin(pace * times)
+        ca, sa, cb, sb = np.cos(self.alpha), np.sin(self.alpha), np.cos(self.beta), np.sin(self.beta)
+        axis = np.stack([ca * cb - sa * sb * c, -sb * s, sa * cb + ca * sb * c], axis=-1)
+        rate = pace * np.stack([sa * sb * s, -sb * c, -ca * sb * s], axis=-1)
+        return _untwisted(axis, rate)
+
+
+@dataclass(frozen=True)
+class _CatRighting:
+    """Every joint from the bend S(t), which rises and falls, and its direction h(t), which goes once around."""
+
+    duration: float
+    joint_names: tuple[str, ...]
+    largest_bend: float = 1.75867609613
+    tail_share: float = 0.387753066315
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        x = times / self.duration
+        s = x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3)
+        pace = 140.0 * x**3 * (1.0 - x) ** 3 / self.duration
+        bend, bend_rate = np.sin(np.pi * s), np.pi * pace * np.cos(np.pi * s)
+        ny, nz = np.cos(2.0 * np.pi * s), -np.sin(2.0 * np.pi * s)
+        ny_rate, nz_rate = 2.0 * np.pi * pace * nz, -2.0 * np.pi * pace * ny
+        gamma, gamma_rate = self.largest_bend * bend, self.largest_bend * bend_rate
+        cosine, sine = np.cos(gamma), np.sin(gamma)
+        axis = np.stack([cosine, nz * sine, -ny * sine], axis=-1)
+        axis_rate = np.stack(
+            [
+                -sine * gamma_rate,
+                nz_rate * sine + nz * cosine * gamma_rate,
+                -ny_rate * sine - ny * cosine * gamma_rate,
+            ],
+            axis=-1,
+        )
+        waist, waist_rate = _untwisted(axis, axis_rate)
+        pitch, pitch_rate = bend * ny, bend_rate * ny + bend * ny_rate
+        yaw, yaw_rate = bend * nz, bend_rate * nz + bend * nz_rate
+        shapes, rates = (np.zeros((len(times), len(self.joint_names))) for _ in range(2))
+        for column, joint in enumerate(_WAIST):
+            place = self.joint_names.index(joint)
+            shapes[:, place], rates[:, place] = waist[:, column], waist_rate[:, column]
+        for joint, value, rate, factor in (
+            ("neck_pitch", pitch, pitch_rate, -1.0),
+            ("neck_yaw", yaw, yaw_rate, -1.0),
+            ("tail_1_pitch", pitch, pitch_rate, self.tail_share),
+            ("tail_1_yaw", yaw, yaw_rate, self.tail_share),
+            *((f"front_{side}_shoulder_pitch", bend, bend_rate, 1.2) for side in ("left", "right")),
+            *((f"front_{side}_elbow", bend, bend_rate, -2.4) for side in ("left", "right")),
+            *((f"rear_{side}_hip_pitch", bend, bend_rate, -1.2) for side in ("left", "right")),
+            *((f"rear_{side}_knee", bend, bend_rate, 2.4) for side in ("left", "right")),
+        ):
+            place = self.joint_names.index(joint)
+            shapes[:, place], rates[:, place] = factor * value, factor * rate
+        return shapes, rates
+
+
+def _untwisted(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
+    """Waist angles pitch, yaw, roll (Ry Rz Rx) that carry the x axis to `axis` without twist, and their rates.
+
+    The turn is the one along the great circle from x to `axis`; all (N, 3).
+    """
+    (x, y, z), (dx, dy, dz) = axis.T, axis_rate.T
+    upper, lower = y * z, x * (1.0 + x) + z * z
+    upper_rate, lower_rate = dy * z + y * dz, dx * (1.0 + 2.0 * x) + 2.0 * z * dz
+    angles = np.stack([np.arctan2(-z, x), np.arcsin(y), np.arctan2(upper, lower)], axis=-1)
+    rates = np.stack(
+        [
+            (z * dx - x * dz) / (x * x + z * z),
+            dy / np.sqrt(1.0 - y * y),
+            (upper_rate * lower - upper * lower_rate) / (upper**2 + lower**2),
+        ],
+        axis=-1,
+    )
+    return angles, rates
+
+
+def _loop(curve: Callable[[Array], tuple[Array, Array]], duration: float, names: tuple[str, ...]) -> ShapePath:
+    period = positive_argument(duration)
+    return ShapePath(curve, period, np.array([0.0, period]), len(names), names, oscillations=4.0)
+
+
+def _one_harmonic(name: str, duration: float, joints: Mapping[str, tuple[float, ...]]) -> ShapePath:
+    """A loop of a body with one harmonic: mean, cosine and sine for the joints that move."""
+    body = load_body(name)
+    mean, cosine, sine = np.zeros((3, body.n_shape))
+    for joint, (a, b, c) in joints.items():
+        place = body.joint_index(joint)
+        mean[place], cosine[place], sine[place] = a, b, c
+    return ShapePath.fourier(mean, cosine[:, None], sine[:, None], duration, joint_names=body.joint_names)

@@ -1,0 +1,175 @@
+"""The innermost loops in machine code, for those who have a C compiler and ask for it once.
+
+CasADi interprets its functions. What it writes of them in C does the same operations in the same order, so the results
+are the same to the last bit, and take a fifth of the time.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import warnings
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import CompilerError
+from ..files import write_whole
+
+# Contracting a product and a sum into one operation would round differently.
+_OPTIONS = ("-O2", "-ffp-contract=off", "-shared", "-fPIC")
+_PATIENCE = 120.0
+_TRIALS = 20
+
+
+class MachineCodeWarning(UserWarning):
+    """Compiled steps were found but cannot be used; the interpreted ones give the same results."""
+
+
+def code_folder() -> Path:
+    """Where compiled functions are kept: $XDG_CACHE_HOME/shapephase, or ~/.cache/shapephase.
+
+    Raises RuntimeError where nobody is at home.
+    """
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    # A relative path is to be ignored: XDG Base Directory Specification.
+    return (named if named.is_absolute() else Path.home() / ".cache") / "shapephase"
+
+
+@lru_cache(maxsize=64)
+def in_machine_code(function: Any) -> Any:
+    """The compiled twin of a CasADi function if there is one in `code_folder`, else the function itself.
+
+    Looked for once.
+    """
+    import casadi
+
+    try:
+        if not code_folder().is_dir():
+            return function
+        library = _library(function.name(), _source(function))
+        # In a folder that others may write to, their code is not ours to run.
+        if not library.is_file() or library.stat().st_uid not in (0, os.getuid()):
+            return function
+    except (OSError, RuntimeError):
+        return function
+    try:
+        return casadi.external(function.name(), str(library))
+    except RuntimeError:
+        warnings.warn(
+            f"{library} cannot be loaded; the steps are interpreted. `shapephase compile` writes it anew",
+            MachineCodeWarning,
+            stacklevel=2,
+        )
+        return function
+
+
+def compile_functions(functions: list[Any]) -> list[Path]:
+    """Compile CasADi functions of dense numbers into `code_folder`, each compared with the interpreted one.
+
+    Raises
+    ------
+    CompilerError
+        If there is no C compiler (`cc`, or what $CC names), it fails, or its code gives other numbers.
+    """
+    compiler = os.environ.get("CC", "cc").split() or ["cc"]
+    if shutil.which(compiler[0]) is None:
+        raise CompilerError(
+            f"there is no C compiler {compiler[0]!r} on this machine; install one (gcc or clang), or name it in $CC. "
+            "Everything works without it"
+        )
+    try:
+        folder = code_folder()
+    except RuntimeError as error:
+        raise CompilerError(f"no place to keep what is compiled ({error}); name one in $XDG_CACHE_HOME") from error
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as workshop:
+            for function in functions:
+                _compile(function, compiler, Path(workshop))
+            _try_all(compiler, workshop)
+            return [_kept(function, Path(workshop)) for function in functions]
+    except OSError as error:
+        raise CompilerError(f"{folder}: cannot be written to ({error}); $XDG_CACHE_HOME names another place") from error
+
+
+def _compile(function: Any, compiler: list[str], workshop: Path) -> None:
+    """One function compiled, and kept as it is beside that."""
+    source, made = workshop / f"{function.name()}.c", workshop / f"{function.name()}.so"
+    source.write_text(_source(function))
+    function.save(str(workshop / f"{function.name()}.casadi"))
+    done = _ran([*compiler, *_OPTIONS, str(source), "-o", str(made), "-lm"], compiler)
+    if done.returncode:
+        raise CompilerError(f"the compiler {compiler[0]} failed: {done.stderr.strip()[-500:] or 'it says nothing'}")
+
+
+def _try_all(compiler: list[str], workshop: str) -> None:
+    """In a process of its own: code for "fast" mathematics changes how all of its process computes, once loaded."""
+    trial = (
+        "import sys; from shapephase.integrator.compilation import same_numbers; "
+        "sys.exit(not same_numbers(sys.argv[1]))"
+    )
+    done = _ran([sys.executable, "-c", trial, workshop], compiler)
+    if done.returncode:
+        said = f" ({done.stderr.strip().splitlines()[-1][-300:]})" if done.stderr.strip() else ""
+        words = " ".join(compiler)
+        raise CompilerError(f"what {words!r} makes of the steps gives other numbers{said}; name another in $CC")
+
+
+def same_numbers(workshop: str) -> bool:
+    """Whether all compiled functions in a folder do the same as the interpreted ones beside them, bit by bit."""
+    import casadi
+
+    rng = np.random.default_rng(0)
+    for kept in sorted(Path(workshop).glob("*.casadi")):
+        function = casadi.Function.load(str(kept))
+        trials = [
+            [rng.uniform(-1.0, 1.0, function.size_in(place)) for place in range(function.n_in())]
+            for _ in range(_TRIALS)
+        ]
+        wanted = [function.call(given) for given in trials]
+        twin = casadi.external(function.name(), str(kept.with_suffix(".so")))
+        for given, numbers in zip(trials, wanted, strict=True):
+            pairs = zip(numbers, twin.call(given), strict=True)
+            if not all(np.array_equal(np.array(a), np.array(b), equal_nan=True) for a, b in pairs):
+                return False
+    smallest = np.array([5e-324])
+    return bool((smallest * 1.0)[0] > 0.0)
+
+
+def _ran(command: list[str], compiler: list[str]) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        raise CompilerError(
+            f"compiling with {compiler[0]} took more than {_PATIENCE:g} s; $CC names another compiler"
+        ) from None
+
+
+def _kept(function: Any, workshop: Path) -> Path:
+    """What was compiled, in its place."""
+    library = _library(function.name(), _source(function))
+    write_whole(library, lambda stream: stream.write((workshop / f"{function.name()}.so").read_bytes()))
+    return library
+
+
+def _source(function: Any) -> str:
+    """A CasADi function in C."""
+    import casadi
+
+    generator = casadi.CodeGenerator(f"{function.name()}.c")
+    generator.add(function)
+    return str(generator.dump())
+
+
+def _library(name: str, source: str) -> Path:
+    """Where the compiled source belongs: another source, machine or system has another name."""
+    kind = f"{platform.system()} {platform.machine()} {' '.join(_OPTIONS)}\n"
+    return code_folder() / f"{name}-{hashlib.sha256((kind + source).encode()).hexdigest()[:24]}.so"

@@ -1,0 +1,147 @@
+"""How small changes of the start grow along a motion: the derivative of the steps themselves."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from .casadi_calls import called, for_rows
+from .compilation import in_machine_code
+from .rotation_step import STAGES, attitude_step
+from .step_loop import BLOCK, adjugate_of, matrix_product, momentum_step_function
+
+CHECKPOINTS = 8
+
+
+def amplification(growth: Array) -> Array:
+    """Largest growth of an error from one time to a later one, from the growth matrices: (B, K + 1, 3, 3) -> (B,).
+
+    Between eight times. A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
+    values as s, 1, 1/s, the sum of their squares gives the largest.
+    """
+    count = growth.shape[1]
+    if count == 0:
+        return np.ones(1)
+    chosen = growth[:, np.arange(CHECKPOINTS) * (count - 1) // (CHECKPOINTS - 1)].reshape(len(growth), -1)
+    largest = for_rows(largest_growth, 9 * CHECKPOINTS, chosen)[:, 0]
+    # Where steps were so long that they overflowed, nothing is known.
+    return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
+
+
+def largest_growth(entries: Any) -> list[Any]:
+    """From the growth matrices at the checkpoints, row by row."""
+    import casadi
+
+    matrices = [[entries[9 * k + 3 * i : 9 * k + 3 * i + 3] for i in range(3)] for k in range(CHECKPOINTS)]
+    rest: Any = 1.0
+    for later in range(1, CHECKPOINTS):
+        for earlier in range(later):
+            between = matrix_product(matrices[later], adjugate_of(matrices[earlier])) if earlier else matrices[later]
+            squares = sum(entry * entry for row in between for entry in row)
+            rest = casadi.fmax(rest, 0.5 * (squares - 1.0))
+    return [(rest + (rest * rest - 1.0) ** 0.5) ** 0.5]
+
+
+def exact_growth(channels: Array, directions: Array, sizes: Array, loops: int) -> Array:
+    """Growth matrices at the step ends: (B, K + 1, 3, 3). Parameters as `march.marched`.
+
+    A turn delta of the start is carried over as S^T delta, and changes the momentum's direction by p x delta.
+    """
+    growth = np.empty((len(sizes), loops * len(channels) + 1, 3, 3))
+    growth[:, 0] = np.eye(3)
+    for row, (direction, size) in enumerate(zip(directions, sizes, strict=True)):
+        first = so3.perpendicular(direction)
+        basis = np.stack([first, np.cross(direction, first)])
+        seeds = np.zeros((2, 8))
+        seeds[:, :3] = np.cross(direction, basis)
+        for place, quaternions, slopes in _derivatives(channels, direction, float(size), loops, seeds):
+            rotation = so3.transpose(so3.matrix_from_quat(quaternions))
+            growth[row, place] = rotation + so3.transpose(slopes) @ basis
+    return growth
+
+
+def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
+    """The turn of the end, body axes, by a change of Pi at the start: (B, 3, 3) for Pi (B, 3), zero or not.
+
+    Here the steps are taken on the quaternion itself: with hardly any momentum its direction tells nothing any more.
+    """
+    count = len(channels)
+    result = np.empty((len(momenta), 3, 3))
+    for row, momentum in enumerate(momenta):
+        state = np.concatenate([[0.0, 0.0, 0.0, 1.0], momentum, np.zeros(12)])
+        for _ in range(loops):
+            for first in range(0, count, BLOCK):
+                block = channels[first : first + BLOCK]
+                (states,) = called(_slope_function(len(block)), len(block), state, block)
+                state = states[-1]
+        result[row] = so3.turn_of(state[:4], state[7:].reshape(3, 4)).T
+    return result
+
+
+def _derivatives(channels: Array, direction: Array, size: float, loops: int, seeds: Array) -> Any:
+    """Block by block: where it stands, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after its steps.
+
+    `seeds` (s, 8) are changes of direction, quaternion and size at the start.
+    """
+    count, columns = len(channels), len(seeds)
+    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0, size], seeds.ravel()])
+    done = 0
+    for _ in range(loops):
+        for first in range(0, count, BLOCK):
+            block = channels[first : first + BLOCK]
+            (states,) = called(_derivative_function(len(block), columns), len(block), state, block)
+            quaternions = states[:, 3:7]
+            slopes = so3.turn_of(quaternions[:, None], states[:, 8:].reshape(-1, columns, 8)[:, :, 3:7])
+            yield slice(done + 1, done + len(block) + 1), quaternions, slopes
+            state, done = states[-1], done + len(block)
+
+
+@lru_cache(maxsize=512)
+def _slope_function(length: int) -> Any:
+    """`length` steps as one CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
+    return in_machine_code(slope_step_function()).mapaccum("steps", length)
+
+
+@lru_cache(maxsize=1)
+def slope_step_function() -> Any:
+    """One step as a CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
+    import casadi
+
+    quaternion, momentum = casadi.SX.sym("quaternion", 4), casadi.SX.sym("momentum", 3)
+    slopes, data = casadi.SX.sym("slopes", 4, 3), casadi.SX.sym("channels", 9 * STAGES)
+    components = casadi.vertsplit(data)
+    channels = [components[9 * s : 9 * s + 9] for s in range(STAGES)]
+    following = casadi.vertcat(*attitude_step(casadi.vertsplit(quaternion), casadi.vertsplit(momentum), channels))
+    further = casadi.jtimes(following, quaternion, slopes) + casadi.jacobian(following, momentum)
+    state = casadi.vertcat(quaternion, momentum, casadi.reshape(slopes, 12, 1))
+    onward = casadi.vertcat(following, momentum, casadi.reshape(further, 12, 1))
+    return casadi.Function("slope_step", [state, data], [onward])
+
+
+@lru_cache(maxsize=512)
+def _derivative_function(length: int, columns: int) -> Any:
+    """`length` steps as one CasADi function of the state with its derivatives, and the channels."""
+    return in_machine_code(derivative_step_function(columns)).mapaccum("steps", length)
+
+
+@lru_cache(maxsize=1)
+def derivative_step_function(columns: int) -> Any:
+    """One step as a CasADi function of the state with its derivatives, and the channels."""
+    import casadi
+
+    state, slopes = casadi.SX.sym("state", 8), casadi.SX.sym("slopes", 8, columns)
+    data = casadi.SX.sym("channels", 9 * STAGES)
+    following, _ = momentum_step_function(False)(state, data)
+    further = casadi.reshape(casadi.jtimes(following, state, slopes), 8 * columns, 1)
+    whole = casadi.vertcat(state, casadi.reshape(slopes, 8 * columns, 1))
+    return casadi.Function(f"derivative_step_{columns}", [whole, data], [casadi.vertcat(following, further)])
+
+
+def forget_functions() -> None:
+    """Build the functions anew when next needed."""
+    _slope_function.cache_clear()
+    _derivative_function.cache_clear()

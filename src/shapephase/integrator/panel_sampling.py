@@ -1,0 +1,271 @@
+"""Any deformation sampled on panels between its breaks, at nested Chebyshev points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ..arrays import Array, Integers, Mask
+from ..errors import AccuracyNotReached
+from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
+from .spectral_error import Channels, Judgement, judged, spectral_sizes
+
+# Degrees to begin with, by tolerance, on many panels and on a few.
+_FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
+_HALF_DEGREE, _LAST_DEGREE = 10, 80
+_MOST_PANELS = 4000
+_LEAST_WIDTH = 1e-13
+# Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
+_BETWEEN = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Panels of one degree."""
+
+    degree: int
+    left: Array
+    right: Array
+    values: Array  # (G, degree + 1, 9) at the ascending Chebyshev points
+    gaps: Array  # (G, 2) errors seen between the nodes; NaN: not looked for
+    judgement: Judgement
+
+    @property
+    def width(self) -> Array:
+        return self.right - self.left
+
+    def kept(self, rows: Mask) -> _Group:
+        return _group(self.degree, self.left[rows], self.right[rows], self.values[rows], self.gaps[rows])
+
+
+def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
+    rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
+    judgement = judged(spectral_sizes(values_to_coefficients(degree) @ values), rounding)
+    if gaps is None:
+        return _Group(degree, left, right, values, np.full((len(left), 2), np.nan), judgement)
+    seen = ~np.isnan(gaps[:, 0])
+    return _Group(
+        degree,
+        left,
+        right,
+        values,
+        gaps,
+        judgement.raised(2.0 * np.nan_to_num(gaps), seen) if seen.any() else judgement,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Wanted:
+    """Panels to be sampled at a degree; `known` are the values of a lower degree that divides it."""
+
+    degree: int
+    left: Array
+    right: Array
+    known: Array | None
+
+    def new_points(self) -> Array:
+        """(G, m) times; the ends are moved a little inwards, to this side of a break."""
+        nodes = _nodes_in(self.left, self.right, self.degree)
+        if self.known is not None:
+            return nodes[:, ~self._old()]
+        if self.degree:
+            nodes[:, 0], nodes[:, -1] = inside(self.left, self.right)
+        return nodes
+
+    def with_values(self, fresh: Array) -> Array:
+        """(G, degree + 1, 9)."""
+        if self.known is None:
+            return self._with_true_ends(fresh) if self.degree else fresh
+        whole = np.empty((len(self.left), self.degree + 1, 9))
+        old = self._old()
+        whole[:, old], whole[:, ~old] = self.known, fresh
+        return whole
+
+    def _with_true_ends(self, values: Array) -> Array:
+        """Values at the very ends from those a little inwards, along the polynomial's slope there."""
+        degrees = np.arange(self.degree + 1.0)
+        slopes = np.stack([(-1.0) ** (degrees + 1.0), np.ones_like(degrees)]) * degrees**2
+        at_ends = slopes @ (values_to_coefficients(self.degree) @ values)
+        first, _ = inside(self.left, self.right)
+        shift = (2.0 * (first - self.left) / (self.right - self.left))[:, None]
+        values = values.copy()
+        values[:, 0] -= shift * at_ends[:, 0]
+        values[:, -1] += shift * at_ends[:, 1]
+        return values
+
+    def _old(self) -> Mask:
+        count = 1 if self.known is None else self.known.shape[1] - 1
+        return np.arange(self.degree + 1) % (self.degree // count) == 0
+
+
+class PanelSampler:
+    """Samples on panels between the breaks, at nested Chebyshev points."""
+
+    def __init__(
+        self,
+        asked: Channels,
+        breaks: Array,
+        loops: int,
+        oscillations: float | None,
+        probe: Callable[[Array], Array] | None,
+    ) -> None:
+        self._asked, self._probe, self._loops = asked, probe, loops
+        self._known = oscillations is not None
+        self._span = float(breaks[-1] - breaks[0])
+        self._most = _MOST_PANELS + 40 * len(breaks)
+        pieces = 4 if oscillations is None else max(1, int(np.ceil(oscillations / 2.0)))
+        ends = [np.linspace(left, right, pieces + 1) for left, right in pairwise(breaks)]
+        self._left, self._right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
+        self._still = oscillations == 0.0
+        self._groups: dict[int, _Group] = {}
+
+    def refine(self, momentum: float, tolerance: float) -> None:
+        """As `Sampler.refine`."""
+        if not self._groups:
+            of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
+            still = self._standing()
+            parts = ((0, still), (of_many if len(self._left) > 4 else of_few, ~still))
+            self._add([_Wanted(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()])
+        while True:
+            errors = {d: g.judgement.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
+            total = self._loops * sum(float(e.sum()) for e in errors.values())
+            if total <= tolerance:
+                if self._known or not self._look_between():
+                    return
+                continue
+            share = tolerance / (self._span * self._loops)
+            rough = {d: (errors[d] > share * g.width) & ~g.judgement.at_rounding for d, g in self._groups.items()}
+            if not any(rows.any() for rows in rough.values()):
+                return
+            self._sharpen(rough, errors, tolerance, total)
+
+    def error(self, momentum: float) -> float:
+        """As `Sampler.error`."""
+        return self._loops * sum(
+            float(g.judgement.error(momentum, g.width, 2.0 * d).sum()) for d, g in self._groups.items()
+        )
+
+    def interpolant(self) -> Interpolant:
+        """As `Sampler.interpolant`."""
+        groups = list(self._groups.values())
+        left = np.concatenate([g.left for g in groups])
+        order = np.argsort(left)
+        coefficients = np.zeros((len(left), max(self._groups) + 1, 9))
+        start = 0
+        for g in groups:
+            rows = slice(start, start + len(g.left))
+            coefficients[rows, : g.degree + 1] = values_to_coefficients(g.degree) @ g.values
+            start = rows.stop
+        edges = np.append(left[order], max(float(g.right.max()) for g in groups))
+        if self._loops > 1:
+            starts = edges[-1] * np.arange(self._loops)
+            edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
+        return Interpolant(edges, coefficients[order], self._loops, self._asked.count)
+
+    def _sharpen(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
+        """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
+        wanted: list[_Wanted] = []
+        crowded = self._panel_count > self._most
+        for degree, rows in rough.items():
+            if not rows.any():
+                continue
+            g = self._groups.pop(degree)
+            share = tolerance / (self._span * self._loops) * g.width
+            with np.errstate(divide="ignore", invalid="ignore"):
+                missing = np.log(np.maximum(errors[degree] / share, 1.0)) / g.judgement.decay
+            # A panel without a decay that is still small enough was found wanting between its nodes.
+            factor = np.clip(np.ceil(np.nan_to_num(missing, nan=0.0, posinf=9.9 * degree) / degree + 0.9), 2, 4)
+            factor[(missing > 3.1 * degree) | (factor * degree > _LAST_DEGREE)] = 0
+            halves = rows & (factor == 0)
+            if (g.width[halves] < _LEAST_WIDTH * self._span).any() or (crowded and halves.any()):
+                where = float(g.left[halves][np.argmin(g.width[halves])])
+                raise AccuracyNotReached(
+                    f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left where "
+                    f"{tolerance:.3g} was asked; declare the times of its jumps as breaks, smooth the data, or loosen "
+                    "the tolerance"
+                )
+            if not rows.all():
+                self._groups[degree] = g.kept(~rows)
+            for times in (2, 3, 4):
+                grows = rows & (factor == times)
+                if grows.any():
+                    wanted.append(_Wanted(times * degree, g.left[grows], g.right[grows], g.values[grows]))
+            if halves.any():
+                left, right = g.left[halves], g.right[halves]
+                middle = 0.5 * (left + right)
+                ends = np.concatenate([left, middle]), np.concatenate([middle, right])
+                wanted.append(_Wanted(_HALF_DEGREE, *ends, None))
+        self._add(wanted)
+
+    def _standing(self) -> Mask:
+        """Panels on which nothing moves: one sample each will do."""
+        standing = np.full(len(self._left), self._still)
+        if self._still or self._probe is None:
+            return standing
+        for fractions in (_BETWEEN[31:32], _BETWEEN):
+            rows = np.flatnonzero(~standing) if len(fractions) == 1 else np.flatnonzero(standing)
+            times = self._left[rows, None] + (self._right - self._left)[rows, None] * fractions
+            seen = self._probe(times.ravel()).reshape(len(rows), len(fractions), -1)
+            standing[rows] = ~seen[:, :, seen.shape[-1] // 2 :].any(axis=(1, 2))
+            if not standing.any():
+                break
+        return standing
+
+    @property
+    def _panel_count(self) -> int:
+        return sum(len(g.left) for g in self._groups.values())
+
+    def _add(self, wanted: list[_Wanted]) -> None:
+        """Sample new panels, and those whose degree is raised; one call for all points."""
+        times = [panels.new_points() for panels in wanted]
+        values = self._asked(np.concatenate([t.ravel() for t in times]))
+        start = 0
+        for panels, points in zip(wanted, times, strict=True):
+            whole = panels.with_values(values[start : start + points.size].reshape(*points.shape, 9))
+            start += points.size
+            left, right, gaps = panels.left, panels.right, None
+            if panels.degree in self._groups:
+                g = self._groups[panels.degree]
+                gaps = np.concatenate([g.gaps, np.full((len(left), 2), np.nan)])
+                left, right = np.concatenate([g.left, left]), np.concatenate([g.right, right])
+                whole = np.concatenate([g.values, whole])
+            gaps = None if self._known else gaps
+            self._groups[panels.degree] = _group(panels.degree, left, right, whole, gaps)
+
+    def _look_between(self) -> bool:
+        """Look at new panels of a black box between their nodes; errors seen there count. False: nothing was new."""
+        found = False
+        for degree, g in list(self._groups.items()):
+            rows = np.flatnonzero(np.isnan(g.gaps[:, 0]))
+            if not len(rows) or not degree:
+                continue
+            found = True
+            points = self._suspicious_points(g, rows)
+            there = chebyshev(2.0 * points - 1.0, degree + 1) @ values_to_coefficients(degree)
+            between = g.left[rows, None] + g.width[rows, None] * points
+            truth = self._asked(between.ravel()).reshape(*points.shape, 9)
+            gaps = g.gaps.copy()
+            gaps[rows] = spectral_sizes(there @ g.values[rows] - truth).max(axis=1)
+            self._groups[degree] = _group(degree, g.left, g.right, g.values, gaps)
+        return found
+
+    def _suspicious_points(self, g: _Group, rows: Integers) -> Array:
+        """Where in its panels (in [0, 1]) the probe is farthest from its own interpolant: (R, k)."""
+        if self._probe is None:
+            return np.broadcast_to(_BETWEEN[::16], (len(rows), 4))
+        there = chebyshev(2.0 * _BETWEEN - 1.0, g.degree + 1) @ values_to_coefficients(g.degree)
+        nodes = _nodes_in(*inside(g.left[rows], g.right[rows]), g.degree)
+        between = g.left[rows, None] + g.width[rows, None] * _BETWEEN
+        seen, truth = (self._probe(t.ravel()).reshape(*t.shape, -1) for t in (nodes, between))
+        gap = np.abs(there @ seen - truth)
+        half = gap.shape[-1] // 2
+        worst = [np.argmax(part.max(axis=-1), axis=1) for part in (gap[..., :half], gap[..., half:])]
+        return _BETWEEN[np.stack(worst, axis=-1)]
+
+
+def _nodes_in(left: Array, right: Array, degree: int) -> Array:
+    """Ascending Chebyshev points of panels (G, degree + 1), ends included."""
+    return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)

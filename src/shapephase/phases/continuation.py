@@ -1,0 +1,194 @@
+"""Closed orbits followed through sizes of the momentum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..deformation.deformation import Deformation
+from ..errors import ShapeError, TrajectoryError
+from .loop_map import MomentumLoop, closed_points, direction_argument, solved, tangent_basis
+
+_UP = np.array([0.0, 0.0, 1.0])
+_LARGEST_STEP, _SMALLEST_STEP = 0.1, 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitBranch:
+    """A closed orbit followed through sizes of the momentum.
+
+    Attributes
+    ----------
+    magnitudes : (k,) of those asked for, the ones reached [kg m^2/s]
+    directions : (k, 3) u(0), unit vectors, the deformation's frame
+    drift : (k, 3) how the direction moves with the size, its derivative [per kg m^2/s]
+    trace : (k,) of the linearised map
+    stopped : why the branch ends before the last magnitude asked for; None when it does not
+    fold : the size at which it meets another orbit and both vanish, to about 1e-8 of the range followed [kg m^2/s];
+        None when it does not
+    """
+
+    magnitudes: Array
+    directions: Array
+    drift: Array
+    trace: Array
+    stopped: str | None
+    fold: float | None
+
+
+def continued_orbits(
+    deformation: Deformation, magnitudes: ArrayLike, *, start: ArrayLike | None = None, tolerance: float = 1e-10
+) -> OrbitBranch:
+    """One closed orbit followed through growing, or falling, sizes of the momentum.
+
+    Each step foretells the orbit by the exact derivative with respect to the momentum's size, and Newton's method
+    corrects it; a step is shortened until the correction is small against it. The branch ends at a fold, where two
+    orbits meet (trace 2) and there are none beyond.
+
+    Parameters
+    ----------
+    magnitudes : (K,) 0 or more, all growing or all falling [kg m^2/s]
+    start : (3,) direction of the orbit at the first magnitude, to 0.1 rad; None: the branch that at zero momentum is
+        the axis about which the loop alone turns this frame, right-handed, by an angle below pi (by pi: either end).
+        The other end of the axis begins another branch.
+    tolerance : of the attitude [rad]
+
+    Raises
+    ------
+    OpenPathError
+        If the shape does not close.
+    ShapeError
+        If there is no orbit near `start`, or the magnitudes are in no order.
+    TrajectoryError
+        If the branch is to start at zero momentum, and the loop alone does not turn the frame: then every direction
+        comes back.
+    AccuracyNotReached
+        If errors grow so much along the loop that the tolerance cannot be met.
+
+    Source: theory.md section 2.
+    """
+    sizes = _sizes_argument(magnitudes)
+    loop = MomentumLoop.of(deformation, tolerance)
+    first = 0.0 if start is None else float(sizes[0])
+    axis = _axis_at_rest(loop) if first == 0.0 else _UP
+    given = axis if start is None else direction_argument(start, "start")
+    if given.shape != (3,):
+        raise ShapeError(f"start: one direction (3,) is needed, got {given.shape}")
+    orbit = _corrected(loop, first, given)
+    if orbit is None or so3.angle_between(orbit.direction, given) > _LARGEST_STEP:
+        raise ShapeError(
+            f"start: no closed orbit within {_LARGEST_STEP} rad of {given} was found at {first:.9g} kg m^2/s; "
+            "`fixed_points` tells where they are"
+        )
+    span = max(float(np.ptp([first, *sizes])), float(sizes[0]))
+    reached: list[_Orbit] = []
+    stopped, fold = None, None
+    for size in sizes:
+        orbit, stopped, fold = _followed(loop, orbit, float(size), span)
+        if stopped:
+            break
+        reached.append(orbit)
+    return OrbitBranch(
+        sizes[: len(reached)],
+        np.array([one.direction for one in reached]).reshape(-1, 3),
+        np.array([one.drift for one in reached]).reshape(-1, 3),
+        np.array([2.0 - one.excess for one in reached]),
+        stopped,
+        fold,
+    )
+
+
+@dataclass(frozen=True)
+class _Orbit:
+    """A fixed point at one size of the momentum: direction (3,), 2 - trace, and how it moves with the size (3,)."""
+
+    size: float
+    direction: Array
+    excess: float
+    drift: Array
+
+
+def _axis_at_rest(loop: MomentumLoop) -> Array:
+    """The axis about which the loop alone turns the frame."""
+    turn = so3.log(loop.run(0.0, _UP[None]).end[0])
+    angle = float(np.linalg.norm(turn))
+    if angle < 1e-7:
+        raise TrajectoryError(
+            f"without momentum this loop turns the frame by {angle:.3g} rad, so every direction comes back and none "
+            "begins a branch; give as `start` one of the `fixed_points` at a first magnitude above 0"
+        )
+    return turn / angle
+
+
+def _corrected(loop: MomentumLoop, size: float, guess: Array) -> _Orbit | None:
+    """The fixed point next to a guess, or None."""
+    closed = closed_points(loop, size, guess[None], loop.goal, 1e-12, iterations=6)
+    if not closed.gap[0] < loop.accepted:
+        return None
+    drift = -solved(closed.slope, closed.by_size, 1e-9)[0] @ tangent_basis(closed.points)[0]
+    return _Orbit(size, closed.points[0], float(closed.excess[0]), drift)
+
+
+def _followed(loop: MomentumLoop, orbit: _Orbit, target: float, span: float) -> tuple[_Orbit, str | None, float | None]:
+    """The orbit at another size of the momentum; or how far it went, why no further, and the size at a fold."""
+    passed, step = [orbit], abs(target - orbit.size)
+    while orbit.size != target:
+        left = target - orbit.size
+        step = min(step, abs(left), _LARGEST_STEP / max(float(np.linalg.norm(orbit.drift)), 1e-300))
+        size = target if step == abs(left) else orbit.size + float(np.copysign(step, left))
+        moved = orbit.drift * (size - orbit.size)
+        guess = so3.normalised(orbit.direction + moved)
+        following = _corrected(loop, size, guess)
+        if following is not None and _continues(orbit, following, guess, moved, span):
+            orbit, step = following, 2.0 * step
+            passed = [*passed[-2:], orbit]
+            continue
+        step *= 0.5
+        if step < _SMALLEST_STEP * span:
+            return orbit, *_ending(passed, size)
+    return orbit, None, None
+
+
+def _continues(orbit: _Orbit, following: _Orbit, guess: Array, moved: Array, span: float) -> bool:
+    """Whether a corrected orbit is the same branch: next to the guess, and moving on alike where the index changes."""
+    length = float(np.linalg.norm(moved))
+    if so3.angle_between(following.direction, guess) > 0.3 * length + 1e-3:
+        return False
+    if orbit.excess * following.excess > 0.0:
+        return True
+    pace, other = np.linalg.norm(orbit.drift), np.linalg.norm(following.drift)
+    return bool(np.linalg.norm(following.drift - orbit.drift) < 0.3 * (pace + other) + 1e-3 / span)
+
+
+def _ending(passed: list[_Orbit], beyond: float) -> tuple[str, float | None]:
+    """What stopped a branch: a fold, or nobody knows.
+
+    At a fold the excess 2 - trace goes through zero evenly along the branch, and the size has its extreme: size = fold
+    + a excess^2 + b excess^3, from the last three orbits.
+    """
+    size, excess = passed[-1].size, np.array([one.excess for one in passed])
+    if len(passed) == 3 and np.all(np.diff(np.abs(excess)) < 0.0):
+        powers = np.stack([np.ones(3), excess**2, excess**3], axis=1)
+        fold = float(np.linalg.solve(powers, np.array([one.size for one in passed]))[0])
+        if abs(fold - size) < 10.0 * abs(beyond - size):
+            side = "above" if beyond > size else "below"
+            return (
+                f"at {fold:.9g} kg m^2/s this orbit meets another (trace 2), and {side} there is neither; the branch "
+                "goes back along the other"
+            ), fold
+    trace = 2.0 - passed[-1].excess
+    return f"the orbit was lost between {size:.9g} and {beyond:.9g} kg m^2/s, at trace {trace:.6g}", None
+
+
+def _sizes_argument(magnitudes: ArrayLike) -> Array:
+    sizes = finite_array(magnitudes, "magnitudes", (None,), unit="kg m^2/s")
+    steps = np.diff(sizes)
+    if sizes.ndim != 1 or not len(sizes) or sizes.min() < 0.0 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        raise ShapeError(
+            f"magnitudes: numbers of 0 or more kg m^2/s, all growing or all falling, are needed, got {magnitudes!r}"
+        )
+    return sizes

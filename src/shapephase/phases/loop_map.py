@@ -1,0 +1,171 @@
+"""The momentum's direction over one loop of shapes: u(0) to u(T), with derivatives, and Newton's method on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, Integers, Mask, finite_array
+from ..deformation.deformation import Deformation
+from ..errors import OpenPathError, ShapeError
+from ..integrator.integrate import SteppedRotation, stepped_rotation, tolerance_argument
+from ..integrator.sampling import Sampler
+
+_ROWS_AT_ONCE = 2048
+
+
+@dataclass(frozen=True)
+class MomentumLoop:
+    """A loop of shapes, sampled once for all that is asked of its map."""
+
+    sampler: Sampler
+    goal: float
+
+    @classmethod
+    def of(cls, deformation: Deformation, tolerance: float) -> MomentumLoop:
+        """Of a deformation whose shape closes. Raises OpenPathError, ShapeError."""
+        if deformation.closure is None:
+            raise OpenPathError(f"closed orbits need a loop of shapes; this one ends {deformation.shape_gap:.3g} off")
+        return cls(deformation.sampler(), tolerance_argument(tolerance))
+
+    @property
+    def accepted(self) -> float:
+        """The gap of what counts as closed [rad]."""
+        return max(1e-10, 10.0 * self.goal)
+
+    def run(self, size: float, points: Array, tolerance: float | None = None) -> SteppedRotation:
+        """The motions that start with momenta of this size along these directions (N, 3)."""
+        return stepped_rotation(self.sampler, size * points, tolerance or self.goal)
+
+    def shift(self, size: float, points: Array, tolerance: float) -> Array:
+        """u(T) - u(0): (N, 3)."""
+        parts = [points[row : row + _ROWS_AT_ONCE] for row in range(0, len(points), _ROWS_AT_ONCE)]
+        return np.concatenate([ends_of(self.run(size, part, tolerance), part) - part for part in parts])
+
+    def exactly(self, size: float, points: Array, tolerance: float | None = None) -> tuple[Array, Array, Array]:
+        """u(T) (N, 3), its derivatives by u(0) (N, 3, 3) and by the momentum's size (N, 3)."""
+        solution = self.run(size, points, tolerance)
+        ends = ends_of(solution, points)
+        return ends, *exact_slopes(solution, points, ends, size)
+
+
+def ends_of(solution: SteppedRotation, points: Array) -> Array:
+    """u(T) of u(0): (N, 3) -> (N, 3)."""
+    return so3.apply(so3.transpose(solution.end), points)
+
+
+def exact_slopes(solution: SteppedRotation, points: Array, ends: Array, size: float) -> tuple[Array, Array]:
+    """Derivatives of u(T) = S^T u(0), by u(0) (N, 3, 3) and by the momentum's size (N, 3)."""
+    turning = so3.hat(ends) @ solution.momentum_slope
+    return so3.transpose(solution.end) + size * turning, so3.apply(turning, points)
+
+
+def tangent_basis(points: Array) -> Array:
+    """Tangent vectors e and u x e at each direction: (N, 3) -> (N, 2, 3)."""
+    first = so3.perpendicular(points)
+    return np.stack([first, np.cross(points, first)], axis=-2)
+
+
+@dataclass(frozen=True)
+class ClosedPoints:
+    """What Newton's method came to.
+
+    Points (N, 3), gaps and last steps (N,), and the derivatives of u(T) - u(0) by u(0) (N, 2, 2) and by size (N, 2).
+    """
+
+    points: Array
+    gap: Array
+    step: Array
+    slope: Array
+    by_size: Array
+
+    def __getitem__(self, rows: Integers | Mask) -> ClosedPoints:
+        """Some of them."""
+        return ClosedPoints(self.points[rows], self.gap[rows], self.step[rows], self.slope[rows], self.by_size[rows])
+
+    @property
+    def excess(self) -> Array:
+        """2 - trace; near the identity the determinant of the derivative minus one, which is the same and sharper."""
+        trace = np.trace(self.slope, axis1=-2, axis2=-1)
+        return np.where(self._steepness < 1.0, np.linalg.det(self.slope), -trace)
+
+    @property
+    def doubt(self) -> Array:
+        """Below this the excess does not tell its sign: points known to 1e-12 tell it to this near a fold."""
+        steep = self._steepness
+        return np.where(steep < 1e-9, np.inf, 1e-6 * steep * np.minimum(1.0, np.sqrt(steep)))
+
+    @property
+    def _steepness(self) -> Array:
+        return np.linalg.norm(self.slope, axis=(-1, -2))
+
+
+def closed_points(
+    loop: MomentumLoop, size: float, points: Array, tolerance: float, enough: float, iterations: int = 12
+) -> ClosedPoints:
+    """Newton's method with exact derivatives, until steps are `enough`, or rounding is all that is left: (N, 3)."""
+    count = len(points)
+    points, active = points.copy(), np.arange(count)
+    gap, length = np.full(count, np.inf), np.full(count, np.inf)
+    slope, by_size = np.zeros((count, 2, 2)), np.zeros((count, 2))
+    for left in reversed(range(iterations)):
+        if not len(active):
+            break
+        ends, slopes, answer = loop.exactly(size, points[active], tolerance)
+        by_size[active] = so3.apply(tangent_basis(points[active]), answer)
+        slope[active], missing = in_tangent_planes(points[active], ends, slopes)
+        step = newton_step(slope[active], missing, 1e-7)
+        before, length[active] = length[active], np.linalg.norm(step, axis=-1)
+        gap[active] = so3.angle_between(points[active], ends)
+        settled = (gap[active] < 10.0 * tolerance) & (length[active] > 0.25 * before)
+        hopeless = (length[active] > 0.1) & (left < iterations - 5)
+        going = (length[active] > enough) & ~settled & ~hopeless & (left > 0)
+        active = active[going]
+        points[active] = moved_along(points[active], step[going])
+    return ClosedPoints(points, gap, length, slope, by_size)
+
+
+def in_tangent_planes(points: Array, ends: Array, slopes: Array) -> tuple[Array, Array]:
+    """The derivative of u(T) - u(0) (N, 2, 2), and u(T) - u(0) itself (N, 2)."""
+    basis = tangent_basis(points)
+    return basis @ slopes @ so3.transpose(basis) - np.eye(2), so3.apply(basis, ends - points)
+
+
+def newton_step(slope: Array, missing: Array, least: float) -> Array:
+    """The step that closes what is missing, no longer than 0.3: (N, 2)."""
+    step = -solved(slope, missing, least)
+    length = np.linalg.norm(step, axis=-1, keepdims=True)
+    return step * np.minimum(1.0, 0.3 / np.maximum(length, 1e-300))
+
+
+def solved(slope: Array, right: Array, least: float) -> Array:
+    """slope^-1 right (N, 2); nothing along directions that answer less than `least` of the most."""
+    scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), 1e-300)[:, None, None]
+    return so3.apply(np.linalg.pinv(slope / scale, rcond=least) / scale, right)
+
+
+def moved_along(points: Array, step: Array) -> Array:
+    """Directions moved in their tangent planes: (N, 3), (N, 2) -> (N, 3)."""
+    return so3.normalised(points + np.einsum("ni,nic->nc", step, tangent_basis(points)))
+
+
+def size_argument(magnitude: float, *, allow_zero: bool = False) -> float:
+    """A user's size of the momentum [kg m^2/s]. Raises ShapeError."""
+    size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
+    if size.ndim or size < 0.0 or (size == 0.0 and not allow_zero):
+        wanted = "0 or more" if allow_zero else "above 0"
+        raise ShapeError(f"magnitude: a number {wanted} kg m^2/s is needed, got {magnitude!r}")
+    return float(size)
+
+
+def direction_argument(value: ArrayLike, name: str) -> Array:
+    """A user's directions, made unit vectors: (..., 3) -> (..., 3). Raises ShapeError."""
+    directions = finite_array(value, name, (3,))
+    largest = np.max(np.abs(directions), axis=-1, keepdims=True)
+    if np.any(largest == 0.0):
+        where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
+        raise ShapeError(f"{name}: entry {list(where)} is zero and has no direction")
+    return so3.normalised(directions / largest)

@@ -1,0 +1,217 @@
+"""The curve of the body momentum on its sphere, seen from a gauge, and what is integrated along it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3, sphere
+from ..arrays import Array
+from ..deformation.frames import Frames, frames_argument, lift_frames, named_frames
+from ..errors import GaugeError
+from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.interpolant import Interpolant
+from ..reconstruction.reconstruction import Motion
+
+_MOST_STEPS = 20_000
+_HALVINGS = 30
+
+Gauge = str | Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
+
+
+@dataclass(frozen=True, eq=False)
+class MomentumCurve:
+    """The directions of the body momentum of a batch of motions, seen from a gauge's frame.
+
+    Attributes
+    ----------
+    motion : whose momentum it is
+    frames : U(t) and its rates; None: the deformation's own frame
+    axis : (B, 3) unit vector of the momentum, inertial axes; any where there is none
+    edges : (K + 1,) times between which the curve bends little and its integrals are found to rounding
+    dynamic : (B, K) integral of omega . Pi/|Pi| over each step [rad]
+    slivers : (B, K) signed area between each step's arc and its chord [sr]
+    corners : (B, K + 1, 3) directions at the edges
+    references : (B, 3) for each curve the direction whose opposite is farthest from it
+    """
+
+    motion: Motion
+    frames: Frames | None
+    axis: Array
+    edges: Array
+    dynamic: Array
+    slivers: Array
+    corners: Array
+    references: Array
+
+    @property
+    def has_phase(self) -> Array:
+        """Which motions of the batch have momentum: (B,)."""
+        return np.linalg.norm(self.motion.momentum.reshape(-1, 3), axis=-1) > 0.0
+
+    def swept(self, times: Array) -> tuple[Array, Array]:
+        """Dynamic phase and area swept from the start to each of these edges: (N,) -> (B, N), (B, N).
+
+        The area is the integral of the area form of the reference, along the curve only; `times` must be edges.
+        """
+        place = np.searchsorted(self.edges, times)
+        steps = self.slivers + sphere.triangle_area(self.references[:, None], self.corners[:, :-1], self.corners[:, 1:])
+        zero = np.zeros((len(self.axis), 1))
+        dynamic = np.concatenate([zero, np.cumsum(self.dynamic, axis=1)], axis=1)
+        area = np.concatenate([zero, np.cumsum(steps, axis=1)], axis=1)
+        moving = self.has_phase[:, None]
+        return np.where(moving, dynamic[:, place], 0.0), np.where(moving, area[:, place], 0.0)
+
+    def directions(self, times: Array) -> Array:
+        """At these edges: (N,) -> (B, N, 3)."""
+        return self.corners[:, np.searchsorted(self.edges, times)]
+
+    def attitudes(self, times: Array) -> Array:
+        """Of the gauge's frame: (N,) -> (B, N, 3, 3)."""
+        start = self.motion.initial_attitude.reshape(-1, 1, 3, 3)
+        attitude = start @ self.motion.solution.rotation(times)
+        return attitude if self.frames is None else attitude @ so3.transpose(self.frames(times)[0])
+
+
+def momentum_curve(
+    motion: Motion, gauge: Gauge, lift: SteppedRotation | None = None, times: Array | None = None
+) -> MomentumCurve:
+    """The curve of a motion in a gauge, cut at the integrator's steps and at `times` too.
+
+    Parameters
+    ----------
+    gauge : a name of `GAUGES`, "link:NAME", or a function as for `in_gauge`
+    lift : of the motion, where it is at hand
+
+    Raises
+    ------
+    UnknownNameError, GaugeError, ShapeError
+        For a gauge that does not exist.
+    """
+    frames, follows = _frames(motion, gauge, lift)
+    spatial = motion.momentum.reshape(-1, 3)
+    size = np.linalg.norm(spatial, axis=-1)
+    still = size == 0.0
+    # Without momentum any axis serves: what hangs on it is set to zero.
+    axis = np.where(still[:, None], [0.0, 0.0, 1.0], spatial) / np.where(still, 1.0, size)[:, None]
+    edges = motion.solution.times
+
+    def curve(at: Array) -> tuple[Array, Array]:
+        """Unit momentum and angular velocity in the gauge."""
+        start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
+        direction = so3.apply(so3.transpose(motion.solution.rotation(at)), start[:, None, :])
+        inverse, drift = motion.interpolant.inverse_and_drift(at)
+        rate = so3.apply(inverse, size[:, None, None] * direction) - drift
+        if frames is None:
+            return direction, rate
+        turn, spin = frames(at)
+        return so3.apply(turn, direction), so3.apply(turn, rate - spin)
+
+    found = _by_step(curve, edges)
+    if not follows:
+        edges, found = _refined(curve, edges, found)
+    references = np.array([sphere.far_reference(polygon) for polygon in found[2]])
+    if times is not None:
+        edges = np.union1d(edges, times)
+        edges, found = _clear(curve, edges, references)
+    return MomentumCurve(motion, frames, axis, edges, *found, references)
+
+
+def horizontal_lift_of(motion: Motion) -> SteppedRotation:
+    """The lift of a motion's deformation, on the samples that the motion already has."""
+    return stepped_rotation(_Resolved(motion.interpolant), np.zeros((1, 3)), min(motion.tolerance, 1e-11))
+
+
+def _frames(motion: Motion, gauge: Gauge, lift: SteppedRotation | None) -> tuple[Frames | None, bool]:
+    """The frames of a gauge, and whether the integrator's steps are short enough for them."""
+    deformation = motion.deformation
+    if not isinstance(gauge, str):
+        return frames_argument(gauge, deformation.breaks), False
+    if gauge == "base":
+        return None, True
+    if gauge == "horizontal":
+        return lift_frames(lift or horizontal_lift_of(motion)), True
+    return named_frames(deformation, gauge), False
+
+
+class _Resolved:
+    """A finished interpolant in the place of a sampler: nothing is evaluated again."""
+
+    def __init__(self, interpolant: Interpolant) -> None:
+        self._interpolant = interpolant
+
+    def refine(self, momentum: float, tolerance: float) -> None:
+        """Nothing: the motion has already been sampled as finely as its own tolerance asked."""
+
+    def interpolant(self) -> Interpolant:
+        return self._interpolant
+
+    def error(self, momentum: float) -> float:  # noqa: ARG002
+        return 0.0
+
+
+def _by_step(curve: sphere.Curve, edges: Array) -> tuple[Array, Array, Array]:
+    """Dynamic phase and area between arc and chord for each step (B, K), directions at the edges (B, K + 1, 3)."""
+    corners, _ = curve(edges)
+    return *_integrals(curve, edges[:-1], edges[1:], corners[:, :-1]), corners
+
+
+def _integrals(curve: sphere.Curve, left: Array, right: Array, start: Array) -> tuple[Array, Array]:
+    """Dynamic phase and area between arc and chord for steps that begin in the directions `start`: (B, K) each."""
+    nodes, weights = sphere.gauss_nodes(left, right)
+    direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
+    dynamic = (np.sum(direction * rate, axis=-1) * weights).sum(axis=-1)
+    slivers = sphere.area_rate(start[:, :, None], direction, np.cross(direction, rate))
+    return dynamic, (slivers * weights).sum(axis=-1)
+
+
+def _refined(
+    curve: sphere.Curve, edges: Array, found: tuple[Array, Array, Array]
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Shorter steps where the gauge's own frame turns faster than those of the integrator: halved until that tells
+    nothing new."""
+    dynamic, slivers, corners = found
+    left, right, start, end = edges[:-1], edges[1:], corners[:, :-1], corners[:, 1:]
+    scale = max(1.0, float(np.abs(dynamic).sum(axis=1).max()))
+    done: list[tuple[Array, ...]] = []
+    count = len(left)
+    while len(left):
+        middle = 0.5 * (left + right)
+        between, _ = curve(middle)
+        first, early = _integrals(curve, left, middle, start)
+        second, late = _integrals(curve, middle, right, between)
+        cut = early + late + sphere.triangle_area(start, between, end)
+        change = np.maximum(np.abs(first + second - dynamic), np.abs(cut - slivers)).max(axis=0)
+        bend = np.linalg.norm(end - start, axis=-1).max(axis=0)
+        rough = (change > 1e-13 * scale / count) | (bend > 0.5)
+        done.append((left[~rough], dynamic[:, ~rough], slivers[:, ~rough], start[:, ~rough]))
+        count += int(rough.sum())
+        if count > _MOST_STEPS:
+            raise GaugeError(f"the gauge's frame turns too fast to be followed near t = {left[rough][0]:.9g} s")
+        left, right = (np.concatenate(pair) for pair in ((left[rough], middle[rough]), (middle[rough], right[rough])))
+        dynamic, slivers, start, end = (
+            np.concatenate([one[:, rough], other[:, rough]], axis=1)
+            for one, other in ((first, second), (early, late), (start, between), (between, end))
+        )
+    times = np.concatenate([part[0] for part in done])
+    dynamic, slivers, start = (np.concatenate([part[k] for part in done], axis=1) for k in (1, 2, 3))
+    order = np.argsort(times)
+    corners = np.concatenate([start[:, order], corners[:, -1:]], axis=1)
+    return np.append(times[order], edges[-1]), (dynamic[:, order], slivers[:, order], corners)
+
+
+def _clear(curve: sphere.Curve, edges: Array, references: Array) -> tuple[Array, tuple[Array, Array, Array]]:
+    """Steps so short that the point opposite the reference is never between an arc and its chord."""
+    found = _by_step(curve, edges)
+    for _ in range(_HALVINGS):
+        corners = found[2]
+        away = np.linalg.norm(corners[:, :-1] + references[:, None], axis=-1)
+        close = np.any(away < 2.0 * np.linalg.norm(np.diff(corners, axis=1), axis=-1), axis=0)
+        if not close.any():
+            break
+        edges = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[close]]))
+        found = _by_step(curve, edges)
+    return edges, found

@@ -1,0 +1,340 @@
+"""The rotation of a motion split into shape holonomy and Montgomery phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3, sphere
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+from ..inertia_tensor import inverse_inertia
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.shape_path import times_argument
+from .momentum_curve import Gauge, horizontal_lift_of, momentum_curve
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseSplit:
+    """What turned a free body: its shape, and its angular momentum.
+
+    All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
+    the momentum, seen from the gauge's frame,
+
+        exp(montgomery_phase hat(mu)) tilt = dynamical_rotation            in the horizontal gauge,
+        exp(montgomery_phase hat(mu)) tilt = total_rotation                in the base gauge of a closed joint path,
+        total_rotation = dynamical_rotation holonomy                       always.
+
+    Attributes
+    ----------
+    gauge : the frame from which the momentum curve was seen
+    total_rotation : (3, 3) Delta R, from the start to the end of the motion, the same in every gauge
+    holonomy : (3, 3) R_G, what the loop of shapes alone does; for an open path the endpoint of its lift
+    dynamical_rotation : (3, 3) R_D, what the momentum adds
+    montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
+    montgomery_angle : the same in (-pi, pi] [rad]
+    dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's size [rad]
+    geometric_phase : minus the solid angle [rad]
+    solid_angle : signed, of the momentum curve in this gauge, closed by the great circle; counted from the
+        region of the sphere farthest from the curve [sr]
+    tilt : (3, 3) transport along the closing great circle; the identity when the momentum closes in this gauge
+    momentum_gap : angle between the ends of the momentum curve in this gauge [rad]
+    shape_gap : how far the end shape is from the start shape
+    residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
+    is_loop : whether the shape closes
+    has_phase : whether there is angular momentum; without it all phases are 0 and R_D is the identity
+    """
+
+    gauge: str
+    total_rotation: Array
+    holonomy: Array
+    dynamical_rotation: Array
+    montgomery_phase: Array
+    montgomery_angle: Array
+    dynamic_phase: Array
+    geometric_phase: Array
+    solid_angle: Array
+    tilt: Array
+    momentum_gap: Array
+    shape_gap: float
+    residual: Array
+    is_loop: bool
+    has_phase: Array
+
+
+def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
+    """Split the rotation of a motion into shape holonomy and Montgomery phase.
+
+    Parameters
+    ----------
+    gauge : "horizontal", the frame that the shape motion alone would carry along (the split people want);
+        "base", the deformation's own frame, whose phase already holds the shape's part; "principal", the
+        principal axes of inertia; "mean_body", the frame nearest to the start shape; "link:NAME", a link of an
+        articulated body; or U(t) itself, a function as for `in_gauge`
+
+    Raises
+    ------
+    UnknownNameError
+        For another gauge.
+    GaugeError
+        If the gauge's frame does not exist, or is not continuous.
+
+    Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
+    """
+    start = motion.initial_attitude.reshape(-1, 3, 3)
+    duration = motion.duration
+    closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
+    lift = horizontal_lift_of(motion)
+    curve = momentum_curve(motion, gauge, lift)
+    has_phase = curve.has_phase
+    carried = start @ lift.end[0] @ closure
+    holonomy = carried @ so3.transpose(start)
+    end = motion.final_attitude.reshape(-1, 3, 3)
+    total = end @ closure @ so3.transpose(start)
+    dynamical = np.where(has_phase[:, None, None], total @ so3.transpose(holonomy), np.eye(3))
+    dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
+    area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners), 0.0)
+    first, last = np.moveaxis(curve.attitudes(np.array([0.0, duration])), 1, 0)
+    departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
+    tilt = np.where(
+        has_phase[:, None, None], first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3)
+    )
+    phase = dynamic - area
+    read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
+    batch = motion.batch
+    matrix = (*batch, 3, 3)
+    return PhaseSplit(
+        gauge=gauge if isinstance(gauge, str) else "given",
+        total_rotation=total.reshape(matrix),
+        holonomy=holonomy.reshape(matrix),
+        dynamical_rotation=dynamical.reshape(matrix),
+        montgomery_phase=phase.reshape(batch)[()],
+        montgomery_angle=so3.wrap(phase).reshape(batch)[()],
+        dynamic_phase=dynamic.reshape(batch)[()],
+        geometric_phase=(0.0 - area).reshape(batch)[()],
+        solid_angle=area.reshape(batch)[()],
+        tilt=tilt.reshape(matrix),
+        momentum_gap=(so3.angle_between(departing, arriving) * has_phase).reshape(batch)[()],
+        shape_gap=motion.deformation.shape_gap,
+        residual=np.abs(so3.wrap(phase - read_off)).reshape(batch)[()],
+        is_loop=motion.deformation.closure is not None,
+        has_phase=has_phase.reshape(batch)[()],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class RunningPhases:
+    """The phases of a motion in time, continuous and starting from zero; fields are batch + t.shape.
+
+    Directions of the momentum are joined to `reference` by great circles: with B(u) the shortest turn from there to
+    u, and R the attitude of the gauge's frame,
+
+        R(t) B(u(t)) = exp(montgomery_phase(t) hat(mu)) R(0) B(u(0)),
+
+    so that nothing jumps as long as the momentum keeps away from the point opposite the reference, which is chosen
+    for that. Whenever the momentum is back at its start, this is the phase of the closed curve.
+
+    Attributes
+    ----------
+    times : (...) [s]
+    gauge : the frame from which the momentum was seen
+    dynamic_phase, geometric_phase, montgomery_phase : unwrapped [rad]
+    montgomery_angle : the last in (-pi, pi] [rad]
+    solid_angle : swept about the reference, minus the geometric phase [sr]
+    reference : batch + (3,), in the gauge's frame
+    residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
+    """
+
+    times: Array
+    gauge: str
+    dynamic_phase: Array
+    geometric_phase: Array
+    montgomery_phase: Array
+    montgomery_angle: Array
+    solid_angle: Array
+    reference: Array
+    residual: Array
+
+
+def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") -> RunningPhases:
+    """The continuous lift of every phase in time.
+
+    Parameters
+    ----------
+    t : times (...) [s]
+    gauge : as for `split`
+
+    Raises as `split`. Source: Cabrera 2006, equation (12); theory.md D5, D9; numerics.md section 3 (branch).
+    """
+    times = times_argument(t, motion.duration)
+    flat = times.ravel()
+    curve = momentum_curve(motion, gauge, times=flat)
+    references = curve.references
+    dynamic, area = curve.swept(flat)
+    about = so3.between(references[:, None], curve.directions(flat))
+    frames = curve.attitudes(flat) @ about
+    begin = curve.attitudes(np.zeros(1)) @ so3.between(references, curve.corners[:, 0])[:, None]
+    seen = so3.angle_about(frames @ so3.transpose(begin), curve.axis[:, None]) * curve.has_phase[:, None]
+    phase = dynamic - area
+    shape = (*motion.batch, *times.shape)
+    return RunningPhases(
+        times=times,
+        gauge=gauge if isinstance(gauge, str) else "given",
+        dynamic_phase=dynamic.reshape(shape)[()],
+        geometric_phase=(0.0 - area).reshape(shape)[()],
+        montgomery_phase=phase.reshape(shape)[()],
+        montgomery_angle=so3.wrap(phase).reshape(shape)[()],
+        solid_angle=area.reshape(shape)[()],
+        reference=references.reshape(*motion.batch, 3),
+        residual=np.abs(so3.wrap(phase - seen)).max(axis=-1, initial=0.0).reshape(motion.batch)[()],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ArcPhases:
+    """A motion cut into arcs, each with a phase of its own; fields have the motion's batch axes in front.
+
+    With R the attitude of the gauge's frame, arc k of K from times[k] to times[k + 1] turns it by
+
+        R(times[k + 1]) R(times[k])^T = exp(montgomery_phase[k] hat(mu)) tilt[k],
+
+    and the arcs add up: total_phase = the sum of their Montgomery phases - polygon_angle is the phase of the whole,
+    and total_tilt its tilt.
+
+    Attributes
+    ----------
+    times : (K + 1,) [s]
+    gauge : the frame from which the momentum was seen
+    dynamic_phase, geometric_phase, montgomery_phase : (K,) each arc closed by its great circle [rad]
+    solid_angle : (K,) minus the geometric phase [sr]
+    tilt : (K, 3, 3) transport along the closing great circles, inertial axes
+    momentum_gap : (K,) angles between the ends of the arcs [rad]
+    polygon_angle : signed area of the closed polygon of those great circles [sr]
+    total_phase : of all arcs as one [rad]
+    total_tilt : (3, 3)
+    """
+
+    times: Array
+    gauge: str
+    dynamic_phase: Array
+    geometric_phase: Array
+    montgomery_phase: Array
+    solid_angle: Array
+    tilt: Array
+    momentum_gap: Array
+    polygon_angle: Array
+    total_phase: Array
+    total_tilt: Array
+
+
+def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") -> ArcPhases:
+    """The phases of the arcs of a motion between given times, and how they add up.
+
+    Parameters
+    ----------
+    times : (K + 1,) increasing [s]; for the loops of a repeated path, the multiples of its period
+    gauge : as for `split`
+
+    All areas are counted from one region, which no arc enters: the sum of the arcs is that of the whole, not only
+    modulo 4 pi.
+
+    Raises
+    ------
+    ShapeError
+        If the times do not increase.
+
+    Raises also as `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
+    """
+    cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
+    if cuts.ndim != 1 or len(cuts) < 2 or np.any(np.diff(cuts) <= 0.0):
+        raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {cuts}")
+    curve = momentum_curve(motion, gauge, times=cuts)
+    references = curve.references
+    swept_phase, swept_area = curve.swept(cuts)
+    ends = curve.directions(cuts)
+    attitudes = curve.attitudes(cuts)
+    moving = curve.has_phase[:, None]
+
+    def closed(start: Array, end: Array) -> Array:
+        half = so3.middle(end, start)
+        back = sphere.triangle_area(references[:, None], end, half)
+        return (back + sphere.triangle_area(references[:, None], half, start)) * moving
+
+    def tilted(frames: Array, start: Array, end: Array) -> Array:
+        tilts = frames @ so3.between(end, start) @ so3.transpose(frames)
+        return np.where(moving[..., None, None], tilts, np.eye(3))
+
+    closing = closed(ends[:, :-1], ends[:, 1:])
+    whole = closed(ends[:, :1], ends[:, -1:])[:, 0]
+    dynamic, area = np.diff(swept_phase, axis=1), np.diff(swept_area, axis=1) + closing
+    phase = dynamic - area
+    polygon = whole - closing.sum(axis=1)
+    batch, count = motion.batch, len(cuts) - 1
+    arcs = (*batch, count)
+    return ArcPhases(
+        times=cuts,
+        gauge=gauge if isinstance(gauge, str) else "given",
+        dynamic_phase=dynamic.reshape(arcs),
+        geometric_phase=(0.0 - area).reshape(arcs),
+        montgomery_phase=phase.reshape(arcs),
+        solid_angle=area.reshape(arcs),
+        tilt=tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:]).reshape(*arcs, 3, 3),
+        momentum_gap=(so3.angle_between(ends[:, :-1], ends[:, 1:]) * moving).reshape(arcs),
+        polygon_angle=polygon.reshape(batch)[()],
+        total_phase=(phase.sum(axis=1) - polygon).reshape(batch)[()],
+        total_tilt=tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:])[:, 0].reshape(*batch, 3, 3),
+    )
+
+
+def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> Array:
+    """Par(R(0)) along the momentum's curve: attitudes that roll with Pi without a turn about the momentum.
+
+    R(t) = exp(dynamic_phase(t) hat(mu)) Par(t): it turns at omega_h = Pi' x Pi / |Pi|^2 (gauge axes).
+
+    Parameters
+    ----------
+    t : times (...) [s]
+    gauge : as for `split`
+
+    Returns
+    -------
+    batch + (..., 3, 3), of the gauge's frame; the attitude itself without momentum
+
+    Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
+    """
+    times = times_argument(t, motion.duration)
+    flat = times.ravel()
+    curve = momentum_curve(motion, gauge, times=flat)
+    dynamic, _ = curve.swept(flat)
+    back = so3.exp(-dynamic[..., None] * curve.axis[:, None])
+    return (back @ curve.attitudes(flat)).reshape(*motion.batch, *times.shape, 3, 3)
+
+
+def dynamic_phase_from_energy(motion: Motion) -> Array:
+    """The dynamic phase of a motion in the base gauge, from kinetic energies: batch [rad].
+
+    The integral of 2 T - 2 T_0 + L_o . I^-1 L_o - I^-1 L_o . Pi over |Pi|, T the whole kinetic energy about the centre
+    of mass and T_0 that of the shape motion alone: a check of `dynamic_phase` that sums over the links.
+
+    Raises
+    ------
+    GaugeError
+        If the deformation is known by its inertia only.
+
+    Source: Cabrera 2006, remark 3.7; theory.md D11.
+    """
+    edges = motion.solution.times
+    nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
+    times = nodes.ravel()
+    source = motion.deformation.source
+    inertia, internal = source.sample(times)
+    drift = so3.apply(inverse_inertia(inertia, times), internal)
+    turning = motion.angular_velocity(times).reshape(-1, len(times), 3)
+    momentum = motion.body_momentum(times).reshape(-1, len(times), 3)
+    whole, shape_only = source.kinetic_energy(times, turning), source.kinetic_energy(times, 0.0 * turning)
+    along = 2.0 * (whole - shape_only) + np.sum(drift * (internal - momentum), axis=-1)
+    size = np.linalg.norm(motion.momentum.reshape(-1, 3), axis=-1)
+    phase = along @ weights.ravel() / np.where(size > 0.0, size, 1.0)
+    return np.where(size > 0.0, phase, 0.0).reshape(motion.batch)[()]

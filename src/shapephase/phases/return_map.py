@@ -1,0 +1,240 @@
+"""The momentum map of a loop of shapes, and the motions whose shape and momentum close together.
+
+Over one loop the direction u = Pi/|Pi| of the body momentum goes from u(0) to u(T): for each size of the momentum an
+area-preserving map of the sphere (theory.md section 2). A fixed point of it is an orbit that closes together with
+the shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, Integers
+from ..deformation.deformation import Deformation
+from ..errors import ShapeError
+from ..integrator.integrate import SteppedRotation
+from ..reconstruction.reconstruction import Motion, reconstruct
+from .fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
+from .loop_map import (
+    MomentumLoop,
+    closed_points,
+    direction_argument,
+    ends_of,
+    exact_slopes,
+    size_argument,
+    tangent_basis,
+)
+
+_UP = np.array([0.0, 0.0, 1.0])
+_LEFSCHETZ = 2
+_STARTS = (162, 642, 2562)
+_FEWEST_DIRECTIONS = 1000
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ReturnMap:
+    """Where directions of the body momentum are after one loop of shapes, in the deformation's frame.
+
+    Attributes
+    ----------
+    magnitude : of the momentum [kg m^2/s]
+    start, end : (..., 3) u(0) and u(T), unit vectors
+    solution : the motions themselves, with the leading axes made one
+    """
+
+    magnitude: float
+    start: Array
+    end: Array
+    solution: SteppedRotation
+
+    @property
+    def gap(self) -> Array:
+        """Angle between start and end: (...) [rad]."""
+        return so3.angle_between(self.start, self.end)[()]
+
+    @cached_property
+    def derivative(self) -> Array:
+        """The linearised map between tangent planes, (..., 2, 2): exact, at one to five milliseconds a direction.
+
+        In the basis e, u x e at the start, e = `so3.perpendicular(u)`, and the same basis carried along the shortest
+        great circle at the end. The determinant is 1, since areas are kept.
+        """
+        start, end = self.start.reshape(-1, 3), self.end.reshape(-1, 3)
+        slope, _ = exact_slopes(self.solution, start, end, self.magnitude)
+        first = tangent_basis(start)
+        carried = so3.apply(so3.between(start, end)[:, None], first)
+        return (carried @ slope @ so3.transpose(first)).reshape(*self.start.shape[:-1], 2, 2)
+
+    @cached_property
+    def trace(self) -> Array:
+        """Of the derivative: (...); it does not depend on the basis at the start."""
+        return np.trace(self.derivative, axis1=-2, axis2=-1)[()]
+
+
+@dataclass(frozen=True, eq=False)
+class FixedPoints:
+    """Directions of the body momentum that come back to themselves after one loop of shapes.
+
+    Attributes
+    ----------
+    magnitude : of the momentum [kg m^2/s]
+    directions : (m, 3) unit vectors, the deformation's frame, ordered by height (to 1e-9) and azimuth
+    trace : (m,) of the linearised map
+    index : (m,) the sign of 2 - trace, +1 or -1; 0 where it is too near zero to tell
+    stability : "elliptic" (|trace| < 2: neighbours circle it), "hyperbolic" (above 2), "inverse hyperbolic" (below
+        -2), or "parabolic" (too near 2 or -2 to tell)
+    gap : (m,) angle between u(T) and u(0) [rad]
+    index_sum : of the indices; 2 for every loop and size when none is missing
+    complete : whether the indices sum to 2, none is 0, and the search left no part of the sphere out
+    """
+
+    magnitude: float
+    directions: Array
+    trace: Array
+    index: Integers
+    stability: tuple[str, ...]
+    gap: Array
+    index_sum: int
+    complete: bool
+
+
+def stroboscopic_map(
+    deformation: Deformation, magnitude: float, directions: ArrayLike, *, tolerance: float = 1e-10
+) -> ReturnMap:
+    """The map u(0) -> u(T) of directions of the body momentum over one loop of shapes.
+
+    Parameters
+    ----------
+    magnitude : of the angular momentum [kg m^2/s]; for 0 the map is the inverse of what the loop alone turns
+    directions : (..., 3), of any length above 0, this deformation's frame
+    tolerance : of each attitude [rad]
+
+    Raises
+    ------
+    OpenPathError
+        If the shape does not close.
+    ShapeError
+        If a direction is zero.
+
+    Source: theory.md section 2.
+    """
+    size = size_argument(magnitude, allow_zero=True)
+    start = direction_argument(directions, "directions")
+    flat = start.reshape(-1, 3)
+    solution = MomentumLoop.of(deformation, tolerance).run(size, flat)
+    return ReturnMap(size, start, ends_of(solution, flat).reshape(start.shape), solution)
+
+
+def fixed_points(
+    deformation: Deformation, magnitude: float, *, tolerance: float = 1e-11, most_directions: int = 100_000
+) -> FixedPoints:
+    """Directions of the body momentum that close together with the shape, as many as a search finds.
+
+    The map is evaluated at even directions and halfway between neighbours, 640 together. Of the triangles those are
+    divided, down to 0.002 rad, in which a fixed point cannot be excluded and the map is not yet nearly linear; from
+    what is left Newton's method starts, with exact derivatives. When the indices do not sum to 2, all is done again
+    from four and from sixteen times as many directions.
+
+    Every point returned is a fixed point, to its `gap`. That none is missing is likely, not certain: a sum of
+    indices other than 2 proves that some are; a sum of 2 does not prove that none is, since two of opposite index may
+    hide where the map bends far more than its values around show. `complete` is False, too, where the map stretches
+    so much that `most_directions` do not resolve it, and where fixed points fill curves or the sphere (symmetric
+    bodies; no holonomy and hardly any momentum): of those come points 0.3 rad apart or more, with index 0.
+
+    Parameters
+    ----------
+    magnitude : of the angular momentum, above 0 [kg m^2/s]
+    tolerance : of the attitude [rad]
+    most_directions : 1000 or more at which the map is evaluated, in each of the three searches; about ten seconds
+        for 100 000
+
+    Raises
+    ------
+    OpenPathError
+        If the shape does not close.
+    AccuracyNotReached
+        If errors grow so much along the loop that the tolerance cannot be met.
+
+    Source: theory.md section 2, B9, D16.
+    """
+    size = size_argument(magnitude)
+    if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
+        raise ShapeError(f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {most_directions!r}")
+    loop = MomentumLoop.of(deformation, tolerance)
+    starts, exhausted = search(loop, size, _STARTS[0], most_directions)
+    found = _judged(loop, size, starts, exhausted=exhausted)
+    for count in _STARTS[1:]:
+        if found.index_sum == _LEFSCHETZ or not found.index.all() or exhausted:
+            break
+        starts, exhausted = search(loop, size, count, most_directions)
+        found = _judged(loop, size, np.concatenate([found.directions, starts]), exhausted=exhausted)
+    return found
+
+
+def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: float = 1e-11) -> list[Motion]:
+    """Motions (momentum along inertial z) whose body momentum closes in this deformation's gauge with the shape.
+
+    The motions at the `fixed_points`, in their order, the highest first. Every loop and size has at least two
+    (theory.md section 2); whether all were found `fixed_points` tells.
+
+    Parameters
+    ----------
+    magnitude : of the angular momentum, above 0 [kg m^2/s]
+    tolerance : of each motion's attitude [rad]
+
+    Raises
+    ------
+    OpenPathError
+        If the shape does not close.
+    """
+    found = fixed_points(deformation, magnitude, tolerance=tolerance)
+    momentum, attitudes = found.magnitude * _UP, _attitude_of(found.directions)
+    return [reconstruct(deformation, momentum, attitude, tolerance=tolerance) for attitude in attitudes]
+
+
+def _attitude_of(direction: Array) -> Array:
+    """An attitude that shows the inertial z axis along a body direction: R^T z = direction."""
+    return so3.transpose(so3.between(np.broadcast_to(_UP, direction.shape), direction))
+
+
+def _judged(loop: MomentumLoop, size: float, starts: Array, *, exhausted: bool) -> FixedPoints:
+    """The fixed points that Newton's method reaches from these starts, and what they are."""
+    roughly = closed_points(loop, size, starts, max(SEARCH_TOLERANCE, loop.goal), 1e-5)
+    near = roughly.points[(roughly.step < 1e-3) | (roughly.gap < 1e-4)]
+    closed = closed_points(loop, size, near[spaced(near, 30.0 * _SAME)], loop.goal, 1e-12)
+    vague = np.abs(closed.excess) <= closed.doubt
+    closed = closed[(closed.gap < loop.accepted) & ((closed.step < _SAME) | vague)]
+    x, y, z = closed.points.T
+    closed = closed[np.lexsort([np.arctan2(y, x), -np.round(z, 9)])]
+    vague = np.abs(closed.excess) <= closed.doubt
+    single, family = np.flatnonzero(~vague), np.flatnonzero(vague)
+    single = single[spaced(closed.points[single], _SAME)]
+    family = family[spaced(closed.points[family], FAMILY_SPACING)]
+    closed = closed[np.sort(np.concatenate([single, family]))]
+    excess, doubt = closed.excess, closed.doubt
+    index = np.where(np.abs(excess) <= doubt, 0, np.sign(excess)).astype(np.int64)
+    total = int(index.sum())
+    return FixedPoints(
+        magnitude=size,
+        directions=closed.points,
+        trace=2.0 - excess,
+        index=index,
+        stability=tuple(_kind(e, d) for e, d in zip(excess, doubt, strict=True)),
+        gap=closed.gap,
+        index_sum=total,
+        complete=total == _LEFSCHETZ and bool(index.all()) and not exhausted,
+    )
+
+
+def _kind(excess: float, doubt: float) -> str:
+    if min(abs(excess), abs(excess - 4.0)) <= doubt:
+        return "parabolic"
+    if excess < 0.0:
+        return "hyperbolic"
+    return "elliptic" if excess < 4.0 else "inverse hyperbolic"

@@ -1,0 +1,205 @@
+"""Figures on the sphere of momenta: the curve of a motion with the area inside it, and the orbits that close."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import so3, sphere
+from ..arrays import Array, finite_array
+from ..errors import ShapeError
+from ..phases.momentum_curve import Gauge, MomentumCurve, horizontal_lift_of, momentum_curve
+from ..phases.return_map import FixedPoints
+from ..reconstruction.reconstruction import Motion
+from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
+from ..shape_space.shape_path import times_argument
+from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided
+from .polhode_plots import spread_energies
+from .sphere_area import enclosed_cells
+from .sphere_axes import SphereAxes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_CURVE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.5}
+_CLOSURE = {"color": VERMILION, "linestyle": (0, (3, 1.2)), "linewidth": 1.7}
+_ROUND_LARGEST = {"color": "#8A8A8A", "linestyle": "-", "linewidth": 0.6}
+_ROUND_SMALLEST = {"color": "#8A8A8A", "linestyle": (0, (4, 2)), "linewidth": 0.6}
+_SEPARATRIX = {"color": PURPLE, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.3}
+_KINDS: dict[str, dict[str, Any]] = {
+    "elliptic": {"marker": "o", "color": BLUE, "markersize": 6.5},
+    "hyperbolic": {"marker": "X", "color": VERMILION, "markersize": 7.0},
+    "inverse hyperbolic": {"marker": "D", "color": ORANGE, "markersize": 5.5},
+    "parabolic": {"marker": "s", "color": GREEN, "markersize": 5.5},
+}
+_BEND = 0.02
+_LONG = 40.0
+_MOST_PARTS = 40
+_CLOSED = 1e-6
+_EQUAL = 1e-9
+_DEFAULT_VIEW = (24.0, 32.0)
+_TILTED = (12.0, 18.0)
+
+
+def plot_momentum_curve(
+    ax: Axes,
+    motion: Motion,
+    gauge: Gauge = "horizontal",
+    *,
+    frozen_at: float | None = 0.0,
+    area: bool = True,
+    view: tuple[float, float] | None = None,
+) -> Axes:
+    """The direction of the body momentum on its sphere, seen from a gauge, with the signed area that it goes round.
+
+    Where the curve does not close, the great circle that closes it is drawn. The area is that of `split`, shaded by how
+    often the curve winds round it, and hatched where clockwise, which counts negative. Behind are the polhodes,
+    separatrices and axes of the rigid body that the deforming one is at one time, in the same frame. The far side is
+    dimmed.
+
+    Parameters
+    ----------
+    ax : flat axes, drawn on in parallel projection, or three-dimensional ones, seen from where they are
+    motion : of one momentum, no batch
+    gauge : as for `split`
+    frozen_at : the time of that rigid body [s]; None: no portrait
+    area : whether it is shaded
+    view : elevation and azimuth of the eye [degrees], for flat axes; None: so that most of the curve is in front
+
+    Raises
+    ------
+    MissingExtraError, UnknownNameError, GaugeError
+    ShapeError
+        If the motion is a batch, or has no momentum.
+
+    Source: Cabrera 2006, equation (12) and section 4.1; Marsden and Ratiu, figure 15.3.1.
+    """
+    check_axes(ax)
+    one_motion(motion)
+    if not np.any(motion.momentum):
+        raise ShapeError("a motion without angular momentum has no curve of momentum; its shape alone turns it")
+    curve = _fine_curve(motion, gauge)
+    points = curve.corners[0]
+    drawn = SphereAxes(ax, _view_of(points) if view is None else view)
+    title = f"{gauge if isinstance(gauge, str) else 'given'} gauge"
+    closing = _great_circle(points[-1], points[0])
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    # Many turns in a finer line, or they would run together.
+    width = _CURVE["linewidth"] * float(np.clip(_LONG / max(length[-1], _LONG), 0.2, 1.0))
+    drawn.curve(points, "Π/|Π|", **{**_CURVE, "linewidth": width})
+    drawn.arrows(points, np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875])), BLACK)
+    drawn.point(points[0], "start", marker="*", color=GREEN, markersize=10.0)
+    if so3.angle_between(points[0], points[-1]) > _CLOSED:
+        drawn.point(points[-1], "end", marker="s", color=VERMILION, markersize=5.5)
+        drawn.curve(closing, "closing great circle", **_CLOSURE)
+    if area:
+        solid_angle = float(curve.slivers.sum() + sphere.polygon_area(curve.corners)[0])
+        drawn.area(enclosed_cells(np.concatenate([points, closing[1:-1]]), curve.references[0]))
+        title += f"; solid angle {_signed(solid_angle)} sr"
+    drawn.keep_free(points[[0, -1]])
+    for axis, name in zip(np.eye(3), "xyz"):
+        drawn.text(axis, name, 0.13, alpha=1.0 if axis @ drawn.eye >= 0.0 else 0.45)
+    if frozen_at is not None:
+        time = times_argument(finite_array(frozen_at, "frozen_at", unit="s"), motion.duration).reshape(1)
+        inertia = motion.deformation.source.sample(time)[0][0]
+        if curve.frames is not None:
+            turn = curve.frames(time)[0][0]
+            inertia = turn @ inertia @ turn.T
+        _portrait(drawn, inertia)
+        title += f"\nbehind it: polhodes of the body frozen at t = {float(time[0]):.4g} s"
+    drawn.finish("Π{}/|Π| [1]", title)
+    return ax
+
+
+def plot_fixed_points(
+    ax: Axes, points: FixedPoints, *, inertia: Array | None = None, view: tuple[float, float] | None = None
+) -> Axes:
+    """The directions of the momentum that come back with the shape, each with its index and stability.
+
+    Circles, crosses, diamonds and squares are elliptic, hyperbolic, inverse hyperbolic and parabolic points; beside
+    each is its index. Those on the far side are dimmed.
+
+    Parameters
+    ----------
+    ax : flat or three-dimensional axes
+    inertia : (3, 3) of a rigid body whose portrait is drawn behind, the deformation's frame [kg m^2]; None: none
+    view : as for `plot_momentum_curve`
+
+    Raises MissingExtraError, ShapeError. Source: theory.md section 2.
+    """
+    check_axes(ax)
+    drawn = SphereAxes(ax, _DEFAULT_VIEW if view is None else view)
+    for direction, index, kind in zip(points.directions, points.index.tolist(), points.stability, strict=True):
+        drawn.point(direction, kind, **_KINDS[kind])
+        near = bool(direction @ drawn.eye >= 0.0)
+        drawn.text(direction, "0" if not index else f"{'+' if index > 0 else '−'}1", 0.13, alpha=1.0 if near else 0.45)
+    if inertia is not None:
+        _portrait(drawn, finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
+    total = f"|Π| = {points.magnitude:.4g} kg m²/s; indices sum to {points.index_sum}"
+    drawn.finish("u{} [1]", total + ("" if points.complete else "\nsome may be missing"))
+    return ax
+
+
+def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
+    """Cut so finely that what a chord cuts off is thinner than a line."""
+    lift = horizontal_lift_of(motion) if gauge == "horizontal" else None
+    curve = momentum_curve(motion, gauge, lift, times=subdivided(motion.solution.times, 4))
+    bend = so3.angle_between(curve.corners[0, :-1], curve.corners[0, 1:])
+    parts = np.clip(np.ceil(bend / _BEND), 1, _MOST_PARTS).astype(int)
+    step = np.repeat(np.arange(len(parts)), parts)
+    within = np.arange(len(step)) - np.repeat(np.cumsum(parts) - parts, parts)
+    times = curve.edges[step] + np.diff(curve.edges)[step] * within / parts[step]
+    return momentum_curve(motion, gauge, lift, times=times)
+
+
+def _portrait(drawn: SphereAxes, inertia: Array) -> None:
+    """Polhodes, separatrices and equilibria of a rigid body, in grey: dots are its centres, crosses its saddles."""
+    moments, axes = np.linalg.eigh(inertia)
+    # What differs by rounding only is symmetric.
+    for lower in (0, 1):
+        if moments[lower + 1] - moments[lower] <= _EQUAL * moments[2]:
+            moments[lower + 1] = moments[lower]
+    levels = spread_energies(moments)
+    for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
+        largest = 2.0 * level * moments[1] < 1.0 or moments[0] == moments[1]
+        label = "round largest moment" if largest else "round smallest moment"
+        for line in pair:
+            drawn.curve(line @ axes.T, label, behind=True, **(_ROUND_LARGEST if largest else _ROUND_SMALLEST))
+    if moments[0] < moments[1] < moments[2]:
+        for line in heteroclinics(moments):
+            drawn.curve(line @ axes.T, "separatrix", behind=True, **_SEPARATRIX)
+    for number, point in enumerate(equilibria(moments)):
+        if point.kind != "degenerate":
+            marker = "o" if point.kind == "centre" else "X"
+            drawn.point(axes @ point.direction, None, behind=True, marker=marker, color=GREY, markersize=5.0)
+            if axes @ point.direction @ drawn.eye >= 0.0:
+                drawn.text(axes @ point.direction, f"I{'₁₂₃'[number // 2]}", 0.13, color="#555555", fontsize=SMALL - 1)
+
+
+def _great_circle(start: Array, end: Array) -> Array:
+    """From one direction to another, through the same midpoint as the area is closed: (N, 3)."""
+    middle = so3.middle(start, end)
+    half = 0.5 * float(so3.angle_between(start, end))
+    across = end - start
+    length = float(np.linalg.norm(across))
+    if length == 0.0:
+        return np.stack([start, end])
+    angle = np.linspace(-half, half, 2 * max(1, int(np.ceil(half / _BEND))) + 1)[:, None]
+    arc = np.cos(angle) * middle + np.sin(angle) * across / length
+    return np.concatenate([start[None], arc[1:-1], end[None]])
+
+
+def _view_of(points: Array) -> tuple[float, float]:
+    """An eye a little beside the middle of a curve, so that its sphere still looks round."""
+    middle = points.mean(axis=0)
+    if float(np.linalg.norm(middle)) < 0.2:
+        return _DEFAULT_VIEW
+    elevation = float(np.degrees(np.arctan2(middle[2], np.hypot(middle[0], middle[1]))))
+    azimuth = float(np.degrees(np.arctan2(middle[1], middle[0])))
+    beside = -1.0 if elevation > 0.0 else 1.0
+    return float(np.clip(elevation + beside * _TILTED[0], -65.0, 65.0)), azimuth - _TILTED[1]
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.4g}".replace("-", "−")

@@ -1,0 +1,237 @@
+"""Figures in time: phases, attitude, energy, and the deformation that makes them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array
+from ..bounds.energy import energy_along
+from ..deformation.deformation import Deformation
+from ..errors import ShapeError, unknown_name
+from ..phases.momentum_curve import Gauge
+from ..phases.phases import running_phases
+from ..reconstruction.reconstruction import Motion
+from .plot_style import (
+    BLACK,
+    GREY,
+    ORANGE,
+    SERIES,
+    SKY,
+    VERMILION,
+    check_flat_axes,
+    even_times,
+    in_time,
+    motion_times,
+    one_motion,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..bounds.regimes import RegimeCertificate
+
+ATTITUDES = ("rotation_vector", "quaternion")
+INERTIAS = ("principal", "entries")
+_ENTRIES = ((0, 0, "xx"), (1, 1, "yy"), (2, 2, "zz"), (0, 1, "xy"), (1, 2, "yz"), (0, 2, "xz"))
+_TOTAL: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
+_WRAPPED: dict[str, Any] = {"color": "#F3CE86", "linewidth": 4.0, "zorder": 1.4}
+_JUMP = 1.0
+_HALF_TURN = 1e-6
+
+
+def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times: ArrayLike | None = None) -> Axes:
+    """The dynamic, geometric and total (Montgomery) phase in time, continuous from zero, and the total in (-π, π].
+
+    The band about the total is the residual, the difference to the same angle read off the attitude; mostly it is far
+    thinner than the line, and its size is in the legend.
+
+    Parameters
+    ----------
+    ax : flat axes
+    motion : of one momentum, no batch; without momentum all is zero
+    gauge : as for `running_phases`
+    times : (N,) where to draw [s]; None: so many that nothing is missed
+
+    Raises MissingExtraError, ShapeError, and as `running_phases`. Source: Cabrera 2006, equation (12).
+    """
+    check_flat_axes(ax)
+    one_motion(motion)
+    t = motion_times(motion, times)
+    found = running_phases(motion, t, gauge)
+    total, room = found.montgomery_phase, float(found.residual)
+    label = f"residual {room:.1g} rad"
+    ax.fill_between(t, total - room, total + room, color=GREY, alpha=0.5, linewidth=0.0, label=label, zorder=1.5)
+    ax.plot(t, found.dynamic_phase, label="dynamic", **SERIES[0])
+    ax.plot(t, found.geometric_phase, label="geometric", **SERIES[1])
+    ax.plot(t, total, label="total", **_TOTAL)
+    _pieces(ax, t, found.montgomery_angle[:, None], [("total in (−π, π]", _WRAPPED)])
+    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+    in_time(ax, (t[0], t[-1]), f"phase, {found.gauge} gauge [rad]")
+    return ax
+
+
+def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, times: ArrayLike | None = None) -> Axes:
+    """The attitude in time, base axes to inertial ones: its rotation vector and angle, or its quaternion x y z w.
+
+    The rotation vector is at most a half turn long; where it passes that it goes over to its opposite, and the lines
+    are cut. The quaternion keeps one sign throughout.
+
+    Parameters
+    ----------
+    ax : flat axes
+    motion : no batch
+    kind : "rotation_vector" [rad] or "quaternion"
+    times : as for `plot_phases`
+
+    Raises MissingExtraError, ShapeError, UnknownNameError.
+    """
+    check_flat_axes(ax)
+    one_motion(motion)
+    if kind not in ATTITUDES:
+        raise unknown_name("kind of attitude", kind, ATTITUDES)
+    t = motion_times(motion, times)
+    if kind == "quaternion":
+        values = motion.quat_xyzw(t)
+        values[1:] *= np.cumprod(np.where(np.sum(values[1:] * values[:-1], axis=-1) < 0.0, -1.0, 1.0))[:, None]
+        _pieces(ax, t, values, [(f"q{name}", SERIES[k]) for k, name in enumerate("xyzw")])
+        ax.set_ylim(-1.08, 1.08)
+        label = "quaternion [1]"
+    else:
+        values = _rotation_vectors(motion.attitude(t))
+        _pieces(ax, t, values, [(f"θ{name}", SERIES[k]) for k, name in enumerate("xyz")])
+        ax.plot(t, np.linalg.norm(values, axis=-1), label="|θ|", color=GREY, linewidth=2.2, zorder=1.5)
+        label = "rotation vector [rad]"
+    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+    in_time(ax, (t[0], t[-1]), label, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return ax
+
+
+def plot_inertia(
+    ax: Axes, deformation: Deformation, kind: str = "principal", *, times: ArrayLike | None = None
+) -> Axes:
+    """The locked inertia in time: its principal moments, ascending, or its six entries in the deformation's frame.
+
+    Parameters
+    ----------
+    ax : flat axes
+    kind : "principal" or "entries"
+    times : (N,) where to draw [s]; None: evenly between the breaks
+
+    Raises MissingExtraError, ShapeError, UnknownNameError.
+    """
+    check_flat_axes(ax)
+    if kind not in INERTIAS:
+        raise unknown_name("kind of inertia", kind, INERTIAS)
+    t = even_times(deformation, times)
+    inertia = deformation.inertia(t)
+    if kind == "principal":
+        for k, moment in enumerate(np.linalg.eigvalsh(inertia).T):
+            ax.plot(t, moment, label=f"I{'₁₂₃'[k]}", **SERIES[k])
+        ax.set_ylim(bottom=0.0)
+    else:
+        for k, (i, j, name) in enumerate(_ENTRIES):
+            ax.plot(t, inertia[:, i, j], label=f"I{name}", **SERIES[k])
+        ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+    label = "principal moments [kg m²]" if kind == "principal" else "locked inertia [kg m²]"
+    in_time(ax, (t[0], t[-1]), label, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return ax
+
+
+def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLike | None = None) -> Axes:
+    """The internal angular momentum L_o in time, with the base at rest, in the deformation's frame, and its size.
+
+    Parameters
+    ----------
+    ax : flat axes
+    times : as for `plot_inertia`
+
+    Raises MissingExtraError, ShapeError.
+    """
+    check_flat_axes(ax)
+    t = even_times(deformation, times)
+    internal = deformation.internal_momentum(t)
+    for k, name in enumerate("xyz"):
+        ax.plot(t, internal[:, k], label=f"L{name}", **SERIES[k])
+    ax.plot(t, np.linalg.norm(internal, axis=-1), label="|L₀|", color=GREY, linewidth=2.2, zorder=1.5)
+    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+    in_time(ax, (t[0], t[-1]), "L₀ [kg m²/s]", ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return ax
+
+
+def plot_energy(
+    ax: Axes,
+    motion: Motion,
+    *,
+    certificate: RegimeCertificate | None = None,
+    times: ArrayLike | None = None,
+) -> Axes:
+    """The energy E_t in time between the bands of the regimes of the body frozen at each time.
+
+    With l the momentum's size, the energy lies between l²/(2 I₃) and l²/(2 I₁). Above l²/(2 I₂), the energy on the
+    separatrix, the frozen polhode circles the axis of the smallest moment, below it that of the largest.
+
+    Parameters
+    ----------
+    ax : flat axes
+    motion : of one momentum, no batch
+    certificate : its bounds of E_t, found without the motion, are drawn as steps; None: none
+    times : as for `plot_phases`
+
+    Raises
+    ------
+    MissingExtraError
+    ShapeError
+        If the motion is a batch, or has no momentum.
+
+    Source: Cabrera 2006, section 4.1.1; theory.md E1, E5.
+    """
+    check_flat_axes(ax)
+    one_motion(motion)
+    size = float(np.linalg.norm(motion.momentum))
+    if not size:
+        raise ShapeError("a motion without angular momentum has E_t = 0 and no regimes")
+    t = motion_times(motion, times)
+    top, middle, bottom = (0.5 * size * size / np.linalg.eigvalsh(motion.deformation.inertia(t))).T
+    bands: tuple[tuple[Array, Array, str, dict[str, Any]], ...] = (
+        (middle, top, "round smallest moment", {"facecolor": "#CBE5F5", "edgecolor": SKY}),
+        (bottom, middle, "round largest moment", {"facecolor": "#FBE8C8", "edgecolor": ORANGE, "hatch": "///"}),
+    )
+    for low, high, label, look in bands:
+        ax.fill_between(t, low, high, linewidth=0.0, label=label, zorder=1, **look)
+    limits = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
+    ax.plot(t, top, label="l²/(2I₁), l²/(2I₃)", **limits)
+    ax.plot(t, bottom, **limits)
+    ax.plot(t, middle, label="l²/(2I₂), separatrix", color=VERMILION, linestyle=(0, (5, 1.5)), linewidth=1.3)
+    if certificate is not None:
+        known = certificate.bounds
+        edges = known.enclosure.edges
+        for values, label in ((known.lower, "certain bounds"), (known.upper, None)):
+            ax.stairs(values, edges, baseline=None, color=BLACK, linestyle=(0, (1, 1)), linewidth=1.2, label=label)
+    ax.plot(t, energy_along(motion, t), label="E", color=BLACK, linewidth=1.7)
+    in_time(ax, (t[0], t[-1]), "energy [J]")
+    return ax
+
+
+def _pieces(ax: Any, t: Array, values: Array, looks: list[tuple[str, dict[str, Any]]]) -> None:
+    """Lines, cut where the values jump together: (N,), (N, k)."""
+    step = np.linalg.norm(np.diff(values, axis=0), axis=-1)
+    cuts = [0, *(np.flatnonzero(step > _JUMP) + 1).tolist(), len(t)]
+    for k, (label, look) in enumerate(looks):
+        for start, end in pairwise(cuts):
+            ax.plot(t[start:end], values[start:end, k], label=None if start else label, **look)
+
+
+def _rotation_vectors(attitudes: Array) -> Array:
+    """Of the two of a half turn, the one nearer to the neighbour: (N, 3, 3) -> (N, 3)."""
+    values = so3.log(attitudes)
+    straight = np.flatnonzero(np.linalg.norm(values, axis=-1) > np.pi - _HALF_TURN)
+    for k in straight[::-1]:
+        beside = values[k + 1] if k + 1 < len(values) else values[k - 1]
+        if values[k] @ beside < 0.0:
+            values[k] *= -1.0
+    return values

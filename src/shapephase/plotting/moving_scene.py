@@ -1,0 +1,230 @@
+"""A motion as things that move in space: poses and sizes of all that is to be drawn, at the times of the frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array
+from ..body.appearance import BOX_COLOUR, Visual, visuals
+from ..deformation.deformation import Deformation
+from ..deformation.descriptions import ArticulatedSource, ParticleSource, Source
+from ..deformation.frames import principal_frames
+from ..errors import ShapeError, ShapePhaseError, unknown_name
+from ..inertia_tensor import principal_axes, second_moment
+from ..reconstruction.reconstruction import Motion
+
+_MOST_FRAMES = 10_000
+_THINNEST = 0.01
+_PARTICLE = 0.06
+"""Radius of the heaviest particle, of the largest distance from the centre of mass."""
+_CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, 8).T
+
+
+@dataclass(frozen=True, eq=False)
+class MovingNode:
+    """Shapes that move as one.
+
+    Attributes
+    ----------
+    name : what carries them
+    shapes : their poses are relative to the node
+    poses : (F, 4, 4) of the node in base axes, one for each frame
+    scales : (F, 3) by which the shapes are stretched along the axes of the node; None: they keep their size
+    """
+
+    name: str
+    shapes: tuple[Visual, ...]
+    poses: Array
+    scales: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MovingScene:
+    """What moves, at F frames; lengths in m, inertial axes where nothing else is said.
+
+    Attributes
+    ----------
+    title : for people
+    times : (F,) of the frames, evenly from 0 to the end of the motion [s]
+    base : (F, 4, 4) pose of the base axes
+    nodes : what hangs on the base
+    centre : (F, 3) centre of mass
+    momentum : (3,) the angular momentum [kg m^2/s]
+    trail : (F, 3) way of the origin of a link; None: not asked for
+    articulated : whether the nodes are the links of a body, else particles or the locked inertia
+    """
+
+    title: str
+    times: Array
+    base: Array
+    nodes: tuple[MovingNode, ...]
+    centre: Array
+    momentum: Array
+    trail: Array | None
+    articulated: bool
+
+    def world_pose(self, node: MovingNode) -> Array:
+        """Pose of a node: (F, 4, 4)."""
+        return self.base @ node.poses
+
+    @property
+    def largest_turn(self) -> float:
+        """The largest angle by which anything turns from one frame to the next [rad]."""
+        turns = [self.base, *(self.world_pose(node) for node in self.nodes)]
+        steps = [so3.transpose(turn[:-1, :3, :3]) @ turn[1:, :3, :3] for turn in turns]
+        return max(float(so3.angle(step).max()) for step in steps)
+
+    @cached_property
+    def reach(self) -> float:
+        """The largest distance of what is drawn from the centre of mass of its time [m]."""
+        return float(np.linalg.norm(self.corners - self.centre[:, None], axis=-1).max())
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(2, 3) least and largest coordinates of all that is drawn of the body, at all frames."""
+        points = self.corners.reshape(-1, 3)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @cached_property
+    def corners(self) -> Array:
+        """Corners of boxes around all shapes: (F, K, 3)."""
+        found = []
+        for node in self.nodes:
+            pose = self.world_pose(node)
+            for shape in node.shapes:
+                points = _corners(shape) @ shape.pose[:3, :3].T + shape.pose[:3, 3]
+                stretched = points[None] if node.scales is None else points * node.scales[:, None]
+                found.append(stretched @ so3.transpose(pose[:, :3, :3]) + pose[:, None, :3, 3])
+        return np.concatenate(found, axis=1) if found else self.centre[:, None]
+
+
+def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fall: ArrayLike) -> MovingScene:
+    """What a motion looks like.
+
+    An articulated body has the shapes of its links (`visuals`), whatever gauge the motion was reconstructed in. Point
+    masses are balls. Of other deformations the box of uniform density with the same locked inertia is shown; where the
+    mass is not known, it measures one metre from corner to corner at the start.
+
+    Parameters
+    ----------
+    frames : how many, evenly over the motion, 2 or more
+    trail : a link whose origin leaves a trail
+    fall : start, velocity, gravity of the centre of mass as in `Motion.base_position`
+
+    Raises
+    ------
+    ShapeError
+        If the motion is a batch, or `frames` is out of range.
+    UnknownNameError
+        If there is no such link.
+
+    Warns
+    -----
+    VisualWarning
+        As `visuals`.
+    """
+    if motion.batch:
+        raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
+    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MOST_FRAMES:
+        raise ShapeError(f"frames: a whole number from 2 to {_MOST_FRAMES} is needed, got {frames!r}")
+    times = np.linspace(0.0, motion.duration, int(frames))
+    source = _original(motion.deformation)
+    base = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
+    base[:, :3, :3] = motion.attitude(times) @ motion.deformation.frame(times)
+    base[:, :3, 3] = motion.base_position(times, **fall)
+    in_base = source.centre_of_mass(times)
+    centre = base[:, :3, 3] + so3.apply(base[:, :3, :3], in_base)
+    way = None
+    if isinstance(source, ArticulatedSource):
+        nodes = _link_nodes(source, times)
+        if trail is not None:
+            place = source.body.link_pose(source.path.curve(times)[0], trail)
+            way = (base @ place)[:, :3, 3]
+    else:
+        if trail is not None:
+            raise unknown_name(f"link of what has none ({motion.deformation.label})", trail, ())
+        particles = isinstance(source, ParticleSource)
+        nodes = _particle_nodes(source, times) if particles else (_inertia_node(motion.deformation, in_base, times),)
+    articulated = isinstance(source, ArticulatedSource)
+    return MovingScene(motion.deformation.label, times, base, nodes, centre, motion.momentum, way, articulated)
+
+
+def _original(deformation: Deformation) -> Source:
+    """What a gauge has turned; its `frame` turns it back."""
+    source = deformation.source
+    while hasattr(source, "original"):
+        source = source.original  # pyright: ignore[reportAttributeAccessIssue]
+    return source
+
+
+def _link_nodes(source: ArticulatedSource, times: Array) -> tuple[MovingNode, ...]:
+    by_link: dict[str, list[Visual]] = {}
+    for shape in visuals(source.body):
+        by_link.setdefault(shape.link, []).append(shape)
+    configuration = source.path.curve(times)[0]
+    return tuple(
+        MovingNode(link, tuple(shapes), source.body.link_pose(configuration, link)) for link, shapes in by_link.items()
+    )
+
+
+def _particle_nodes(source: ParticleSource, times: Array) -> tuple[MovingNode, ...]:
+    points, _ = source.centred(times)
+    largest = _PARTICLE * float(np.linalg.norm(points, axis=-1).max())
+    radii = largest * np.cbrt(source.masses / source.masses.max())
+    nodes = []
+    for number, radius in enumerate(radii.tolist()):
+        poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
+        poses[:, :3, 3] = points[:, number]
+        ball = Visual(f"particle {number + 1}", "sphere", (radius,), np.eye(4), BOX_COLOUR)
+        nodes.append(MovingNode(ball.link, (ball,), poses))
+    return tuple(nodes)
+
+
+def _inertia_node(deformation: Deformation, in_base: Array, times: Array) -> MovingNode:
+    """The box of the locked inertia, stretched frame by frame."""
+    source = _original(deformation)
+    moment = second_moment(source.sample(times)[0])
+    axes = _continuous_axes(replace(deformation, source=source, closure=None), moment, times)
+    moments = np.maximum(np.einsum("nji,njk,nki->ni", axes, moment, axes), 0.0)
+    # Of a box m a^2 / 12 is the second moment along an edge a; without a mass, the start sets the scale.
+    mass = getattr(source, "mass", 12.0 * moments[0].sum())
+    edges = np.sqrt(12.0 * moments / mass)
+    poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
+    poses[:, :3, :3], poses[:, :3, 3] = axes, in_base
+    cube = Visual("locked inertia", "box", (1.0, 1.0, 1.0), np.eye(4), BOX_COLOUR)
+    thin = _THINNEST * edges.max(axis=-1, keepdims=True)
+    return MovingNode(cube.link, (cube,), poses, np.maximum(edges, thin))
+
+
+def _continuous_axes(deformation: Deformation, moment: Array, times: Array) -> Array:
+    """Principal axes that go along continuously, where there are such, as columns: (F, 3, 3)."""
+    try:
+        return so3.transpose(principal_frames(deformation)(times)[0])
+    except ShapePhaseError:
+        return principal_axes(moment)[1]
+
+
+def _corners(shape: Visual) -> Array:
+    """Corners of the box around a shape, in its own axes: (8, 3)."""
+    if shape.kind == "mesh":
+        low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+        return 0.5 * (low + high) + 0.5 * (high - low) * _CORNERS
+    return _half_size(shape) * _CORNERS
+
+
+def _half_size(shape: Visual) -> Array:
+    size = shape.size
+    halves: Mapping[str, tuple[float, ...]] = {
+        "sphere": size * 3,
+        "ellipsoid": size,
+        "box": tuple(0.5 * edge for edge in size),
+        "cylinder": (size[0], size[0], 0.5 * size[-1]),
+        "capsule": (size[0], size[0], 0.5 * size[-1] + size[0]),
+    }
+    return np.array(halves[shape.kind])

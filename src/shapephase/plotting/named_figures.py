@@ -1,0 +1,124 @@
+"""The figures of a motion by name, one column wide, as images in files or in memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import ShapeError, unknown_name
+from ..files import write_whole
+from ..phases.momentum_curve import Gauge
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.shape_path import ShapePath
+from .plot_style import axes_image
+from .plots import (
+    column_axes,
+    plot_attitude,
+    plot_energy,
+    plot_inertia,
+    plot_internal_momentum,
+    plot_momentum_curve,
+    plot_phases,
+    plot_shape_path,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A kind of figure.
+
+    Attributes
+    ----------
+    caption : one line
+    height : [in]
+    draw : from axes, motion, path of the joints and gauge
+    with_momentum, with_path : whether it shows nothing without a momentum, without a path
+    """
+
+    caption: str
+    height: float
+    draw: Callable[[Axes, Motion, ShapePath | None, Gauge], object]
+    with_momentum: bool = False
+    with_path: bool = False
+
+
+def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
+    if path is None:
+        raise ShapeError("the figure 'shape' needs the path of the joints, and there is none")
+    plot_shape_path(ax, path, getattr(motion.deformation.source, "body", None))
+
+
+FIGURES: Mapping[str, Figure] = {
+    "momentum": Figure(
+        "The momentum seen from the gauge's frame, and the area it goes round",
+        3.9,
+        lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
+        with_momentum=True,
+    ),
+    "phases": Figure(
+        "The phases as they grow", 2.8, lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge), with_momentum=True
+    ),
+    "attitude": Figure("The attitude as a rotation vector", 2.8, lambda ax, motion, *_: plot_attitude(ax, motion)),
+    "shape": Figure("The joints", 2.8, lambda ax, motion, path, _: _draw_shape(ax, motion, path), with_path=True),
+    "inertia": Figure(
+        "Principal moments of the locked inertia", 2.8, lambda ax, motion, *_: plot_inertia(ax, motion.deformation)
+    ),
+    "internal_momentum": Figure(
+        "Internal momentum", 2.8, lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation)
+    ),
+    "energy": Figure(
+        "The energy, and which axis the momentum circles",
+        2.8,
+        lambda ax, motion, *_: plot_energy(ax, motion),
+        with_momentum=True,
+    ),
+}
+
+
+def figure_image(
+    kind: str, motion: Motion, path: ShapePath | None = None, gauge: Gauge = "horizontal", *, ending: str = "svg"
+) -> bytes:
+    """One of `FIGURES` as an image.
+
+    Parameters
+    ----------
+    path : what the joints did, for "shape"
+    ending : "svg", "pdf" or "png"
+
+    Raises
+    ------
+    UnknownNameError
+        For another kind, or another ending.
+    ShapeError
+        For a kind that shows nothing without momentum, or without a path; or if the motion is a batch.
+    MissingExtraError
+        Without Matplotlib.
+    """
+    if kind not in FIGURES:
+        raise unknown_name("kind of figure", kind, FIGURES)
+    if ending not in ("svg", "pdf", "png"):
+        raise unknown_name("kind of image", ending, ("svg", "pdf", "png"))
+    figure = FIGURES[kind]
+    if figure.with_momentum and not motion.momentum.any():
+        raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
+    ax = column_axes(figure.height)
+    figure.draw(ax, motion, path, gauge)
+    return axes_image(ax, ending)
+
+
+def write_figure(
+    kind: str,
+    motion: Motion,
+    out: str | os.PathLike[str],
+    path: ShapePath | None = None,
+    gauge: Gauge = "horizontal",
+) -> None:
+    """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all. Raises as `figure_image`."""
+    image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix("."))
+    write_whole(out, lambda stream: stream.write(image))

@@ -1,0 +1,161 @@
+"""How every figure looks: colours, lines and sizes; and the checks that each drawing function begins with.
+
+The colours are those of Okabe and Ito, which the colour-blind tell apart; lines also differ by their dashes and points
+by their markers, so nothing is lost in black and white. Sizes are for figures one column wide, 3.4 in.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, finite_array
+from ..deformation.deformation import Deformation
+from ..errors import MissingExtraError, ShapeError
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.shape_path import ShapePath, times_argument
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BLACK, BLUE, SKY, VERMILION, ORANGE, GREEN = "#000000", "#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73"
+PURPLE, GREY = "#CC79A7", "#999999"
+SMALL = 8
+"""Points; readable in a figure one column wide."""
+COLUMN = 3.4
+"""Inches."""
+SERIES: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linestyle": "-", "linewidth": 1.6},
+    {"color": VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.5},
+    {"color": GREEN, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.5},
+    {"color": BLACK, "linestyle": (0, (1, 1.2)), "linewidth": 1.5},
+    {"color": ORANGE, "linestyle": (0, (7, 5)), "linewidth": 1.7},
+    {"color": PURPLE, "linestyle": (0, (3, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.5},
+)
+"""One look for each curve of a figure, the first three for x, y and z."""
+_RESOLUTION = 300
+_FEWEST = 800
+_BY_LOOP = 200
+
+
+def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
+    """Axes of a new figure one column wide (3.4 in) that leaves room for labels and legend by itself.
+
+    Parameters
+    ----------
+    height : [in]
+    projection : None: flat; "3d"
+
+    The figure is `axes.figure`, which no window shows; `axes.figure.savefig(path, dpi=300)` writes it.
+
+    Raises MissingExtraError.
+    """
+    _check_matplotlib()
+    from matplotlib.figure import Figure
+
+    tall = float(finite_array(height, "height", unit="in"))
+    if not tall > 0.0:
+        raise ShapeError(f"height: a length above 0 [in] is needed, got {height!r}")
+    return Figure(figsize=(COLUMN, tall), layout="constrained").add_subplot(projection=projection)
+
+
+def axes_image(ax: Any, ending: str) -> bytes:
+    """The figure of some axes as "svg", "pdf" or "png"; nothing in it depends on the time of day."""
+    stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
+    stream = BytesIO()
+    ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
+    return stream.getvalue()
+
+
+def check_axes(ax: object) -> None:
+    """
+    Raises
+    ------
+    MissingExtraError
+        If Matplotlib is not installed.
+    ShapeError
+        If these are no axes of it.
+    """
+    _check_matplotlib()
+    from matplotlib.axes import Axes
+
+    if not isinstance(ax, Axes):
+        raise ShapeError(f"ax: expected Matplotlib axes, as of Figure().add_subplot(), got {type(ax).__name__}")
+
+
+def check_flat_axes(ax: object) -> None:
+    """As `check_axes`, for figures that have no depth."""
+    check_axes(ax)
+    if getattr(ax, "name", "") == "3d":
+        raise ShapeError("ax: flat axes are needed here, got three-dimensional ones; make them without a projection")
+
+
+def one_motion(motion: Motion) -> None:
+    """Raise `ShapeError` for a batch."""
+    if motion.batch:
+        raise ShapeError(f"a picture shows one motion, this is a batch of {motion.batch}; reconstruct one of them")
+
+
+def motion_times(motion: Motion, times: ArrayLike | None) -> Array:
+    """The times to draw at: those given, or every step of the integrator in so many parts that no turn is missed."""
+    if times is not None:
+        return given_times(times, motion.duration)
+    steps = motion.solution.times
+    parts = max(4, int(np.ceil(_FEWEST / (len(steps) - 1))))
+    return subdivided(np.union1d(steps, motion.deformation.breaks), parts)
+
+
+def even_times(of: Deformation | ShapePath, times: ArrayLike | None) -> Array:
+    """The times to draw at: those given, or even ones between the breaks."""
+    if times is not None:
+        return given_times(times, of.duration)
+    count = max(_FEWEST, _BY_LOOP * of.loops)
+    return subdivided(of.breaks, max(2, int(np.ceil(count / (len(of.breaks) - 1)))))
+
+
+def given_times(times: ArrayLike, duration: float) -> Array:
+    """Two or more ascending times of [0, duration]: (N,)."""
+    values = times_argument(times, duration)
+    if values.ndim != 1 or len(values) < 2 or np.any(np.diff(values) <= 0.0):
+        raise ShapeError(f"times: two or more that increase are needed, (N,), got an array of shape {values.shape}")
+    return values
+
+
+def subdivided(edges: Array, parts: int) -> Array:
+    """Every interval cut into equal parts: (K + 1,) -> (K parts + 1,)."""
+    inner = edges[:-1, None] + np.diff(edges)[:, None] * np.arange(parts) / parts
+    return np.append(inner.ravel(), edges[-1])
+
+
+def finish(ax: Any, **place: Any) -> Any:
+    """Small ticks and a legend of two columns, by default above the axes; returns the legend."""
+    ax.tick_params(labelsize=SMALL)
+    ax.xaxis.get_offset_text().set_fontsize(SMALL)
+    ax.yaxis.get_offset_text().set_fontsize(SMALL)
+    above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)} if not place else {}
+    look = {
+        "fontsize": SMALL - 1,
+        "title_fontsize": SMALL - 1,
+        "handlelength": 2.6,
+        "handletextpad": 0.6,
+        "columnspacing": 1.0,
+    }
+    return ax.legend(**{"ncols": 2, "frameon": False, **look, **above, **place})
+
+
+def in_time(ax: Any, duration: tuple[float, float], label: str, **place: Any) -> None:
+    """The frame of a figure whose abscissa is time [s]; `label` with its unit."""
+    ax.set_xlim(*duration)
+    ax.set_xlabel("t [s]", fontsize=SMALL)
+    ax.set_ylabel(label, fontsize=SMALL)
+    finish(ax, **place)
+
+
+def _check_matplotlib() -> None:
+    try:
+        import matplotlib.axes  # noqa: F401
+    except ImportError:
+        raise MissingExtraError("figures need Matplotlib; install it with: pip install 'shapephase[plot]'") from None

@@ -1,0 +1,112 @@
+"""Figures of what is certain before a motion: the part of the momentum sphere it can reach, bounds beside values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arrays import Array
+from ..bounds.all_bounds import Bound
+from ..bounds.regimes import CrownRegion
+from ..errors import ShapeError
+from ..reconstruction.reconstruction import Motion
+from .plot_style import BLACK, BLUE, SKY, SMALL, VERMILION, check_flat_axes, one_motion
+from .sphere_axes import SphereAxes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_POINTS, _TIMES = 241, 800
+
+
+def plot_crown(
+    ax: Axes, crown: CrownRegion, motion: Motion | None = None, *, view: tuple[float, float] | None = None
+) -> Axes:
+    """The crown region on the sphere of unit momentum, in which Pi is certain to stay; and the motion, inside.
+
+    Parameters
+    ----------
+    ax : flat axes, drawn on in parallel projection
+    crown : from `crown_region`
+    motion : of one momentum, no batch; drawn over the certificate's interval
+    view : elevation and azimuth of the eye [degrees]; None: beside the certificate's axis
+
+    Raises
+    ------
+    MissingExtraError, ShapeError
+
+    Source: Cabrera 2006, section 4.1; theory.md E8.
+    """
+    check_flat_axes(ax)
+    from matplotlib.patches import Patch
+
+    axis = crown.certificate.axis
+    sphere = SphereAxes(ax, _beside(axis) if view is None else view)
+    across = np.linspace(-1.0, 1.0, _POINTS)
+    x, y = np.meshgrid(across, across)
+    rest = 1.0 - x * x - y * y
+    inside = rest >= 0.0
+    towards = np.sqrt(np.maximum(rest, 0.0))[..., None] * sphere.eye
+    directions = x[..., None] * sphere.screen[0] + y[..., None] * sphere.screen[1] + towards
+    within = np.zeros(x.shape)
+    within[inside] = crown.contains(directions[inside])
+    ax.contourf(x, y, within, levels=[0.5, 1.5], colors=[SKY], alpha=0.45, zorder=1.2)
+    ax.contour(x, y, within, levels=[0.5], colors=[BLUE], linewidths=0.8, zorder=1.5)
+    sphere.named["crown: where Π can be"] = Patch(facecolor=SKY, edgecolor=BLUE, alpha=0.45)
+    if motion is not None:
+        track = _track(motion, crown)
+        sphere.curve(track, "Π/|Π|", color=BLACK, linewidth=1.6)
+        sphere.point(track[0], "start", color=VERMILION, marker="*", markersize=9.0)
+    sphere.point(axis, None, color=BLACK, marker="o")
+    sphere.finish("Π{}/|Π|", f"certain before the motion: {crown.certificate.regime}")
+    return ax
+
+
+def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
+    """How near each bound is to what it bounds: a bar of the smaller over the larger, 1 where they are equal.
+
+    Parameters
+    ----------
+    bounds : from `estimates.bounds`
+
+    Raises
+    ------
+    MissingExtraError, ShapeError
+    """
+    check_flat_axes(ax)
+    if not bounds:
+        raise ShapeError("bounds: there are none to be drawn")
+    places = np.arange(len(bounds))[::-1]
+    for upper, colour, hatch in ((True, SKY, None), (False, "#F3BE73", "////")):
+        chosen = [(place, bound) for place, bound in zip(places, bounds, strict=True) if bound.is_upper is upper]
+        ax.barh(
+            [place for place, _ in chosen],
+            [bound.tightness for _, bound in chosen],
+            height=0.7,
+            color=colour,
+            edgecolor=BLACK,
+            linewidth=0.6,
+            hatch=hatch,
+            label="upper bound" if upper else "lower bound",
+        )
+    ax.set_yticks(places, [bound.name for bound in bounds], fontsize=SMALL - 1)
+    ax.set(xlim=(0.0, 1.0), ylim=(-0.6, len(bounds) - 0.4))
+    ax.set_xlabel("sharpness (1: equal)", fontsize=SMALL)
+    ax.tick_params(axis="x", labelsize=SMALL)
+    ax.legend(fontsize=SMALL, frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    return ax
+
+
+def _beside(axis: Array) -> tuple[float, float]:
+    """A view from 40 degrees off a direction, lower than it where it points up."""
+    elevation, azimuth = np.degrees([np.arcsin(np.clip(axis[2], -1.0, 1.0)), np.arctan2(axis[1], axis[0])])
+    return (elevation - np.copysign(40.0, elevation) if abs(elevation) > 50.0 else 24.0), azimuth + 35.0
+
+
+def _track(motion: Motion, crown: CrownRegion) -> Array:
+    one_motion(motion)
+    start, end = crown.certificate.interval
+    momenta = motion.body_momentum(np.linspace(start, min(end, motion.duration), _TIMES))
+    return momenta / np.linalg.norm(momenta, axis=-1, keepdims=True)

@@ -1,0 +1,266 @@
+"""Figures of shapes: joints in time, loops in the plane of two joints, and the curvature over such a plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import ShapeError, unknown_name
+from ..shape_space.curvature_field import curvature_on_plane
+from ..shape_space.shape_path import ShapePath
+from .plot_style import BLACK, BLUE, GREEN, GREY, SERIES, SMALL, check_flat_axes, even_times, finish, in_time
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_STILL = 1e-9
+_MOST_NAMED = 6
+_LEVELS = 8
+_COUNT = 61
+_MARGIN = 0.25
+_AXES = "xyz"
+
+
+def plot_shape_path(
+    ax: Axes,
+    path: ShapePath,
+    body: Body | None = None,
+    joints: Sequence[str | int] | None = None,
+    *,
+    times: ArrayLike | None = None,
+) -> Axes:
+    """The joints in time, those in radians on the left scale and those in metres on the right.
+
+    Parameters
+    ----------
+    ax : flat axes; where there are joints of both units, a twin of them is added to their figure
+    body : whose joints they are, for names and units; None: names as the path has them, all on one scale
+    joints : names or places of those to draw; None: those that move. The six that move most get a name, the others are
+        grey
+    times : (N,) where to draw [s]; None: evenly between the breaks
+
+    Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
+    """
+    check_flat_axes(ax)
+    t = even_times(path, times)
+    route, names, units = _named(path, body)
+    values = route.shape(t)
+    span = np.ptp(values, axis=0)
+    chosen = np.flatnonzero(span > _STILL) if joints is None else np.array([_place(j, names) for j in joints], int)
+    if not len(chosen):
+        raise ShapeError("joints: none of them moves along this path; name those to draw")
+    chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MOST_NAMED else chosen
+    scales = sorted({units[k] for k in chosen}, key=("rad", "m", "rad or m").index)
+    places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
+    handles: dict[str, Any] = {}
+    for number, k in enumerate(chosen):
+        named = number < _MOST_NAMED
+        look = SERIES[number] if named else {"color": GREY, "linewidth": 0.6, "zorder": 1.5}
+        (line,) = places[units[k]].plot(t, values[:, k], **look)
+        text = names[k] if len(scales) == 1 else f"{names[k]} [{units[k]}]"
+        handles[text if named else f"{len(chosen) - _MOST_NAMED} others"] = line
+    for unit, place in list(places.items())[1:]:
+        place.set_ylabel(f"joints [{unit}]", fontsize=SMALL)
+        place.tick_params(labelsize=SMALL)
+    above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", handles=handles.values(), labels=handles.keys(), **above)
+    return ax
+
+
+def plot_shape_plane(
+    ax: Axes,
+    path: ShapePath,
+    joints: Sequence[str | int],
+    body: Body | None = None,
+    *,
+    times: ArrayLike | None = None,
+) -> Axes:
+    """The path of shapes in the plane of two joints, its start and its direction.
+
+    Parameters
+    ----------
+    ax : flat axes
+    joints : the two, names or places; the first is the abscissa
+    body, times : as for `plot_shape_path`
+
+    Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
+    """
+    check_flat_axes(ax)
+    t = even_times(path, times)
+    route, names, units = _named(path, body)
+    i, j = _pair(joints, names)
+    points = route.shape(t)[:, [i, j]]
+    _loop(ax, points)
+    ax.set_xlabel(f"{names[i]} [{units[i]}]", fontsize=SMALL)
+    ax.set_ylabel(f"{names[j]} [{units[j]}]", fontsize=SMALL)
+    finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return ax
+
+
+def plot_curvature(
+    ax: Axes,
+    body: Body,
+    joints: Sequence[str | int],
+    first: ArrayLike | None = None,
+    second: ArrayLike | None = None,
+    *,
+    axis: str | ArrayLike | None = None,
+    shape: ArrayLike | None = None,
+    path: ShapePath | None = None,
+) -> Axes:
+    """One component of the curvature over the plane of two joints, and a path of shapes on it.
+
+    Violet is positive and orange negative; lines of equal curvature are labelled, solid where positive, dashed where
+    negative, thick where zero. A small square gone round counterclockwise turns the body by minus this, times its area.
+
+    Parameters
+    ----------
+    ax : flat axes; a scale of colours is added to their figure
+    joints : the two, names or places; the first is the abscissa
+    first, second : (A,), (B,) where to evaluate, ascending [rad or m]; None: round the path, or the joints' limits
+    axis : "x", "y", "z", or the direction (3,) whose component is drawn, base axes; None: that of the largest component
+    shape : (n,) where the other joints stand; None: neutral
+    path : to be drawn on it; its other joints may move
+
+    Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError. Source: theory.md B6.
+    """
+    check_flat_axes(ax)
+    names, units = body.joint_names, body.joint_units
+    i, j = _pair(joints, names)
+    points = None
+    if path is not None:
+        points = path.matched(names, body.name).shape(even_times(path, None))[:, [i, j]]
+    rows = [
+        _row(values, body, k, None if points is None else points[:, n], label)
+        for n, (values, k, label) in enumerate(((first, i, "first"), (second, j, "second")))
+    ]
+    field = curvature_on_plane(body, (i, j), rows[0], rows[1], shape)
+    direction, name = _direction(axis, field)
+    values = (field @ direction).T
+    power, scale = _power_of_ten(float(np.abs(values).max()))
+    values = values * 10.0**-power
+    largest = float(np.abs(values).max()) or 1.0
+    mesh = _coloured(ax, rows, values, largest)
+    _contours(ax, rows, values, largest)
+    if points is not None:
+        _loop(ax, points)
+        finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    ax.set(xlim=(rows[0][0], rows[0][-1]), ylim=(rows[1][0], rows[1][-1]))
+    ax.set_xlabel(f"{names[i]} [{units[i]}]", fontsize=SMALL)
+    ax.set_ylabel(f"{names[j]} [{units[j]}]", fontsize=SMALL)
+    ax.tick_params(labelsize=SMALL)
+    bar = ax.figure.colorbar(mesh, ax=ax)
+    per = f"{units[i]}²" if units[i] == units[j] else f"({units[i]} {units[j]})"
+    bar.set_label(f"curvature, {name}\n[{scale}rad/{per}]", fontsize=SMALL)
+    bar.ax.tick_params(labelsize=SMALL)
+    return ax
+
+
+def _loop(ax: Any, points: Array) -> None:
+    """A path in a plane with its start and heads along it."""
+    ax.plot(*points.T, color=BLACK, linewidth=1.6, label="path")
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points / _extent(points), axis=0), axis=1))])
+    for k in np.searchsorted(length, length[-1] * np.array([0.15, 0.4, 0.65, 0.9])):
+        after = min(k + 1, len(points) - 1)
+        if length[after] > length[after - 1]:
+            style = {"arrowstyle": "-|>", "color": BLACK, "mutation_scale": 10.0, "linewidth": 0.0}
+            ax.annotate("", points[after], points[after - 1], arrowprops=style)
+    start = {"marker": "*", "color": GREEN, "markersize": 10.0, "markeredgecolor": "white", "linestyle": "none"}
+    ax.plot(*points[:1].T, label="start", **start)
+    if np.abs(points[-1] - points[0]).max() > _STILL:
+        ax.plot(*points[-1:].T, marker="s", color=BLUE, markersize=5.0, linestyle="none", label="end")
+
+
+def _coloured(ax: Any, rows: list[Array], values: Array, largest: float) -> Any:
+    from matplotlib.colors import LinearSegmentedColormap
+
+    # Neither end so dark that lines and text on it could not be read.
+    colours = LinearSegmentedColormap.from_list("orange to violet", ["#C8701A", "#F7F7F7", "#7F6FB0"])
+    look = {"cmap": colours, "vmin": -largest, "vmax": largest, "shading": "gouraud", "rasterized": True}
+    return ax.pcolormesh(*rows, values, **look)
+
+
+def _contours(ax: Any, rows: list[Array], values: Array, largest: float) -> None:
+    """Lines of equal values at round numbers, as far as there are any."""
+    from matplotlib.ticker import MaxNLocator
+
+    levels = MaxNLocator(nbins=_LEVELS, symmetric=True).tick_values(-largest, largest)
+    levels = levels[(levels > values.min()) & (levels < values.max())]
+    if len(levels):
+        styles = ["-" if level >= 0.0 else "--" for level in levels]
+        widths = [1.5 if abs(level) < 1e-9 * largest else 0.7 for level in levels]
+        lines = ax.contour(*rows, values, levels=levels, colors="#333333", linestyles=styles, linewidths=widths)
+        ax.clabel(lines, fmt=lambda level: f"{level:.2g}".replace("-", "−"), fontsize=SMALL - 2, inline_spacing=2)
+
+
+def _power_of_ten(size: float) -> tuple[int, str]:
+    """To be taken out of numbers up to this size, and how that is written before a unit."""
+    power = int(np.floor(np.log10(size))) if size > 0.0 else 0
+    if -3 <= power <= 2:
+        return 0, ""
+    return power, "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")) + " "
+
+
+def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:
+    if axis is None:
+        axis = _AXES[int(np.argmax(np.abs(field).max(axis=(0, 1))))]
+    if isinstance(axis, str):
+        if axis not in _AXES or len(axis) != 1:
+            raise unknown_name("axis", axis, _AXES)
+        return np.eye(3)[_AXES.index(axis)], f"{axis} component"
+    direction = finite_array(axis, "axis", (3,))
+    size = float(np.linalg.norm(direction))
+    if direction.ndim != 1 or not size:
+        raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {direction}")
+    unit = direction / size
+    return unit, "along ({:.2g}, {:.2g}, {:.2g})".format(*unit).replace("-", "−")
+
+
+def _row(values: ArrayLike | None, body: Body, joint: int, points: Array | None, name: str) -> Array:
+    if values is not None:
+        row = finite_array(values, name)
+        if row.ndim != 1 or len(row) < 2 or np.any(np.diff(row) <= 0.0):
+            raise ShapeError(f"{name}: two coordinates or more that increase are needed, got shape {row.shape}")
+        return row
+    low, high = body.joint_limits[joint]
+    if points is not None:
+        room = _MARGIN * (float(np.ptp(points)) or 1.0)
+        low, high = float(points.min()) - room, float(points.max()) + room
+    elif not (np.isfinite(low) and np.isfinite(high)):
+        low, high = -np.pi, np.pi
+    return np.linspace(low, high, _COUNT)
+
+
+def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ...], tuple[str, ...]]:
+    """The path in the body's order, names and units of its columns."""
+    if body is not None:
+        return path.matched(body.joint_names, body.name), body.joint_names, body.joint_units
+    names = path.joint_names or tuple(f"joint {k}" for k in range(path.n_shape))
+    return path, names, ("rad or m",) * path.n_shape
+
+
+def _pair(joints: Sequence[str | int], names: Sequence[str]) -> tuple[int, int]:
+    if isinstance(joints, str) or len(joints) != 2:
+        raise ShapeError(f"joints: two joints are needed, got {joints!r}")
+    i, j = (_place(joint, names) for joint in joints)
+    if i == j:
+        raise ShapeError(f"joints: two different joints are needed, got {names[i]} twice")
+    return i, j
+
+
+def _place(joint: str | int, names: Sequence[str]) -> int:
+    if isinstance(joint, str) and joint in names:
+        return list(names).index(joint)
+    if isinstance(joint, (int, np.integer)) and not isinstance(joint, bool) and 0 <= joint < len(names):
+        return int(joint)
+    raise unknown_name("joint", str(joint), names)
+
+
+def _extent(points: Array) -> Array:
+    span = np.ptp(points, axis=0)
+    return np.where(span > 0.0, span, 1.0)

@@ -1,0 +1,123 @@
+"""The inside of a closed curve on the sphere, cut into cells of one winding number each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import so3, sphere
+from ..arrays import Array, Integers
+
+_MOST_STRIPS = 1500
+_FEWEST_STRIPS = 120
+_LONGEST = 0.05
+MOST_TURNS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class AreaCells:
+    """Small polygons that cover the inside of a curve once.
+
+    Attributes
+    ----------
+    polygons : (m_k, 3) corners each, counterclockwise as seen from outside
+    windings : (K,) how often the curve goes round each, counterclockwise; not zero, three for more
+    """
+
+    polygons: list[Array]
+    windings: Integers
+
+    @property
+    def area(self) -> float:
+        """The sum of the cells' areas times their windings [sr]."""
+        sizes = [float(sphere.triangle_area(p[0], p[1:-1], p[2:]).sum()) for p in self.polygons]
+        return float(np.array(sizes) @ self.windings)
+
+
+def enclosed_cells(corners: Array, reference: Array) -> AreaCells:
+    """The cells inside a closed polygon of great-circle arcs.
+
+    The strips between meridians of `reference` through the corners are cut by the arcs that cross them. Walking in from
+    the point opposite, where the winding is zero, each arc adds its sense: the area is that of
+    `sphere.polygon_area`, counted from the region of the point opposite `reference`.
+
+    Parameters
+    ----------
+    corners : (N, 3) unit vectors, the last joined to the first
+    reference : (3,) its opposite is not on the curve
+    """
+    first = so3.perpendicular(reference)
+    basis = np.stack([first, np.cross(reference, first)])
+    x, y = corners @ basis.T[:, 0], corners @ basis.T[:, 1]
+    azimuth = np.arctan2(y, x)
+    edges = _strip_edges(azimuth)
+    crossings = _crossings(corners, azimuth, edges, reference, basis)
+    polygons, windings = [], []
+    for strip, (heights, senses) in crossings.items():
+        left, right = edges[strip], edges[(strip + 1) % len(edges)]
+        sides = [np.cos(a) * basis[0] + np.sin(a) * basis[1] for a in (left, right)]
+        outward = np.argsort(-heights.sum(axis=1), kind="stable")
+        winding = np.clip(np.cumsum(senses[outward]), -MOST_TURNS, MOST_TURNS)
+        # Where more turns are shown alike, the arcs between them bound nothing.
+        kept = np.flatnonzero(np.diff(winding, prepend=0))
+        bounds = np.concatenate([heights[outward][kept], np.zeros((1, 2))])
+        for k, layer in enumerate(winding[kept]):
+            if layer:
+                polygons.append(_cell(reference, sides, bounds[k], bounds[k + 1]))
+                windings.append(int(layer))
+    return AreaCells(polygons, np.array(windings, dtype=np.int64))
+
+
+def _strip_edges(azimuth: Array) -> Array:
+    """Azimuths of the meridians, ascending in (-pi, pi]: those of the corners, or some of them if they are many."""
+    own = np.unique(azimuth)
+    own = own[np.unique(np.linspace(0, len(own) - 1, min(len(own), _MOST_STRIPS)).astype(int))]
+    edges = np.union1d(own, np.linspace(-np.pi, np.pi, _FEWEST_STRIPS + 1)[1:])
+    return edges[np.diff(edges, prepend=-np.inf) > 1e-12]
+
+
+def _crossings(
+    corners: Array, azimuth: Array, edges: Array, reference: Array, basis: Array
+) -> dict[int, tuple[Array, Array]]:
+    """For each strip the polar angles at which arcs pass its two sides (M, 2), and their senses (M,)."""
+    count = len(edges)
+    turn = so3.wrap(np.roll(azimuth, -1) - azimuth)
+    cell = np.searchsorted(edges, azimuth, side="right")
+    # Whole turns are counted in cells, so that an arc across the cut of the azimuth goes on.
+    following = np.roll(cell, -1)
+    across = np.round((turn - (np.roll(azimuth, -1) - azimuth)) / (2.0 * np.pi)).astype(np.int64)
+    steps = following + count * across - cell
+    rows = np.repeat(np.arange(len(corners)), np.abs(steps))
+    order = np.arange(len(rows)) - np.repeat(np.cumsum(np.abs(steps)) - np.abs(steps), np.abs(steps))
+    # Going up from cell c the edges c, c + 1, ... are passed; going down c - 1, c - 2, ...
+    passed = np.where(steps[rows] > 0, cell[rows] + order, cell[rows] - 1 - order) % count
+    normal = np.cross(corners[rows], np.roll(corners, -1, axis=0)[rows])
+    angle = edges[passed][:, None]
+    along = np.cos(angle) * basis[0] + np.sin(angle) * basis[1]
+    point = np.cross(normal, np.cross(reference, along))
+    outwards = np.sum(point * along, axis=-1)
+    upwards = point @ reference * np.where(outwards < 0.0, -1.0, 1.0)
+    polar = np.arctan2(np.abs(outwards), upwards)
+    last, sense = np.roll(passed, 1), np.sign(steps[rows])
+    before = np.roll(sense, 1)
+    # A strip is crossed between two passings of different sides in one sense; else the curve has turned back in it.
+    whole = (before == sense) & ((passed - last) % count == sense % count)
+    strip = np.where(sense > 0, last, passed)
+    start = np.roll(polar, 1)
+    heights = np.where((sense > 0)[:, None], np.stack([start, polar], axis=-1), np.stack([polar, start], axis=-1))
+    found: dict[int, tuple[Array, Array]] = {}
+    for s in np.unique(strip[whole]):
+        mine = whole & (strip == s)
+        found[int(s)] = heights[mine], sense[mine].astype(np.float64)
+    return found
+
+
+def _cell(reference: Array, sides: list[Array], outer: Array, inner: Array) -> Array:
+    """Between two meridians and two arcs: corners along the meridians every few degrees."""
+    down, up = (
+        np.linspace(a, b, 2 + int(abs(a - b) / _LONGEST)) for a, b in ((inner[0], outer[0]), (outer[1], inner[1]))
+    )
+    left = np.cos(down)[:, None] * reference + np.sin(down)[:, None] * sides[0]
+    right = np.cos(up)[:, None] * reference + np.sin(up)[:, None] * sides[1]
+    return np.concatenate([left, right])

@@ -1,0 +1,280 @@
+"""Motions in three dimensions: live in a browser or a notebook, and as one HTML file that opens without a network."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+import io
+import math
+import os
+import threading
+import time
+import warnings
+import webbrowser
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..body.appearance import VisualWarning
+from ..errors import MissingExtraError, ShapeError
+from ..files import write_whole
+from ..reconstruction.reconstruction import Motion
+from .moving_scene import MovingScene, moving_scene
+from .scene_drawing import DrawnScene, set_camera
+
+if TYPE_CHECKING:
+    import viser
+
+_SHORTEST, _LONGEST, _RATE, _MOST_FRAMES = 4.0, 20.0, 30, 3000
+"""Seconds that a motion is played in unless a speed is asked for, frames in each of them, and in all."""
+_HOLD_FIRST, _HOLD_LAST = 0.5, 1.0
+
+
+def motion_page(
+    motion: Motion,
+    path: str | os.PathLike[str],
+    *,
+    speed: float | None = None,
+    frames: int | None = None,
+    trail: str | None = None,
+    ghost: bool = True,
+    **fall: ArrayLike,
+) -> None:
+    """Write a motion as one HTML page to play, stop and scrub; it needs no network and no server.
+
+    The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass and the
+    body at the start as a shadow of itself.
+
+    Parameters
+    ----------
+    path : of the file, written whole or not at all
+    speed : seconds of motion in a second of playing; None: 1, or what makes the playing last from 4 to 20 s
+    frames : None: 30 in a second of playing
+    trail : a link whose origin leaves a trail, light at the start and dark at the end
+    ghost : whether the body at the start is shown
+    fall : start, velocity, gravity of the centre of mass as in `Motion.base_position`; by default it rests at the
+        origin
+
+    Raises
+    ------
+    MissingExtraError
+        If viser is not installed.
+    ShapeError, UnknownNameError
+        As `moving_scene`, and for a speed that is not above zero.
+
+    Warns
+    -----
+    VisualWarning
+        As `visuals`; and if something turns by more than a quarter from one frame to the next, so that it may seem to
+        turn the other way, where `frames` is None.
+    """
+    page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, **fall)
+    write_whole(path, lambda stream: stream.write(page.encode()))
+
+
+def motion_html(
+    motion: Motion,
+    *,
+    speed: float | None = None,
+    frames: int | None = None,
+    trail: str | None = None,
+    ghost: bool = True,
+    **fall: ArrayLike,
+) -> str:
+    """The page that `motion_page` writes, as text: arguments, errors and warnings as there."""
+    viser_module()
+    pace = _pace(motion, speed)
+    scene = _scene(motion, pace, frames, trail, fall)
+    with _server() as server:
+        page = _recording(server, scene, pace, ghost).as_html()
+    title = f"<title>{html.escape(scene.title)}</title>"
+    return page.replace("<title>Viser</title>", title, 1)
+
+
+def view(
+    motion: Motion,
+    *,
+    speed: float | None = None,
+    frames: int | None = None,
+    trail: str | None = None,
+    ghost: bool = True,
+    notebook: bool | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    browser: bool = True,
+    **fall: ArrayLike,
+) -> LiveView | None:
+    """Show a motion: in a browser by a server of this process, or in the cell of a notebook.
+
+    Parameters
+    ----------
+    speed, frames, trail, ghost, fall : as in `motion_page`
+    notebook : whether to show it in a cell, recorded as `motion_page` does; None: in a notebook
+    host, port : where the server listens; a port in use is passed over
+    browser : whether to open a browser there
+
+    Returns
+    -------
+    the running view, with `url` and `stop()`; None in a notebook
+
+    Raises and warns as `motion_page`.
+    """
+    viser_module()
+    pace = _pace(motion, speed)
+    scene = _scene(motion, pace, frames, trail, fall)
+    if _in_notebook() if notebook is None else notebook:
+        with _server() as server:
+            _recording(server, scene, pace, ghost).show(height=480)
+        return None
+    running = LiveView(_started(host, port), scene, pace, ghost)
+    if browser:
+        webbrowser.open(running.url)
+    return running
+
+
+def viser_module() -> Any:
+    """The module viser. Raises MissingExtraError."""
+    try:
+        import viser
+    except ImportError:
+        raise MissingExtraError("3-D views need viser; install it with: pip install 'shapephase[viz]'") from None
+    return viser
+
+
+class LiveView:
+    """A motion shown by a server of this process, with a slider of time, a button to play and a speed.
+
+    Made by `view`. It runs until `stop()`, or the end of the process; a with-block stops it, too.
+
+    Attributes
+    ----------
+    server : the viser server, to which more can be added
+    """
+
+    def __init__(self, server: viser.ViserServer, scene: MovingScene, pace: float, ghost: bool) -> None:
+        self.server = server
+        self._scene = scene
+        self._drawn = DrawnScene(server.scene, scene, pace, ghost)
+        set_camera(server, scene)
+        self._stopped = threading.Event()
+        end = float(scene.times[-1])
+        gui = server.gui
+        self._slider = gui.add_slider("time [s]", min=0.0, max=end, step=end / 1000.0, initial_value=0.0)
+        self._playing = gui.add_checkbox("play", initial_value=True)
+        self._speed = gui.add_number("speed", initial_value=pace, min=0.0)
+        self._thread = threading.Thread(target=self._play, daemon=True, name="shapephase view")
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        """Where a browser finds it."""
+        return f"http://{self.server.get_host()}:{self.server.get_port()}"
+
+    def stop(self) -> None:
+        """End the view and its server."""
+        self._stopped.set()
+        self._thread.join()
+        with _quiet():
+            self.server.stop()
+
+    def wait(self) -> None:
+        """Return when the view is stopped, from elsewhere or by Ctrl-C: for a script that has nothing else to do."""
+        try:
+            self._thread.join()
+        except KeyboardInterrupt:
+            self.stop()
+
+    def __enter__(self) -> LiveView:
+        """The view itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop it."""
+        self.stop()
+
+    def __repr__(self) -> str:
+        """One line for people."""
+        return f"LiveView({self._scene.title!r}, {self.url})"
+
+    def _play(self) -> None:
+        end, last = float(self._scene.times[-1]), time.monotonic()
+        while not self._stopped.wait(1.0 / _RATE):
+            now = time.monotonic()
+            if self._playing.value:
+                moved = self._slider.value + (now - last) * self._speed.value
+                self._slider.value = moved if moved <= end else 0.0
+            last, self._drawn.pace = now, self._speed.value
+            with self.server.atomic():
+                self._drawn.show(round(self._slider.value / end * (len(self._scene.times) - 1)))
+
+
+def _recording(server: viser.ViserServer, scene: MovingScene, pace: float, ghost: bool) -> Any:
+    drawn = DrawnScene(server.scene, scene, pace, ghost)
+    set_camera(server, scene)
+    serializer = server.get_scene_serializer()
+    serializer.insert_sleep(_HOLD_FIRST)
+    step = float(scene.times[1] - scene.times[0]) / pace
+    for frame in range(1, len(scene.times)):
+        serializer.insert_sleep(step)
+        drawn.show(frame)
+    serializer.insert_sleep(_HOLD_LAST)
+    return serializer
+
+
+@contextlib.contextmanager
+def _server() -> Iterator[viser.ViserServer]:
+    """A server for as long as a scene is recorded, on a port that the system chooses."""
+    server = _started("127.0.0.1", 0)
+    try:
+        yield server
+    finally:
+        with _quiet():
+            server.stop()
+
+
+def _started(host: str, port: int) -> viser.ViserServer:
+    with _quiet():
+        return viser_module().ViserServer(host=host, port=port, verbose=False)
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what viser prints when it begins and ends."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        yield
+
+
+def _pace(motion: Motion, speed: float | None) -> float:
+    if speed is None:
+        return motion.duration / min(max(motion.duration, _SHORTEST), _LONGEST)
+    if not (isinstance(speed, int | float | np.floating | np.integer) and 0.0 < speed < math.inf):
+        raise ShapeError(f"speed: seconds of motion in a second of playing, above zero, are needed, got {speed!r}")
+    return float(speed)
+
+
+def _scene(
+    motion: Motion, pace: float, frames: int | None, trail: str | None, fall: Mapping[str, ArrayLike]
+) -> MovingScene:
+    if frames is not None:
+        return moving_scene(motion, frames, trail=trail, **fall)
+    count = min(max(math.ceil(_RATE * motion.duration / pace), 2), _MOST_FRAMES) + 1
+    scene = moving_scene(motion, count, trail=trail, **fall)
+    if scene.largest_turn > 0.5 * math.pi:
+        warnings.warn(
+            f"from one frame to the next something turns by {math.degrees(scene.largest_turn):.0f} degrees and may "
+            f"seem to turn the other way; ask for more than {count} frames, or for a lower speed than {pace:.3g}",
+            VisualWarning,
+            stacklevel=3,
+        )
+    return scene
+
+
+def _in_notebook() -> bool:
+    try:
+        from IPython.core.getipython import get_ipython
+    except ImportError:
+        return False
+    shell = get_ipython()
+    return shell is not None and getattr(shell, "kernel", None) is not None

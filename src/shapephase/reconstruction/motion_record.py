@@ -1,0 +1,169 @@
+"""Motions in files: a whole motion as NPZ, a time series as CSV."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..deformation.deformation import Deformation, sampled_deformation
+from ..errors import InputFileNotFoundError, ResultFileError
+from ..files import write_whole
+from ..integrator.integrate import SteppedRotation
+from ..integrator.interpolant import Interpolant, unit_nodes, values_to_coefficients
+
+_FORMAT = "shapephase motion 3"
+_STEPS = (
+    "momentum",
+    "steps",
+    "quaternions",
+    "directions",
+    "turns",
+    "dynamics",
+    "sampling_error",
+    "stepping_error",
+    "amplification",
+    "propagator",
+)
+_SAMPLES = ("edges", "coefficients")
+_CENTRE_DEGREE = 24
+# What a damaged archive raises: its directory, checksums, compression, headers of arrays, or text.
+_UNREADABLE = (OSError, ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRecord:
+    """What is kept of a motion; its fields are those of `reconstruction.Motion`.
+
+    When read, the deformation is one made of the samples: it needs neither body nor path.
+    """
+
+    deformation: Deformation
+    momentum: Array
+    initial_attitude: Array
+    tolerance: float
+    method: str
+    evaluations: int
+    solution: SteppedRotation
+
+
+def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> None:
+    """Write a motion whole, with versions and units."""
+    interpolant, deformation = record.solution.interpolant, record.deformation
+    header = {
+        "format": _FORMAT,
+        "shapephase": version("shapephase"),
+        "numpy": np.__version__,
+        "deformation": deformation.label,
+        "sha256": dict(deformation.inputs),
+        "tolerance": record.tolerance,
+        "method": record.method,
+        "evaluations": record.evaluations,
+        "loops": interpolant.loops,
+        "interpolant_evaluations": interpolant.evaluations,
+        "shape_gap": deformation.shape_gap,
+        "units": "SI: rad, s, m, kg m^2, kg m^2/s; quaternions x y z w",
+    }
+    arrays: dict[str, Any] = {
+        "header": np.array(json.dumps(header)),
+        "spatial_momentum": record.momentum,
+        "initial_attitude": record.initial_attitude,
+        "breaks": deformation.breaks,
+        "centre": _centre_coefficients(deformation, interpolant),
+        **{name: getattr(interpolant, name) for name in _SAMPLES},
+        **{f"step_{name}": getattr(record.solution, name) for name in _STEPS},
+    }
+    if deformation.closure is not None:
+        arrays["closure"] = deformation.closure
+    write_whole(path, lambda stream: np.savez(stream, **arrays))
+
+
+def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
+    """Read what `write_motion_record` wrote.
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    ResultFileError
+        If the file is no motion, is damaged, or was written by a version with another format.
+    """
+    where = Path(path)
+    if not where.is_file():
+        raise InputFileNotFoundError(f"{where}: there is no such file")
+    try:
+        with zipfile.ZipFile(where) as archive:
+            arrays = {
+                name.removesuffix(".npy"): np.lib.format.read_array(BytesIO(archive.read(name)), allow_pickle=False)
+                for name in archive.namelist()
+            }
+        header = json.loads(str(arrays["header"]))
+    except (*_UNREADABLE, KeyError) as error:
+        raise ResultFileError(f"{where}: no motion that can be read ({error})") from None
+    if not isinstance(header, dict) or "format" not in header:
+        raise ResultFileError(f"{where}: no motion; its header says {str(header)[:80]!r}")
+    if header["format"] != _FORMAT:
+        raise ResultFileError(
+            f"{where}: holds {header['format']!r}, this version reads {_FORMAT!r}; compute the motion anew"
+        )
+    try:
+        return _record(header, arrays)
+    except KeyError as error:
+        raise ResultFileError(f"{where}: the motion lacks {error}; compute it anew") from None
+    except (AttributeError, TypeError, ValueError) as error:
+        raise ResultFileError(f"{where}: the motion's numbers cannot be used ({error}); compute it anew") from None
+
+
+def write_table(path: str | os.PathLike[str], columns: Mapping[str, Array]) -> None:
+    """Write columns of numbers as CSV, every digit kept."""
+    rows = np.column_stack(list(columns.values())).tolist()
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+    text = "\n".join(lines) + "\n"
+    write_whole(path, lambda stream: stream.write(text.encode()))
+
+
+def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecord:
+    interpolant = Interpolant(
+        **{name: arrays[name] for name in _SAMPLES},
+        loops=int(header["loops"]),
+        evaluations=int(header["interpolant_evaluations"]),
+    )
+    deformation = sampled_deformation(
+        interpolant,
+        arrays["centre"],
+        arrays["breaks"],
+        arrays.get("closure"),
+        float(header["shape_gap"]),
+        str(header["deformation"]),
+        {str(name): str(digest) for name, digest in header["sha256"].items()},
+    )
+    return MotionRecord(
+        deformation,
+        arrays["spatial_momentum"],
+        so3.orthonormalised(arrays["initial_attitude"]),
+        float(header["tolerance"]),
+        str(header["method"]),
+        int(header["evaluations"]),
+        SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS}),
+    )
+
+
+def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> Array:
+    """Chebyshev coefficients of the centre of mass on the interpolant's panels: (P, n, 3)."""
+    nodes = unit_nodes(_CENTRE_DEGREE)
+    edges = interpolant.edges[: len(interpolant.coefficients) + 1]
+    left, right = edges[:-1, None], edges[1:, None]
+    times = np.clip(0.5 * (left + right) + 0.5 * (right - left) * nodes, left, right)
+    values = deformation.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
+    return values_to_coefficients(_CENTRE_DEGREE) @ values

@@ -1,0 +1,433 @@
+"""The attitude of a free body whose shape changes in a known way."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..deformation.deformation import Deformation
+from ..deformation.descriptions import RigidSource
+from ..errors import AccuracyNotReached, ShapeError, unknown_name
+from ..inertia_tensor import inverse_inertia
+from ..integrator.integrate import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
+from ..integrator.interpolant import Interpolant
+from ..shape_space.shape_path import times_argument
+from .closed_form import rigid_rotation
+from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
+
+_IDENTITY = np.eye(3)
+_IDENTITY.flags.writeable = False
+METHODS = ("auto", "collocation", "closed_form", "dop853")
+_COLUMNS = (
+    "time",
+    *("qx", "qy", "qz", "qw"),
+    *("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s"),
+    *("base_x_m", "base_y_m", "base_z_m"),
+)
+
+
+class Solution(Protocol):
+    """S(t), the attitude relative to the start, for a batch."""
+
+    @property
+    def times(self) -> Array:
+        """(K + 1,) times between which the solution is smooth and turns little [s]."""
+        ...
+
+    @property
+    def error_estimate(self) -> Array:
+        """(B,) [rad]."""
+        ...
+
+    def rotation(self, t: Array, /) -> Array:
+        """(N,) -> (B, N, 3, 3)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """How the attitude at the end of a motion answers to small changes, to first order.
+
+    A change dmu of the momentum and a turn of the start to R(0) exp(hat(delta)) turn the end to R(T) exp(hat(e)) with
+    e = by_momentum dmu + by_attitude delta: the derivative of the steps, not a difference.
+
+    Attributes
+    ----------
+    by_momentum : batch + (3, 3) [rad per kg m^2/s], from inertial axes to base axes
+    by_attitude : batch + (3, 3), base axes at the start to base axes at the end
+    """
+
+    by_momentum: Array
+    by_attitude: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """How a free body turns: attitude, body angular momentum and angular velocity at any time of [0, T].
+
+    Results have the shape batch + t.shape + item, where batch are the leading axes of momentum and attitude.
+
+    Attributes
+    ----------
+    deformation : what moved
+    momentum : batch + (3,), about the centre of mass, inertial axes [kg m^2/s]
+    initial_attitude : batch + (3, 3), base axes to inertial axes
+    tolerance : the one asked for [rad]
+    method : the one used
+    evaluations : how often the locked inertia and internal momentum were computed
+    solution : S(t), the attitude relative to the start: attitude(t) = initial_attitude S(t)
+    """
+
+    deformation: Deformation
+    momentum: Array
+    initial_attitude: Array
+    tolerance: float
+    method: str
+    evaluations: int
+    solution: Solution
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.deformation.duration
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """The leading axes."""
+        return self.momentum.shape[:-1]
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """R(t), base axes to inertial axes: times (...) -> batch + (..., 3, 3)."""
+        times = times_argument(t, self.duration)
+        turned = self._flat_attitude[:, None] @ self.solution.rotation(times.ravel())
+        return turned.reshape(*self.batch, *times.shape, 3, 3)
+
+    def quat_xyzw(self, t: ArrayLike) -> Array:
+        """The attitude as quaternions x y z w with w >= 0: times (...) -> batch + (..., 4)."""
+        return so3.quat_from_matrix(self.attitude(t))
+
+    def body_momentum(self, t: ArrayLike) -> Array:
+        """Pi(t) = R(t)^T momentum: times (...) -> batch + (..., 3), base axes [kg m^2/s]."""
+        times = times_argument(t, self.duration)
+        attitude = self.attitude(times)
+        spatial = self.momentum.reshape(*self.batch, *(1,) * times.ndim, 3)
+        return so3.apply(so3.transpose(attitude), np.broadcast_to(spatial, attitude.shape[:-1]))
+
+    def angular_velocity(self, t: ArrayLike) -> Array:
+        """omega(t) = I^-1 (Pi - L_o): times (...) -> batch + (..., 3), base axes [rad/s]."""
+        times = times_argument(t, self.duration)
+        inertia, internal = self.deformation.source.sample(times.ravel())
+        pi = self.body_momentum(times).reshape(-1, times.size, 3)
+        omega = so3.apply(inverse_inertia(inertia, times.ravel()), pi - internal)
+        return omega.reshape(*self.batch, *times.shape, 3)
+
+    def base_position(
+        self,
+        t: ArrayLike,
+        *,
+        start: ArrayLike = (0.0, 0.0, 0.0),
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        gravity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Where the base origin is, inertial axes: times (...) -> batch + (..., 3) [m].
+
+        The centre of mass moves as start + velocity t + gravity t^2 / 2; by default it rests at the origin.
+
+        Parameters
+        ----------
+        start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
+        """
+        times = times_argument(t, self.duration)
+        point, speed, pull = (
+            finite_array(value, name, (3,))
+            for value, name in ((start, "start"), (velocity, "velocity"), (gravity, "gravity"))
+        )
+        centre = point + times[..., None] * speed + 0.5 * times[..., None] ** 2 * pull
+        return centre - so3.apply(self.attitude(times), self.deformation.centre_of_mass(times))
+
+    @property
+    def final_attitude(self) -> Array:
+        """R(T): batch + (3, 3)."""
+        return self.attitude(self.duration)
+
+    @property
+    def error_estimate(self) -> Array:
+        """Estimate of the largest attitude error over [0, T]: batch [rad]."""
+        return self.solution.error_estimate.reshape(self.batch)[()]
+
+    @cached_property
+    def equation_residual(self) -> Array:
+        """Largest defect of I omega + L_o = R^T momentum, omega by differentiating R(t): batch [relative].
+
+        At 20 times; the deformation is evaluated anew, so a fault of sampling or stepping shows here.
+        """
+        inner = np.repeat(self.solution.times[:-1], 2) + np.repeat(np.diff(self.solution.times), 2) * np.tile(
+            [0.3, 0.7], len(self.solution.times) - 1
+        )
+        times = inner[np.linspace(0, len(inner) - 1, 20).astype(int)]
+        inertia, internal = self.deformation.source.sample(times)
+        omega = self._differentiated(times)
+        pi = self.body_momentum(times).reshape(-1, len(times), 3)
+        defect = so3.apply(inertia[None], omega) + internal - pi
+        size = np.linalg.norm(pi, axis=-1).max() + np.linalg.norm(internal, axis=-1).max() + 1e-300
+        return (np.linalg.norm(defect, axis=-1).max(axis=-1) / size).reshape(self.batch)[()]
+
+    @property
+    def interpolant(self) -> Interpolant:
+        """I^-1 and I^-1 L_o as the integrator saw them."""
+        return _stepped(self).interpolant
+
+    @property
+    def amplification(self) -> Array:
+        """The largest growth of a small error of the attitude from one time to a later one: batch."""
+        return _stepped(self).amplification.reshape(self.batch)[()]
+
+    @property
+    def propagator(self) -> Array:
+        """`sensitivity.by_attitude` to a few thousandths, at no cost: batch + (3, 3)."""
+        return _stepped(self).propagator.reshape(*self.batch, 3, 3)
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""
+        stepped = _stepped(self)
+        slope = stepped.momentum_slope
+        start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
+        attitude = so3.transpose(stepped.end) + slope @ so3.hat(start)
+        matrix = (*self.batch, 3, 3)
+        return Sensitivity(
+            (slope @ so3.transpose(self._flat_attitude)).reshape(matrix),
+            attitude.reshape(matrix),
+        )
+
+    def dynamic_phase(self, t: ArrayLike) -> Array:
+        """The integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
+
+        Source: Cabrera 2006, equation (12); theory.md B9.
+        """
+        times = times_argument(t, self.duration)
+        return _stepped(self).dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
+
+    def solid_angle(self, t: ArrayLike) -> Array:
+        """The signed area that Pi has gone round from 0 to t, closed by the great circle, seen from the base frame.
+
+        Times (...) -> batch + (...) [sr]; zero without momentum. It grows continuously from zero as long as Pi keeps
+        away from the point opposite its start, where it jumps by 4 pi: at the end of the motion it is that of
+        `split(motion, "base")` up to multiples of 4 pi, and dynamic_phase - solid_angle turns the start into the
+        attitude, up to the transport along the great circle.
+
+        Source: theory.md D; numerics.md section 3.
+        """
+        times = times_argument(t, self.duration)
+        return _stepped(self).solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
+        record = MotionRecord(
+            self.deformation,
+            self.momentum,
+            self.initial_attitude,
+            self.tolerance,
+            self.method,
+            self.evaluations,
+            _stepped(self),
+        )
+        write_motion_record(record, path)
+
+    def write_csv(self, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike) -> None:
+        """Write a time series: attitude (x y z w, one sign throughout), angular velocity, base position.
+
+        Parameters
+        ----------
+        times : (N,) [s]; None: 201 even times
+        fall : start, velocity, gravity as in `base_position`
+
+        Raises
+        ------
+        ShapeError
+            If the motion is a batch.
+        """
+        if self.batch:
+            raise ShapeError(f"a table holds one motion, this is a batch of {self.batch}; reconstruct one of them")
+        t = np.linspace(0.0, self.duration, 201) if times is None else finite_array(times, "times", (None,), unit="s")
+        quaternions = self.quat_xyzw(t)
+        flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
+        quaternions[1:] *= np.cumprod(flips)[:, None]
+        columns = [t, *quaternions.T, *self.angular_velocity(t).T, *self.base_position(t, **fall).T]
+        write_table(path, dict(zip(_COLUMNS, columns, strict=True)))
+
+    @cached_property
+    def _flat_attitude(self) -> Array:
+        return self.initial_attitude.reshape(-1, 3, 3)
+
+    def _differentiated(self, times: Array) -> Array:
+        """omega from the attitude alone, by differences of order eight within a step: (N,) -> (B, N, 3)."""
+        ends = self.solution.times
+        index = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 2)
+        reach = np.minimum(times - ends[index], ends[index + 1] - times)
+        h = 0.24 * reach
+        middle = self.solution.rotation(times)
+        total = np.zeros((*middle.shape[:2], 3))
+        for k, weight in enumerate((4 / 5, -1 / 5, 4 / 105, -1 / 280), start=1):
+            ahead, behind = self.solution.rotation(times + k * h), self.solution.rotation(times - k * h)
+            total += weight * (so3.vee(so3.transpose(middle) @ ahead) - so3.vee(so3.transpose(middle) @ behind))
+        return total / h[:, None]
+
+
+def reconstruct(
+    deformation: Deformation,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    *,
+    tolerance: float = 1e-9,
+    method: str = "auto",
+) -> Motion:
+    """The motion of a free body with a known change of shape and a given angular momentum.
+
+    Solves R' = R hat(I^-1 (R^T momentum - L_o)).
+
+    Parameters
+    ----------
+    momentum : (..., 3) about the centre of mass, inertial axes [kg m^2/s]; zero is allowed
+    attitude : (..., 3, 3) of the deformation's frame at t = 0, to inertial axes; None: the identity. Leading
+        axes of both broadcast; the deformation is sampled once for all of them.
+    tolerance : of the attitude, over the whole interval, between 1e-13 and 1e-4 [rad]
+    method : "auto" or "collocation" (the deformation sampled at Chebyshev points, the attitude stepped on the
+        interpolant), "closed_form" (of a rigid body, by elliptic functions: `rigid_body.EulerTop`), or "dop853"
+        (SciPy's integrator on the deformation itself, an independent check)
+
+    Raises
+    ------
+    ShapeError, UnknownNameError
+        For arguments of the wrong shape, an unknown method, or "closed_form" for a deformation not made by `rigid`.
+    SingularInertiaError
+        If the locked inertia is not positive definite somewhere.
+    AccuracyNotReached
+        If the tolerance cannot be met.
+
+    Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
+    """
+    if method not in METHODS:
+        raise unknown_name("method", method, METHODS)
+    goal = tolerance_argument(tolerance)
+    spatial, start = _broadcast(momentum, attitude)
+    at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
+    at_start = at_start.reshape(-1, 3)
+    if method == "closed_form":
+        if not isinstance(deformation.source, RigidSource):
+            others = [name for name in METHODS if name != method]
+            raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", method, others)
+        exact = rigid_rotation(deformation.source.tensor, at_start, deformation.duration, goal)
+        return Motion(deformation, spatial, start, goal, method, 1, exact)
+    if method == "dop853":
+        solution = _dop853(deformation, at_start, goal)
+        return Motion(deformation, spatial, start, goal, method, solution.evaluations, solution)
+    solution = stepped_rotation(deformation.sampler(), at_start, goal)
+    evaluations = solution.interpolant.evaluations
+    return Motion(deformation, spatial, start, goal, "collocation", evaluations, solution)
+
+
+def load_motion(path: str | os.PathLike[str]) -> Motion:
+    """Read a motion written by `Motion.save`; it needs neither the body nor the path it was made from.
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    ResultFileError
+        If the file is no motion, is damaged, or was written by a version with another format.
+    """
+    return Motion(**vars(read_motion_record(path)))
+
+
+def momentum_from_rate(
+    deformation: Deformation, angular_velocity: ArrayLike, attitude: ArrayLike | None = None
+) -> Array:
+    """The angular momentum of a body that starts with this rate while its shape motion starts too.
+
+    Parameters
+    ----------
+    angular_velocity : (..., 3) of the base at t = 0, base axes [rad/s]
+    attitude : (..., 3, 3) at t = 0; None: the identity
+
+    Returns
+    -------
+    (..., 3) about the centre of mass, inertial axes [kg m^2/s]: R (I omega + L_o)
+
+    Source: Cabrera 2006, equation (7).
+    """
+    omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
+    inertia, internal = deformation.inertia(0.0), deformation.internal_momentum(0.0)
+    body = so3.apply(inertia, omega) + internal
+    return body if attitude is None else so3.apply(so3.rotation_argument(attitude, "attitude"), body)
+
+
+@dataclass(frozen=True, eq=False)
+class _Dop853Solution:
+    dense: tuple[Callable[[Array], Array], ...]
+    times: Array
+    error_estimate: Array
+    evaluations: int
+
+    def rotation(self, t: Array) -> Array:
+        return np.stack([so3.matrix_from_quat(one(t)) for one in self.dense])
+
+
+def _dop853(deformation: Deformation, at_start: Array, tolerance: float) -> _Dop853Solution:
+    """Two runs for each start, one ten times as tight; their difference bounds the error of the looser one."""
+    dense, estimates, evaluations = [], [], 0
+    rtol = max(0.01 * tolerance, 1e-12)
+    pieces = max(2, 64 // (len(deformation.breaks) - 1))
+    times = np.unique(
+        np.concatenate(
+            [np.linspace(a, b, pieces) for a, b in zip(deformation.breaks[:-1], deformation.breaks[1:], strict=True)]
+        )
+    )
+    for start in at_start:
+        loose, first = dop853_rotation(deformation.source.sample, deformation.breaks, start, rtol)
+        tight, second = dop853_rotation(deformation.source.sample, deformation.breaks, start, 0.1 * rtol)
+        between = times[:-1] + 0.37 * np.diff(times)
+        there = np.concatenate([times, between])
+        gap = so3.angle(so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there)))
+        dense.append(tight)
+        estimates.append(float(gap.max()) + 1e-13)
+        evaluations += first + second
+    worst = max(estimates)
+    if worst > tolerance:
+        raise AccuracyNotReached(
+            f"DOP853 reached {worst:.3g} rad where {tolerance:.3g} was asked; loosen the tolerance or use "
+            "method='collocation'"
+        )
+    return _Dop853Solution(tuple(dense), times, np.array(estimates), evaluations)
+
+
+def _stepped(motion: Motion) -> SteppedRotation:
+    """The motion on an interpolant; for another method that interpolant's steps hold the method's rotations."""
+    solution = motion.solution
+    if isinstance(solution, SteppedRotation):
+        return solution
+    start = so3.apply(so3.transpose(motion._flat_attitude), motion.momentum.reshape(-1, 3))
+    stepped = stepped_rotation(motion.deformation.sampler(), start, motion.tolerance)
+    return stepped.with_rotations(solution.rotation(stepped.times), solution.error_estimate)
+
+
+def _broadcast(momentum: ArrayLike, attitude: ArrayLike | None) -> tuple[Array, Array]:
+    spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
+    if attitude is None:
+        return spatial, np.broadcast_to(_IDENTITY, (*spatial.shape[:-1], 3, 3)) if spatial.ndim > 1 else _IDENTITY
+    start = so3.rotation_argument(attitude, "attitude")
+    try:
+        batch = np.broadcast_shapes(spatial.shape[:-1], start.shape[:-2])
+    except ValueError:
+        raise ShapeError(
+            f"momentum {spatial.shape} and attitude {start.shape}: their leading axes must broadcast"
+        ) from None
+    return np.broadcast_to(spatial, (*batch, 3)), np.broadcast_to(start, (*batch, 3, 3))

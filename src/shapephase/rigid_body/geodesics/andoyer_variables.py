@@ -1,0 +1,353 @@
+"""Andoyer's variables (g, k, l, G, K, L) of a turning body, to and from attitude and momentum and Euler angles.
+
+G is the size of the angular momentum mu, K its component along the inertial third axis, L along the body's third axis.
+With cos I = K/G and cos J = L/G the attitude, body to inertial axes, is
+
+    R = R_z(k + pi) R_x(I) R_z(g) R_x(J) R_z(l),
+
+so that Pi = (sqrt(G^2 - L^2) sin l, sqrt(G^2 - L^2) cos l, L), and mu has the azimuth k + pi/2. g, k, l are conjugate
+to G, K, L: the six are canonical on the cotangent bundle of SO(3). k is that of Bonnard et al.; Deprit's h is k + pi.
+The third axes matter: `attitude` may be turned by constant rotations on both sides before it comes here.
+
+Singular are L = G and L = -G, where only g + l or g - l is determined, and K = G and K = -G, where only g + k or
+g - k is. There l, or k, is 0 and g takes the whole turn. Next to them the variables are coordinates that lose digits:
+attitudes come back from them to rounding times G/sqrt(G^2 - L^2) and G/sqrt(G^2 - K^2). What is not defined there
+(the rates of a body whose third axis is not principal) is refused, as is a momentum that is zero.
+
+Source: Bonnard, Cots and Shcherbakova 2013, section 3.4, with theory.md B-E3, B-E4; theory.md R1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ... import so3
+from ...arrays import Array, Mask, finite_array
+from ...errors import AccuracyNotReached, ChartPoleError, ShapeError
+from ...inertia_tensor import inertia_argument, inverse_inertia
+from ..euler_angles import ZXZ, ZYZ, EulerChart
+
+_NEAREST = 1e-8
+_LARGEST_TURN = 1.0
+_STILL = 1e-9
+_MOST_SAMPLES = 200_000
+
+
+class TurningBody(Protocol):
+    """What has an attitude and a body momentum at given times: an `EulerTop`, the `Motion` of `reconstruct`."""
+
+    def attitude(self, t: Array, /) -> Array:
+        """R(t), body to inertial axes: (N,) -> (..., N, 3, 3)."""
+        ...
+
+    def body_momentum(self, t: Array, /) -> Array:
+        """Pi(t): (N,) -> (..., N, 3) [kg m^2/s]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class AndoyerVariables:
+    """g, k, l [rad] and the momenta conjugate to them [kg m^2/s]; see `andoyer_variables`. They broadcast together.
+
+    Raises
+    ------
+    ShapeError
+        If their shapes do not go together, an entry is not finite, G is not above 0, or |L| or |K| is above G.
+    """
+
+    g: Array
+    k: Array
+    l: Array  # noqa: E741
+    total: Array
+    """G, conjugate to g: |mu|."""
+    vertical: Array
+    """K, conjugate to k: the component along the inertial third axis."""
+    axial: Array
+    """L, conjugate to l: the component along the body's third axis."""
+
+    def __post_init__(self) -> None:  # noqa: D105
+        names = ("g", "k", "l", "total", "vertical", "axial")
+        values = [finite_array(getattr(self, name), name) for name in names]
+        try:
+            values = np.broadcast_arrays(*values)
+        except ValueError:
+            shapes = ", ".join(f"{name} {value.shape}" for name, value in zip(names, values, strict=True))
+            raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
+        for name, value in zip(names, values, strict=True):
+            object.__setattr__(self, name, value)
+        for name, value in (("total", 0.0), ("vertical", self.vertical), ("axial", self.axial)):
+            bad = (self.total <= 0.0) | (np.abs(value) > self.total)
+            if bad.any():
+                where = tuple(int(i) for i in np.argwhere(bad)[0])
+                raise ShapeError(
+                    f"{name}: entry {list(where)} is {getattr(self, name)[where]:.17g} where G is "
+                    f"{self.total[where]:.17g}; G must be above 0, K and L between -G and G"
+                )
+
+    @property
+    def is_regular(self) -> Mask:
+        """Whether they are coordinates there: the parts of the momentum across both third axes are above 1e-8 of G."""
+        return (self._across > _NEAREST * self.total) & (self._level > _NEAREST * self.total)
+
+    @property
+    def body_momentum(self) -> Array:
+        """Pi: (..., 3), body axes [kg m^2/s]. Singular cases included.
+
+        Source: Bonnard et al., before (5).
+        """
+        across = self._across
+        return np.stack([across * np.sin(self.l), across * np.cos(self.l), self.axial], axis=-1)
+
+    @property
+    def spatial_momentum(self) -> Array:
+        """mu: (..., 3), inertial axes [kg m^2/s]. Singular cases included."""
+        level = self._level
+        return np.stack([-level * np.sin(self.k), level * np.cos(self.k), self.vertical], axis=-1)
+
+    @property
+    def attitude(self) -> Array:
+        """R, body to inertial axes: (..., 3, 3). Singular cases included."""
+        outward = _vertical_frame(self.k, np.arctan2(self._level, self.vertical))
+        return outward @ _about_third(self.g) @ _body_frame(np.arctan2(self._across, self.axial), self.l)
+
+    def euler_angles(self, chart: EulerChart = ZYZ) -> tuple[Array, Array]:
+        """Euler angles (phi, theta, psi) in [rad] and their momenta: two (..., 3).
+
+        p_phi = K and p_psi = L in both charts, `ZYZ` of Bonnard et al. and `ZXZ` of Marsden and Ratiu.
+
+        Raises
+        ------
+        ChartPoleError
+            Within 1e-8 of a pole of the chart, where the two third axes are parallel. Its converse is
+            `andoyer_from_euler`.
+
+        Source: Bonnard et al., section 3.4, the complete relations, of which the last is for phi_3 (theory.md B-E4).
+        """
+        angles = chart.angles(self.attitude)
+        return angles, chart.conjugate_momenta(angles, self.body_momentum)
+
+    def hamiltonian(self, inertia: ArrayLike) -> Array:
+        """The energy Pi.I^-1 Pi/2 of a body of this inertia: (..., 3, 3) [kg m^2, body axes] -> (...) [J].
+
+        Raises
+        ------
+        ShapeError, UnphysicalInertiaError, SingularInertiaError
+            If the inertia does not go with the variables, is not symmetric, or not positive definite.
+
+        Source: Bonnard et al. (5), there in principal axes.
+        """
+        momentum = self.body_momentum
+        return 0.5 * np.sum(momentum * so3.apply(self._inverse(inertia), momentum), axis=-1)
+
+    def rates(self, inertia: ArrayLike) -> tuple[Array, Array, Array]:
+        """g', l' [rad/s] and L' [kg m^2/s^2] of free motion; k, G and K are constant: (..., 3, 3) -> three (...).
+
+        Raises
+        ------
+        ChartPoleError
+            At L = +-G, to 1e-8 of the momentum, if the body's third axis is not principal: l has no rate there.
+        ShapeError, UnphysicalInertiaError, SingularInertiaError
+            As `hamiltonian`.
+
+        Source: Bonnard et al. (8), there in principal axes.
+        """
+        inverse = self._inverse(inertia)
+        sine, cosine, across, along = np.sin(self.l), np.cos(self.l), self._across, self.axial
+        zero = np.zeros(across.shape)
+        ahead, aside = (
+            np.stack([sine, cosine, zero], -1),
+            np.stack([cosine, -sine, zero], -1),
+        )
+        column, third = so3.apply(inverse, ahead), inverse[..., 2, 2]
+        own, mixed = np.sum(column * ahead, axis=-1), column[..., 2]
+        bad = (across <= _NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
+        if bad.any():
+            where = tuple(int(i) for i in np.argwhere(bad)[0])
+            raise ChartPoleError(
+                f"entry {list(where)}: the momentum is along the body's third axis to {_NEAREST:g}, where l has no "
+                "rate unless that axis is principal; turn the body axes, so that another axis is the third"
+            )
+        part = np.where(mixed == 0.0, 0.0, along * mixed / np.where(across > 0.0, across, 1.0))
+        twist = across**2 * np.sum(column * aside, axis=-1) + across * along * np.sum(aside * inverse[..., 2], axis=-1)
+        return self.total * (own + part), along * (third - own - part) + across * mixed, -twist
+
+    @property
+    def _across(self) -> Array:
+        return np.sqrt((self.total - self.axial) * (self.total + self.axial))
+
+    @property
+    def _level(self) -> Array:
+        return np.sqrt((self.total - self.vertical) * (self.total + self.vertical))
+
+    def _inverse(self, inertia: ArrayLike) -> Array:
+        tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
+        try:
+            np.broadcast_shapes(tensor.shape[:-2], self.l.shape)
+        except ValueError:
+            raise ShapeError(
+                f"inertia {tensor.shape}: its leading axes do not go with those of the variables, {self.l.shape}"
+            ) from None
+        return inverse_inertia(tensor)
+
+
+def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerVariables:
+    """Andoyer's variables of a state: (..., 3, 3), (..., 3) -> (...) each.
+
+    Parameters
+    ----------
+    attitude : (..., 3, 3) body to inertial axes
+    body_momentum : (..., 3) Pi = R^T mu, body axes [kg m^2/s]
+
+    Returns
+    -------
+    AndoyerVariables, the angles in (-pi, pi]; singular cases as the module says
+
+    Raises
+    ------
+    ShapeError
+        If an argument is no rotation or no finite vector, or a momentum is zero.
+    """
+    rotation = so3.rotation_argument(attitude, "attitude")
+    momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
+    try:
+        shape = np.broadcast_shapes(rotation.shape[:-2], momentum.shape[:-1])
+    except ValueError:
+        raise ShapeError(
+            f"attitude {rotation.shape}, body_momentum {momentum.shape}: the leading axes cannot be broadcast together"
+        ) from None
+    momentum = np.broadcast_to(momentum, (*shape, 3))
+    total, vertical, azimuth, tilt = _outer(so3.apply(rotation, momentum), "body_momentum")
+    across = np.hypot(momentum[..., 0], momentum[..., 1])
+    # Adding zero takes the sign off a zero, of which arctan2 would make half a turn.
+    inner = np.arctan2(momentum[..., 0] + 0.0, momentum[..., 1] + 0.0)
+    inward = _body_frame(np.arctan2(across, momentum[..., 2]), inner)
+    middle = so3.transpose(_vertical_frame(azimuth, tilt)) @ rotation @ so3.transpose(inward)
+    turn = np.arctan2(middle[..., 1, 0] - middle[..., 0, 1], middle[..., 0, 0] + middle[..., 1, 1])
+    # G was rounded in other axes; next to G its difference to L is what counts.
+    size = np.abs(momentum[..., 2])
+    axial = np.where(size > across, total - across**2 / (total + size), size)
+    axial = np.copysign(axial, momentum[..., 2])
+    return AndoyerVariables(so3.wrap(turn), so3.wrap(azimuth), so3.wrap(inner), total, vertical, axial)
+
+
+def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart = ZYZ) -> AndoyerVariables:
+    """Andoyer's variables of Euler angles (phi, theta, psi) and their momenta: (..., 3), (..., 3) -> (...) each.
+
+    Raises
+    ------
+    ChartPoleError
+        Within 1e-8 of a pole of the chart.
+    ShapeError
+        If an argument is no finite vector, or a momentum is zero.
+
+    Source: as `AndoyerVariables.euler_angles`.
+    """
+    return andoyer_variables(chart.attitude(angles), chart.body_momentum(angles, momenta))
+
+
+def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
+    """Andoyer's variables along a motion without torque, g and l unwrapped: times (N,) -> (..., N) each.
+
+    From (-pi, pi] at the first time. What g gains while Pi comes back, beside the turns of l, is the Montgomery phase:
+    if l gains 2 pi n, the body has turned about mu by the gain of g. Past L = G only g + l, past L = -G only g - l is
+    followed well, and g and l may gain half turns there that leave the attitude as it is. Between the times given the
+    motion is looked at more often, until it turns by less than a radian from one look to the next.
+
+    Parameters
+    ----------
+    motion : has `attitude(t)` and `body_momentum(t)`: an `EulerTop`, a `Motion` (of a deforming body, too)
+    t : (N,) times in order, forward or backward; between two of them the body turns less than a few turns [s]
+
+    Raises
+    ------
+    ShapeError
+        If the times are not a list in order, or the momentum is zero.
+    AccuracyNotReached
+        If the attitude jumps, or turns so often between the times that it cannot be followed.
+
+    Source: Cabrera 2006 (13) for the phase; theory.md R1.
+    """
+    times = finite_array(t, "t", (None,), unit="s")
+    if times.ndim != 1 or not (np.all(np.diff(times) > 0.0) or np.all(np.diff(times) < 0.0)):
+        raise ShapeError(f"t: a list (N,) of times in strict order is needed, got shape {times.shape}")
+    if not times.size:
+        raise ShapeError("t: at least one time is needed, got none")
+    if times.size == 1:
+        return andoyer_variables(motion.attitude(times), motion.body_momentum(times))
+    dense, attitudes = _close_samples(motion, times)
+    here = slice(None, None, (dense.size - 1) // (times.size - 1))
+    momentum = motion.body_momentum(times)
+    spatial = so3.apply(attitudes[..., here, :, :], momentum).mean(axis=-2, keepdims=True)
+    total, vertical, azimuth, tilt = _outer(spatial, "motion")
+    about = so3.transpose(_vertical_frame(azimuth, tilt)) @ attitudes
+    angles = ZXZ.continuous_angles(about)[..., here, :]
+    start = angles[..., :1, :]
+    angles = angles + (so3.wrap(start) - start)
+    axial = np.clip(momentum[..., 2], -total, total)
+    return AndoyerVariables(angles[..., 0], so3.wrap(azimuth), angles[..., 2], total, vertical, axial)
+
+
+def _close_samples(motion: TurningBody, times: Array) -> tuple[Array, Array]:
+    """Times among which those given stand at even distance, and attitudes, close together at two levels."""
+    steps, before, parts = np.diff(times), np.inf, 1
+    while True:
+        inner = times[:-1, None] + steps[:, None] * (np.arange(parts) / parts)
+        dense = np.append(inner.ravel(), times[-1])
+        attitudes = motion.attitude(dense)
+        turned = so3.angle(so3.transpose(attitudes[..., :-1, :, :]) @ attitudes[..., 1:, :, :])
+        largest = float(np.max(turned, initial=0.0))
+        # Half the step, half the turn: whole turns from one sample to the next would look like none.
+        if before < _LARGEST_TURN and largest < 0.7 * before + _STILL:
+            return dense, attitudes
+        before = largest
+        if dense.size > max(_MOST_SAMPLES, 8 * times.size):
+            raise AccuracyNotReached(
+                f"motion: from one of {dense.size} samples to the next it still turns by {largest:.2g} rad; "
+                "the attitude jumps, or the times are too far apart; give times closer together"
+            )
+        parts *= 2
+
+
+def _outer(spatial: Array, name: str) -> tuple[Array, Array, Array, Array]:
+    """G, K, k and I of the momentum in inertial axes."""
+    bad = np.all(spatial == 0.0, axis=-1)
+    if bad.any():
+        where = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise ShapeError(f"{name}: entry {list(where)} is zero, and a momentum without direction has no such variables")
+    level = np.hypot(spatial[..., 0], spatial[..., 1])
+    total = np.maximum(np.hypot(level, spatial[..., 2]), np.abs(spatial[..., 2]))
+    return (
+        total,
+        spatial[..., 2],
+        np.arctan2(0.0 - spatial[..., 0], spatial[..., 1] + 0.0),
+        np.arctan2(level, spatial[..., 2]),
+    )
+
+
+def _about_third(angle: Array) -> Array:
+    """R_z(angle)."""
+    return _turn(angle, 0, 1)
+
+
+def _vertical_frame(azimuth: Array, tilt: Array) -> Array:
+    """R_z(azimuth + pi) R_x(tilt), whose third axis is that of the momentum."""
+    return _about_third(azimuth) @ _turn(-tilt, 1, 2) * np.array([-1.0, -1.0, 1.0])
+
+
+def _body_frame(tilt: Array, angle: Array) -> Array:
+    """R_x(tilt) R_z(angle)."""
+    return _turn(tilt, 1, 2) @ _about_third(angle)
+
+
+def _turn(angle: Array, i: int, j: int) -> Array:
+    angle = np.asarray(angle)
+    matrix = np.zeros((*angle.shape, 3, 3))
+    matrix[...] = np.eye(3)
+    matrix[..., i, i] = matrix[..., j, j] = np.cos(angle)
+    matrix[..., j, i] = np.sin(angle)
+    matrix[..., i, j] = -matrix[..., j, i]
+    return matrix

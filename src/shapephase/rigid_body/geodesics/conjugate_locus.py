@@ -1,0 +1,267 @@
+"""Conjugate points on a surface of revolution: exactly one of every order between consecutive turning points.
+
+The functions take any latitude of the start, all orders, and directions (angles from east to north at the start).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+from ...roots import ROUNDING, root
+from .arc_quadrature import Arcs, folded_cosine
+from .extremal import Start, start_of, stretch_at
+from .surface_of_revolution import SurfaceOfRevolution
+
+_ORDERS = 1000
+_STILL = 1e-11
+"""Conjugate times that change by less with the direction, in parts of the time, do not change."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConjugatePoints:
+    """Conjugate points along extremals in directions (...), see `conjugate_points`."""
+
+    direction: Array
+    """Angle at the start from east to north [rad]."""
+    momentum: Array
+    """Clairaut's p of the extremal."""
+    time: Array
+    """Length of the extremal to the conjugate point."""
+    latitude: Array
+    """phi of the conjugate point."""
+    longitude: Array
+    """theta gained on the way, not reduced [rad]."""
+    height: Array
+    """y = sqrt(1 - m/m(0)), of the sign of phi: the sine of the parametric latitude of an ellipsoid."""
+    phase: Array
+    """chi there, of the extremal mirrored northward [rad]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConjugateLocus:
+    """The conjugate locus of one order, sampled, see `conjugate_locus`."""
+
+    order: int
+    points: ConjugatePoints
+    """Of directions (N,), ascending."""
+    time_rate: Array
+    """(N,) derivative of the conjugate time by the direction."""
+    cusp_directions: Array
+    """(C,) directions [rad] between which samples the rate changes sign, in the middle: cusps of the locus."""
+
+    @property
+    def cusps(self) -> int:
+        """Number of cusps; 0 where the locus is a single point."""
+        return len(self.cusp_directions)
+
+
+def conjugate_points(
+    surface: SurfaceOfRevolution, direction: ArrayLike, order: int = 1, latitude: float = 0.0
+) -> ConjugatePoints:
+    """The conjugate points of an order along extremals from a latitude, longitude 0: directions (...) [rad] -> (...).
+
+    Raises
+    ------
+    ShapeError
+        If the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
+
+    Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
+    """
+    _check_order(order)
+    angle = finite_array(direction, "direction", unit="rad")
+    return _points(surface, angle, start_of(surface, angle, latitude), order)[0]
+
+
+def conjugate_points_of_momentum(surface: SurfaceOfRevolution, momentum: ArrayLike, order: int = 1) -> ConjugatePoints:
+    """`conjugate_points` of a point on the equator along extremals with Clairaut constants p (...), northward.
+
+    phi_1c and theta_1c of Bonnard et al., section 2.2, for order 1.
+    """
+    _check_order(order)
+    p, q, room = surface.parameters(momentum)
+    start = Start(p, q, room, np.zeros(p.shape), np.ones(p.shape))
+    return _points(surface, np.asarray(surface.direction_of(p)), start, order)[0]
+
+
+def conjugate_locus(
+    surface: SurfaceOfRevolution, directions: int | ArrayLike = 400, order: int = 1, latitude: float = 0.0
+) -> ConjugateLocus:
+    """The conjugate locus of a point: all conjugate points of an order, and its cusps.
+
+    Parameters
+    ----------
+    directions : how many (the next multiple of 4), spread evenly over those that lead to oscillating extremals, none
+        of them along an axis of symmetry; or (N,) ascending angles [rad]
+    order : from 1
+    latitude : of the point
+
+    A cusp is where the conjugate time is extremal in the direction; two between neighbouring directions are missed.
+
+    Raises
+    ------
+    ShapeError
+        As `conjugate_points`; or if fewer than 8 directions are asked for.
+    """
+    _check_order(order)
+    if isinstance(directions, int | np.integer):
+        east = _eastward(surface, int(directions), latitude)
+        if latitude == 0.0:
+            points, rate = _points_and_rate(surface, east[len(east) // 2 :], order, latitude)
+            points, rate = _mirrored(points, 0.0, ("latitude", "height")), np.concatenate([-rate[::-1], rate])
+        else:
+            points, rate = _points_and_rate(surface, east, order, latitude)
+        points, rate = _mirrored(points, np.pi, ("momentum", "longitude")), np.concatenate([rate, -rate[::-1]])
+        closed = surface.has_smooth_poles
+        band = np.repeat([0, 0 if closed else 1], len(east))
+    else:
+        chosen = finite_array(directions, "directions", (None,), unit="rad")
+        if chosen.ndim != 1 or np.any(np.diff(chosen) <= 0.0):
+            raise ShapeError("directions: expected how many, or ascending angles (N,)")
+        points, rate = _points_and_rate(surface, chosen, order, latitude)
+        band, closed = np.zeros(len(rate), dtype=int), False
+    signs = np.sign(np.where(np.abs(rate) < _STILL * points.time, 0.0, rate))
+    moving = np.flatnonzero(signs)
+    ahead = np.roll(moving, -1)
+    change = (signs[moving] != signs[ahead]) & (band[moving] == band[ahead]) & (closed | (ahead > moving))
+    here, there = points.direction[moving[change]], points.direction[ahead[change]]
+    there = np.where(there < here, there + 2.0 * np.pi, there)
+    return ConjugateLocus(int(order), points, rate, 0.5 * (here + there))
+
+
+def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, order: int = 1) -> Array:
+    """n R'' + integral of d^2 f/dp^2 from the equator on: what decides whether a branch of the locus has cusps.
+
+    The second derivative by p of the longitude on the latitude of the conjugate point of order n, of extremals from the
+    equator with 0 < p < sqrt(m(0)): (...) -> (...). Where it is not 0 the branch has no cusp, also where R'' < 0.
+
+    Raises
+    ------
+    ShapeError
+        If p is that of the equator, where it is infinite, or of no oscillating extremal.
+
+    Source: Bonnard et al., before proposition 3, where R'' > 0 is asked for; theory.md B-E9, O13.
+    """
+    _check_order(order)
+    p, q, room = surface.parameters(momentum)
+    if np.any(q == 0.0):
+        raise ShapeError(
+            f"momentum: below sqrt(m(0)) = {surface.greatest_momentum:.17g}, at which the rate is infinite"
+        )
+    start = Start(p, q, room, np.zeros(p.shape), np.ones(p.shape))
+    points, ends = _points(surface, np.asarray(surface.direction_of(p)), start, order)
+    xi = points.phase - order * np.pi
+    value, slope, _ = stretch_at(surface, q, room, xi)
+    second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
+    sine, cosine = np.sin(xi), np.cos(xi)
+    by_q = slope * sine**3 / cosine - ends.end.bend - q * second
+    # At a fixed latitude q sin^2(chi) is fixed, so chi moves with q.
+    moving = by_q - value / cosine**2 * np.tan(xi) / (2.0 * q)
+    return (-2.0 * p / (surface.equator**2 * q) * moving)[()]
+
+
+class _Ends(NamedTuple):
+    """Integrals along extremals: up to the start, over a quarter of the period, up to the conjugate point."""
+
+    begin: Arcs
+    quarter: Arcs
+    end: Arcs
+
+
+def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int) -> tuple[ConjugatePoints, _Ends]:
+    p, q, room, first = start.momentum, start.q, start.room, start.phase
+    sine0, cosine0 = np.sin(first), folded_cosine(first)
+    here = stretch_at(surface, q, room, first)[0]
+    begin = surface.trusted_arcs(p, q, room, first)
+    quarter = surface.trusted_arcs(p, q, room, np.full(p.shape, 0.5 * np.pi))
+    whole = 2.0 * order * quarter.bend
+
+    def step(xi: Array) -> tuple[Array, Array]:
+        # Newton's rule in the tangent of xi, in which L is nearly a straight line.
+        xi = xi.reshape(p.shape)
+        there = stretch_at(surface, q, room, xi)[0]
+        bend = surface.trusted_arcs(p, q, room, xi).bend
+        level = here * sine0 + cosine0 * q * (bend + whole - begin.bend)
+        value = cosine0 * there * np.sin(xi) - np.cos(xi) * level
+        return value.ravel(), np.arctan2(level, cosine0 * there).ravel()
+
+    limit = np.full(p.size, 0.5 * np.pi)
+    guess = np.arctan2(here * sine0 + cosine0 * q * (whole - begin.bend), cosine0 * here)
+    xi = root(step, np.ravel(guess), -limit, limit, ROUNDING).reshape(p.shape)
+    rest = surface.trusted_arcs(p, q, room, xi)
+    end = Arcs(*(part + 2.0 * order * one for part, one in zip(rest, quarter)))
+    # The phase is xi and whole half turns, each of which changes the sign of y.
+    height = (-1.0) ** order * start.side * np.sqrt(q) * np.sin(xi)
+    top = np.sqrt(surface.depth)
+    points = ConjugatePoints(
+        angle,
+        p,
+        end.time - begin.time,
+        np.asarray(surface.latitude(np.clip(height, -top, top))),
+        end.longitude - begin.longitude,
+        height,
+        xi + order * np.pi,
+    )
+    return points, _Ends(begin, quarter, end)
+
+
+def _points_and_rate(
+    surface: SurfaceOfRevolution, angle: Array, order: int, latitude: float
+) -> tuple[ConjugatePoints, Array]:
+    """Conjugate points, and d t_c/d direction from L(chi) = L(chi_0) differentiated."""
+    start = start_of(surface, angle, latitude)
+    points, ends = _points(surface, angle, start, order)
+    q, room, first, xi = start.q, start.room, start.phase, points.phase - order * np.pi
+    rest = 1.0 - float(surface.height(latitude)) ** 2
+    _, slope, _ = stretch_at(surface, q, room, xi)
+    here, slope0, _ = stretch_at(surface, q, room, first)
+    second0 = surface.bend_rate(q, room, first)
+    second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
+    sine, cosine, sine0, cosine0 = np.sin(xi), np.cos(xi), np.sin(first), np.cos(first)
+    first_rate = -sine0 / cosine0 / (2.0 * np.where(q > 0.0, q, 1.0))
+    level_rate = here / cosine0**2 * first_rate + slope0 * sine0**3 / cosine0 - ends.begin.bend - q * second0
+    by_q = slope * sine**3 * cosine - cosine**2 * (ends.end.bend + q * second)
+    time_rate = 0.5 * (ends.end.bend - ends.begin.bend) + cosine**2 * level_rate - by_q - here * first_rate
+    return points, 2.0 * np.sin(angle) * np.cos(angle) * rest * time_rate
+
+
+def _whole_bend_rate(surface: SurfaceOfRevolution, q: Array, room: Array) -> Array:
+    return surface.bend_rate(q, room, np.full(q.shape, 0.5 * np.pi))
+
+
+def _eastward(surface: SurfaceOfRevolution, count: int, latitude: float) -> Array:
+    """Half of so many directions of oscillating extremals: those to the east, none along an axis of symmetry."""
+    if count < 8:
+        raise ShapeError(f"directions: at least 8 are needed to see the locus, got {count}")
+    half = (count + 1) // 2
+    if half % 2:
+        half += 1
+    return _widest(surface, latitude) * (2.0 * (np.arange(half) + 0.5) / half - 1.0)
+
+
+def _mirrored(points: ConjugatePoints, turn: float, changing: tuple[str, ...]) -> ConjugatePoints:
+    """Extremals in ascending directions and their mirror images, in directions `turn` less theirs, in one."""
+    images = {name: (-values if name in changing else values)[::-1] for name, values in vars(points).items()}
+    images["direction"] = turn - points.direction[::-1]
+    pairs = [(images, vars(points)), (vars(points), images)][turn > 0.0]
+    return ConjugatePoints(**{name: np.concatenate([pair[name] for pair in pairs]) for name in images})
+
+
+def _widest(surface: SurfaceOfRevolution, latitude: float) -> float:
+    """The greatest angle to the parallels of extremals that still oscillate, less a little where there are others."""
+    if surface.has_smooth_poles:
+        return 0.5 * np.pi
+    here = float(np.sqrt(surface.metric(latitude)))
+    if here <= surface.least_momentum:
+        raise ShapeError(f"latitude: {latitude!r} is at the surface's end, from where no extremal oscillates")
+    return float(np.arccos(surface.least_momentum / here)) * (1.0 - 1e-6)
+
+
+def _check_order(order: int) -> None:
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= _ORDERS:
+        raise ShapeError(f"order: expected a whole number from 1 to {_ORDERS}, got {order!r}")

@@ -1,0 +1,100 @@
+"""Cut loci of two-spheres of revolution, where the theory gives them.
+
+On a smooth sphere of revolution, symmetric in its equator, whose curvature falls all the way from the equator to the
+poles (an oblate ellipsoid), the cut locus of a point is an arc of the opposite parallel; where it rises (a prolate
+one), an arc of the opposite meridian; on the round sphere the opposite point. The arc's ends are conjugate points.
+
+Sources: Sinclair and Tanaka 2007, main theorem; Bonnard, Cots and Shcherbakova 2013, end of section 2; theory.md O16,
+P6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+from ...roots import root
+from .conjugate_locus import conjugate_points
+from .extremal import start_of
+from .surface_of_revolution import SurfaceOfRevolution
+
+
+@dataclass(frozen=True)
+class CutLocus:
+    """The cut locus of the point at a latitude and longitude 0: an arc between two ends, see `cut_locus`."""
+
+    kind: str
+    """ "parallel", "meridian" or "point"."""
+    latitudes: tuple[float, float]
+    """phi of the ends, ascending."""
+    longitudes: tuple[float, float]
+    """theta of the ends, ascending, about pi [rad]."""
+
+
+def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
+    """The cut locus of the point at a latitude, longitude 0.
+
+    Raises
+    ------
+    ShapeError
+        If the surface is no smooth sphere whose curvature changes one way from the equator to the poles, or the point
+        is a pole.
+    """
+    kind = _kind(surface, latitude)
+    phi = float(latitude)
+    if kind == "point":
+        return CutLocus(kind, (-phi, -phi), (np.pi, np.pi))
+    if kind == "parallel":
+        end = float(conjugate_points(surface, 0.0, 1, latitude).longitude)
+        return CutLocus(kind, (-phi, -phi), (end, 2.0 * np.pi - end))
+    ends = np.sort(conjugate_points(surface, np.array([0.5, -0.5]) * np.pi, 1, latitude).latitude)
+    return CutLocus(kind, (float(ends[0]), float(ends[1])), (np.pi, np.pi))
+
+
+def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Array:
+    """How long extremals from a latitude in directions (...) [rad] are the shortest way: (...) -> (...) [length].
+
+    Until they meet their mirror image: at the opposite parallel, after half a period, or at the opposite meridian.
+
+    Raises
+    ------
+    ShapeError
+        See `cut_locus`.
+    """
+    kind = _kind(surface, latitude)
+    angle = finite_array(direction, "direction", unit="rad")
+    start = start_of(surface, angle, latitude)
+    if kind != "meridian":
+        return np.asarray(0.5 * surface.period(start.momentum))[()]
+    p, q, room, first = (np.ravel(a) for a in (start.momentum, start.q, start.room, start.phase))
+    size = np.abs(p)
+    begin = surface.trusted_arcs(size, q, room, first)
+    # Next to a meridian the longitude jumps at the pole, and the conjugate point is the limit of the meeting points.
+    straight = size <= 1e-9 * surface.greatest_momentum
+
+    def step(chi: Array) -> tuple[Array, Array]:
+        gained = surface.trusted_arcs(size, q, room, chi).longitude - begin.longitude - np.pi
+        square = q * np.sin(chi) ** 2
+        value, _, _ = surface.stretch(square, surface.depth - square)
+        rate = size / surface.equator * value / np.maximum(1.0 - square, np.finfo(float).tiny)
+        return gained, chi - gained / np.maximum(rate, np.finfo(float).tiny)
+
+    chi = root(step, first + 0.9 * np.pi, first, first + np.pi)
+    time = surface.trusted_arcs(size, q, room, chi).time - begin.time
+    conjugate = np.ravel(conjugate_points(surface, angle, 1, latitude).time)
+    return np.where(straight, conjugate, time).reshape(angle.shape)[()]
+
+
+def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
+    if not surface.has_smooth_poles:
+        raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this surface ends at a {surface.end}")
+    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - 1e-12:
+        raise ShapeError(f"latitude: one number between the poles is needed, got {latitude!r}")
+    trend = surface.curvature_trend()
+    if trend == "neither":
+        raise ShapeError("the curvature must fall, or rise, all the way from the equator to the poles; it does neither")
+    return {"decreasing": "parallel", "increasing": "meridian", "constant": "point"}[trend]

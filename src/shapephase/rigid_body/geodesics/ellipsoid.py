@@ -1,0 +1,135 @@
+"""Ellipsoids of revolution, oblate, round and prolate: closed forms of their extremals, periods and caustics.
+
+The meridian is (a cos(psi), b sin(psi)), psi the parametric latitude, epsilon = b/a the *aspect*. In the normal form of
+`surface_of_revolution` y = sin(psi), m(0) = a^2 and D = a sqrt(epsilon^2 + (1 - epsilon^2) Y), so that all integrals
+along extremals are elliptic; Carlson's forms have no subtraction in them, for any aspect.
+
+Sources: Bonnard, Cots and Shcherbakova 2013, section 2, "Computations on the ellipsoid of revolution"; DLMF 19.25 for
+Carlson's forms. theory.md P1-P6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import elliprd, elliprf, elliprj
+
+from ... import elliptic
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+from .arc_quadrature import Arcs, folded_cosine
+from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
+
+_ASPECTS = (1e-3, 1e3)
+
+
+@dataclass(frozen=True)
+class EllipsoidStretch:
+    """D(Y) = a sqrt(epsilon^2 + (1 - epsilon^2) Y) and its derivatives."""
+
+    aspect: float
+    radius: float
+
+    def __call__(self, square: Array, rest: Array) -> tuple[Array, Array, Array]:
+        """Y and 1 - Y, (N,) each -> D, D', D'', (N,) each."""
+        flattening = (1.0 - self.aspect) * (1.0 + self.aspect)
+        unit = np.sqrt(self.aspect**2 * rest + square)
+        return self.radius * unit, 0.5 * self.radius * flattening / unit, -0.25 * self.radius * flattening**2 / unit**3
+
+    def arcs(self, p: Array, q: Array, _room: Array, chi: Array) -> Arcs:
+        """The integrals along extremals, phases in [-pi/2, pi/2]: (N,) x 4 -> `Arcs`. Source: DLMF 19.25.5, 13, 14."""
+        aspect, p = self.aspect, p / self.radius
+        sine, cosine = np.sin(chi), folded_cosine(chi)
+        sine2, cosine2 = sine * sine, cosine * cosine
+        delta = cosine2 + sine2 * (p * p + q / aspect**2)
+        pole = np.where(p > 0.0, cosine2 + p * p * sine2, 1.0)
+        first = sine * elliprf(cosine2, delta, 1.0)
+        cube = sine2 * sine / 3.0
+        bend = (1.0 - aspect) * (1.0 + aspect) / aspect * cube * elliprd(cosine2, delta, 1.0)
+        longitude = p / aspect * (aspect**2 * first + q * cube * elliprj(cosine2, delta, 1.0, pole))
+        over_pole = (p == 0.0) & (np.abs(chi) >= 0.5 * np.pi)
+        longitude = np.where(over_pole, np.copysign(0.5 * np.pi, chi), longitude)
+        return Arcs(self.radius * (aspect * first + q * bend), longitude, self.radius * bend)
+
+
+def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolution:
+    """The ellipsoid of revolution with polar over equatorial axis `aspect`: below 1 oblate, above 1 prolate.
+
+    Raises
+    ------
+    ShapeError
+        If the aspect is not between 0.001 and 1000, or the radius not positive.
+
+    Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
+    """
+    epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
+    if not _ASPECTS[0] <= epsilon <= _ASPECTS[1]:
+        raise ShapeError(f"aspect: polar over equatorial axis must be between 0.001 and 1000, got {epsilon!r}")
+    if not radius > 0.0:
+        raise ShapeError(f"equatorial_radius: must be positive, got {radius!r}")
+    stretch = EllipsoidStretch(epsilon, radius)
+    return surface_of_stretch(stretch, radius**2, 1.0, "pole", stretch.arcs)
+
+
+def metric_coefficients(aspect: float, colatitude: ArrayLike) -> tuple[Array, Array]:
+    """F_1 = cos^2 + epsilon^2 sin^2 and F_2 = sin^2 of the parametric colatitude, unit equator: (...) -> (...), (...).
+
+    Source: Bonnard et al., section 2.
+    """
+    phi = finite_array(colatitude, "colatitude", unit="rad")
+    sine2 = np.sin(phi) ** 2
+    return np.cos(phi) ** 2 + _number(aspect, "aspect") ** 2 * sine2, sine2
+
+
+def meridian_length(aspect: float, colatitude: ArrayLike) -> Array:
+    """Phi, the length of the meridian from the pole to a parametric colatitude, unit equator: (...) [rad] -> (...).
+
+    E(phi, k) with k^2 = 1 - epsilon^2; for a prolate ellipsoid, k^2 < 0, by the complementary amplitude.
+    Source: Bonnard et al., section 2; theory.md P1, P4.
+    """
+    epsilon = _number(aspect, "aspect")
+    phi = finite_array(colatitude, "colatitude", unit="rad")
+    if epsilon <= 1.0:
+        return elliptic.incomplete_e(phi, epsilon**2)
+    m1 = 1.0 / epsilon**2
+    return epsilon * (elliptic.complete_e(m1) - elliptic.incomplete_e(0.5 * np.pi - phi, m1))
+
+
+def ellipsoid_period(aspect: float, momentum: ArrayLike) -> Array:
+    """T(p) = 4 alpha E(m) of an ellipsoid with unit equator: (...) -> (...).
+
+    Here alpha^2 = epsilon^2 + (1 - p^2)(1 - epsilon^2), and the complementary parameter is epsilon^2/alpha^2. For a
+    prolate ellipsoid, where m^2 < 0, it is T = 4 epsilon E with the complementary parameter alpha^2/epsilon^2.
+
+    Source: Bonnard et al., section 2; theory.md P2.
+    """
+    epsilon = _number(aspect, "aspect")
+    p = finite_array(momentum, "momentum")
+    if np.any(np.abs(p) > 1.0):
+        raise ShapeError("momentum: on a unit equator Clairaut's constant is at most 1 in size")
+    alpha2 = epsilon**2 * p * p + (1.0 - p) * (1.0 + p)
+    if epsilon <= 1.0:
+        return 4.0 * np.sqrt(alpha2) * elliptic.complete_e(np.minimum(epsilon**2 / alpha2, 1.0))
+    return 4.0 * epsilon * elliptic.complete_e(np.minimum(alpha2 / epsilon**2, 1.0))
+
+
+def astroid(aspect: float, direction: ArrayLike) -> tuple[Array, Array]:
+    """Parametric latitude and longitude of a nearly round ellipsoid's caustic: (...) -> (...), (...).
+
+    (-pi f sin^3, pi - pi f cos^3) of the direction at the start, east to north [rad], with f = 1 - epsilon: an astroid
+    with its centre opposite to the start on the equator. It is what `conjugate_locus` tends to as f -> 0.
+
+    Source: the formulae of `surface_of_revolution` to first order in f; theory.md P3.
+    """
+    angle = finite_array(direction, "direction", unit="rad")
+    size = np.pi * (1.0 - _number(aspect, "aspect"))
+    return -size * np.sin(angle) ** 3, np.pi - size * np.cos(angle) ** 3
+
+
+def _number(value: float, name: str) -> float:
+    found = finite_array(value, name)
+    if found.shape != ():
+        raise ShapeError(f"{name}: expected one number, got shape {found.shape}")
+    return float(found)

@@ -1,0 +1,207 @@
+"""Extremals of a surface of revolution by Clairaut's integral, and the Jacobi fields along them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+
+from ...arrays import Array, finite_array
+from ...errors import AccuracyNotReached, ShapeError
+from ...roots import ROUNDING, root
+from .arc_quadrature import Arcs
+from .surface_of_revolution import SurfaceOfRevolution
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where extremals start, in the form the integrals need: all (...) of one shape.
+
+    Extremals that start southward are mirrored in the equator, so that the start phase is in [-pi/2, pi/2].
+    """
+
+    momentum: Array
+    """Clairaut's p."""
+    q: Array
+    """1 - p^2/m(0)."""
+    room: Array
+    """depth - q."""
+    phase: Array
+    """chi at the start [rad], of the mirrored extremal where `side` is -1."""
+    side: Array
+    """1 for a northward start, -1 for a southward one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extremal:
+    """Extremals of unit speed from one latitude, longitude 0, in directions (...); made by `extremal`.
+
+    Arguments t (...) [length] are any numbers; results have the directions' axes first, then those of t.
+    """
+
+    surface: SurfaceOfRevolution
+    start: Start
+
+    def phase(self, times: ArrayLike) -> Array:
+        """chi at times t, increasing, of the mirrored extremal where it starts southward [rad]."""
+        t = finite_array(times, "times")
+        p, q, room, phase = (
+            np.broadcast_to(_spread(a, t), np.shape(a) + t.shape)
+            for a in (self.start.momentum, self.start.q, self.start.room, self.start.phase)
+        )
+        quarter = self.surface.trusted_arcs(p, q, room, np.full(p.shape, 0.5 * np.pi)).time
+        total = self.surface.trusted_arcs(p, q, room, phase).time + t
+        turns = np.rint(total / (2.0 * quarter))
+        rest = np.clip(total - 2.0 * turns * quarter, -quarter, quarter)
+
+        def step(chi: Array) -> tuple[Array, Array]:
+            chi = chi.reshape(p.shape)
+            value = self.surface.trusted_arcs(p, q, room, chi).time - rest
+            return value.ravel(), (chi - value / self._stretch(q, room, chi)).ravel()
+
+        start = 0.5 * np.pi * rest / quarter
+        limit = np.full(p.size, 0.5 * np.pi)
+        return root(step, start.ravel(), -limit, limit, ROUNDING).reshape(p.shape) + turns * np.pi
+
+    def state(self, times: ArrayLike) -> tuple[Array, Array, Array]:
+        """Latitude phi, longitude theta (continuous) [rad] and p_phi = d phi/dt at times t.
+
+        Source: Bonnard et al., section 2.1.
+        """
+        t = finite_array(times, "times")
+        p, q, _, first, side = (_spread(a, t) for a in _fields(self.start))
+        chi = self.phase(t)
+        longitude = self._arcs(chi, t).longitude - self.surface.arcs(p, first).longitude
+        return (
+            self.surface.latitude(side * np.sqrt(q) * np.sin(chi)),
+            longitude,
+            side * np.sqrt(q) * np.cos(chi) / np.sqrt(1.0 - q * np.sin(chi) ** 2),
+        )
+
+    def jacobi_field(self, times: ArrayLike) -> Array:
+        """The normal Jacobi field j with j = 0, j' = 1 at the start, by the derivative of the extremal, at times t.
+
+        Its zeros are the conjugate times; j'' + G j = 0 with the Gauss curvature G. Source: see the module
+        `surface_of_revolution`.
+        """
+        t = finite_array(times, "times")
+        return self.jacobi_field_at(self.phase(t), t)
+
+    def jacobi_field_at(self, phase: Array, times: Array) -> Array:
+        """`jacobi_field` at known phases of the times."""
+        p, q, room, first, _ = (_spread(a, times) for a in _fields(self.start))
+        bend = self._arcs(phase, times).bend - self.surface.trusted_arcs(p, q, room, first).bend
+        there, here = self._stretch(q, room, phase), self._stretch(q, room, first)
+        return (
+            np.cos(first) * there * np.sin(phase)
+            - np.cos(phase) * here * np.sin(first)
+            - q * np.cos(phase) * np.cos(first) * bend
+        )
+
+    def direction_derivative(self, times: ArrayLike) -> tuple[Array, Array]:
+        """d phi and d theta by the direction of the start, at a fixed time: the vertical Jacobi field J_1.
+
+        J_1 per unit of p_theta is this over -sqrt(m) p_phi at the start. p_phi d phi + p_theta d theta = 0.
+        Source: Bonnard et al., proposition 1.
+        """
+        latitude, _, slope = self.state(times)
+        field = self.jacobi_field(times)
+        p = _spread(self.start.momentum, finite_array(times, "times"))
+        distance = np.sqrt(self.surface.metric(latitude))
+        return field * p / distance, -field * slope / distance
+
+    def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
+        """J_2 = t dq/dt, of phi and theta: how the end moves with the size of the initial momentum, at times t.
+
+        Source: Bonnard et al., section 2.2.
+        """
+        t = finite_array(times, "times")
+        latitude, _, slope = self.state(t)
+        return t * slope, t * _spread(self.start.momentum, t) / self.surface.metric(latitude)
+
+    def _arcs(self, phase: Array, times: Array) -> Arcs:
+        p, q, room = (_spread(a, times) for a in (self.start.momentum, self.start.q, self.start.room))
+        return self.surface.trusted_arcs(*np.broadcast_arrays(p, q, room, phase))
+
+    def _stretch(self, q: Array, room: Array, phase: Array) -> Array:
+        return stretch_at(self.surface, q, room, phase)[0]
+
+
+def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Extremal:
+    """Extremals from a latitude in directions (...), angles from east to north [rad].
+
+    Raises
+    ------
+    ShapeError
+        If a direction leads out of the band of extremals that oscillate about the equator within the chart.
+    """
+    return Extremal(surface, start_of(surface, direction, latitude))
+
+
+def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Start:
+    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`."""
+    angle = finite_array(direction, "direction", unit="rad")
+    if np.ndim(latitude) != 0:
+        raise ShapeError(f"latitude: expected one number, got shape {np.shape(latitude)}")
+    y = float(surface.height(latitude))
+    rest = (1.0 - y) * (1.0 + y)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    p = surface.greatest_momentum * np.sqrt(rest) * cosine
+    surface.parameters(p)
+    q = y * y + sine * sine * rest
+    room = np.maximum(cosine * cosine * rest - (1.0 - surface.depth), 0.0)
+    side = np.where(sine < 0.0, -1.0, 1.0)
+    phase = np.arctan2(side * y, np.abs(sine) * np.sqrt(rest))
+    return Start(p, q, room, phase, side)
+
+
+def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array) -> tuple[Array, Array, Array]:
+    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3."""
+    q, room, phase = np.broadcast_arrays(q, room, phase)
+    sine2, cosine2 = np.sin(phase) ** 2, np.cos(phase) ** 2
+    found = surface.stretch((q * sine2).ravel(), (room + q * cosine2).ravel())
+    value, slope, second = (a.reshape(q.shape) for a in found)
+    return value, slope, second
+
+
+def variational_jacobi_field(
+    surface: SurfaceOfRevolution, direction: float, times: ArrayLike, latitude: float = 0.0
+) -> Array:
+    """`Extremal.jacobi_field` of one direction by integration of Jacobi's equation j'' + G j = 0: (N,) -> (N,).
+
+    The phase is integrated along, by d chi/dt = 1/D, so that turning points are no obstacle. Times ascend, from 0 on.
+
+    Raises
+    ------
+    AccuracyNotReached
+        If the integration fails.
+
+    Source: Bonnard et al., definition 2.2.
+    """
+    t = finite_array(times, "times", (None,))
+    if t.ndim != 1 or not t.size or t[0] < 0.0 or np.any(np.diff(t) < 0.0):
+        raise ShapeError("times: expected ascending times (N,), from 0 on")
+    start = start_of(surface, direction, latitude)
+
+    def rate(_: float, state: Array) -> Array:
+        value, slope = (float(a) for a in stretch_at(surface, start.q, start.room, np.asarray(state[0]))[:2])
+        curvature = (value - 2.0 * float(start.q) * np.sin(state[0]) ** 2 * slope) / value**3
+        return np.array([1.0 / value, state[2], -curvature * state[1]])
+
+    state = [float(start.phase), 0.0, 1.0]
+    span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
+    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=3e-14, atol=1e-15)
+    if not solution.success:
+        raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
+    return solution.y[1]
+
+
+def _fields(start: Start) -> tuple[Array, Array, Array, Array, Array]:
+    return start.momentum, start.q, start.room, start.phase, start.side
+
+
+def _spread(values: Array, times: Array) -> Array:
+    """The directions' axes first, then room for those of the times."""
+    return np.reshape(values, np.shape(values) + (1,) * np.ndim(times))

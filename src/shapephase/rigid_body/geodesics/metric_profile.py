@@ -1,0 +1,258 @@
+"""A surface of revolution from its metric F_1(x) dx^2 + F_2(x) d theta^2, given by functions: the polar form found.
+
+x is any coordinate along the meridians, 0 on the equator; with F_1 = 1 it is the latitude phi and F_2 is m. The
+stretch D (see `surface_of_revolution`) is tabulated once, by Chebyshev polynomials on panels that are halved until they
+hold it to rounding; its derivatives are those of the polynomials. Before a parallel, where D grows without bound,
+sqrt(depth - Y) D is tabulated, which does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from scipy.fft import dct
+
+from ...arrays import Array
+from ...errors import AccuracyNotReached, ShapeError
+from ...roots import root
+from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
+
+Profile = Callable[[Array], tuple[Array, Array]]
+"""x (N,) -> F_2 and dF_2/dx, (N,) each; the derivative with all its digits next to the equator, where it vanishes."""
+Meridian = Callable[[Array], Array]
+"""x (N,) -> F_1 > 0 (N,)."""
+
+_DEGREE = 24
+_HALVINGS = 14
+_SETTLED = 1.5e-15
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_SAMPLES = 257
+_NEAREST = 1e-60
+"""D at a parallel itself is infinite; so near to it the curvature has its limit."""
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Which assumptions a metric meets, see `assumptions`."""
+
+    equator_is_parallel: bool
+    """(A1) F_2'(0) = 0."""
+    is_symmetric: bool
+    """(A2) F_1 and F_2 are even."""
+    falls_to_reach: bool
+    """F_2 falls all the way from the equator to the reach, so that extremals have one turning point there."""
+    end: str
+    """What is at the reach: "pole", "parallel" or "boundary"."""
+
+
+@dataclass(frozen=True, eq=False)
+class TabulatedStretch:
+    """D and its derivatives by Chebyshev series in Y on panels."""
+
+    edges: Array
+    """(P + 1,) ascending depth - Y."""
+    series: tuple[Array, ...]
+    """P times (3, terms): of the tabulated function and its two derivatives by Y."""
+    has_root: bool
+    """Whether sqrt(depth - Y) D is tabulated, instead of D."""
+
+    def __call__(self, square: Array, rest: Array) -> tuple[Array, Array, Array]:
+        """Y and depth - Y, (N,) each -> D, D', D'', (N,) each."""
+        panel = np.clip(np.searchsorted(self.edges, rest, side="right") - 1, 0, len(self.series) - 1)
+        found = np.empty((3, *square.shape))
+        for number in np.unique(panel):
+            here = panel == number
+            low, high = self.edges[number], self.edges[number + 1]
+            place = ((high - rest[here]) - (rest[here] - low)) / (high - low)
+            found[:, here] = chebyshev.chebval(place, self.series[number].T)
+        if not self.has_root:
+            return found[0], found[1], found[2]
+        value, slope, second = found
+        rest = np.maximum(rest, _NEAREST)
+        root_rest = np.sqrt(rest)
+        return (
+            value / root_rest,
+            (slope + 0.5 * value / rest) / root_rest,
+            (second + slope / rest + 0.75 * value / rest**2) / root_rest,
+        )
+
+
+def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None) -> Assumptions:
+    """Which assumptions on the metric F_1 dx^2 + F_2 d theta^2 hold for |x| <= reach, by 257 samples.
+
+    (A3), on the curvature, is `SurfaceOfRevolution.is_greatest_curvature_on_equator`.
+
+    Raises
+    ------
+    ShapeError
+        If the reach is not positive, or the functions give no finite numbers of the right shape, or F_2 <= 0 inside.
+
+    Source: Bonnard et al., section 2.1.
+    """
+    if not (np.isfinite(reach) and reach > 0.0):
+        raise ShapeError(f"reach: the largest x must be positive and finite, got {reach!r}")
+    x = reach * np.linspace(0.0, 1.0, _SAMPLES)
+    north, north_slope = _values(profile, x)
+    south, south_slope = _values(profile, -x)
+    along, back = _meridian_values(meridian, x), _meridian_values(meridian, -x)
+    scale = north[0]
+    if not (north[:-1] > 0.0).all() or not (along[:-1] > 0.0).all():
+        raise ShapeError("F_1 and F_2 must be positive from the equator to the reach, not counting a pole there")
+    steepness = np.abs(north_slope).max()
+    end = "boundary"
+    if north[-1] <= 1e-12 * scale:
+        end = "pole"
+    elif abs(north_slope[-1]) <= 1e-9 * steepness:
+        end = "parallel"
+    return Assumptions(
+        bool(abs(north_slope[0]) <= 1e-12 * steepness),
+        bool(
+            np.abs(north - south).max() <= 1e-12 * scale
+            and np.abs(north_slope + south_slope).max() <= 1e-10 * steepness
+            and np.abs(along - back).max() <= 1e-12 * along.max()
+        ),
+        bool((north_slope[1:-1] < 0.0).all()),
+        end,
+    )
+
+
+def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None = None) -> SurfaceOfRevolution:
+    """The surface with the metric F_1 dx^2 + F_2 d theta^2, |x| <= reach.
+
+    Parameters
+    ----------
+    profile : F_2 with its derivative (m with m' where F_1 = 1), see `Profile`
+    reach : the largest x: of a pole, where F_2 = 0, of the next parallel, where F_2' = 0, or of the chart's boundary
+    meridian : F_1; 1 where not given
+
+    Raises
+    ------
+    ShapeError
+        If the metric breaks an assumption: its equator no parallel, not symmetric, F_2 not falling to the reach; or the
+        derivative is not that of F_2.
+    AccuracyNotReached
+        If the metric is too rough to be tabulated to rounding.
+
+    Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
+    """
+    found = assumptions(profile, reach, meridian)
+    if not found.equator_is_parallel:
+        raise ShapeError("(A1) fails: the equator x = 0 is no extremal, as F_2'(0) is not 0; count x from the equator")
+    if not found.is_symmetric:
+        raise ShapeError("(A2) fails: F_1 and F_2 must be even in x")
+    if not found.falls_to_reach:
+        raise ShapeError(
+            "F_2 must fall from the equator to the reach; take the reach no farther than the next parallel, "
+            "and x = 0 where F_2 is greatest"
+        )
+    sampler = _Sampler(profile, meridian, float(reach), found.end)
+    return surface_of_stretch(sampler.table(), sampler.equator, sampler.depth, found.end)
+
+
+class _Sampler:
+    """D at given Y, by F_1 and F_2; differences of F_2 are integrals of F_2', which keep their digits."""
+
+    def __init__(self, profile: Profile, meridian: Meridian | None, reach: float, end: str) -> None:
+        self.profile, self.meridian, self.reach, self.end = profile, meridian, reach, end
+        ends, _ = _values(profile, np.array([0.0, reach]))
+        self.equator = float(ends[0])
+        self.depth = 1.0 if end == "pole" else float(1.0 - ends[1] / ends[0])
+        x = reach * np.linspace(0.0, 1.0, 65)
+        middle, _ = _values(profile, x)
+        truth = 1.0 - middle / self.equator
+        self.panels = 1
+        last = self.drop(np.zeros_like(x), x)
+        while self.panels < 64:
+            self.panels *= 2
+            finer = self.drop(np.zeros_like(x), x)
+            settled = np.abs(finer - last).max() <= 1e-14
+            last = finer
+            if settled:
+                break
+        if np.abs(last - truth).max() > 1e-11:
+            at = x[int(np.abs(last - truth).argmax())]
+            raise ShapeError(
+                f"profile: the derivative given is not that of F_2, or F_2 is too rough, up to x = {at:.6g}"
+            )
+
+    def drop(self, start: Array, stop: Array) -> Array:
+        """Y(stop) - Y(start): (N,) x 2 -> (N,)."""
+        fraction = (np.arange(self.panels)[:, None] + 0.5 * (1.0 + _NODES)).ravel() / self.panels
+        weight = np.tile(0.5 * _WEIGHTS, self.panels) / self.panels
+        x = start[:, None] + (stop - start)[:, None] * fraction
+        _, slope = _values(self.profile, x.ravel())
+        return -(slope.reshape(x.shape) @ weight) * (stop - start) / self.equator
+
+    def tabulated(self, square: Array, rest: Array) -> Array:
+        """D, or sqrt(depth - Y) D before a parallel, at Y and depth - Y: (N,) x 2 -> (N,)."""
+        near = square <= rest
+        zero, far = np.zeros_like(square), np.full_like(square, self.reach)
+
+        def step(x: Array) -> tuple[Array, Array]:
+            ahead = np.where(near, zero, far)
+            value = self.drop(ahead, x) - np.where(near, square, -rest)
+            _, slope = _values(self.profile, x)
+            slope = np.where(slope < 0.0, -slope / self.equator, np.inf)
+            return value, x - value / slope
+
+        guess = self.reach * np.where(near, np.sqrt(square / self.depth), 1.0 - np.sqrt(rest / self.depth))
+        x = root(step, guess, zero, far)
+        _, slope = _values(self.profile, x)
+        along = np.sqrt(_meridian_values(self.meridian, x))
+        below = (1.0 - self.depth) + rest
+        value = along * 2.0 * np.sqrt(square) * np.sqrt(below) * self.equator / -slope
+        return value * np.sqrt(rest) if self.end == "parallel" else value
+
+    def table(self) -> TabulatedStretch:
+        """Panels from the equator to the reach, each halved until its series has settled."""
+        angles = np.pi * (np.arange(_DEGREE + 1) + 0.5) / (_DEGREE + 1)
+        toward = 0.5 * (1.0 - np.cos(angles))
+        waiting, edges, series = [(0.0, 1.0)], [0.0], []
+        while waiting:
+            low, high = waiting.pop()
+            square = self.depth * (low + (high - low) * toward)
+            rest = self.depth * ((1.0 - high) + (high - low) * (1.0 - toward))
+            samples = self.tabulated(square, rest)
+            coefficients = np.asarray(dct(samples[::-1], type=2)) / (_DEGREE + 1)
+            coefficients[0] *= 0.5
+            # Ever finer panels forgive more, as the functions given may have a last digit that is noise.
+            forgiven = min(_SETTLED * 1.5 ** np.log2(1.0 / (high - low)), 20.0 * _SETTLED)
+            if np.abs(coefficients[-3:]).max() > forgiven * np.abs(samples).max():
+                if high - low < 0.5**_HALVINGS:
+                    raise AccuracyNotReached(
+                        f"the metric is too rough near Y = {square[0]:.6g} to be tabulated to rounding; give a smooth "
+                        "metric, with a derivative right to rounding"
+                    )
+                middle = 0.5 * (low + high)
+                # The half next to the reach first, so that edges ascend in depth - Y.
+                waiting += [(low, middle), (middle, high)]
+                continue
+            # What is left at the end is rounding, which every derivative would magnify.
+            coefficients = chebyshev.chebtrim(coefficients, 4e-16 * np.abs(samples).max())
+            coefficients = np.pad(coefficients, (0, max(0, 3 - len(coefficients))))
+            scale = 2.0 / (self.depth * (high - low))
+            first, second = (chebyshev.chebder(coefficients, order) * scale**order for order in (1, 2))
+            series.append(np.stack([coefficients, np.pad(first, (0, 1)), np.pad(second, (0, 2))]))
+            edges.append(self.depth * (1.0 - low))
+        return TabulatedStretch(np.array(edges), tuple(series), self.end == "parallel")
+
+
+def _values(profile: Profile, x: Array) -> tuple[Array, Array]:
+    try:
+        value, slope = (np.asarray(a, dtype=float) for a in profile(x))
+    except (TypeError, ValueError) as error:
+        raise ShapeError(f"profile: expected a function x (N,) -> F_2, F_2', (N,) each ({error})") from None
+    return _checked(value, x, "F_2"), _checked(slope, x, "F_2'")
+
+
+def _meridian_values(meridian: Meridian | None, x: Array) -> Array:
+    return np.ones_like(x) if meridian is None else _checked(np.asarray(meridian(x), dtype=float), x, "F_1")
+
+
+def _checked(value: Array, x: Array, name: str) -> Array:
+    if value.shape not in ((), x.shape) or not np.isfinite(value).all():
+        raise ShapeError(f"{name}: expected {x.shape} finite numbers for x {x.shape}, got shape {value.shape}")
+    return np.broadcast_to(value, x.shape)

@@ -1,0 +1,123 @@
+"""Action and angle variables of the free rigid body (Sadov's), from Andoyer's, and its two frequencies.
+
+The actions are J, the integral of L dl round the closed curve in the (l, L) plane by 2 pi, G and K. Their angles
+advance evenly in free motion: that of J at `own_rate`, once round in a period of the momentum in the body; that of G
+at `precession_rate`, the mean of g'; that of K, k itself, not at all. Body axes are principal, I_1 > I_2 > I_3.
+
+J is even in the sense of the motion; it grows from 0, with the momentum along axis 1, to G, along axis 3. Where the
+momentum circles axis 1 or -1, angles count from l = pi/2 or -pi/2, L > 0; where it circles axis 3 or -3, from l = pi/2.
+Along axis 1 the angle of J is undefined, along axis 3 it goes with l.
+
+Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
+speed by homogeneity: the action and the rates are sqrt(2 E) times theirs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ... import elliptic, so3
+from ...arrays import Array, Mask, finite_array
+from ...errors import ShapeError
+from .andoyer_variables import AndoyerVariables
+from .serret_andoyer import serret_andoyer_metric
+
+
+@dataclass(frozen=True, eq=False)
+class SadovVariables:
+    """Actions, angles and frequencies, (...) each; see `sadov_variables`."""
+
+    own: Array
+    """Conjugate to `action` [rad]."""
+    precession: Array
+    """Conjugate to `total` [rad]; g without its oscillation."""
+    node: Array
+    """Andoyer's k, conjugate to `vertical` [rad]."""
+    action: Array
+    """J [kg m^2/s]."""
+    total: Array
+    """G [kg m^2/s]."""
+    vertical: Array
+    """K [kg m^2/s]."""
+    own_rate: Array
+    """dH/dJ: 2 pi over the period of the momentum in the body [rad/s]."""
+    precession_rate: Array
+    """dH/dG, the mean rate about the momentum [rad/s]."""
+
+
+def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVariables:
+    """Action and angle variables of states in Andoyer's variables: (3,), (...) -> (...).
+
+    Parameters
+    ----------
+    moments : (3,) about the body axes 1, 2, 3, descending [kg m^2]
+    variables : of a body whose axes are those
+
+    Raises
+    ------
+    ShapeError
+        If the moments do not descend strictly, or a state is on the separatrix or along axis 2, where the period is
+        infinite and there are no angles. Next to it their digits are lost as 1/m1.
+    """
+    metric = serret_andoyer_metric(moments)
+    momentum = variables.body_momentum
+    family = metric.geodesics_of(momentum)
+    lost = family.complement == 0.0
+    if lost.any():
+        where = tuple(int(i) for i in np.argwhere(lost)[0])
+        raise ShapeError(
+            f"variables: entry {list(where)} is on the separatrix or along axis 2, where the period is infinite and "
+            "there are no angle variables; the action alone is `SerretAndoyerMetric.separatrix().action`"
+        )
+    speed = np.sqrt(2.0 * variables.hamiltonian(np.diag(metric.moments)))
+    u = _argument(metric.moments, momentum, variables.l, family.is_oscillating, family.complement)
+    quarter = elliptic.complete_k(family.complement)
+    whole = elliptic.complete_pi_excess(family.constants.characteristic, family.complement)
+    part = elliptic.jacobi_and_pi_excess(family.constants.characteristic, u, family.complement)[4]
+    return SadovVariables(
+        own=so3.wrap(0.5 * np.pi * u / quarter),
+        precession=so3.wrap(variables.g + family.constants.third_kind * (part - whole * (u / quarter))),
+        node=variables.k,
+        action=speed * family.action,
+        total=variables.total,
+        vertical=variables.vertical,
+        own_rate=speed * 2.0 * np.pi / family.period,
+        precession_rate=speed * 2.0 * family.first_return / family.period,
+    )
+
+
+def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Array, Array]:
+    """dH/dJ and dH/dG, the frequencies of free motion through these momenta: (3,), (..., 3) -> (...), (...) [rad/s].
+
+    The rate of the momentum's way round in the body, and the mean rate about the momentum; both limits on the
+    separatrix, where the first is 0. Principal axes, that of the largest moment first.
+
+    Raises
+    ------
+    ShapeError
+        If the moments do not descend strictly, or a momentum is zero.
+
+    Source: theory.md R15.
+    """
+    metric = serret_andoyer_metric(moments)
+    momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
+    family = metric.geodesics_of(momentum)
+    speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))
+    return speed * 2.0 * np.pi / family.period, speed * family.mean_theta_rate
+
+
+def _argument(moments: Array, momentum: Array, angle: Array, oscillating: Mask, complement: Array) -> Array:
+    """u of a state in [-K, 3 K), from l = +-pi/2 on."""
+    i1, i2, i3 = moments
+    h1, h2, h3 = np.moveaxis(momentum, -1, 0)
+    near, rest, far = (i1 - i2) / i2, i1 * (i2 - i3) / i2, i1 - i3
+    # Along axis 3 by l, as there is no momentum across.
+    oscillation = -np.copysign(1.0, h1) * h2 * np.sqrt(near * i3)
+    rotation = -np.copysign(1.0, h3) * np.cos(angle) * np.sqrt(rest)
+    sine = np.where(oscillating, oscillation, rotation)
+    cosine = np.where(oscillating, h3, np.sin(angle)) * np.sqrt(far)
+    short = elliptic.argument_of(sine, np.abs(cosine), complement)
+    return np.where(cosine < 0.0, 2.0 * elliptic.complete_k(complement) - short, short)

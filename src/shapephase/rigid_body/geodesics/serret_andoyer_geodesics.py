@@ -1,0 +1,354 @@
+"""Geodesics of the Serret-Andoyer metric in closed real form, their returns to the equator and conjugate points.
+
+With u = M t, the sine and cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and n <= 0 are, up to a common factor,
+
+    oscillating  I_2 < p^2 <= I_1   m sn(u) : k' dn(u)          n = -(1 - A p^2)/(C p^2 - 1)       f = cn
+    rotating     I_3 <= p^2 < I_2   sn(u) : k' cn(u)            n = -(B - A)/(C - B)               f = dn
+    extended     p^2 < I_3          sqrt(m1) sn(u) : k' cn(u)   n = -p^2 (B - A)/(1 - B p^2)       f = 1
+    separatrix   p^2 = I_2          as rotating, with m = 1
+
+with m1 = 1 - m^2 the complement of each one's own modulus. In all of them phi' = sqrt(1 - A p^2) f(u)/sqrt(1 - n sn^2),
+
+    theta = s t - c (Pi(n; u) - u/(1 - n)),
+
+s = 1/p or B p, and the derivative of theta by p at constant phi, which decides on the conjugate points, is
+
+    (A u + q S(u))/(M (1 - A p^2)),  S = the integral of (sn/f)^2,
+
+with constants c, q >= 0. Nothing is complex, and but for theta, which next to its start has I_1/I_2 times the rounding
+of its last digit, no terms cancel. What is small near the separatrix and near the equator, 1 - B p^2 and 1 - A p^2, is
+found from p without rounding.
+
+Sources: Bonnard, Cots and Shcherbakova 2013, sections 4.3 and 4.4, with the misprints and the case of theory.md B-E6,
+B-E7, B-E8, B-E11; theory.md R6 to R13.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import elliprd, hyp2f1
+
+from ... import elliptic
+from ...arrays import Array, Mask, finite_array
+from ...errors import AccuracyNotReached, ShapeError
+from .serret_andoyer_constants import EXTENDED, ROTATING, SEPARATRIX, GeodesicConstants, moment_gaps, refuse
+
+CLASSES = ("extended", "rotating", "separatrix", "oscillating", "equator")
+_STEPS = 200
+_NOT_ZERO = 1e-100
+"""In place of a cn that vanishes, at a pole of S, where only f S is finite."""
+
+
+@dataclass(frozen=True, eq=False)
+class GeodesicFamily:
+    """Geodesics of unit speed from the equator towards phi >= 0, of given p_theta; all times broadcast against them.
+
+    `SerretAndoyerMetric.geodesics` makes them.
+    """
+
+    constants: GeodesicConstants
+
+    @property
+    def p_theta(self) -> Array:
+        """Clairaut's constant m theta': (...) [sqrt(kg) m]."""
+        return self.constants.p_theta
+
+    @property
+    def is_oscillating(self) -> Mask:
+        """Whether they return to the equator, or stay on it: (...)."""
+        return self.constants.oscillating
+
+    @property
+    def complement(self) -> Array:
+        """m1 = 1 - m^2 of the elliptic functions of M t, to all digits; 0 on the separatrix: (...)."""
+        return self.constants.complement
+
+    @property
+    def trajectory_class(self) -> str | np.ndarray:
+        """The names of the classes, of one geodesic as a string.
+
+        "oscillating" about the equator (the momentum circles the axis of I_1) and its limit, the "equator" itself;
+        "rotating" (the momentum circles the axis of I_3); "separatrix"; "extended": |p_theta| below sqrt(I_3), where
+        there is a geodesic but no rigid body.
+
+        Source: Bonnard et al., section 4.2.
+        """
+        names = np.array(CLASSES)[self.constants.kind]
+        return str(names) if names.ndim == 0 else names
+
+    @property
+    def period(self) -> Array:
+        """T = 4 K/M; infinite on the separatrix: (...) [sqrt(kg) m].
+
+        An oscillating geodesic is back at the equator, upward, after T; on a rotating one phi gains 4 K(k)/alpha.
+        Source: theory.md section 4, B-E12.
+        """
+        return 4.0 * elliptic.complete_k(self.complement) / self.constants.rate
+
+    @property
+    def first_return(self) -> Array:
+        """R, what theta gains in T/2, after which an oscillating geodesic is at the equator again: (...) [rad].
+
+        Infinite on the separatrix. On oscillating geodesics decreasing and convex in p (proposition 9: see
+        `first_return_slope`); odd in p.
+        Source: theory.md R11, in another form.
+        """
+        half = 2.0 * elliptic.complete_k(self.complement) / self.constants.rate
+        third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
+        return self._turned(self.constants.drift * half - 2.0 * self.constants.third_kind * third)
+
+    @property
+    def mean_theta_rate(self) -> Array:
+        """2 R/T, the mean of theta'; on the separatrix its limit, B p: (...) [1/(sqrt(kg) m)]."""
+        third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
+        return self._turned(self.constants.drift - 4.0 * self.constants.third_kind * third / self.period)
+
+    @property
+    def first_return_slope(self) -> Array:
+        """R' = dR/dp of oscillating geodesics, which is T'/(2 p) = dT/d(p^2): (...) [rad/(sqrt(kg) m)].
+
+        A sum of negative terms. Raises ShapeError if a geodesic does not oscillate.
+        Source: Bonnard et al., lemma 2.8 and proposition 9.
+        """
+        return self._period_slopes()[0]
+
+    @property
+    def first_return_bend(self) -> Array:
+        """R'' = d^2 R/dp^2 of oscillating geodesics, p times a sum of positive terms: (...) [rad/(kg m^2)].
+
+        Raises ShapeError if a geodesic does not oscillate. Source: as `first_return_slope`.
+        """
+        return 2.0 * self.p_theta * self._period_slopes()[1]
+
+    @property
+    def action(self) -> Array:
+        """The integral of phi' d phi over a period, by 2 pi: (...) [sqrt(kg) m]; from 0 on the equator.
+
+        (T - 2 p R)/(2 pi), as a sum of terms >= 0; also on the separatrix.
+        Source: theory.md R15.
+        """
+        open_ = self.constants.at_crest > 0.0
+        rising = np.where(open_, self.constants.at_crest * np.where(open_, self.period, 0.0), 0.0)
+        third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
+        return (rising + 4.0 * self.constants.size * self.constants.third_kind * third) / (2.0 * np.pi)
+
+    @property
+    def amplitude(self) -> Array:
+        """The largest phi of oscillating geodesics, phi_+: (...) [sqrt(kg) m]; K/alpha on the separatrix.
+
+        Raises ShapeError for rotating geodesics, which have none.
+        Source: Bonnard et al., section 4.2.
+        """
+        bad = self.constants.kind < SEPARATRIX
+        refuse(bad, self.p_theta, "p_theta", "only an oscillating geodesic has a largest phi: |p_theta| >= sqrt(I_2)")
+        _, b, c = moment_gaps(self.constants.moments)
+        # Y_+ = (1 - A p^2)/((B - A) p^2) and 1 - Y_+.
+        sine, cosine = np.sqrt(self.constants.at_equator), np.sqrt(np.maximum(-self.constants.at_crest, 0.0))
+        return elliptic.argument_of(sine, cosine, b / c) / np.sqrt(c)
+
+    def phi(self, t: ArrayLike) -> Array:
+        """phi along the geodesics: (...) [sqrt(kg) m] -> (...) [sqrt(kg) m].
+
+        Source: Bonnard et al. (16); theory.md R9.
+        """
+        _, b, c = moment_gaps(self.constants.moments)
+        turns, sine, cosine = self._tangent(self._arguments(t))
+        complement = b / c
+        rest = elliptic.argument_of(sine, cosine, complement)
+        return (2.0 * turns * elliptic.complete_k(complement) + rest) / np.sqrt(c)
+
+    def y(self, t: ArrayLike) -> Array:
+        """Andoyer's y = l, continuous, from pi/2 down: (...) [sqrt(kg) m] -> (...) [rad].
+
+        Source: Bonnard et al. (9).
+        """
+        turns, sine, cosine = self._tangent(self._arguments(t))
+        return 0.5 * np.pi - turns * np.pi - np.arctan2(sine, cosine)
+
+    def p_phi(self, t: ArrayLike) -> Array:
+        """phi' = sqrt(1 - p_theta^2/m): (...) [sqrt(kg) m] -> (...), between -1 and 1."""
+        sn, cn, dn, _ = elliptic.jacobi(self._arguments(t), self.complement)
+        rising = np.sqrt(self.constants.at_equator) * self._denominator(cn, dn)
+        return rising / np.sqrt(1.0 - self.constants.characteristic * sn**2)
+
+    def p_y(self, t: ArrayLike) -> Array:
+        """Andoyer's p_y = L, from negative values: (...) [sqrt(kg) m] -> (...) [sqrt(kg) m].
+
+        Source: Bonnard et al. (8), with theory.md B-E5 for the sign.
+        """
+        _, b, c = moment_gaps(self.constants.moments)
+        _, sine, cosine = self._tangent(self._arguments(t))
+        square = (b * sine**2 + c * cosine**2) / (sine**2 + cosine**2)
+        return -self.p_phi(t) / np.sqrt(square)
+
+    def theta(self, t: ArrayLike) -> Array:
+        """theta along the geodesics, unwrapped, 0 at t = 0: (...) [sqrt(kg) m] -> (...) [rad].
+
+        Source: Bonnard et al. (17) to (20) in real form, with theory.md B-E7, B-E8; rotating: theory.md B-E11.
+        """
+        u = self._arguments(t)
+        third = elliptic.jacobi_and_pi_excess(self.constants.characteristic, u, self.complement)[4]
+        return self._turned(self.constants.drift * np.asarray(t, dtype=float) - self.constants.third_kind * third)
+
+    def jacobi_field(self, t: ArrayLike) -> Array:
+        """The normal Jacobi field J with J(0) = 0, J'(0) = 1, in closed form: (...) [sqrt(kg) m] -> (...).
+
+        J'' + G J = 0 with the Gauss curvature G; its zeros are the points conjugate to t = 0. It is the derivative of
+        theta by p at constant phi, times sqrt(I_1 m) phi'(0) phi'(t).
+        Source: Bonnard et al., lemma 2.7; theory.md R12, R13.
+        """
+        u = self._arguments(t)
+        sn, cn, dn, _ = elliptic.jacobi(u, self.complement)
+        f = self._denominator(cn, dn)
+        first = 1.0 / self.constants.moments[0]
+        rising = first * u * f + self.constants.growth * self._spread_integral(u, sn, cn, dn)
+        _, sine, cosine = self._tangent(u)
+        second = 1.0 / self.constants.moments[1]
+        w = (first * cosine**2 + second * sine**2) / (sine**2 + cosine**2)
+        return rising / (self.constants.rate * np.sqrt(first * w * (1.0 - self.constants.characteristic * sn**2)))
+
+    def conjugate_points(self, order: int = 1) -> ConjugatePoints:
+        """The points of oscillating geodesics conjugate to their start on the equator, of an order 1, 2, ...
+
+        The first locus is the curve of these points for sqrt(I_2) < p <= sqrt(I_1), on phi <= 0, and its mirror image
+        in the equator, of the geodesics that start downward; it starts with a cusp on the equator at p = sqrt(I_1) and
+        tends to phi = -K/alpha, theta infinite, as p falls to sqrt(I_2).
+
+        Raises
+        ------
+        ShapeError
+            If a geodesic is not oscillating: the others have no conjugate point (theory.md R13).
+        AccuracyNotReached
+            If Newton's iteration does not come to rest.
+
+        Source: Bonnard et al., section 4.4; theory.md R12.
+        """
+        if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
+            raise ShapeError(f"order: expected a whole number from 1 on, got {order!r}")
+        first = 1.0 / self.constants.moments[0]
+        wanted = -order * self._period_slopes()[0] * self.constants.rate * self.constants.at_equator
+        v = _rising_root(first, self.constants.growth, self.complement, wanted)
+        u = 2.0 * order * elliptic.complete_k(self.complement) + v
+        third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
+        rest = elliptic.jacobi_and_pi_excess(self.constants.characteristic, v, self.complement)[4]
+        time = u / self.constants.rate
+        theta = self._turned(self.constants.drift * time - self.constants.third_kind * (2.0 * order * third + rest))
+        _, sine, cosine = self._tangent(v)
+        _, b, c = moment_gaps(self.constants.moments)
+        size = elliptic.argument_of(sine, cosine, b / c) / np.sqrt(c)
+        return ConjugatePoints(time=time, phi=np.where(order % 2, -1.0, 1.0) * size, theta=theta)
+
+    def _turned(self, theta: Array) -> Array:
+        return self.p_theta / self.constants.size * theta
+
+    def _arguments(self, t: ArrayLike) -> Array:
+        times = finite_array(t, "t", unit="sqrt(kg) m")
+        try:
+            return self.constants.rate * times
+        except ValueError:
+            raise ShapeError(
+                f"t {times.shape}: cannot be broadcast with the geodesics {self.p_theta.shape}; add axes"
+            ) from None
+
+    def _denominator(self, cn: Array, dn: Array) -> Array:
+        return np.where(self.constants.oscillating, cn, np.where(self.constants.kind >= ROTATING, dn, 1.0))
+
+    def _tangent(self, u: Array) -> tuple[Array, Array, Array]:
+        """Half turns of am(alpha phi), and up to a common factor the sine and cosine >= 0 of its rest."""
+        sn, cn, dn, amplitude = elliptic.jacobi(u, self.complement)
+        _, b, c = moment_gaps(self.constants.moments)
+        oscillating = self.constants.oscillating
+        odd, whole = _half_turns(amplitude, cn)
+        sign = 1.0 - 2.0 * odd
+        sine = sn * np.where(self.constants.kind == EXTENDED, np.sqrt(self.complement), self.constants.modulus)
+        factor = np.sqrt(b / c)
+        turned = np.where(oscillating, sine, sign * sine), factor * np.where(oscillating, dn, np.abs(cn))
+        return np.where(oscillating, 0.0, whole), *turned
+
+    def _spread_integral(self, u: Array, sn: Array, cn: Array, dn: Array) -> Array:
+        """f times the integral of (sn/f)^2, for oscillating geodesics continued past the poles."""
+        amplitude = elliptic.jacobi(u, self.complement)[3]
+        odd, turns = _half_turns(amplitude, cn)
+        refuse(dn < _NOT_ZERO, u / self.constants.rate, "t", "there the Jacobi field is beyond 1e100")
+        m1, sine, cosine = self.complement, (1.0 - 2.0 * odd) * sn, np.maximum(np.abs(cn), _NOT_ZERO)
+        regular = np.where(m1 > 0.0, m1, 1.0)
+        rest = sine**3 / 3.0
+        flat = rest * elliprd(cosine**2, dn**2, 1.0)
+        tame = dn * rest * elliprd(cosine**2, 1.0, dn**2)
+        wild = (1.0 - 2.0 * odd) * cosine * rest * elliprd(dn**2, 1.0, cosine**2)
+        whole_wild = -2.0 * elliptic.complete_e(regular) / regular * cn
+        whole_tame = 2.0 * dn * elliprd(0.0, 1.0, regular) / 3.0
+        whole_flat = 2.0 * elliprd(0.0, regular, 1.0) / 3.0
+        oscillating, plain = self.constants.oscillating, self.constants.kind == EXTENDED
+        part = np.where(oscillating, wild, np.where(plain, flat, tame))
+        return part + turns * np.where(oscillating, whole_wild, np.where(plain, whole_flat, whole_tame))
+
+    def _period_slopes(self) -> tuple[Array, Array]:
+        """dT/d(p^2) and d^2 T/d(p^2)^2, the terms of each all of one sign."""
+        bad = ~self.constants.oscillating
+        wanted = "the geodesic must oscillate, sqrt(I_2) < |p_theta| <= sqrt(I_1)"
+        refuse(bad, self.p_theta, "p_theta", wanted)
+        (a, b, _), c = moment_gaps(self.constants.moments), 1.0 / self.constants.moments[2]
+        excess = self.constants.rate**2 / a
+        m1 = self.complement
+        m_slope = -b * (a + b) / (a * excess**2)
+        k, k_slope, k_bend = elliptic.complete_k(m1), elliprd(0.0, 1.0, m1) / 6.0, _second_derivative_of_k(m1)
+        fall = c / (2.0 * excess)
+        first = 4.0 / self.constants.rate * (k_slope * m_slope - k * fall)
+        second = 4.0 / self.constants.rate * (k_bend * m_slope**2 - 6.0 * fall * k_slope * m_slope + 3.0 * k * fall**2)
+        return first, second
+
+
+@dataclass(frozen=True, eq=False)
+class ConjugatePoints:
+    """Points conjugate to a point of the equator, as `GeodesicFamily.conjugate_points` finds them."""
+
+    time: Array
+    """(...) arc length from the start [sqrt(kg) m]."""
+    phi: Array
+    """(...) [sqrt(kg) m]; of a geodesic that starts upward. Its mirror image is conjugate too."""
+    theta: Array
+    """(...) from the start [rad]."""
+
+
+def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
+    """Whether their number is odd, and the number of half turns of an amplitude whose cosine is known better."""
+    odd = np.where(cosine < 0.0, 1.0, 0.0)
+    return odd, 2.0 * np.rint(0.5 * (amplitude / np.pi - odd)) + odd
+
+
+def _second_derivative_of_k(m1: Array) -> Array:
+    """d^2 K/dm^2 by the hypergeometric series for small m, else by Legendre's equation."""
+    m = 1.0 - m1
+    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, 0.4))
+    large = np.maximum(m, 0.4)
+    small = 1.0 - large
+    small = np.where(m > 0.4, m1, small)
+    equation = (0.25 * elliptic.complete_k(small) - (small - large) * elliprd(0.0, 1.0, small) / 6.0) / (large * small)
+    return np.where(m > 0.4, equation, series)
+
+
+def _rising_root(first: float, spread: Array, m1: Array, wanted: Array) -> Array:
+    """The v in [0, K) where first v + spread S(v) = wanted >= 0, S the integral of (sn/cn)^2.
+
+    The left side is convex and grows without bound, so Newton's steps come down to the root from above; one that leaves
+    the bracket is replaced by its middle.
+    """
+    quarter = elliptic.complete_k(m1)
+    low, high = np.zeros(np.shape(wanted)), np.minimum(quarter, wanted / first)
+    # Not from K itself, a pole, whose neighbourhood Newton's steps leave slowly.
+    v = np.minimum(high, 0.9 * quarter)
+    for _ in range(_STEPS):
+        sn, cn, dn, _ = elliptic.jacobi(v, m1)
+        cn = np.maximum(np.abs(cn), _NOT_ZERO)
+        gap = first * v + spread * sn**3 / 3.0 * elliprd(dn**2, 1.0, cn**2) - wanted
+        low, high = np.where(gap <= 0.0, v, low), np.where(gap > 0.0, v, high)
+        step = v - gap / (first + spread * (sn / cn) ** 2)
+        v, before = np.where((step >= low) & (step <= high), step, 0.5 * (low + high)), v
+        # The steps' size is squared each time, in parts of the distance to the pole.
+        if np.all(np.abs(v - before) <= 1e-9 * np.minimum(quarter - v, 1.0)):
+            return v
+    raise AccuracyNotReached(f"conjugate points: Newton's iteration is not at rest after {_STEPS} steps")

@@ -1,0 +1,334 @@
+"""Surfaces of revolution d phi^2 + m(phi) d theta^2 that are symmetric about their equator, and their extremals.
+
+Every metric taken here has its equator at phi = 0, m(-phi) = m(phi), and m falling from there to phi = `reach`. With
+
+    y^2 = Y = 1 - m(phi)/m(0),  y of the sign of phi,        D(Y) = (d phi/dy) sqrt(1 - Y)
+
+it is described by the one smooth function D, the *stretch* (D = 1 on the unit sphere, where y is the sine of the
+latitude). Along an extremal with Clairaut's constant p, parametrised by arc length t, the *phase* chi is defined by
+
+    y = sqrt(q) sin(chi),   q = 1 - p^2/m(0),
+
+and grows by pi from one crossing of the equator to the next. Nothing is singular in it, turning points included:
+
+    dt = D(Y) d chi,   d theta = (p/m(0)) D(Y)/(1 - Y) d chi,   d bend = 2 D'(Y) sin^2(chi) d chi,
+
+the period is T = 4 t(pi/2), the first return R = 2 theta(pi/2), R' = -(2/m(0)) bend(pi/2) = T'/(2p), and the Jacobi
+field normal to the extremal, 0 at the phase chi_0 with slope 1, is
+
+    j(chi) = cos(chi) cos(chi_0) (L(chi) - L(chi_0)),   L = D(Y) tan(chi) - q bend(chi),   dL/dchi = D/cos^2(chi).
+
+So L rises from minus to plus infinity between two turning points: there is exactly one conjugate point of every order
+between consecutive ones. The Gauss curvature is (D - 2 Y D')/D^3.
+
+Sources: Bonnard, Cots and Shcherbakova 2013, section 2 (the statements); Besse 1978, chapter 4 (the normal form, due
+to Darboux); the formulas in chi follow by integrating theirs by parts. theory.md O1-O16.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arrays import Array, Mask, finite_array
+from ...errors import AccuracyNotReached, ShapeError
+from ...roots import ROUNDING, root
+from .arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
+
+ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]
+"""p >= 0, q, depth - q and phases in [-pi/2, pi/2], all (N,) -> `Arcs`: what `quadrature` finds by nodes."""
+
+_ENDS = ("pole", "parallel", "boundary")
+_EDGE = 1e-9
+"""Next to a parallel that extremals approach without end, p must stay this far away, in parts of p."""
+_NEAREST = 1e-60
+"""At a parallel the stretch is infinite; so near to it the curvature has its limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceOfRevolution:
+    """A surface d phi^2 + m(phi) d theta^2 by its stretch; made by `surface_of_stretch` and the functions that call it.
+
+    Lengths are in the unit of phi. Extremals oscillate about the equator when their Clairaut constant p, in size, is
+    between `least_momentum` and `greatest_momentum`; these, and the meridians p = 0 over smooth poles, are treated.
+    Results are right to a few units of rounding, magnified by 1/(p/`least_momentum` - 1) before a parallel.
+    """
+
+    equator: float
+    """m(0) > 0."""
+    depth: float
+    """Y at the reach, 1 - m(reach)/m(0), in (0, 1]."""
+    end: str
+    """At the reach: a "pole" (m = 0), a "parallel" (m' = 0), where a separatrix ends, or a "boundary" of the chart."""
+    stretch: Stretch
+    """Y and depth - Y, (N,) each -> D, D', D'' (N,) each."""
+    closed_arcs: ClosedArcs | None
+    """The integrals along extremals in closed form, where known."""
+    splits: int
+    """How fine the panels of the quadrature are."""
+
+    @property
+    def greatest_momentum(self) -> float:
+        """sqrt(m(0)), p of the equator."""
+        return float(np.sqrt(self.equator))
+
+    @property
+    def least_momentum(self) -> float:
+        """sqrt(m(reach)); from here on down extremals leave the chart, or pass beyond the parallel at its end."""
+        return float(np.sqrt(self.equator * (1.0 - self.depth)))
+
+    @property
+    def reach(self) -> float:
+        """The largest latitude phi."""
+        return float(self.latitude(np.sqrt(self.depth)))
+
+    @property
+    def has_smooth_poles(self) -> bool:
+        """Whether it closes to a smooth sphere: two poles without a cone's tip, where sqrt(m) has the slope 1."""
+        if self.end != "pole":
+            return False
+        stretch, _, _ = self.stretch(np.ones(1), np.zeros(1))
+        return bool(abs(stretch[0] / self.greatest_momentum - 1.0) < 1e-9)
+
+    def height(self, latitude: ArrayLike) -> Array:
+        """y of latitudes phi: (...) -> (...). Raises ShapeError beyond the reach."""
+        phi = finite_array(latitude, "latitude")
+        reach = self.reach
+        _refuse(np.abs(phi) > reach * (1.0 + 1e-12), phi, "latitude", f"the surface reaches to {reach:.17g}")
+        size = np.minimum(np.abs(phi), reach).ravel()
+        top = np.sqrt(self.depth)
+
+        def step(angle: Array) -> tuple[Array, Array]:
+            value, slope = self._meridian(angle)
+            return value - size, angle - (value - size) / slope
+
+        angle = root(step, 0.5 * np.pi * size / reach, np.zeros_like(size), np.full_like(size, 0.5 * np.pi), ROUNDING)
+        return np.copysign(top * np.sin(angle).reshape(phi.shape), phi)[()]
+
+    def latitude(self, height: ArrayLike) -> Array:
+        """phi of y in [-sqrt(depth), sqrt(depth)], the arc length along a meridian: (...) -> (...)."""
+        y = finite_array(height, "height")
+        top = np.sqrt(self.depth)
+        _refuse(np.abs(y) > top * (1.0 + 1e-15), y, "height", f"the surface reaches to {top:.17g}")
+        value, _ = self._meridian(np.arcsin(np.clip(np.abs(y) / top, 0.0, 1.0)).ravel())
+        return np.copysign(value.reshape(y.shape), y)[()]
+
+    def metric(self, latitude: ArrayLike) -> Array:
+        """m, the square of the distance from the axis: (...) -> (...)."""
+        return self.equator * (1.0 - self.height(latitude) ** 2)
+
+    def curvature(self, latitude: ArrayLike) -> Array:
+        """Gauss curvature G = -(sqrt m)''/sqrt m at latitudes phi: (...) -> (...). Source: Bonnard et al., (A3)."""
+        return self.curvature_at_height(self.height(latitude))
+
+    def curvature_at_height(self, height: ArrayLike) -> Array:
+        """Gauss curvature (D - 2 Y D')/D^3 at y: (...) -> (...)."""
+        y = finite_array(height, "height")
+        square = np.minimum(y * y, self.depth).ravel()
+        value, slope, _ = self.stretch(square, np.maximum(self.depth - square, _NEAREST))
+        return ((value - 2.0 * square * slope) / value**3).reshape(y.shape)[()]
+
+    def potential(self, latitude: ArrayLike, momentum: ArrayLike) -> Array:
+        """V = p^2/m(phi), with (d phi/dt)^2 + V = 1: (...), (...) -> (...). Source: Bonnard et al., remark 1."""
+        return finite_array(momentum, "momentum") ** 2 / self.metric(latitude)
+
+    def momentum_of(self, direction: ArrayLike, latitude: ArrayLike = 0.0) -> Array:
+        """p = sqrt(m) cos(direction) of extremals that start at this angle from east to north: (...) [rad] -> (...)."""
+        return np.sqrt(self.metric(latitude)) * np.cos(finite_array(direction, "direction", unit="rad"))
+
+    def direction_of(self, momentum: ArrayLike) -> Array:
+        """The angle in [0, pi] at which an extremal with this p crosses the equator northward: (...) -> (...) [rad]."""
+        p, q, _ = self.parameters(momentum)
+        return np.arctan2(np.sqrt(q), p / self.greatest_momentum)[()]
+
+    def parameters(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
+        """p, q = 1 - p^2/m(0) and depth - q of extremals that oscillate: (...) -> (...) each.
+
+        Raises
+        ------
+        ShapeError
+            If the extremal with this p does not oscillate about the equator within the chart.
+        """
+        p = finite_array(momentum, "momentum")
+        top, low = self.greatest_momentum, self.least_momentum
+        size = np.abs(p)
+        _refuse(size > top * (1.0 + 4e-16), p, "momentum", f"at most sqrt(m(0)) = {top:.17g} in size")
+        size = np.minimum(size, top)
+        if self.end == "pole":
+            _refuse((size == 0.0) & (not self.has_smooth_poles), p, "momentum", "no extremal passes a cone's tip")
+        else:
+            least = low * (1.0 + _EDGE) if self.end == "parallel" else low
+            _refuse(size < least, p, "momentum", f"extremals oscillate above {low:.17g}, the p of the {self.end}")
+        return p, (top - size) * (top + size) / self.equator, (size - low) * (size + low) / self.equator
+
+    def arcs(self, momentum: ArrayLike, phase: ArrayLike) -> Arcs:
+        """Time, longitude and bend from the equator to a phase: (...), (...) [rad] -> `Arcs`.
+
+        Any real phase. At p = 0 the longitude is the limit from p > 0, half a turn for every pole that is passed.
+
+        Raises
+        ------
+        ShapeError
+            See `parameters`.
+        """
+        p, q, room = self.parameters(momentum)
+        chi = finite_array(phase, "phase", unit="rad")
+        p, q, room, chi = np.broadcast_arrays(p, q, room, chi)
+        return self.trusted_arcs(p, q, room, chi)
+
+    def trusted_arcs(self, p: Array, q: Array, room: Array, chi: Array) -> Arcs:
+        """`arcs` by p, q and depth - q, all of one shape, not checked."""
+        turns = np.rint(chi / np.pi)
+        rest = self._folded(p, q, room, chi - turns * np.pi)
+        if not turns.any():
+            return rest
+        whole = self._folded(p, q, room, np.full(chi.shape, 0.5 * np.pi))
+        return Arcs(*(part + 2.0 * turns * quarter for part, quarter in zip(rest, whole)))
+
+    def _folded(self, p: Array, q: Array, room: Array, chi: Array) -> Arcs:
+        flat = [np.ravel(a) for a in (np.abs(p), q, room, chi)]
+        arcs = self.closed_arcs(*flat) if self.closed_arcs is not None else self._by_quadrature(*flat)
+        time, longitude, bend = (part.reshape(np.shape(chi)) for part in arcs)
+        return Arcs(time, np.where(np.signbit(p), -longitude, longitude), bend)
+
+    def _by_quadrature(self, p: Array, q: Array, room: Array, chi: Array) -> Arcs:
+        time, angle, bend, _ = quadrature(self.stretch, self.depth, self.end, q, room, chi, self.splits)
+        root_m = self.greatest_momentum
+        if self.end == "pole":
+            tip, _, _ = self.stretch(np.ones(1), np.zeros(1))
+            peak = tip[0] * np.arctan2(p / root_m * np.sin(chi), folded_cosine(chi))
+        else:
+            peak = np.zeros(())
+        return Arcs(time, (peak + p / root_m * angle) / root_m, bend)
+
+    def _meridian(self, angle: Array) -> tuple[Array, Array]:
+        """phi where y = sqrt(depth) sin(angle), angles (N,) in [0, pi/2], and its derivative by the angle."""
+        rate = self._meridian_rate(angle)
+        if self.end == "pole":
+            zero = np.zeros_like(angle)
+            return self.trusted_arcs(zero, zero + 1.0, zero, angle).time, rate
+        fraction, weight = graded_rule(self.splits)
+        return angle * (self._meridian_rate(angle[:, None] * fraction) @ weight), rate
+
+    def _meridian_rate(self, angle: Array) -> Array:
+        sine, cosine = np.sin(angle).ravel(), np.maximum(folded_cosine(angle), 1e-8).ravel()
+        rest = self.depth * cosine * cosine
+        value, _, _ = self.stretch(self.depth * sine * sine, rest)
+        rate = np.sqrt(self.depth) * value * cosine / np.sqrt((1.0 - self.depth) + rest)
+        return rate.reshape(angle.shape)
+
+    def period(self, momentum: ArrayLike) -> Array:
+        """T(p), the length of an extremal until it comes back to its latitude and direction: (...) -> (...).
+
+        Source: Bonnard et al., definition 2.4.
+        """
+        return 4.0 * self.arcs(momentum, 0.5 * np.pi).time[()]
+
+    def first_return(self, momentum: ArrayLike) -> Array:
+        """R(p), the longitude gained from one crossing of the equator to the next: (...) -> (...) [rad].
+
+        Odd in p. Source: Bonnard et al., definition 2.4.
+        """
+        return 2.0 * self.arcs(momentum, 0.5 * np.pi).longitude[()]
+
+    def first_return_rate(self, momentum: ArrayLike) -> Array:
+        """R'(p), even in p: (...) -> (...). Source: Bonnard et al., lemma 2.8."""
+        return -2.0 / self.equator * self.arcs(momentum, 0.5 * np.pi).bend[()]
+
+    def first_return_second_rate(self, momentum: ArrayLike) -> Array:
+        """R''(p): (...) -> (...)."""
+        p, q, room = self.parameters(momentum)
+        return (4.0 * p / self.equator**2 * self.bend_rate(q, room, np.full(p.shape, 0.5 * np.pi)))[()]
+
+    def period_rate(self, momentum: ArrayLike) -> Array:
+        """T'(p) = 2 p R'(p): (...) -> (...). Source: Bonnard et al., lemma 2.8."""
+        return 2.0 * finite_array(momentum, "momentum") * self.first_return_rate(momentum)
+
+    def period_second_rate(self, momentum: ArrayLike) -> Array:
+        """T''(p) = 2 R'(p) + 2 p R''(p): (...) -> (...)."""
+        p = finite_array(momentum, "momentum")
+        return 2.0 * self.first_return_rate(p) + 2.0 * p * self.first_return_second_rate(p)
+
+    def bend_rate(self, q: Array, room: Array, chi: Array) -> Array:
+        """2 integral D'' sin^4, d bend/dq at a fixed phase in [-pi/2, pi/2]: q, depth - q, chi (...) -> (...)."""
+        flat = np.ravel(q), np.ravel(room), np.ravel(chi)
+        return quadrature(self.stretch, self.depth, self.end, *flat, self.splits)[3].reshape(np.shape(chi))
+
+    def tameness(self) -> str:
+        """How the first return changes with p > 0: "decreasing" (tame), "increasing", "constant" or "neither".
+
+        By its derivative at 65 values of p. Tame extremals have no conjugate point before they return to the equator.
+        Source: Bonnard et al., definition 2.5 and proposition 2.
+        """
+        rate = self.first_return_rate(self._sampled_momenta())
+        if np.abs(rate).max() <= 1e-11 * self.reach / self.equator:
+            return "constant"
+        return "decreasing" if rate.max() < 0.0 else "increasing" if rate.min() > 0.0 else "neither"
+
+    def is_greatest_curvature_on_equator(self) -> bool:
+        """Assumption (A3): the Gauss curvature is positive on the equator and nowhere greater (65 latitudes)."""
+        curvature = self.curvature_at_height(self._sampled_heights())
+        return bool(curvature[0] > 0.0 and (curvature[1:] < curvature[0]).all())
+
+    def curvature_trend(self) -> str:
+        """How the curvature goes from the equator to the reach: "decreasing", "increasing", "constant" or "neither"."""
+        curvature = self.curvature_at_height(self._sampled_heights())
+        change = np.diff(curvature)
+        if np.ptp(curvature) <= 1e-10 * np.abs(curvature).max():
+            return "constant"
+        return "decreasing" if change.max() < 0.0 else "increasing" if change.min() > 0.0 else "neither"
+
+    def _sampled_momenta(self) -> Array:
+        square = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, 66) / 66)
+        return np.sqrt(self.equator * (1.0 - self.depth * square))
+
+    def _sampled_heights(self) -> Array:
+        return np.sqrt(self.depth * (0.5 - 0.5 * np.cos(np.pi * np.arange(65) / 65)))
+
+
+def surface_of_stretch(
+    stretch: Stretch, equator: float, depth: float, end: str = "pole", closed_arcs: ClosedArcs | None = None
+) -> SurfaceOfRevolution:
+    """A surface by its stretch D(Y), see the module.
+
+    Parameters
+    ----------
+    stretch : Y and depth - Y, (N,) each -> D, D', D'' (N,) each, D > 0; smooth for 0 <= Y < depth, and up to depth
+        unless `end` is "parallel", where sqrt(depth - Y) D is
+    equator : m(0)
+    depth : Y at the reach; 1 for a pole
+    end : "pole", "parallel" or "boundary"
+    closed_arcs : the integrals along extremals in closed form, where known
+
+    Raises
+    ------
+    ShapeError
+        If m(0) or the depth is out of range, or D is not positive and finite.
+    AccuracyNotReached
+        If D is too rough for the quadrature to settle.
+    """
+    if end not in _ENDS:
+        raise ShapeError(f"end: expected one of {', '.join(_ENDS)}, got {end!r}")
+    if not (np.isfinite(equator) and equator > 0.0):
+        raise ShapeError(f"equator: m(0) must be positive and finite, got {equator!r}")
+    if not (0.0 < depth <= 1.0) or (end == "pole") != (depth == 1.0):
+        raise ShapeError(f"depth: 1 - m(reach)/m(0) must be in (0, 1), and 1 for a pole; got {depth!r} for a {end}")
+    square = depth * np.linspace(0.0, 0.999, 33)
+    value, _, _ = stretch(square, depth - square)
+    if not (np.isfinite(value).all() and (value > 0.0).all()):
+        raise ShapeError("stretch: D(Y) must be positive and finite for 0 <= Y < depth")
+    splits = settled_splits(stretch, float(depth), end)
+    if splits is None:
+        raise AccuracyNotReached("the metric is too rough: its integrals along extremals do not settle")
+    surface = SurfaceOfRevolution(float(equator), float(depth), end, stretch, closed_arcs, splits)
+    finer = replace(surface, splits=splits + 1)
+    return surface if abs(surface.reach - finer.reach) <= 1e-13 * finer.reach else finer
+
+
+def _refuse(bad: Mask, values: Array, name: str, wanted: str) -> None:
+    if np.any(bad):
+        where = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise ShapeError(f"{name}: entry {list(where)} is {values[where]:.17g}; {wanted}")

@@ -1,0 +1,147 @@
+"""Cayley-Klein parameters: the rigid body on C^2, over so(3)* by the momentum map of SU(2).
+
+z = q + i p in C^2 has the canonical bracket {q_a, p_b} = delta_ab. SU(2) acts by multiplication, and minus its
+momentum map, Pi_k = -z^H sigma_k z / 4 with Pauli's matrices sigma_k, is a Poisson map onto so(3)* with the minus
+Lie-Poisson bracket. A collective Hamiltonian H(Pi(z)) gives z' = (i/2) (Omega . sigma) z, Omega = dH/dPi, and z covers
+the whole motion of the body, attitude included: z(t) = U(t)^H z(0) with U in SU(2) over R(t), R' = R hat(Omega).
+|Pi| = |z|^2 / 4.
+
+Source: Marsden and Ratiu, exercise 15.4-1; theory.md G6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+from ..flow import ascending_times, flow
+from .lie_algebra import complex_or_real, su2
+from .lie_poisson import angular_velocity, inverse_inertia_argument, kinetic_energy
+
+Spinor = NDArray[np.complex128]
+
+PAULI = 2j * su2().matrix_basis
+"""Pauli's matrices sigma_k: (3, 2, 2)."""
+PAULI.setflags(write=False)
+
+
+def cayley_klein_momentum(z: ArrayLike) -> Array:
+    """Pi_k = -z^H sigma_k z / 4, minus the momentum map of SU(2) on C^2: (..., 2) -> (..., 3) [kg m^2/s].
+
+    Raises ShapeError.
+    """
+    spinor = _spinor(z, "z")
+    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+
+
+def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
+    """A z over a momentum, the fibre's coordinate being its phase: (..., 3), (...) -> (..., 2).
+
+    Raises ShapeError.
+    """
+    pi, angle = finite_array(momentum, "momentum", (3,)), finite_array(phase, "phase")
+    length = np.linalg.norm(pi, axis=-1)
+    below = pi[..., 2] <= 0.0
+    # The larger component is made real: no cancellation, wherever the momentum points.
+    large = np.sqrt(2.0 * (length + np.abs(pi[..., 2])))
+    cross = -2.0 * (pi[..., 0] + 1j * pi[..., 1])
+    small = np.where(below, cross, cross.conj()) / np.where(large > 0.0, large, 1.0)
+    pair = np.where(below[..., None], np.stack([large + 0j, small], -1), np.stack([small, large + 0j], -1))
+    return np.exp(1j * angle)[..., None] * pair
+
+
+def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
+    """{F, G} on C^2 = T*R^2, from gradients with respect to q (real parts) and p (imaginary parts): (...).
+
+    Parameters
+    ----------
+    first, second : (..., 2) complex, dF/dq + i dF/dp
+
+    Raises ShapeError.
+    """
+    f, g = _spinor(first, "first"), _spinor(second, "second")
+    return np.sum(f.real * g.imag - f.imag * g.real, axis=-1)
+
+
+def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
+    """The gradient dF/dq + i dF/dp of a collective F(Pi(z)) with dF/dPi = omega: (..., 3), (..., 2) -> (..., 2).
+
+    Raises ShapeError.
+    """
+    return -0.5 * _turned(finite_array(omega, "omega", (3,)), _spinor(z, "z"))
+
+
+def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
+    """The kinetic energy as a function on C^2, K(Pi(z)): (..., 3, 3), (..., 2) -> (...) [J].
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If the inertia is not symmetric positive definite, or the shapes are not right.
+    """
+    return kinetic_energy(inertia, cayley_klein_momentum(z))
+
+
+def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
+    """Hamilton's equations of the kinetic energy on C^2, z' = (i/2) (Omega . sigma) z: (..., 2) -> (..., 2).
+
+    Raises as `cayley_klein_hamiltonian`.
+    """
+    spinor = _spinor(z, "z")
+    return 0.5j * _turned(angular_velocity(inertia, cayley_klein_momentum(spinor)), spinor)
+
+
+def cayley_klein_motion(inertia: ArrayLike, z: ArrayLike, times: ArrayLike) -> Spinor:
+    """The rigid body's flow on C^2 from z at the first time: (..., 2), (N,) -> (..., N, 2).
+
+    Raises as `cayley_klein_hamiltonian`.
+    """
+    inverse = inverse_inertia_argument(inertia)
+    return _collective_flow(lambda pi: (inverse @ pi[..., None])[..., 0], _spinor(z, "z"), ascending_times(times))
+
+
+def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
+    """The attitude since `start` that a z of the same motion covers: (..., 2), (..., 2) -> (..., 3, 3).
+
+    The U in SU(2) with z = U^H start, as a rotation: R^T takes the momentum of `start` to that of z.
+
+    Raises
+    ------
+    ShapeError
+        If the two lengths differ by more than 1e-6 of themselves, or are zero.
+    """
+    first, last = _spinor(start, "start"), _spinor(z, "z")
+    length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)
+    if not np.all((length > 0.0) & (np.abs(length - other) <= 1e-6 * length)):
+        raise ShapeError("z: not on the sphere |z| = |start| of a motion; equal lengths above 0 are needed")
+    a, b = (np.stack(_frame(x / n[..., None]), axis=-1) for x, n in ((first, length), (last, other)))
+    unitary = a @ np.swapaxes(b.conj(), -1, -2)
+    return 0.5 * np.einsum("jab,...bc,kcd,...ad->...jk", PAULI, unitary, PAULI, unitary.conj()).real
+
+
+def _frame(unit: Spinor) -> tuple[Spinor, Spinor]:
+    """A unit vector of C^2 and the one that makes with it a matrix of SU(2)."""
+    return unit, np.stack([-unit[..., 1].conj(), unit[..., 0].conj()], axis=-1)
+
+
+def _turned(omega: Array, spinor: Spinor) -> Spinor:
+    return np.einsum("...k,kab,...b->...a", omega, PAULI, spinor)
+
+
+def _collective_flow(gradient: Callable[[Array], Array], start: Spinor, times: Array) -> Spinor:
+    def rate(state: Array) -> Array:
+        spinor = state[..., :2] + 1j * state[..., 2:]
+        pi = -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+        change = 0.5j * _turned(gradient(pi), spinor)
+        return np.concatenate([change.real, change.imag], axis=-1)
+
+    states = flow(rate, np.concatenate([start.real, start.imag], axis=-1), times)
+    return states[..., :2] + 1j * states[..., 2:]
+
+
+def _spinor(value: ArrayLike, name: str) -> Spinor:
+    return complex_or_real(value, name, (2,)).astype(np.complex128)

@@ -1,0 +1,78 @@
+"""Double-bracket dissipation of the free rigid body: energy falls, the momentum sphere stays.
+
+Pi' = Pi x Omega + alpha Pi x (Pi x Omega) with alpha > 0, that is F' = {F, K} + {F, K}_sym with the symmetric bracket
+{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G); Marsden and Ratiu print it without the minus sign, with which the
+energy would grow.
+
+Source: Marsden and Ratiu, exercise 15.9-2; theory.md K4, M-E8.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arrays import Array, finite_array
+from ..flow import ascending_times, flow
+from .lie_poisson import Gradient, angular_velocity, gradient_at, inverse_inertia_argument
+
+
+def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G), from gradients at momenta (..., 3): (...).
+
+    Parameters
+    ----------
+    first, second : gradients of F and G, values (..., 3) or callables of the momentum
+    momentum : (..., 3) body momentum [kg m^2/s]
+    alpha : (...) dissipation [s/(kg m^2)], positive where energy is lost
+
+    Raises ShapeError.
+    """
+    pi, strength = _momentum(momentum), finite_array(alpha, "alpha")
+    across = np.cross(pi, gradient_at(first, "first", pi))
+    return -strength * np.sum(across * np.cross(pi, gradient_at(second, "second", pi)), axis=-1)
+
+
+def double_bracket_equations(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """Pi' = Pi x Omega + alpha Pi x (Pi x Omega): (..., 3, 3), (..., 3), (...) -> (..., 3) [kg m^2/s^2].
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If the inertia is not symmetric positive definite, or the shapes are not right.
+    """
+    pi = _momentum(momentum)
+    return _rate(pi, angular_velocity(inertia, pi), finite_array(alpha, "alpha")[..., None])
+
+
+def dissipated_power(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """-dK/dt = alpha |Pi x Omega|^2, zero at equilibria only: (...) [W]. Raises as `double_bracket_equations`."""
+    pi = _momentum(momentum)
+    torque = np.cross(pi, angular_velocity(inertia, pi))
+    return finite_array(alpha, "alpha") * np.sum(torque * torque, axis=-1)
+
+
+def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float, times: ArrayLike) -> Array:
+    """The body momentum under double-bracket dissipation, given at the first time: (..., 3), (N,) -> (..., N, 3).
+
+    Parameters
+    ----------
+    inertia : (3, 3) or (..., 3, 3) [kg m^2]
+    alpha : (...) dissipation [s/(kg m^2)]; a negative one drives the body
+    times : (N,) strictly ascending [s]
+
+    Raises as `double_bracket_equations`.
+    """
+    pi, instants, strength = _momentum(momentum), ascending_times(times), finite_array(alpha, "alpha")[..., None]
+    inverse = inverse_inertia_argument(inertia)
+    start = np.array(np.broadcast_to(pi, np.broadcast_shapes(pi.shape, inverse.shape[:-1], (*strength.shape[:-1], 3))))
+    return flow(lambda p: _rate(p, (inverse @ p[..., None])[..., 0], strength), start, instants)
+
+
+def _rate(pi: Array, omega: Array, strength: Array) -> Array:
+    torque = np.cross(pi, omega)
+    return torque + strength * np.cross(pi, torque)
+
+
+def _momentum(value: ArrayLike) -> Array:
+    return finite_array(value, "momentum", (3,), unit="kg m^2/s")

@@ -1,0 +1,140 @@
+"""The Euler-Poincare equations of a left-invariant kinetic energy on any Lie algebra.
+
+With the inertia operator I and the body momentum mu = I xi they read mu' = ad*_xi mu, for so(3) Euler's equations
+Pi' = Pi x Omega. The attitude follows from g' = g xi.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arrays import Array, finite_array
+from ..flow import ascending_times, flow
+from .lie_algebra import LieAlgebra, Matrices, inertia_operator, linear_solution
+
+
+@dataclass(frozen=True, eq=False)
+class EulerPoincareMotion:
+    """A motion of the Euler-Poincare equations that starts at the identity of the group.
+
+    Attributes
+    ----------
+    algebra : the Lie algebra
+    inertia : (d, d) inertia operator
+    times : (N,)
+    momentum : (..., N, d) body momentum mu
+    velocity : (..., N, d) body velocity xi = I^-1 mu
+    adjoint : (..., N, d, d) Ad_g, from body to space components; needs no matrices of the group
+    attitude : (..., N, n, n) the group element g, g' = g xi; None where the algebra has no basis of matrices
+    """
+
+    algebra: LieAlgebra
+    inertia: Array
+    times: Array
+    momentum: Array
+    velocity: Array
+    adjoint: Array
+    attitude: Matrices | None
+
+    @property
+    def energy(self) -> Array:
+        """l = <I xi, xi>/2, constant: (..., N)."""
+        return 0.5 * np.sum(self.momentum * self.velocity, axis=-1)
+
+    @property
+    def space_velocity(self) -> Array:
+        """xi_s = Ad_g xi: (..., N, d)."""
+        return np.einsum("...ij,...j->...i", self.adjoint, self.velocity)
+
+    @property
+    def space_momentum(self) -> Array:
+        """mu_s = Ad*_{g^-1} mu, constant: (..., N, d)."""
+        return linear_solution(np.swapaxes(self.adjoint, -1, -2), self.momentum)
+
+
+def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: ArrayLike) -> Array:
+    """mu' = ad*_xi mu with xi = I^-1 mu: (..., d) -> (..., d).
+
+    Parameters
+    ----------
+    inertia : (d, d) symmetric isomorphism of the algebra with its dual
+    momentum : (..., d) body momentum
+
+    Raises
+    ------
+    ShapeError, LieAlgebraError
+        If the shapes do not fit, an entry is not finite, or the operator is not symmetric or singular.
+
+    Source: Marsden and Ratiu, section 15.3 and chapter 13; theory.md G7.
+    """
+    operator = inertia_operator(algebra, inertia)
+    mu = finite_array(momentum, "momentum", (algebra.dimension,))
+    return algebra.coad(linear_solution(operator, mu), mu)
+
+
+def euler_poincare_motion(
+    algebra: LieAlgebra, inertia: ArrayLike, momentum: ArrayLike, times: ArrayLike
+) -> EulerPoincareMotion:
+    """The motion with a given body momentum at the first time, with its reconstruction g' = g xi.
+
+    Parameters
+    ----------
+    inertia : (d, d) symmetric isomorphism of the algebra with its dual
+    momentum : (..., d) body momentum at times[0], where g is the identity
+    times : (N,) strictly ascending
+
+    Raises
+    ------
+    ShapeError, LieAlgebraError
+        As `euler_poincare_rate`, or if the times do not ascend.
+    AccuracyNotReached
+        If the motion goes to infinity before the last time, which some algebras allow.
+
+    Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
+    """
+    operator, d = inertia_operator(algebra, inertia), algebra.dimension
+    mu, instants = finite_array(momentum, "momentum", (d,)), ascending_times(times)
+    inverse, basis = np.linalg.inv(operator), algebra.basis
+    # The adjoint representation and, where there is one, the matrix group obey the same equation.
+    adjoint_basis = np.swapaxes(algebra.structure, -1, -2)
+    blocks = [adjoint_basis] if basis is None else [adjoint_basis, basis]
+
+    def rate(state: Array) -> Array:
+        momenta, *elements = _split(state, blocks)
+        xi = momenta @ inverse
+        turning = [g @ np.einsum("...i,iab->...ab", xi, block) for g, block in zip(elements, blocks)]
+        return _joined(np.einsum("...i,ijk,...k->...j", xi, algebra.structure, momenta), turning)
+
+    identities = [np.broadcast_to(np.eye(b.shape[-1], dtype=b.dtype), (*mu.shape[:-1], *b.shape[1:])) for b in blocks]
+    start = _joined(mu, identities)
+    scale = np.ones(start.shape)
+    scale[..., :d] = np.abs(mu).max(axis=-1, initial=0.0, keepdims=True)
+    momenta, adjoint, *rest = _split(flow(rate, start, instants, scale), blocks)
+    return EulerPoincareMotion(
+        algebra, operator, instants, momenta, linear_solution(operator, momenta), adjoint, rest[0] if rest else None
+    )
+
+
+def _joined(momentum: Array, elements: list[Matrices]) -> Array:
+    """One real vector: the momentum, then the entries of each group element, real parts before imaginary ones."""
+    parts = [momentum]
+    for g in elements:
+        flat = g.reshape(*g.shape[:-2], -1)
+        parts += [np.real(flat), np.imag(flat)] if np.iscomplexobj(g) else [flat]
+    return np.concatenate(parts, axis=-1)
+
+
+def _split(state: Array, blocks: list[Matrices]) -> list[Matrices]:
+    """The inverse of `_joined`: the momentum, then a matrix for each block of generators."""
+    at = len(blocks[0])
+    parts: list[Matrices] = [state[..., :at]]
+    for block in blocks:
+        n = block.shape[-1]
+        entries = [state[..., at + i * n * n : at + (i + 1) * n * n] for i in range(2 if np.iscomplexobj(block) else 1)]
+        at += len(entries) * n * n
+        whole = entries[0] if len(entries) == 1 else entries[0] + 1j * entries[1]
+        parts.append(whole.reshape(*state.shape[:-1], n, n))
+    return parts

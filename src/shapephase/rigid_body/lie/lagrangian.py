@@ -1,0 +1,202 @@
+"""The Lagrangian of the free rigid body from its particles: three velocities, three equal energies, the inertia.
+
+Masses (P,) sit at material points X (P, 3), x = R X in space. Sums over particles stand for the integrals over the
+body.
+
+Source: Marsden and Ratiu, sections 15.1 to 15.3; theory.md A12 to A15.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ... import so3
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedBody:
+    """A rigid body with its translations reduced out: what is left turns on SO(3).
+
+    Attributes
+    ----------
+    mass : total mass [kg]
+    centre : (3,) centre of mass from the material origin [m]
+    positions : (P, 3) from the centre of mass [m]
+    inertia : (3, 3) about the centre of mass [kg m^2]
+    """
+
+    mass: float
+    centre: Array
+    positions: Array
+    inertia: Array
+
+    def momentum(self, se3_momentum: ArrayLike) -> Array:
+        """(Pi, P) about the material origin -> Pi - c x P about the centre of mass: (..., 6) -> (..., 3).
+
+        A Poisson map of se(3)* to so(3)*, both with the minus Lie-Poisson bracket. Raises ShapeError.
+        """
+        both = finite_array(se3_momentum, "se3_momentum", (6,))
+        return both[..., :3] - np.cross(self.centre, both[..., 3:])
+
+
+def material_velocity(attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
+    """V(X) = R' X: (..., 3, 3), (P, 3) -> (..., P, 3) [m/s]. Raises ShapeError; equation (15.2.1)."""
+    rate, points = finite_array(attitude_rate, "attitude_rate", (3, 3)), finite_array(positions, "positions", (None, 3))
+    return points @ so3.transpose(rate)
+
+
+def spatial_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, points: ArrayLike) -> Array:
+    """v(x) = R' R^-1 x at points of space: (..., 3, 3), (..., 3, 3), (..., P, 3) -> (..., P, 3) [m/s].
+
+    Raises ShapeError. Source: equation (15.2.2).
+    """
+    omega = spatial_angular_velocity(attitude, attitude_rate)
+    return np.cross(omega[..., None, :], finite_array(points, "points", (None, 3)))
+
+
+def convective_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
+    """R^-1 R' X, the velocity in body axes: (..., 3, 3), (..., 3, 3), (P, 3) -> (..., P, 3) [m/s].
+
+    Raises ShapeError. Source: equation (15.2.3).
+    """
+    omega = body_angular_velocity(attitude, attitude_rate)
+    return np.cross(omega[..., None, :], finite_array(positions, "positions", (None, 3)))
+
+
+def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
+    """Omega, hat(Omega) = R^-1 R': (..., 3, 3), (..., 3, 3) -> (..., 3) [rad/s, body axes].
+
+    Raises
+    ------
+    ShapeError
+        If R is no rotation, or R' is not tangent to the rotations at R.
+
+    Source: equation (15.2.8).
+    """
+    rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
+    spin = so3.transpose(rotation) @ rate
+    symmetric = np.abs(spin + so3.transpose(spin)).max(initial=0.0)
+    if symmetric > 1e-6 * np.abs(spin).max(initial=0.0):
+        raise ShapeError(
+            f"attitude_rate: not the rate of a rotation, R^T R' has a symmetric part of {symmetric:.3g}; "
+            "R' = R hat(Omega) is needed"
+        )
+    return so3.vee(spin)
+
+
+def spatial_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
+    """omega = R Omega, hat(omega) = R' R^-1: (..., 3, 3), (..., 3, 3) -> (..., 3) [rad/s, inertial axes].
+
+    Raises ShapeError as `body_angular_velocity`. Source: equation (15.2.7).
+    """
+    return so3.apply(so3.rotation_argument(attitude, "attitude"), body_angular_velocity(attitude, attitude_rate))
+
+
+def material_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude_rate: ArrayLike) -> Array:
+    """L = sum m |V|^2 / 2 over material velocities: (P,), (P, 3), (..., 3, 3) -> (...) [J].
+
+    Left invariant: the same for (B R, B R') with any rotation B. Raises ShapeError.
+    Source: equations (15.2.4), (15.2.9).
+    """
+    m, _ = _particles(masses, positions)
+    return _energy(m, material_velocity(attitude_rate, positions))
+
+
+def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
+    """L = sum m |v(x)|^2 / 2 over the field of space at x = R X: -> (...) [J]. Raises ShapeError; equation (15.2.5)."""
+    m, points = _particles(masses, positions)
+    placed = points @ so3.transpose(so3.rotation_argument(attitude, "attitude"))
+    return _energy(m, spatial_velocity(attitude, attitude_rate, placed))
+
+
+def convective_lagrangian(
+    masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike
+) -> Array:
+    """L = sum m |Omega x X|^2 / 2: -> (...) [J]. Raises ShapeError; equations (15.2.6), (15.3.1)."""
+    m, points = _particles(masses, positions)
+    return _energy(m, convective_velocity(attitude, attitude_rate, points))
+
+
+def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
+    """<<a, b>> = sum m (a x X) . (b x X): (P,), (P, 3), (..., 3), (..., 3) -> (...) [kg m^2 times those of a and b].
+
+    L = <<Omega, Omega>> / 2. Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.2).
+    """
+    m, points = _particles(masses, positions)
+    first, second = (np.cross(finite_array(v, n, (3,))[..., None, :], points) for v, n in ((a, "a"), (b, "b")))
+    return np.sum(m * np.sum(first * second, axis=-1), axis=-1)
+
+
+def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
+    """The inertia tensor about the material origin, I a . b = <<a, b>>: (P,), (P, 3) -> (3, 3) [kg m^2].
+
+    Raises ShapeError. Source: Marsden and Ratiu, section 15.3.
+    """
+    m, points = _particles(masses, positions)
+    return _inertia(m, points)
+
+
+def legendre_transform(masses: ArrayLike, positions: ArrayLike, angular_velocity: ArrayLike) -> Array:
+    """Pi = sum m X x (Omega x X) = I Omega, the body momentum: (P,), (P, 3), (..., 3) -> (..., 3) [kg m^2/s].
+
+    Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.4).
+    """
+    m, points = _particles(masses, positions)
+    speeds = np.cross(finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")[..., None, :], points)
+    return np.sum(m[:, None] * np.cross(points, speeds), axis=-2)
+
+
+def spatial_momentum(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
+    """pi = sum m x x v = R Pi, constant in a free motion: -> (..., 3) [kg m^2/s, inertial axes].
+
+    Raises ShapeError. Source: Marsden and Ratiu, equations (15.3.5), (15.3.7), (15.3.13).
+    """
+    m, points = _particles(masses, positions)
+    placed = points @ so3.transpose(so3.rotation_argument(attitude, "attitude"))
+    return np.sum(m[:, None] * np.cross(placed, spatial_velocity(attitude, attitude_rate, placed)), axis=-2)
+
+
+def se3_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
+    """The inertia operator on se(3), twist (Omega, V) of the material origin -> (Pi, P): (P,), (P, 3) -> (6, 6).
+
+    Of the kinetic energy with translations; for `euler_poincare_motion(se3(), ...)`. Raises ShapeError.
+    """
+    m, points = _particles(masses, positions)
+    coupling = so3.hat(m @ points)
+    return np.block([[_inertia(m, points), coupling], [-coupling, m.sum() * np.eye(3)]])
+
+
+def reduce_translations(masses: ArrayLike, positions: ArrayLike) -> ReducedBody:
+    """The body about its centre of mass: SE(3) reduced by its translations to SO(3).
+
+    Raises ShapeError. Source: Marsden and Ratiu, exercise 15.1-1.
+    """
+    m, points = _particles(masses, positions)
+    centre = m @ points / m.sum()
+    return ReducedBody(float(m.sum()), centre, points - centre, _inertia(m, points - centre))
+
+
+def _inertia(masses: Array, points: Array) -> Array:
+    second = np.einsum("p,pi,pj->ij", masses, points, points)
+    return np.trace(second) * np.eye(3) - second
+
+
+def _energy(masses: Array, speeds: Array) -> Array:
+    return 0.5 * np.sum(masses * np.sum(speeds * speeds, axis=-1), axis=-1)
+
+
+def _particles(masses: ArrayLike, positions: ArrayLike) -> tuple[Array, Array]:
+    m, points = (
+        finite_array(masses, "masses", (None,), unit="kg"),
+        finite_array(positions, "positions", (None, 3), unit="m"),
+    )
+    if m.ndim != 1 or points.shape != (len(m), 3) or not len(m):
+        raise ShapeError(f"positions: one (3,) for each mass is needed, got {points.shape} for masses {m.shape}")
+    if not np.all(m > 0.0):
+        raise ShapeError(f"masses: every mass must be above 0 kg, got {m[np.argmin(m)]:.6g} at {int(np.argmin(m))}")
+    return m, points

@@ -1,0 +1,253 @@
+"""The minus Lie-Poisson bracket on the dual of a Lie algebra, its Casimirs and the symplectic form of its leaves.
+
+{F, G}(mu) = -<mu, [dF, dG]>, on so(3)* = R^3 the rigid body's bracket -Pi . (grad F x grad G). The equations of
+motion F' = {F, H} are mu' = ad*_{dH} mu, for the kinetic energy K = Pi . I^-1 Pi / 2 Euler's equations. Functions
+enter by their gradients, as values (..., d) or as callables of the momentum. Where no algebra is given it is so(3).
+
+Source: Marsden and Ratiu, section 15.3 and chapter 13.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+from ...inertia_tensor import inverse_inertia
+from ..flow import ascending_times, flow
+from .lie_algebra import LieAlgebra, so3
+
+Gradient = ArrayLike | Callable[[Array], ArrayLike]
+"""The gradient of a function on the dual: values (..., d), or a callable of momenta (..., d)."""
+
+_SO3 = so3()
+
+
+def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
+    """B_ij = {mu_i, mu_j} = -c_ij^k mu_k: (..., d) -> (..., d, d). {F, G} = dF . B dG, and mu' = B dH.
+
+    For so(3) it is hat(Pi). Raises ShapeError.
+    """
+    return -np.einsum("ijk,...k->...ij", algebra.structure, _momentum(momentum, algebra))
+
+
+def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
+    """{F, G}(mu) = -<mu, [dF, dG]>: (...), from the gradients of F and G at momenta (..., d).
+
+    Raises
+    ------
+    ShapeError
+        If a shape is wrong or an entry not finite.
+
+    Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
+    """
+    mu = _momentum(momentum, algebra)
+    bracket = algebra.bracket(gradient_at(first, "first", mu), gradient_at(second, "second", mu))
+    return -np.sum(mu * bracket, axis=-1)
+
+
+def bracket_gradient(
+    first: tuple[ArrayLike, ArrayLike],
+    second: tuple[ArrayLike, ArrayLike],
+    momentum: ArrayLike,
+    algebra: LieAlgebra = _SO3,
+) -> Array:
+    """The gradient of {F, G}, with which brackets can be nested: (..., d).
+
+    Parameters
+    ----------
+    first, second : gradient (..., d) and Hessian (..., d, d) of F and of G at the momenta
+    momentum : (..., d)
+
+    Raises ShapeError.
+    """
+    d, mu = algebra.dimension, _momentum(momentum, algebra)
+    df, dg = finite_array(first[0], "first gradient", (d,)), finite_array(second[0], "second gradient", (d,))
+    ddf, ddg = finite_array(first[1], "first Hessian", (d, d)), finite_array(second[1], "second Hessian", (d, d))
+    tensor = poisson_tensor(mu, algebra)
+    outer = np.einsum("...ji,...jk,...k->...i", ddf, tensor, dg) + np.einsum("...j,...jk,...ki->...i", df, tensor, ddg)
+    return outer - algebra.bracket(df, dg)
+
+
+def hamiltonian_vector_field(hamiltonian: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
+    """X_H(mu) = ad*_{dH} mu, with {F, H} = dF . X_H: (..., d) -> (..., d). For so(3) it is Pi x grad H.
+
+    Raises ShapeError.
+    """
+    mu = _momentum(momentum, algebra)
+    return algebra.coad(gradient_at(hamiltonian, "hamiltonian", mu), mu)
+
+
+def lie_poisson_motion(
+    hamiltonian: Callable[[Array], ArrayLike], momentum: ArrayLike, times: ArrayLike, algebra: LieAlgebra = _SO3
+) -> Array:
+    """The motion mu' = ad*_{dH} mu from a momentum at the first time: (..., d), (N,) -> (..., N, d).
+
+    Parameters
+    ----------
+    hamiltonian : gradient of H, momenta (..., d) -> (..., d)
+    times : (N,) strictly ascending
+
+    Raises
+    ------
+    ShapeError
+        If the gradient, the momentum or the times are not right.
+    AccuracyNotReached
+        If the motion goes to infinity before the last time.
+    """
+    start, instants = _momentum(momentum, algebra), ascending_times(times)
+    gradient_at(hamiltonian, "hamiltonian", start)
+
+    def rate(mu: Array) -> Array:
+        gradient = np.broadcast_to(np.asarray(hamiltonian(mu), dtype=float), mu.shape)
+        return np.einsum("...i,ijk,...k->...j", gradient, algebra.structure, mu)
+
+    return flow(rate, start, instants)
+
+
+def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
+    """Length of ad*_{dC} mu, the vector field of a function: (..., d) -> (...); zero everywhere iff C is a Casimir.
+
+    Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.12).
+    """
+    return np.linalg.norm(hamiltonian_vector_field(function, momentum, algebra), axis=-1)
+
+
+def linear_casimirs(algebra: LieAlgebra) -> Array:
+    """An orthonormal basis v of the linear Casimirs mu -> v . mu, that is of the centre of the algebra: (count, d)."""
+    return _null_space(algebra.structure.reshape(algebra.dimension, -1).T)
+
+
+def quadratic_casimirs(algebra: LieAlgebra) -> Array:
+    """A basis Q of the quadratic Casimirs mu -> mu . Q mu, orthonormal, each Q symmetric: (count, d, d).
+
+    Products of linear Casimirs are among them. From the null space of {mu . Q mu, mu_j} = 0, d^2 (d + 1)/2 linear
+    equations for d (d + 1)/2 unknowns.
+    """
+    d = algebra.dimension
+    rows, columns = np.triu_indices(d)
+    symmetric = np.zeros((len(rows), d, d))
+    weight = np.where(rows == columns, 1.0, np.sqrt(0.5))
+    symmetric[np.arange(len(rows)), rows, columns] = weight
+    symmetric[np.arange(len(rows)), columns, rows] = weight
+    field = np.einsum("qim,ijk->qjmk", symmetric, algebra.structure)
+    equations = (field + field.swapaxes(-1, -2)).reshape(len(rows), -1)
+    return np.einsum("cq,qij->cij", _null_space(equations.T), symmetric)
+
+
+def coadjoint_orbit_form(first: ArrayLike, second: ArrayLike, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
+    """The minus form of the coadjoint orbit, omega(ad*_a mu, ad*_b mu) = -<mu, [a, b]>: (...).
+
+    {F, G} = omega(X_F, X_G), and omega(X_H, v) = dH . v.
+
+    Parameters
+    ----------
+    first, second : (..., d) tangent vectors of the orbit
+    momentum : (..., d)
+
+    Raises
+    ------
+    ShapeError
+        If a vector is not tangent to the orbit: it is no ad*_a mu, to 1e-9 of its length.
+    """
+    mu = _momentum(momentum, algebra)
+    tensor = poisson_tensor(mu, algebra)
+    inverse = np.linalg.pinv(tensor, rcond=1e-12)
+    u, v = finite_array(first, "first", mu.shape[-1:]), finite_array(second, "second", mu.shape[-1:])
+    for name, vector in (("first", u), ("second", v)):
+        off = np.linalg.norm((tensor @ inverse @ vector[..., None])[..., 0] - vector, axis=-1)
+        if np.any(off > 1e-9 * np.linalg.norm(vector, axis=-1)):
+            raise ShapeError(
+                f"{name}: not tangent to the coadjoint orbit, {off.max():.3g} of it points out of the leaf"
+            )
+    return np.einsum("...ij,...j,...i->...", inverse, u, v)
+
+
+def sphere_area_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLike) -> Array:
+    """dA(u, v) = Pi . (u x v)/|Pi|, the area form of the sphere through Pi, positive from outside: (..., 3) -> (...).
+
+    Raises ShapeError for a zero momentum.
+    """
+    pi, u, v = (finite_array(x, n, (3,)) for x, n in ((momentum, "momentum"), (first, "first"), (second, "second")))
+    return np.sum(pi * np.cross(u, v), axis=-1) / _radius(pi)
+
+
+def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLike) -> Array:
+    """omega(u, v) = -Pi . (u x v)/|Pi|^2 = -dA/|Pi|, the form of the leaf for the minus bracket: (..., 3) -> (...).
+
+    omega(X_H, v) = dH . v for tangent v. Raises ShapeError for a zero momentum. Source: theory.md K2, D3.
+    """
+    area = sphere_area_form(momentum, first, second)
+    return -area / _radius(np.asarray(momentum, dtype=float))
+
+
+def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
+    """Pi' = Pi x I^-1 Pi: (..., 3, 3), (..., 3) -> (..., 3) [kg m^2/s^2].
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If the inertia is not symmetric positive definite, or the shapes are not right.
+
+    Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
+    """
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    return np.cross(pi, angular_velocity(inertia, pi))
+
+
+def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
+    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Raises as `euler_equations`; equation (15.3.3)."""
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    return 0.5 * np.sum(pi * angular_velocity(inertia, pi), axis=-1)
+
+
+def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
+    """Omega = I^-1 Pi, the gradient of the kinetic energy: (..., 3, 3), (..., 3) -> (..., 3) [rad/s, body axes].
+
+    Raises as `euler_equations`.
+    """
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    return (inverse_inertia_argument(inertia) @ pi[..., None])[..., 0]
+
+
+def inverse_inertia_argument(inertia: ArrayLike) -> Array:
+    """The inverse of a user's inertia tensor: (..., 3, 3) -> (..., 3, 3).
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If it is not symmetric to 1e-9 of its size, or not positive definite.
+    """
+    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
+    skew = np.abs(tensor - np.swapaxes(tensor, -1, -2)).max(initial=0.0)
+    if skew > 1e-9 * np.abs(tensor).max(initial=0.0):
+        raise ShapeError(f"inertia: not symmetric, off by {skew:.3g} kg m^2")
+    return inverse_inertia(0.5 * (tensor + np.swapaxes(tensor, -1, -2)))
+
+
+def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
+    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError."""
+    value = gradient(mu) if callable(gradient) else gradient
+    return finite_array(value, f"{name} gradient", mu.shape[-1:])
+
+
+def _momentum(value: ArrayLike, algebra: LieAlgebra) -> Array:
+    return finite_array(value, "momentum", (algebra.dimension,))
+
+
+def _radius(pi: Array) -> Array:
+    radius = np.linalg.norm(pi, axis=-1)
+    if not np.all(radius > 0.0):
+        raise ShapeError("momentum: the sphere of radius 0 has no area form; a momentum other than 0 is needed")
+    return radius
+
+
+def _null_space(equations: Array) -> Array:
+    """Orthonormal solutions of a homogeneous linear system: (m, n) -> (count, n)."""
+    # By the triangular factor first: there are many more equations than unknowns.
+    _, values, vectors = np.linalg.svd(np.linalg.qr(equations, mode="r"))
+    rank = int(np.sum(values > 1e-10 * max(float(values.max(initial=0.0)), 1.0)))
+    return vectors[rank:]

@@ -1,0 +1,53 @@
+"""Roots of increasing functions, many at once: the caller's own step, kept inside a bracket that shrinks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .arrays import Array
+from .errors import AccuracyNotReached
+
+ROUNDING = 2e-16
+"""The floor for an angle in [-pi/2, pi/2]."""
+_STEPS = 120
+_CLOSE = 6e-16
+
+
+def root(
+    step: Callable[[Array], tuple[Array, Array]], start: Array, low: Array, high: Array, floor: float = 0.0
+) -> Array:
+    """The x (N,) in [low, high] where increasing functions cross 0.
+
+    Parameters
+    ----------
+    step : x (N,) -> the functions there, or anything of their sign, and the next x by the caller's rule
+    start, low, high : (N,)
+    floor : change of x that makes no difference, however small x is; 6e-16 of x is always such
+
+    A next x outside the bracket is replaced by the bracket's middle, so that it ends whatever the rule.
+
+    Raises
+    ------
+    AccuracyNotReached
+        If the bracket has not closed after 120 steps, which a function that is no number causes.
+    """
+    x, low, high = np.clip(start, low, high), low.copy(), high.copy()
+    last = high - low
+    settled = np.zeros(x.shape, dtype=bool)
+    for _ in range(_STEPS):
+        value, proposed = step(x)
+        low = np.where(value <= 0.0, x, low)
+        high = np.where(value >= 0.0, x, high)
+        change = np.abs(proposed - x)
+        inside = (proposed >= low) & (proposed <= high)
+        # Steps that do not shrink by half are the mark of a rule that jumps to and fro.
+        following = np.where(inside & (change <= 0.5 * last), proposed, 0.5 * (low + high))
+        settled |= (np.minimum(change, high - low) <= floor + _CLOSE * np.abs(x)) | (value == 0.0)
+        following = np.where(settled, x, following)
+        last = np.abs(following - x)
+        x = following
+        if settled.all():
+            return x
+    raise AccuracyNotReached("no root was enclosed; the functions must be finite and increase from below 0 to above it")

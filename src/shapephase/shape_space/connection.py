@@ -1,0 +1,304 @@
+"""The mechanical connection: how a motion of the joints alone turns a free body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import AccuracyNotReached, OpenPathError, ShapeError
+from ..inertia_tensor import inverse_inertia
+from ..integrator.integrate import SteppedRotation, stepped_rotation, tolerance_argument
+from ..integrator.sampling import Sampler, sampler
+from .shape_path import ShapePath, times_argument
+
+CLOSED = 1e-9
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_PIECES = (2, 4, 8, 16, 32, 64)
+
+
+def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
+    """Rotation rate of the base that cancels the angular momentum of a joint motion.
+
+    A(r) = I(r)^-1 J(r): with zero momentum the base turns at omega = -A(r) rate [rad/s, base axes].
+
+    Parameters
+    ----------
+    shape : (..., n) joint coordinates [rad or m]
+
+    Returns
+    -------
+    (..., 3, n) connection, base axes [rad per unit of joint]
+
+    Raises
+    ------
+    ShapeError
+        If the last axis is not the body's n joints, or an entry is not finite.
+
+    Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
+    """
+    return inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
+
+
+def curvature(body: Body, shape: ArrayLike) -> Array:
+    """Curvature of the mechanical connection, F_ij = d_i A_j - d_j A_i - A_i x A_j.
+
+    A small square of side e in the joints i, j, gone round from i to j, turns the body by exp(-e^2 F_ij).
+
+    Parameters
+    ----------
+    shape : (..., n) joint coordinates [rad or m]
+
+    Returns
+    -------
+    (..., n, n, 3) antisymmetric in i, j; base axes [rad per product of the two joints' units]
+
+    Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
+    """
+    columns, slopes = connection_slopes(body, shape)
+    bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
+    return slopes - np.swapaxes(slopes, -2, -3) - bracket
+
+
+def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
+    """Columns A_j of the connection and their exact derivatives d_i A_j: (..., n) -> (..., n, 3), (..., n, n, 3)."""
+    inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
+    connection = mechanical_connection(body, shape)
+    # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
+    gradient = inverse @ (
+        body.momentum_matrix_gradient(shape) - body.inertia_gradient(shape) @ connection[..., None, :, :]
+    )
+    return np.swapaxes(connection, -1, -2), np.swapaxes(gradient, -1, -2)
+
+
+def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
+    """The rotation of a body with zero angular momentum whose joints go once round a loop.
+
+    Parameters
+    ----------
+    path : a closed path; a continuous joint may end whole turns from its start
+    tolerance : of the rotation, between 1e-13 and 1e-4 [rad]
+
+    Returns
+    -------
+    (3, 3) attitude at the end for the identity at the start
+
+    Raises
+    ------
+    OpenPathError
+        If the path does not close: then the rotation depends on where the base frame is fixed.
+
+    Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
+    """
+    goal = tolerance_argument(tolerance)
+    route = path.matched(body.joint_names, body.name)
+    return _lift_of_loop(body, route, goal).end[0]
+
+
+@dataclass(frozen=True, eq=False)
+class HorizontalLift:
+    """The attitude of a body with zero angular momentum along a path of its joints.
+
+    Attributes
+    ----------
+    body : who moves
+    path : how the joints move, in the body's order
+    solution : the integrated rotation
+    """
+
+    body: Body
+    path: ShapePath
+    solution: SteppedRotation
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.path.duration
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimate of the largest attitude error along the path [rad]."""
+        return float(self.solution.error_estimate[0])
+
+    @property
+    def end(self) -> Array:
+        """The attitude at the end, (3, 3); of a loop its holonomy."""
+        return self.solution.end[0]
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """Base axes to the base axes at the start: times (...) -> (..., 3, 3). Raises TrajectoryError outside."""
+        times = times_argument(t, self.duration)
+        return self.solution.rotation(times.ravel())[0].reshape(*times.shape, 3, 3)
+
+    def angular_velocity(self, t: ArrayLike) -> Array:
+        """-A(r) rate: times (...) -> (..., 3), base axes [rad/s]. Raises TrajectoryError outside."""
+        times = times_argument(t, self.duration)
+        shapes, rates = self.path.curve(times.ravel())
+        return -so3.apply(mechanical_connection(self.body, shapes), rates).reshape(*times.shape, 3)
+
+
+def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> HorizontalLift:
+    """The attitude of a body with zero angular momentum along a path, open or closed: R' = R hat(-A rate), R(0) = 1.
+
+    Parameters
+    ----------
+    path : any path of the body's joints
+    tolerance : of the attitude at all times, between 1e-13 and 1e-4 [rad]
+
+    Raises
+    ------
+    UnknownNameError, TrajectoryError
+        If the path has other joints than the body.
+    AccuracyNotReached
+        If the tolerance cannot be met.
+
+    Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
+    """
+    goal = tolerance_argument(tolerance)
+    route = path.matched(body.joint_names, body.name)
+    return HorizontalLift(body, route, _lift(body, route, goal))
+
+
+def _lift(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
+    return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
+
+
+def _lift_of_loop(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
+    check_closed(body, route)
+    return _lift(body, route, tolerance)
+
+
+def check_closed(body: Body, path: ShapePath) -> None:
+    """Raise `OpenPathError` where the path is no loop; continuous joints may end whole turns from their start."""
+    gap = path_gap(body, path)
+    worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
+    if len(gap) and abs(gap[worst]) > CLOSED:
+        raise OpenPathError(
+            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from "
+            "its start; close the path, or take the end of its horizontal_lift"
+        )
+
+
+def holonomy_derivative(
+    body: Body, path: ShapePath, variation: Callable[[Array], ArrayLike], tolerance: float = 1e-9
+) -> tuple[Array, Array]:
+    """The holonomy of a loop, and its exact derivative by parameters that the loop may depend on.
+
+    Seen from the start, the loop path + c variation_k turns the body by exp(c hat(d_k)) holonomy to first order in c:
+    d_k is the integral of the curvature F(rate, variation_k), carried along by the lift, plus what moving the loop's
+    own start does.
+
+    Parameters
+    ----------
+    path : a closed path, as for `holonomy`
+    variation : times (N,) -> (N, m, n), the derivatives of the shape by m parameters, joints in the body's order;
+        smooth between the path's breaks, the same at the end as at the start
+    tolerance : of the holonomy, and of its derivative relative to the integral of the curvature's size
+
+    Returns
+    -------
+    holonomy : (3, 3)
+    derivative : (m, 3) d_k, inertial axes [rad per unit of the parameter]
+
+    Raises
+    ------
+    OpenPathError
+        If the path does not close, or a variation opens it.
+    ShapeError
+        If `variation` returns another shape, or what is not finite.
+    AccuracyNotReached
+        If the tolerance cannot be met.
+
+    Source: theory.md B6; numerics.md section 4 (curvature of the connection).
+    """
+    goal = tolerance_argument(tolerance)
+    route = path.matched(body.joint_names, body.name)
+    lift = _lift_of_loop(body, route, goal)
+    ends = np.array([0.0, route.duration])
+    at_ends = _variation_at(variation, ends, body.n_shape)
+    if np.abs(at_ends[1] - at_ends[0]).max(initial=0.0) > CLOSED * (1.0 + np.abs(at_ends).max(initial=0.0)):
+        raise OpenPathError("a variation opens the loop: it must be the same at the end as at the start")
+    turned = lift.end[0]
+    connection = mechanical_connection(body, route.shape(0.0))
+    moved_start = -(at_ends[0] @ connection.T) @ (turned - np.eye(3)).T
+
+    def carried_curvature(times: Array) -> tuple[Array, Array]:
+        shapes, rates = route.curve(times)
+        inertia, matrix, inertia_rate, matrix_rate = body.sample_rates(shapes, rates)
+        inverse = inverse_inertia(inertia, times)
+        columns = inverse @ matrix
+        turning = -so3.apply(columns, rates)
+        along = inverse @ (matrix_rate - inertia_rate @ columns)
+        across = inverse @ np.swapaxes(body.angular_momentum_gradient(shapes, rates, turning), -1, -2)
+        bracket = so3.hat(turning) @ columns
+        by_joint = lift.rotation(times)[0] @ (along - across + bracket)
+        changes = _variation_at(variation, times, body.n_shape)
+        size = np.einsum("nak,nmk->n", np.abs(along) + np.abs(across) + np.abs(bracket), np.abs(changes))
+        return np.einsum("nak,nmk->nma", by_joint, changes), size
+
+    return turned, moved_start + _integral(carried_curvature, route.breaks, goal)
+
+
+def _variation_at(variation: Callable[[Array], ArrayLike], times: Array, n_shape: int) -> Array:
+    values = finite_array(variation(times), "variation")
+    if values.ndim != 3 or values.shape[0] != len(times) or values.shape[2] != n_shape:
+        raise ShapeError(f"variation: expected ({len(times)}, m, {n_shape}) at {len(times)} times, got {values.shape}")
+    return values
+
+
+def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, tolerance: float) -> Array:
+    """The integral of a function smooth between breaks, by Gauss on ever shorter panels.
+
+    The function returns its values (N, m, 3), and the size of what they are differences of (N,): the tolerance is
+    relative to the integral of that.
+    """
+    last, change, goal = None, np.inf, 0.0
+    for pieces in _PIECES:
+        edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(breaks)] + [breaks[-1:]])
+        half = 0.5 * np.diff(edges)
+        times = edges[:-1, None] + half[:, None] * (_NODES + 1.0)
+        weights = (half[:, None] * _WEIGHTS).ravel()
+        values, sizes = function(times.ravel())
+        total = np.einsum("n,nma->ma", weights, values)
+        goal = tolerance * float(weights @ sizes)
+        if last is not None:
+            change = float(np.abs(total - last).max(initial=0.0))
+        # Halving sixteen-point panels gains many digits: the change is the error of the coarser ones.
+        if change <= goal or goal == 0.0:
+            return total
+        last = total
+    raise AccuracyNotReached(
+        f"the derivative of the holonomy still changes by {change:.3g} rad where {goal:.3g} was asked; declare the "
+        "times where the variation jumps as breaks of the path, or loosen the tolerance"
+    )
+
+
+def path_gap(body: Body, path: ShapePath) -> Array:
+    """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,)."""
+    gap = path.gap
+    return np.where(body.continuous, so3.wrap(gap), gap)
+
+
+def path_sampler(body: Body, path: ShapePath) -> Sampler:
+    """A sampler of the body along a path whose columns are in the body's order."""
+
+    def evaluate(times: Array) -> tuple[Array, Array]:
+        return body.sample(*path.curve(times))
+
+    def probe(times: Array) -> Array:
+        return np.concatenate(path.curve(times), axis=1)
+
+    return sampler(
+        evaluate,
+        path.breaks,
+        oscillations=path.oscillations,
+        loops=path.loops,
+        smooth_loop=path.smooth_loop,
+        probe=probe,
+    )

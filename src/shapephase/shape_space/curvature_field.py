@@ -1,0 +1,349 @@
+"""The curvature of the mechanical connection over regions of shape space, and the holonomies that it makes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
+from ..inertia_tensor import inverse_inertia
+from ..integrator.integrate import stepped_rotation, tolerance_argument
+from ..integrator.sampling import sampler
+from .connection import CLOSED, check_closed, connection_slopes
+from .shape_path import ShapePath
+
+_EPS = float(np.finfo(float).eps)
+_SHAPES, _SEED = 16, 15
+# No joint of a body is meant to go further; such limits stand for none.
+_NO_LIMIT = 1e3
+# Rounding left no more than this of the curvature of 130 flat bodies.
+_ROUNDING = 16.0 * _EPS
+_NODES = 12
+_PIECES = (1, 2, 4, 8, 16, 32, 64)
+_ROWS = 2000
+_SHARE = 0.01
+
+
+def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
+    """Whether the curvature vanishes, so that small loops of the joints do not turn the body.
+
+    Parameters
+    ----------
+    shapes : (..., n) where to look [rad or m]; None: at 16 random shapes, always the same, spread over the joint
+        limits, and over a whole turn (or 2 pi m) where a joint has none
+    tolerance : of each F_ij relative to |d_i A_j| + |d_j A_i| + |A_i| |A_j|, the terms that it is the difference of;
+        beyond that only what rounding leaves of them is taken for zero: wheels too small to turn the body by a
+        billionth of their own turn may count as no wheels
+
+    Raises
+    ------
+    ShapeError
+        If the last axis is not the body's n joints, there are no shapes, or the tolerance is not above 0.
+
+    Source: theory.md B6.
+    """
+    goal = finite_array(tolerance, "tolerance")
+    if goal.ndim or goal <= 0.0:
+        raise ShapeError(f"tolerance: a number above 0 is needed, got {tolerance!r}")
+    places = _random_shapes(body) if shapes is None else finite_array(shapes, "shapes")
+    if not places.size and body.n_shape:
+        raise ShapeError(f"shapes: one shape or more is needed, got an array of shape {places.shape}")
+    columns, slopes = connection_slopes(body, places)
+    crossed = np.cross(columns[..., :, None, :], columns[..., None, :, :])
+    defect = np.linalg.norm(slopes - np.swapaxes(slopes, -2, -3) - crossed, axis=-1)
+    slope, size = np.linalg.norm(slopes, axis=-1), np.linalg.norm(columns, axis=-1)
+    terms = slope + np.swapaxes(slope, -1, -2) + size[..., :, None] * size[..., None, :]
+    return bool(np.all(defect <= goal * terms + _rounding_of_slopes(body, places)))
+
+
+def curvature_on_plane(
+    body: Body,
+    joints: Sequence[str | int],
+    first: ArrayLike,
+    second: ArrayLike,
+    shape: ArrayLike | None = None,
+) -> Array:
+    """The curvature F_ij over the plane of two joints.
+
+    Parameters
+    ----------
+    joints : the joints i and j, names or places in the shape vector
+    first, second : (A,), (B,) coordinates of the two joints [rad or m]
+    shape : (n,) where the other joints stand; None: neutral
+
+    Returns
+    -------
+    (A, B, 3) base axes [rad per product of the two joints' units]; a small square of side e about a point of the plane,
+    gone round from i to j, turns the body by exp(-e^2 F_ij)
+
+    Raises
+    ------
+    UnknownNameError
+        If a name is not one of the body's joints.
+    ShapeError
+        If the joints are not two different ones, or an array has the wrong shape.
+
+    Source: theory.md B6; numerics.md section 4.
+    """
+    i, j = _two_joints(body, joints)
+    across, along = (_row(values, name) for values, name in ((first, "first"), (second, "second")))
+    shapes = np.empty((len(across), len(along), body.n_shape))
+    shapes[:] = body.shape() if shape is None else _one_shape(body, shape, "shape")
+    shapes[:, :, i], shapes[:, :, j] = across[:, None], along
+    rows = shapes.reshape(-1, body.n_shape)
+    unit = np.eye(body.n_shape)
+    field, _, _ = _curvature_along(body, rows, *(np.broadcast_to(unit[k], rows.shape) for k in (i, j)))
+    return field.reshape(len(across), len(along), 3)
+
+
+def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre: ArrayLike | None = None) -> Array:
+    """The holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
+
+    The loop is spanned by the cone of straight rays from a centre c to its shapes p(t). With T(x, t) the horizontal
+    lift along the ray c + x (p(t) - c), from x = 0, the curvature carried to the centre,
+
+        a(t) = integral from 0 to 1 of T(x, t) F(p - c, p') x dx,
+
+    is the connection along the loop in the frame that the rays carry: G' = G hat(-a), and the loop turns the body by
+    T(1, 0)^T G T(1, 0). No lift along the loop is used, so this is an independent check of `holonomy`.
+
+    Along a ray lift and integral are found by Gauss collocation of 12 nodes on 1, 2, 4 ... pieces until halving
+    changes them by less than a hundredth of the tolerance; a(t) is then sampled and its ordered exponential stepped
+    by the integrator of `holonomy`, whose estimate of the error is what the rest of the tolerance is held against.
+
+    Parameters
+    ----------
+    path : a closed path; it may have corners, cross itself and pass through the centre
+    tolerance : of the rotation, between 1e-13 and 1e-4 [rad]
+    centre : (n,) the tip of the cone, joints in the body's order [rad or m]; None: the mean shape of the loop, whose
+        cone stays within the limits of the joints if the loop does
+
+    Returns
+    -------
+    (3, 3) as `holonomy`
+
+    Raises
+    ------
+    OpenPathError
+        If the path does not close, or a continuous joint ends whole turns from its start: no cone spans such a loop.
+    SingularInertiaError
+        If at the centre or at another shape of the cone all mass is on one line: there the connection is not defined.
+    AccuracyNotReached
+        If the tolerance cannot be met, as where the cone passes close to such a shape.
+
+    Source: theory.md B6, B7.
+    """
+    goal = tolerance_argument(tolerance)
+    route = path.matched(body.joint_names, body.name)
+    check_closed(body, route)
+    _check_no_turns(body, route)
+    cone = _Cone(body, route, _mean_shape(route) if centre is None else _one_shape(body, centre, "centre"), goal)
+    carried = sampler(
+        cone.sample,
+        route.breaks,
+        oscillations=route.oscillations,
+        loops=route.loops,
+        smooth_loop=route.smooth_loop,
+        probe=lambda times: np.concatenate(route.curve(times), axis=1),
+    )
+    round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
+    _, (out, back) = cone.rays(np.array([0.0, route.duration]))
+    estimate = float(round_loop.error_estimate[0]) + 3.0 * cone.worst
+    if estimate > goal:
+        raise AccuracyNotReached(
+            f"the tolerance {goal:.3g} rad was not reached: the estimate is {estimate:.3g} rad, of which the rays from "
+            f"the centre {3.0 * cone.worst:.3g}; loosen the tolerance or choose a centre nearer to the loop"
+        )
+    return out.T @ round_loop.end[0] @ back
+
+
+class _Cone:
+    """The straight rays from a centre to a loop.
+
+    Attributes
+    ----------
+    worst : the largest change left when the pieces of a ray were halved, as a turn of the whole loop [rad]
+    """
+
+    def __init__(self, body: Body, route: ShapePath, centre: Array, tolerance: float) -> None:
+        self._body, self._route, self._centre, self._tolerance = body, route, centre, tolerance
+        self.worst = 0.0
+        try:
+            inverse_inertia(body.locked_inertia(centre))
+        except SingularInertiaError as error:
+            raise SingularInertiaError(f"at the centre of the cone: {error}; or choose another centre") from None
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        """What the integrator takes for locked inertia and internal momentum: 1 and a(t)."""
+        return np.broadcast_to(np.eye(3), (len(times), 3, 3)), self.rays(times)[0]
+
+    def rays(self, times: Array) -> tuple[Array, Array]:
+        """The curvature a(t) carried to the centre, and the lifts T(1, t) to the loop: (N,) -> (N, 3), (N, 3, 3)."""
+        shapes, rates = self._route.curve(times)
+        arms = shapes - self._centre
+        parts = [slice(start, start + _ROWS) for start in range(0, len(times), _ROWS)]
+        done = [self._refined(times[part], arms[part], rates[part]) for part in parts]
+        densities, lifts = (np.concatenate(part) for part in zip(*done, strict=True))
+        return densities, lifts
+
+    def _refined(self, times: Array, arms: Array, rates: Array) -> tuple[Array, Array]:
+        """On ever more pieces, each ray until it is good."""
+        densities, lifts, _ = self._on_pieces(1, times, arms, rates)
+        rough, left = np.arange(len(times)), 0.0
+        for pieces in _PIECES[1:]:
+            block = max(1, _ROWS // pieces)
+            blocks = [rough[k : k + block] for k in range(0, len(rough), block)]
+            parts = [self._on_pieces(pieces, times[rows], arms[rows], rates[rows]) for rows in blocks]
+            density, lift, size = (np.concatenate(part) for part in zip(*parts, strict=True))
+            change = self._route.duration * np.linalg.norm(density - densities[rough], axis=-1)
+            change = np.maximum(change, np.abs(lift - lifts[rough]).max(axis=(-1, -2)))
+            densities[rough], lifts[rough] = density, lift
+            rounding = 8.0 * _EPS * (1.0 + self._route.duration * size)
+            good = change <= np.maximum(_SHARE * self._tolerance, rounding)
+            self.worst = max(self.worst, float(change[good].max(initial=0.0)))
+            if good.all():
+                return densities, lifts
+            rough, left = rough[~good], float(change[~good].max())
+        raise AccuracyNotReached(
+            f"the curvature along the ray from the centre to the shape at t = {times[rough[0]]:.9g} s still changes by "
+            f"{left:.3g} rad where {_SHARE * self._tolerance:.3g} was asked; loosen the tolerance or "
+            "choose another centre"
+        )
+
+    def _on_pieces(self, pieces: int, times: Array, arms: Array, rates: Array) -> tuple[Array, Array, Array]:
+        """a(t), T(1, t), and the size of what a(t) is the difference of, with 12 nodes on each piece of the rays."""
+        nodes, weights, integrals = _collocation()
+        along = ((np.arange(pieces)[:, None] + nodes) / pieces).ravel()
+        shapes = self._centre + along[:, None] * arms[:, None]
+        directions, changes = np.broadcast_arrays(arms[:, None], rates[:, None] * along[:, None])
+        flat = (len(times) * len(along), self._body.n_shape)
+        places, outward, sideways = (part.reshape(flat) for part in (shapes, directions, changes))
+        try:
+            field, turning, size = _curvature_along(self._body, places, outward, sideways, np.repeat(times, len(along)))
+        except SingularInertiaError as error:
+            raise SingularInertiaError(
+                f"on the ray from the centre to the shape of that time: {error}; or choose another centre"
+            ) from None
+        grid = (len(times), pieces, _NODES)
+        spin = so3.hat(-turning.reshape(*grid, 3)) / pieces
+        # Y = 1 + integral of Y hat(omega), for the transposes of Y at the nodes.
+        system = np.einsum("ij,npjcb->npibjc", integrals, spin).reshape(len(times), pieces, 3 * _NODES, 3 * _NODES)
+        solved = np.linalg.solve(np.eye(3 * _NODES) - system, np.tile(np.eye(3), (_NODES, 1)))
+        inner = so3.transpose(solved.reshape(*grid, 3, 3))
+        whole = np.eye(3) + np.einsum("j,npjab->npab", weights, inner @ spin)
+        carried = so3.apply(inner, field.reshape(*grid, 3))
+        by_piece = np.einsum("j,npja->npa", weights / pieces, carried)
+        density, lift = np.zeros((len(times), 3)), np.broadcast_to(np.eye(3), (len(times), 3, 3))
+        for piece in range(pieces):
+            density += so3.apply(lift, by_piece[:, piece])
+            lift = lift @ whole[:, piece]
+        return density, lift, size.reshape(len(times), -1).mean(axis=1)
+
+
+def _curvature_along(
+    body: Body, shapes: Array, first: Array, second: Array, times: Array | None = None
+) -> tuple[Array, Array, Array]:
+    """F(u, v) for two directions at each shape, A u, and the size of what F is the difference of.
+
+    (N, n) each -> (N, 3), (N, 3), (N,)
+    """
+    inertia, matrix, inertia_first, matrix_first = body.sample_rates(shapes, first)
+    _, _, inertia_second, matrix_second = body.sample_rates(shapes, second)
+    inverse = inverse_inertia(inertia, times)
+    turn_first, turn_second = (so3.apply(inverse, so3.apply(matrix, v)) for v in (first, second))
+    onward = so3.apply(inverse, so3.apply(matrix_first, second) - so3.apply(inertia_first, turn_second))
+    sideways = so3.apply(inverse, so3.apply(matrix_second, first) - so3.apply(inertia_second, turn_first))
+    bracket = np.cross(turn_first, turn_second)
+    sizes = np.linalg.norm(np.stack([onward, sideways, bracket]), axis=-1)
+    return onward - sideways - bracket, turn_first, sizes.sum(axis=0)
+
+
+@lru_cache(maxsize=1)
+def _collocation() -> tuple[Array, Array, Array]:
+    """Gauss nodes and weights of [0, 1], and the integrals from 0 to each node of the polynomials through them."""
+    legendre = np.polynomial.legendre
+    nodes, weights = legendre.leggauss(_NODES)
+    coefficients = (legendre.legvander(nodes, _NODES - 1) * weights[:, None]).T * (np.arange(_NODES)[:, None] + 0.5)
+    integrals = legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T
+    return 0.5 * (nodes + 1.0), 0.5 * weights, np.asarray(0.5 * integrals, dtype=np.float64)
+
+
+def _mean_shape(route: ShapePath) -> Array:
+    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
+    return route.curve(times)[0].mean(axis=0)
+
+
+def _check_no_turns(body: Body, route: ShapePath) -> None:
+    turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
+    if len(turned):
+        joint = int(turned[0])
+        raise OpenPathError(
+            f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
+            "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
+        )
+
+
+def _random_shapes(body: Body) -> Array:
+    lower, upper = body.joint_limits.T
+    open_below, open_above = ~(lower > -_NO_LIMIT), ~(upper < _NO_LIMIT)
+    least = np.where(open_below, np.where(open_above, -np.pi, upper - 2.0 * np.pi), lower)
+    most = np.where(open_above, np.where(open_below, np.pi, lower + 2.0 * np.pi), upper)
+    return np.random.default_rng(_SEED).uniform(least, most, (_SHAPES, body.n_shape))
+
+
+def _rounding_of_slopes(body: Body, shapes: Array) -> Array:
+    """What rounding may leave of the curvature: (..., n) -> (..., n, n).
+
+    A joint motion of kinetic energy T_0 has an angular momentum of at most sqrt(2 T_0 I), I the largest moment, taken
+    about the base origin where momenta are summed; rounding is relative to the connection that would give. A slide
+    counts by the body's radius of gyration, and as if it moved all mass: what is the same for all of it cancels too.
+    """
+    sliding = np.array([unit == "m" for unit in body.joint_units], dtype=bool)
+    moments = np.linalg.eigvalsh(body.locked_inertia(shapes))[..., [0, 2]]
+    energies = body.kinetic_energy(shapes[..., None, :], np.eye(body.n_shape))
+    energies = np.where(sliding, 0.5 * body.mass, np.maximum(energies, 0.0))
+    about_origin = moments[..., 1:] + body.mass * np.square(body.centre_of_mass(shapes)).sum(axis=-1, keepdims=True)
+    most = np.sqrt(2.0 * energies * about_origin) / moments[..., :1]
+    length = np.where(sliding, np.sqrt(moments[..., 1:] / body.mass), 1.0)
+    by_pair = most[..., None, :] / length[..., :, None]
+    return _ROUNDING * (by_pair + np.swapaxes(by_pair, -1, -2))
+
+
+def _two_joints(body: Body, joints: Sequence[str | int]) -> tuple[int, int]:
+    if isinstance(joints, str) or len(joints) != 2:
+        raise ShapeError(f"joints: two joints of {body.name} are needed, got {joints!r}")
+    i, j = (_joint_place(body, joint) for joint in joints)
+    if i == j:
+        raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[i]} twice")
+    return i, j
+
+
+def _joint_place(body: Body, joint: str | int) -> int:
+    if isinstance(joint, str):
+        return body.joint_index(joint)
+    if isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < body.n_shape:
+        raise unknown_name(f"joint of {body.name}", str(joint), body.joint_names)
+    return int(joint)
+
+
+def _one_shape(body: Body, value: ArrayLike, name: str) -> Array:
+    shape = finite_array(value, name)
+    if shape.shape != (body.n_shape,):
+        raise ShapeError(
+            f"{name}: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
+            f"got shape {shape.shape}"
+        )
+    return shape
+
+
+def _row(values: ArrayLike, name: str) -> Array:
+    row = finite_array(values, name)
+    if row.ndim != 1:
+        raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
+    return row

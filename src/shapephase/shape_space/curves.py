@@ -1,0 +1,183 @@
+"""Shapes and their rates as functions of time: what shape paths are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, Integers, check_reach, real_array
+from ..errors import ShapeError, TrajectoryError
+
+_WHOLE_TURN = 2.0 * np.pi
+
+
+class Curve(Protocol):
+    """Shapes and rates at times of [0, duration]: (N,) -> (N, n), (N, n)."""
+
+    def __call__(self, times: Array, /) -> tuple[Array, Array]:
+        """Shapes and their rates."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Fourier:
+    """mean + sum a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T)."""
+
+    mean: Array
+    cosines: Array
+    sines: Array
+    period: float
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        harmonics, weights = self._weights
+        phase = times[:, None] * harmonics
+        both = np.concatenate([np.cos(phase), np.sin(phase)], axis=1) @ weights
+        n_shape = len(self.mean)
+        return both[:, :n_shape] + self.mean, both[:, n_shape:]
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """Angular frequencies (k,) [rad/s]; of the cosines and sines in the shapes and in the rates (2 k, 2 n)."""
+        harmonics = _WHOLE_TURN / self.period * np.arange(1, self.cosines.shape[1] + 1)
+        of_cosines = np.concatenate([self.cosines, self.sines * harmonics]).T
+        of_sines = np.concatenate([self.sines, -self.cosines * harmonics]).T
+        return harmonics, np.concatenate([of_cosines, of_sines])
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewisePolynomial:
+    """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n)."""
+
+    knots: Array
+    coefficients: Array
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        piece = np.searchsorted(self.knots[1:-1], times, side="right")
+        powers = (times - self.knots[piece])[:, None] ** np.arange(len(self.coefficients))
+        both = (powers[:, None] @ self._by_piece[piece])[:, 0]
+        n_shape = self.coefficients.shape[2]
+        return both[:, :n_shape], both[:, n_shape:]
+
+    @cached_property
+    def _by_piece(self) -> Array:
+        """Coefficients of the shapes and of the rates, side by side: (pieces, order, 2 n)."""
+        shapes = np.moveaxis(self.coefficients, 0, 1)
+        rates = np.zeros_like(shapes)
+        rates[:, :-1] = shapes[:, 1:] * np.arange(1.0, shapes.shape[1])[:, None]
+        return np.concatenate([shapes, rates], axis=2)
+
+
+def returned_pair(returned: object) -> tuple[Array, Array]:
+    """The shapes and rates that a user's function returned. Raises ShapeError where it is no such pair."""
+    if not isinstance(returned, tuple | list) or len(returned) != 2:
+        raise ShapeError("the path's function must return a pair, (shapes, rates)")
+    return real_array(returned[0], "shapes of the path's function"), real_array(
+        returned[1], "rates of the path's function"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A user's function, its results checked at every call."""
+
+    f: Callable[[Array], tuple[ArrayLike, ArrayLike]]
+    n_shape: int
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        shapes, rates = returned_pair(self.f(times))
+        wanted = (len(times), self.n_shape)
+        for name, part in (("shapes", shapes), ("rates", rates)):
+            if part.shape != wanted:
+                raise ShapeError(f"the path's function must return {name} {wanted} for these times, got {part.shape}")
+            if not np.isfinite(part).all():
+                row = int(np.argwhere(~np.isfinite(part))[0, 0])
+                raise TrajectoryError(f"the path's function returned {name} that are not finite at {times[row]:.9g} s")
+        check_reach(shapes, "shapes of the path's function")
+        return shapes, rates
+
+
+@dataclass(frozen=True, eq=False)
+class Reversed:
+    """A curve run through backwards."""
+
+    curve: Curve
+    duration: float
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        shapes, rates = self.curve(self.duration - times)
+        return shapes, -rates
+
+
+@dataclass(frozen=True, eq=False)
+class Stretched:
+    """A curve run through `factor` times as slowly."""
+
+    curve: Curve
+    factor: float
+    duration: float
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        shapes, rates = self.curve(np.minimum(times / self.factor, self.duration))
+        return shapes, rates / self.factor
+
+
+@dataclass(frozen=True, eq=False)
+class Reordered:
+    """The columns of a curve in another order."""
+
+    curve: Curve
+    order: Integers
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        shapes, rates = self.curve(times)
+        return shapes[:, self.order], rates[:, self.order]
+
+
+@dataclass(frozen=True, eq=False)
+class Joined:
+    """A curve, and after it another, shifted by `offset` (whole turns)."""
+
+    first: Curve
+    first_duration: float
+    second: Curve
+    second_duration: float
+    offset: Array
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        late = times >= self.first_duration
+        shapes, rates = (np.empty((len(times), len(self.offset))) for _ in range(2))
+        shapes[~late], rates[~late] = self.first(times[~late])
+        inside = np.minimum(times[late] - self.first_duration, self.second_duration)
+        shapes[late], rates[late] = self.second(inside)
+        shapes[late] += self.offset
+        return shapes, rates
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """A loop `count` times, each time `turns` (whole turns) further."""
+
+    curve: Curve
+    period: float
+    count: int
+    turns: Array
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        # Compared with the very numbers that stand in the breaks, so that a time just before one stays in its loop.
+        starts = self.period * np.arange(self.count)
+        loop = np.searchsorted(starts, times, side="right") - 1
+        shapes, rates = self.curve(np.minimum(times - starts[loop], self.period))
+        return shapes + loop[:, None] * self.turns, rates

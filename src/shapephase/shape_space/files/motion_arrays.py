@@ -1,0 +1,161 @@
+"""Joint motions in NumPy's files: our own NPZ, and MuJoCo's `qpos` as NPY or NPZ."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Array, finite_array
+from ...errors import ShapeError, TrajectoryError
+from .recording import MOST_BYTES, Recording, file_bytes, times_from_zero
+
+_FREE_JOINT = 7
+_SCALAR_FIRST = [1, 2, 3, 0]
+
+
+def read_arrays(where: Path, joint_names: Sequence[str], timestep: float | None) -> Recording:
+    """An NPZ file with `shapes`, `time`, `joint_names`, or with MuJoCo's `qpos`; an NPY file is `qpos` alone.
+
+    Of `qpos` (N, 7 + n), the first seven columns are the free joint, x y z and the quaternion w x y z, MuJoCo's
+    order; (N, n) is without a free joint. The joints are the array `joint_names` where there is one, else the n
+    joints of the body in the body's order: MuJoCo may order a model's joints otherwise, so store their names.
+    Times are the array `time`, or follow from `timestep`, an array of one number or the argument.
+
+    Parameters
+    ----------
+    joint_names : of the body
+    timestep : [s], for a file without times
+
+    Raises
+    ------
+    InputFileNotFoundError, TrajectoryError
+        For a file that is not there; for faults, with the array and the entry.
+    """
+    data = file_bytes(where)
+    arrays = {"qpos": _loaded(data, where)} if where.suffix.lower() == ".npy" else _members(data, where)
+    try:
+        if "qpos" in arrays:
+            return _mujoco(arrays, where, joint_names, timestep)
+        if timestep is not None:
+            raise TrajectoryError(f"{where}: timestep is for qpos without times; this file has its times")
+        return _shapes(arrays, where)
+    except ShapeError as error:
+        raise TrajectoryError(str(error)) from None
+
+
+def _shapes(arrays: dict[str, Any], where: Path) -> Recording:
+    for name in ("time", "shapes", "joint_names"):
+        if name not in arrays:
+            raise TrajectoryError(f"{where}: the array {name!r} is missing; there are {', '.join(sorted(arrays))}")
+    names = _names(arrays["joint_names"], where)
+    times = _array(arrays["time"], where, "time", (None,), "s")
+    shapes = _array(arrays["shapes"], where, "shapes", (len(times), len(names)))
+    quaternions, positions = arrays.get("base_quat_xyzw"), arrays.get("base_position")
+    if quaternions is not None:
+        quaternions = _array(quaternions, where, "base_quat_xyzw", (len(times), 4))
+    if positions is not None:
+        positions = _array(positions, where, "base_position", (len(times), 3), "m")
+    return _recording(where, "NPZ", times, shapes, names, quaternions, positions)
+
+
+def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], timestep: float | None) -> Recording:
+    if "shapes" in arrays:
+        raise TrajectoryError(f"{where}: both 'shapes' and 'qpos' are there; keep one")
+    qpos = _array(arrays["qpos"], where, "qpos", (None, None))
+    names = _names(arrays["joint_names"], where) if "joint_names" in arrays else list(joint_names)
+    free, n = qpos.shape[1] - len(names), len(names)
+    if free not in (0, _FREE_JOINT):
+        raise TrajectoryError(
+            f"{where}: qpos has {qpos.shape[1]} columns; with {n} joints ({', '.join(names)}) it has "
+            f"{n + _FREE_JOINT}, or {n} without the free joint. Joints that follow others are left out"
+        )
+    times = _mujoco_times(arrays, where, len(qpos), timestep)
+    quaternions = qpos[:, 3:_FREE_JOINT][:, _SCALAR_FIRST] if free else None
+    positions = qpos[:, :3] if free else None
+    return _recording(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions)
+
+
+def _mujoco_times(arrays: dict[str, Any], where: Path, count: int, timestep: float | None) -> Array:
+    given = [name for name in ("time", "timestep") if name in arrays] + ["argument"] * (timestep is not None)
+    if len(given) != 1:
+        raise TrajectoryError(
+            f"{where}: the times of qpos come from one of the array 'time', the array 'timestep' and the argument "
+            f"timestep; {'none' if not given else 'more than one'} is there"
+        )
+    if given == ["time"]:
+        return _array(arrays["time"], where, "time", (count,), "s")
+    step = _array(arrays.get("timestep", timestep), where, "timestep", (), "s")
+    if step.size != 1 or step.ravel()[0] <= 0.0:
+        raise TrajectoryError(f"{where}: timestep: one number above 0 is needed [s], got {step}")
+    return np.arange(count) * step.ravel()[0]
+
+
+def _recording(
+    where: Path,
+    kind: str,
+    times: Array,
+    shapes: Array,
+    names: list[str],
+    quaternions: Array | None,
+    positions: Array | None,
+) -> Recording:
+    rows = range(len(times))
+    columns = {name: np.ascontiguousarray(column) for name, column in zip(names, shapes.T, strict=True)}
+    shifted = times_from_zero(times, str(where), "sample", rows)
+    return Recording(str(where), kind, shifted, columns, "sample", rows, False, quaternions, positions)
+
+
+def _array(value: Any, where: Path, name: str, trailing: tuple[int | None, ...], unit: str = "") -> Array:
+    array = finite_array(value, f"{where}: {name}", trailing, unit=unit)
+    if trailing and array.ndim != len(trailing):
+        raise TrajectoryError(f"{where}: {name}: {len(trailing)} axes are needed, got shape {array.shape}")
+    return array
+
+
+def _names(stored: Any, where: Path) -> list[str]:
+    if stored.dtype.kind not in "UT" and stored.size:
+        raise TrajectoryError(f"{where}: joint_names: text is needed, got an array of {stored.dtype}")
+    names = [str(name) for name in np.ravel(stored)]
+    if len(set(names)) != len(names):
+        raise TrajectoryError(f"{where}: a joint name stands twice in {', '.join(names)}")
+    return names
+
+
+def _members(data: bytes, where: Path) -> dict[str, Any]:
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            entries = archive.infolist()
+            # A small file can unpack to any size.
+            if sum(entry.file_size for entry in entries) > 4 * MOST_BYTES:
+                raise TrajectoryError(f"{where}: more than {4 * MOST_BYTES // 2**20} MiB when unpacked")
+            names = [entry.filename.removesuffix(".npy") for entry in entries]
+            if len(set(names)) != len(names):
+                raise TrajectoryError(f"{where}: an array stands twice in the file")
+            return {name: _loaded(archive.read(entry), where) for name, entry in zip(names, entries, strict=True)}
+    except TrajectoryError:
+        raise
+    except Exception as error:  # a damaged archive fails in the decoders in many ways
+        raise TrajectoryError(f"{where}: no NPZ file that can be read ({error})") from None
+
+
+def _loaded(data: bytes, where: Path) -> Any:
+    try:
+        stream = io.BytesIO(data)
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(stream)
+        if dtype.hasobject:
+            raise TrajectoryError(f"{where}: an array of Python objects; such files can run code and are never read")
+        # The header may promise more than there is, and the memory would be taken first.
+        if float(np.prod(shape, dtype=np.float64)) * dtype.itemsize > len(data):
+            raise TrajectoryError(f"{where}: an array of shape {shape} does not fit into the file; it is cut off")
+        return np.load(io.BytesIO(data), allow_pickle=False)
+    except TrajectoryError:
+        raise
+    except Exception as error:  # a damaged header fails in NumPy's parser in many ways
+        raise TrajectoryError(f"{where}: no array that can be read ({error})") from None

@@ -1,0 +1,194 @@
+"""What a motion file holds before its columns have found their joints, and what all kinds of file have in common."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import InputFileNotFoundError, TrajectoryError
+
+MOST_BYTES = 256 * 2**20
+_WILD_STEPS = 100.0
+
+
+class TrajectoryWarning(UserWarning):
+    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """The columns of a motion file.
+
+    Attributes
+    ----------
+    where : the file, for messages
+    format : the kind of file, for people
+    times : (N,) from 0 [s]
+    columns : name in the file -> (N,)
+    row : what a sample is called in messages, "row" or "point"
+    rows : (N,) the numbers of the samples in messages
+    degrees : whether turning joints are in degrees; None: the file ought to say so and does not
+    base_quat_xyzw : (N, 4) as recorded, or None
+    base_position : (N, 3) [m] or None
+    """
+
+    where: str
+    format: str
+    times: Array
+    columns: dict[str, Array]
+    row: str
+    rows: Sequence[int]
+    degrees: bool | None = False
+    base_quat_xyzw: Array | None = None
+    base_position: Array | None = None
+
+    def place(self, index: int) -> str:
+        """The file and the sample, for messages."""
+        return f"{self.where}: {self.row} {self.rows[index]}"
+
+
+def warn(message: str) -> None:
+    """Issue a `TrajectoryWarning`."""
+    warnings.warn(message, TrajectoryWarning, stacklevel=6)
+
+
+def file_bytes(where: Path, most: int = MOST_BYTES) -> bytes:
+    """The content of a regular file.
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If it is not there, no file, or not to be opened.
+    TrajectoryError
+        If it is larger than `most` bytes.
+    """
+    check_size(where, most)
+    try:
+        with where.open("rb") as stream:
+            data = stream.read(most + 1)
+    except OSError as error:
+        raise InputFileNotFoundError(f"{where}: cannot be opened ({error.strerror})") from None
+    return data
+
+
+def check_size(where: Path, most: int = MOST_BYTES) -> None:
+    """Raise what `file_bytes` raises, without reading."""
+    if not where.is_file():
+        kind = "is no regular file" if where.exists() else "there is no such file"
+        raise InputFileNotFoundError(f"{where}: {kind}")
+    size = where.stat().st_size
+    if size > most:
+        raise TrajectoryError(
+            f"{where}: {size / 2**20:.0f} MiB, up to {most / 2**20:g} MiB are read; write fewer samples, or NPZ"
+        )
+
+
+def digest(where: Path) -> str:
+    """The SHA-256 of a file; of a folder, that of the lines `<SHA-256>  <name>` of its files by name."""
+    if where.is_dir():
+        lines = [f"{digest(part)}  {part.name}\n" for part in sorted(where.iterdir())]
+        return hashlib.sha256("".join(lines).encode()).hexdigest()
+    with where.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def check_text(data: bytes, where: Path) -> None:
+    """Raise TrajectoryError where bytes are no UTF-8 text or hold a NUL."""
+    try:
+        data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TrajectoryError(
+            f"{where}: not UTF-8 text, byte {error.start} (0x{data[error.start]:02x}) cannot be read; save it as UTF-8"
+        ) from None
+    zero = data.find(b"\0")
+    if zero >= 0:
+        raise TrajectoryError(f"{where}: byte {zero} is NUL, so this is no text")
+
+
+def number(entry: str, place: str) -> float:
+    """A finite number, strictly written. Raises TrajectoryError that begins with `place`."""
+    try:
+        # Python's own reading also takes 1_000 and digits of other scripts.
+        value = float(entry) if entry.isascii() and "_" not in entry else np.nan
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        text = entry.strip()
+        shown = repr(text if len(text) < 40 else text[:40] + "...")
+        raise TrajectoryError(f"{place}: {shown} is no finite number{_way_out(text)}")
+    return float(value)
+
+
+def plain_numbers(entries: Sequence[str]) -> list[float] | None:
+    """Many entries at once; None where `number` has to look at each."""
+    together = "".join(entries)
+    if not together.isascii() or "_" in together:
+        return None
+    try:
+        values = [float(entry) for entry in entries]
+    except ValueError:
+        return None
+    return values if math.isfinite(sum(map(abs, values))) else None
+
+
+def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> Array:
+    """Times checked and shifted to start at 0: (N,) -> (N,) [s].
+
+    Raises
+    ------
+    TrajectoryError
+        If there are fewer than two, they do not ascend, or their differences are no numbers.
+
+    Warns
+    -----
+    TrajectoryWarning
+        Where one step is more than a hundred times as long, or as short, as most, or where numbers so far from zero
+        resolve the steps badly.
+    """
+    if len(times) < 2:
+        raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}")
+    with np.errstate(over="ignore"):
+        steps, shifted = np.diff(times), times - times[0]
+    late = np.flatnonzero(steps <= 0.0)
+    if len(late):
+        i = int(late[0]) + 1
+        raise TrajectoryError(
+            f"{where}: {row} {rows[i]}: time {times[i]:.9g} s does not come after {times[i - 1]:.9g} s; sort the "
+            f"{row}s and drop repeated times"
+        )
+    if not np.isfinite(shifted[-1]) or np.any(np.diff(shifted) <= 0.0):
+        raise TrajectoryError(
+            f"{where}: times from {times[0]:.9g} s to {times[-1]:.9g} s cannot be told apart as double numbers"
+        )
+    if np.spacing(np.abs(times).max()) > 1e-6 * steps.min():
+        warn(
+            f"{where}: times near {times[-1]:.9g} s resolve only {np.spacing(np.abs(times).max()):.2g} s of steps of "
+            f"{steps.min():.3g} s; subtract the start before the file is written"
+        )
+    usual = float(np.median(steps))
+    longest, shortest = int(np.argmax(steps)), int(np.argmin(steps))
+    for i, odd, what in (
+        (longest, steps[longest] > _WILD_STEPS * usual, "a gap in the recording? The path is interpolated across it"),
+        (shortest, steps[shortest] * _WILD_STEPS < usual, "the same sample twice? Rates there may be far too large"),
+    ):
+        if odd:
+            warn(
+                f"{where}: {steps[i]:.6g} s between {row} {rows[i]} and {row} {rows[i + 1]}, where the usual step is "
+                f"{usual:.6g} s: {what}"
+            )
+    return shifted
+
+
+def _way_out(text: str) -> str:
+    if not text or text.lower() in ("nan", ".nan", "na", "null", "none", "~"):
+        return "; fill the gap or drop the row"
+    if text.count(",") == 1 and text.replace(",", "").lstrip("+-").isdigit():
+        return "; write the decimal comma as a point"
+    return ""

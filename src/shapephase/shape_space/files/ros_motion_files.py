@@ -1,0 +1,367 @@
+"""Joint motions that ROS recorded or commands: trajectories in YAML, states and trajectories in bags."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
+from .recording import Recording, check_size, check_text, file_bytes, number, times_from_zero
+from .strict_yaml import Word, yaml_documents
+
+_STATE = "sensor_msgs/msg/JointState"
+_TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
+_MOST_YAML = 16 * 2**20
+_MOST_METADATA = 2**20
+_NANO = 10**9
+# What goals and planners wrap around a trajectory.
+_WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")
+_SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsecs", "nsec")
+
+
+class _State(NamedTuple):
+    """A JointState message: its own time and the one at which it was recorded [ns], some joints."""
+
+    stamp: int
+    recorded: int
+    names: list[str]
+    positions: list[float]
+
+
+class _Trajectory(NamedTuple):
+    """A JointTrajectory message: its time [ns], joints, and of each point its time [ns and s] and positions."""
+
+    stamp: int
+    names: list[str]
+    nanoseconds: list[int]
+    seconds: list[float]
+    positions: list[list[float]]
+
+
+def read_ros_yaml(where: Path) -> Recording:
+    """A `JointTrajectory` in YAML, bare or in a goal, or documents of several, or of `JointState` messages.
+
+    Several trajectories follow each other by their header stamps; states are merged as in a bag.
+
+    Raises
+    ------
+    InputFileNotFoundError, TrajectoryError, MissingExtraError
+        For a file that is not there; for faults, with line or point; without PyYAML.
+    """
+    data = file_bytes(where, _MOST_YAML)
+    check_text(data, where)
+    documents = [_unwrapped(document) for document in yaml_documents(data.decode("utf-8-sig"), str(where))]
+    states = [_is(document, "name", "position") for document in documents]
+    if not documents or not all(
+        state or _is(document, "joint_names", "points") for state, document in zip(states, documents, strict=True)
+    ):
+        raise TrajectoryError(
+            f"{where}: no ROS trajectory; a mapping with `joint_names` and `points` (JointTrajectory), or documents "
+            "with `name` and `position` (JointState) are needed"
+        )
+    if any(states) != all(states):
+        raise TrajectoryError(f"{where}: JointState and JointTrajectory messages are mixed; keep one kind")
+    if states[0]:
+        messages = [_yaml_state(document, where, k) for k, document in enumerate(documents, start=1)]
+        return _of_states(messages, str(where), "ROS YAML JointState")
+    trajectories = [_yaml_trajectory(document, where) for document in documents]
+    return _of_trajectories(trajectories, str(where), "ROS YAML JointTrajectory")
+
+
+def read_bag(where: Path, topic: str | None) -> Recording:
+    """The states or trajectories of one topic of a rosbag1 file, a rosbag2 folder, an MCAP or a SQLite file.
+
+    The time of a state is that of its header, or the time of recording where all headers are without. Messages
+    that carry some of the joints are merged when together they have all of them at each time. Message definitions in
+    the bag are not used: a bag with other definitions of these types is refused.
+
+    Raises
+    ------
+    InputFileNotFoundError, UnknownNameError
+        If there is no such file, or no such topic.
+    TrajectoryError
+        For more than one topic with motions and none chosen; for faults, with the message.
+    MissingExtraError
+        Without rosbags.
+    """
+    try:
+        import rosbags.highlevel  # noqa: F401
+    except ImportError:
+        raise MissingExtraError("ROS bags need rosbags; install it with: pip install 'shapephase[ros]'") from None
+    _check_sizes(where)
+    try:
+        return _read_messages(where, topic)
+    except ShapePhaseError:
+        raise
+    except Exception as error:  # a damaged bag fails inside rosbags in many ways
+        raise TrajectoryError(f"{where}: no bag that can be read ({type(error).__name__}: {error!s:.200})") from None
+
+
+def _check_sizes(where: Path) -> None:
+    if not where.is_dir():
+        check_size(where)
+        return
+    if not (where / "metadata.yaml").is_file():
+        raise TrajectoryError(f"{where}: a folder without metadata.yaml, so no rosbag2; name a file in it")
+    check_size(where / "metadata.yaml", _MOST_METADATA)
+    for part in where.iterdir():
+        check_size(part)
+
+
+def _check_database(where: Path) -> None:
+    """Refuse a SQLite file in which reading a table runs a query of the file's own."""
+    import sqlite3
+
+    with closing(sqlite3.connect(f"{where.resolve().as_uri()}?mode=ro", uri=True)) as database:
+        kinds = "type NOT IN ('table', 'index') OR sql LIKE '%VIRTUAL%' OR sql LIKE '%GENERATED%'"
+        computed = [str(name) for (name,) in database.execute(f"SELECT name FROM sqlite_master WHERE {kinds}")]
+    if computed:
+        raise TrajectoryError(f"{where}: computed tables ({', '.join(computed)!s:.100}) are not read; record plainly")
+
+
+def _read_messages(where: Path, topic: str | None) -> Recording:
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+    from rosbags.typesys import Stores, get_typestore
+
+    first = where.suffix.lower() == ".bag" and where.is_file()
+    for part in where.glob("*.db3") if where.is_dir() else [where] * (where.suffix.lower() == ".db3"):
+        _check_database(part)
+    types = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
+    with Reader1(where) if first else Reader2(where) as reader:
+        chosen = _connections(reader.connections, where, topic)
+        for connection in chosen:
+            kind = connection.msgtype
+            digest = types.generate_msgdef(kind)[1] if first else types.hash_rihs01(kind)
+            if connection.digest and connection.digest != digest:
+                raise TrajectoryError(f"{where}: topic {connection.topic}: not the usual definition of {kind}")
+        decode = types.deserialize_ros1 if first else types.deserialize_cdr
+        kind = chosen[0].msgtype
+        messages = ((time, decode(data, kind)) for _, time, data in reader.messages(chosen))
+        label = f"{'rosbag1' if first else 'rosbag2'} {kind.split('/')[-1]}"
+        if kind == _STATE:
+            return _of_states(list(_bag_states(messages)), str(where), label)
+        return _of_trajectories([_bag_trajectory(message) for _, message in messages], str(where), label)
+
+
+def _connections(connections: Sequence[Any], where: Path, topic: str | None) -> list[Any]:
+    """The connections of the one topic that holds joint motions."""
+    motions = [connection for connection in connections if connection.msgtype in (_STATE, _TRAJECTORY)]
+    topics = sorted({connection.topic for connection in motions})
+    if not topics:
+        others = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in connections})[:20]) or "none"
+        raise TrajectoryError(f"{where}: no topic of type {_STATE} or {_TRAJECTORY}; topics: {others}")
+    if topic is not None and topic not in topics:
+        raise unknown_name(f"topic with joint motions in {where}", topic, topics)
+    if topic is None and len(topics) > 1:
+        listed = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in motions}))
+        raise TrajectoryError(f"{where}: several topics hold joint motions, choose one with topic=: {listed}")
+    chosen = [connection for connection in motions if connection.topic == (topic or topics[0])]
+    if len({connection.msgtype for connection in chosen}) > 1:
+        raise TrajectoryError(f"{where}: topic {chosen[0].topic} holds messages of two types")
+    return chosen
+
+
+def _bag_states(messages: Iterator[tuple[int, Any]]) -> Iterator[_State]:
+    for recorded, message in messages:
+        yield _State(_bag_time(message.header.stamp), recorded, list(message.name), message.position.tolist())
+
+
+def _bag_trajectory(message: Any) -> _Trajectory:
+    points = message.points
+    return _Trajectory(
+        _bag_time(message.header.stamp),
+        list(message.joint_names),
+        [_bag_time(point.time_from_start) for point in points],
+        [0.0] * len(points),
+        [point.positions.tolist() for point in points],
+    )
+
+
+def _bag_time(time: Any) -> int:
+    return time.sec * _NANO + time.nanosec
+
+
+def _of_states(messages: list[_State], where: str, label: str) -> Recording:
+    """Messages with some of the joints each, merged by their times."""
+    stamped = any(message.stamp for message in messages)
+    # A clock may start at zero; a zero later on is a header that was not filled in.
+    for count, message in enumerate(messages[1:], start=2):
+        if not message.stamp and messages[count - 2].stamp:
+            raise TrajectoryError(f"{where}: message {count} has no time in its header, and others have; drop it")
+    if messages and not stamped and not any(message.recorded for message in messages):
+        raise TrajectoryError(f"{where}: the messages have no times; record them with header stamps")
+    joints = list(dict.fromkeys(name for message in messages for name in message.names))
+    rows: dict[int, dict[str, float]] = {}
+    numbers: dict[int, int] = {}
+    for count, (stamp, recorded, names, positions) in enumerate(messages, start=1):
+        if len(names) != len(positions):
+            raise TrajectoryError(f"{where}: message {count}: {len(names)} joints and {len(positions)} positions")
+        time = stamp if stamped else recorded
+        row = rows.setdefault(time, {})
+        numbers.setdefault(time, count)
+        for name, position in zip(names, positions, strict=True):
+            if name in row:
+                raise TrajectoryError(
+                    f"{where}: message {count}: joint {name} stands twice at one time; drop one message"
+                )
+            row[name] = position
+    for time, row in rows.items():
+        if len(row) != len(joints):
+            lacking = ", ".join(name for name in joints if name not in row)
+            raise TrajectoryError(
+                f"{where}: message {numbers[time]}: no {lacking} at this time, and other messages have them; all "
+                "joints are needed at each time: record one topic with all, choose it by topic=, or resample to a table"
+            )
+    table = np.array([[row[name] for name in joints] for row in rows.values()]).reshape(len(rows), len(joints))
+    return _recording(where, label, list(rows), np.zeros(len(rows)), joints, table, "message", list(numbers.values()))
+
+
+def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Recording:
+    """One trajectory, or several one after the other by the times of their headers."""
+    joints = trajectories[0].names if trajectories else []
+    for count, trajectory in enumerate(trajectories, start=1):
+        doubled = [name for name, times in Counter(trajectory.names).items() if times > 1]
+        if doubled:
+            raise TrajectoryError(f"{where}: joint {', '.join(doubled[:5])} stands twice in joint_names")
+        if set(trajectory.names) != set(joints):
+            raise TrajectoryError(f"{where}: trajectory {count} has other joints than the first; keep one of them")
+        if len(trajectories) > 1 and not trajectory.stamp:
+            raise TrajectoryError(
+                f"{where}: {len(trajectories)} trajectories, and number {count} has no time in its header, so their "
+                "order in time is unknown; keep one trajectory"
+            )
+        for k, positions in enumerate(trajectory.positions, start=1):
+            if len(positions) != len(joints):
+                raise TrajectoryError(f"{where}: point {k}: {len(positions)} positions for {len(joints)} joints")
+    several = len(trajectories) > 1
+    nanoseconds = [t.stamp * several + time for t in trajectories for time in t.nanoseconds]
+    seconds = np.array([time for t in trajectories for time in t.seconds])
+    table = np.empty((len(nanoseconds), len(joints)))
+    first = 0
+    for t in trajectories:
+        place = {name: k for k, name in enumerate(t.names)}
+        part = np.array(t.positions).reshape(len(t.positions), len(joints))
+        table[first : first + len(part)] = part[:, [place[name] for name in joints]]
+        first += len(part)
+    rows = list(range(1, len(nanoseconds) + 1))
+    return _recording(where, label, nanoseconds, seconds, joints, table, "point", rows)
+
+
+def _recording(
+    where: str,
+    label: str,
+    nanoseconds: list[int],
+    seconds: Array,
+    joints: list[str],
+    table: Array,
+    row: str,
+    rows: list[int],
+) -> Recording:
+    start = nanoseconds[0] if nanoseconds else 0
+    # Whole nanoseconds are subtracted first: as doubles, those of today's clocks are 200 ns apart.
+    times = np.array([(time - start) / _NANO for time in nanoseconds]) + seconds
+    if not np.isfinite(table).all():
+        i, j = (int(k) for k in np.argwhere(~np.isfinite(table))[0])
+        raise TrajectoryError(
+            f"{where}: {row} {rows[i]}: joint {joints[j]} is {table[i, j]}, no finite number; drop the {row}"
+        )
+    shifted = times_from_zero(times, where, row, rows)
+    columns = {name: np.ascontiguousarray(table[:, j]) for j, name in enumerate(joints)}
+    return Recording(where, label, shifted, columns, row, rows)
+
+
+def _unwrapped(document: Any) -> Any:
+    for _ in _WRAPPERS:
+        if not isinstance(document, dict) or "points" in document or "position" in document:
+            return document
+        document = next((document[key] for key in _WRAPPERS if key in document), document)
+    return document
+
+
+def _is(document: Any, *keys: str) -> bool:
+    return isinstance(document, dict) and all(key in document for key in keys)
+
+
+def _yaml_state(document: dict[str, Any], where: Path, count: int) -> _State:
+    names = _yaml_names(document["name"], f"{where}: message {count}: name")
+    positions = _yaml_numbers(document["position"], f"{where}: message {count}", "position", names)
+    return _State(_yaml_stamp(document, where), 0, names, positions)
+
+
+def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
+    names = _yaml_names(document["joint_names"], f"{where}: joint_names")
+    points = document["points"]
+    if not isinstance(points, list):
+        raise TrajectoryError(f"{where}: points: a list is needed")
+    times: list[tuple[int, float]] = []
+    positions: list[list[float]] = []
+    for count, point in enumerate(points, start=1):
+        place = f"{where}: point {count}"
+        for key in ("positions", "time_from_start"):
+            if not _is(point, key):
+                raise TrajectoryError(f"{place} has no {key}")
+        times.append(_yaml_time(point["time_from_start"], f"{place}: time_from_start"))
+        positions.append(_yaml_numbers(point["positions"], place, "positions", names))
+    return _Trajectory(_yaml_stamp(document, where), names, [t[0] for t in times], [t[1] for t in times], positions)
+
+
+def _yaml_names(value: Any, place: str) -> list[str]:
+    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
+        raise TrajectoryError(f"{place}: a list of joint names is needed")
+    return [entry.text for entry in value]
+
+
+def _yaml_numbers(value: Any, place: str, key: str, names: list[str]) -> list[float]:
+    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
+        raise TrajectoryError(f"{place}: {key}: a list of numbers is needed")
+    labels = [*names, *("without a name" for _ in value[len(names) :])]
+    return [
+        number(entry.text, f"{place} (line {entry.line}), joint {name}")
+        for entry, name in zip(value, labels[: len(value)], strict=True)
+    ]
+
+
+def _yaml_stamp(document: dict[str, Any], where: Path) -> int:
+    header = document.get("header")
+    if not isinstance(header, dict) or "stamp" not in header:
+        return 0
+    whole, part = _yaml_time(header["stamp"], f"{where}: header stamp")
+    return whole + round(part * _NANO)
+
+
+def _yaml_time(value: Any, place: str) -> tuple[int, float]:
+    """Whole nanoseconds, and seconds: {sec, nanosec}, {secs, nsecs} or a number of seconds."""
+    if isinstance(value, Word):
+        return 0, _bounded(number(value.text, place), place)
+    if isinstance(value, dict) and len(value) <= 2 and set(value) <= {*_SECONDS, *_NANOSECONDS}:
+        total = 0
+        for keys, factor in ((_SECONDS, _NANO), (_NANOSECONDS, 1)):
+            parts = [value[key] for key in keys if key in value]
+            if len(parts) > 1:
+                break
+            for part in parts:
+                total += factor * _whole(part, place)
+        else:
+            return total, 0.0
+    raise TrajectoryError(f"{place}: {{sec, nanosec}}, {{secs, nsecs}} or a number of seconds is needed")
+
+
+def _whole(value: Any, place: str) -> int:
+    text = value.text if isinstance(value, Word) else ""
+    digits = text.removeprefix("-")
+    if not digits.isascii() or not digits.isdigit() or len(digits) > 12:
+        raise TrajectoryError(f"{place}: a whole number is needed, got {text!r:.40}")
+    return int(text)
+
+
+def _bounded(seconds: float, place: str) -> float:
+    if abs(seconds) > 1e12:
+        raise TrajectoryError(f"{place}: {seconds:g} s is no time")
+    return seconds

@@ -1,0 +1,402 @@
+"""Shapes as functions of time: the joint motions that drive everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, check_finite, check_reach, finite_array
+from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
+from .curves import (
+    Curve,
+    Fourier,
+    Function,
+    Joined,
+    PiecewisePolynomial,
+    Reordered,
+    Repeated,
+    Reversed,
+    Stretched,
+    returned_pair,
+)
+
+_WHOLE_TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True, eq=False)
+class ShapePath:
+    """A motion of the joints, r(t) on [0, duration].
+
+    Made by `fourier`, `spline`, `waypoints` or `function`, or read from a file. Between two neighbouring
+    `breaks` the path is smooth; the breaks hold 0 and `duration`.
+
+    Attributes
+    ----------
+    curve : shapes and rates at an array of times
+    duration : [s]
+    breaks : (M,) ascending, first 0, last `duration` [s]
+    n_shape : number of joints
+    joint_names : the joints in the order of the columns, or None where the path belongs to no body in particular
+    oscillations : how often the path can swing between two breaks, an upper bound; None: unknown
+    loops : the path is its first `duration / loops` seconds, this many times
+    smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    sha256 : of the file it was read from, whatever was done to it since; None without a file
+    """
+
+    curve: Curve
+    duration: float
+    breaks: Array
+    n_shape: int
+    joint_names: tuple[str, ...] | None = None
+    oscillations: float | None = None
+    loops: int = 1
+    smooth_loop: bool = False
+    sha256: str | None = None
+
+    @staticmethod
+    def fourier(
+        mean: ArrayLike,
+        cosines: ArrayLike,
+        sines: ArrayLike,
+        duration: float,
+        *,
+        joint_names: Sequence[str] | None = None,
+    ) -> ShapePath:
+        """The closed loop r = mean + sum_k a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T), k = 1 ... K.
+
+        Parameters
+        ----------
+        mean : (n,) [rad or m]
+        cosines, sines : (n, K), the a_k and b_k [rad or m]
+        duration : T [s]
+        joint_names : n names, to be matched with a body's by name
+        """
+        middle = finite_array(mean, "mean", (None,))
+        a = finite_array(cosines, "cosines", (len(middle), None))
+        b = finite_array(sines, "sines", a.shape)
+        if middle.ndim != 1 or a.ndim != 2 or b.ndim != 2:
+            shapes = f"{middle.shape}, {a.shape} and {b.shape}"
+            raise ShapeError(f"mean (n,), cosines (n, K) and sines (n, K) are needed, got {shapes}")
+        for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
+            check_reach(values, name)
+        period = positive_argument(duration)
+        breaks = np.array([0.0, period])
+        names = _names(joint_names, len(middle))
+        curve = Fourier(middle, a, b, period)
+        return ShapePath(curve, period, breaks, len(middle), names, float(a.shape[1]), smooth_loop=True)
+
+    @staticmethod
+    def spline(
+        times: ArrayLike, shapes: ArrayLike, periodic: bool | None = None, *, joint_names: Sequence[str] | None = None
+    ) -> ShapePath:
+        """The C2 cubic spline through samples; its knots are its breaks.
+
+        Parameters
+        ----------
+        times : (N,) ascending [s]; the path starts at 0, so times are shifted
+        shapes : (N, n) [rad or m]
+        periodic : smooth where the end meets the start; None: when the last sample equals the first to 1e-9.
+            Otherwise the ends are not-a-knot.
+
+        Raises
+        ------
+        TrajectoryError
+            If times do not ascend, there are fewer than two samples, or a periodic path does not close.
+        """
+        t, r = _samples(times, shapes)
+        closes = _closes(r[0], r[-1]) and len(t) > 2
+        if periodic and not closes:
+            joint = int(np.argmax(np.abs(r[-1] - r[0])))
+            raise TrajectoryError(
+                f"a periodic spline needs the last sample to equal the first (and three samples or more); joint number "
+                f"{joint} ends {r[-1, joint] - r[0, joint]:.6g} from its start"
+            )
+        use_period = closes if periodic is None else periodic
+        if use_period:
+            r = np.concatenate([r[:-1], r[:1]])
+        return _piecewise(t, _spline_coefficients(t, r, use_period), joint_names)
+
+    @staticmethod
+    def waypoints(times: ArrayLike, shapes: ArrayLike, *, joint_names: Sequence[str] | None = None) -> ShapePath:
+        """Straight moves from rest to rest through waypoints, each by the quintic of least jerk.
+
+        r = r_i + (r_(i+1) - r_i) (10 s^3 - 15 s^4 + 6 s^5), s = (t - t_i)/(t_(i+1) - t_i).
+        Parameters and errors as `spline`.
+        """
+        t, r = _samples(times, shapes)
+        moves = np.diff(r, axis=0)
+        steps = np.diff(t)[:, None]
+        coefficients = np.zeros((6, *moves.shape))
+        for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
+            coefficients[power] = factor * moves / steps**power
+        coefficients[0] = r[:-1]
+        return _piecewise(t, coefficients, joint_names)
+
+    @staticmethod
+    def function(
+        f: Callable[[Array], tuple[ArrayLike, ArrayLike]],
+        duration: float,
+        breaks: ArrayLike = (),
+        *,
+        joint_names: Sequence[str] | None = None,
+    ) -> ShapePath:
+        """A path given by a function of times (N,) that returns shapes (N, n) and rates (N, n).
+
+        Parameters
+        ----------
+        breaks : interior times where a derivative jumps [s]; the function is evaluated just inside them
+
+        Raises
+        ------
+        TrajectoryError
+            If the rates are not the derivatives of the shapes (checked at a few times).
+        """
+        period = positive_argument(duration)
+        edges = breaks_argument(breaks, period)
+        start, _ = returned_pair(f(np.zeros(1)))
+        if start.ndim != 2 or start.shape[0] != 1:
+            raise ShapeError(f"the function must return shapes (N, n) for times (N,); for N = 1 it gave {start.shape}")
+        curve = Function(f, start.shape[1])
+        path = ShapePath(curve, period, edges, start.shape[1], _names(joint_names, start.shape[1]))
+        _check_rates(path)
+        return path
+
+    def shape(self, t: ArrayLike) -> Array:
+        """r(t): times (...) of [0, duration] -> (..., n) [rad or m]. Raises TrajectoryError outside."""
+        return self._evaluated(t)[0]
+
+    def rate(self, t: ArrayLike) -> Array:
+        """r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
+        return self._evaluated(t)[1]
+
+    @property
+    def gap(self) -> Array:
+        """Where the path ends, seen from where it begins: (n,) [rad or m]; zero for a loop."""
+        ends, _ = self.curve(np.array([0.0, self.duration]))
+        return ends[1] - ends[0]
+
+    def reversed(self) -> ShapePath:
+        """The same shapes in the opposite order of time."""
+        breaks = self.duration - self.breaks[::-1]
+        breaks[[0, -1]] = 0.0, self.duration
+        return replace(self, curve=Reversed(self.curve, self.duration), breaks=breaks)
+
+    def stretched(self, factor: float) -> ShapePath:
+        """The same shapes, `factor` times as slowly."""
+        scale = positive_argument(factor, "factor", "a number")
+        duration = self.duration * scale
+        breaks = self.breaks * scale
+        breaks[-1] = duration
+        return replace(self, curve=Stretched(self.curve, scale, self.duration), duration=duration, breaks=breaks)
+
+    def then(self, other: ShapePath) -> ShapePath:
+        """This path, and after it another.
+
+        A start that differs from this path's end by whole turns of joints is shifted by them, so that the
+        shape stays continuous.
+
+        Raises
+        ------
+        TrajectoryError
+            If the joints differ, or `other` starts at another shape than the one where this path ends.
+        """
+        names = _joined_names(self, other)
+        end, start = self.shape(self.duration), other.shape(0.0)
+        offset = np.round((end - start) / _WHOLE_TURN) * _WHOLE_TURN
+        if not _closes(end, start + offset):
+            joint = int(np.argmax(np.abs(end - start - offset)))
+            raise TrajectoryError(
+                f"paths do not join: joint {names[joint] if names else joint} ends at {end[joint]:.9g} and the next "
+                f"path starts at {start[joint]:.9g}"
+            )
+        duration = self.duration + other.duration
+        breaks = np.concatenate([self.breaks, self.duration + other.breaks[1:]])
+        breaks[-1] = duration
+        curve = Joined(self.curve, self.duration, other.curve, other.duration, offset)
+        return ShapePath(curve, duration, breaks, self.n_shape, names, _larger(self.oscillations, other.oscillations))
+
+    def repeated(self, count: int) -> ShapePath:
+        """The loop `count` times in a row.
+
+        Raises
+        ------
+        OpenPathError
+            If the path does not end where it begins (to whole turns of joints).
+        """
+        if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
+            raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {count}")
+        gap = self.gap
+        turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
+        if not _closes(gap, turns):
+            joint = int(np.argmax(np.abs(gap - turns)))
+            raise OpenPathError(f"only a loop can be repeated; joint {self._joint(joint)} ends {gap[joint]:.9g} off")
+        starts = self.duration * np.arange(count)
+        breaks = np.concatenate([*(start + self.breaks[:-1] for start in starts), [count * self.duration]])
+        if self.smooth_loop:
+            breaks = breaks[[0, -1]]
+        curve = Repeated(self.curve, self.duration, int(count), turns)
+        loops = self.loops * int(count)
+        return replace(self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops)
+
+    @property
+    def sample_times(self) -> Array:
+        """Times whose samples tell the path: a spline's knots, which tell it exactly, or some 400: (N,) [s]."""
+        if isinstance(self.curve, PiecewisePolynomial) and len(self.curve.coefficients) == 4:
+            return self.breaks
+        pieces = [np.linspace(a, b, 400 // (len(self.breaks) - 1) + 2) for a, b in pairwise(self.breaks)]
+        return np.unique(np.concatenate(pieces))
+
+    def matched(self, joint_names: Sequence[str], owner: str) -> ShapePath:
+        """The same path with its columns in the order of `joint_names`, found by name where the path has names.
+
+        Raises
+        ------
+        UnknownNameError
+            If the path has a joint that is not among them.
+        TrajectoryError
+            If one of them is missing, or a path without names has another number of columns. `owner` names the
+            body in messages.
+        """
+        wanted = tuple(joint_names)
+        if self.joint_names is None:
+            if self.n_shape != len(wanted):
+                raise TrajectoryError(
+                    f"the path has {self.n_shape} joints, {owner} has {len(wanted)}: {', '.join(wanted)}"
+                )
+            return self
+        for name in self.joint_names:
+            if name not in wanted:
+                raise unknown_name(f"joint of {owner}", name, wanted)
+        missing = [name for name in wanted if name not in self.joint_names]
+        if missing:
+            raise TrajectoryError(f"the path lacks these joints of {owner}: {', '.join(missing)}")
+        if self.joint_names == wanted:
+            return self
+        order = np.array([self.joint_names.index(name) for name in wanted])
+        return replace(self, curve=Reordered(self.curve, order), joint_names=wanted)
+
+    def _joint(self, column: int) -> str:
+        return self.joint_names[column] if self.joint_names else f"number {column}"
+
+    def _evaluated(self, t: ArrayLike) -> tuple[Array, Array]:
+        times = times_argument(t, self.duration)
+        shapes, rates = self.curve(times.ravel())
+        wanted = (*times.shape, self.n_shape)
+        return shapes.reshape(wanted), rates.reshape(wanted)
+
+
+def times_argument(t: ArrayLike, duration: float) -> Array:
+    """A user's times, checked to lie in [0, duration] (to rounding): (...) -> (...) [s]. Raises TrajectoryError."""
+    times = finite_array(t, "t", unit="s")
+    slack = 1e-9 * duration
+    if times.size and (times.min() < -slack or times.max() > duration + slack):
+        outside = times.min() if times.min() < -slack else times.max()
+        raise TrajectoryError(f"time {outside:.9g} s lies outside the motion's [0, {duration:.9g}] s")
+    return np.clip(times, 0.0, duration)
+
+
+def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
+    """A user's interior breaks with the two ends added: (M,) -> (M + 2,) ascending [s]. Raises TrajectoryError."""
+    inner = finite_array(breaks, "breaks", (None,), unit="s")
+    if inner.ndim != 1:
+        raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
+    if np.any((inner < 0.0) | (inner > duration)):
+        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {inner}")
+    return np.unique(np.concatenate([[0.0], inner, [duration]]))
+
+
+def _piecewise(times: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
+    n_shape = coefficients.shape[2]
+    curve = PiecewisePolynomial(times, coefficients)
+    return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape), 0.5)
+
+
+def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(times, shapes, bc_type="periodic" if periodic else "not-a-knot")
+    pieces = np.broadcast_to(spline.c[::-1], (len(spline.c), len(times) - 1, shapes.shape[1]))
+    return np.ascontiguousarray(pieces)
+
+
+def _samples(times: ArrayLike, shapes: ArrayLike) -> tuple[Array, Array]:
+    t = finite_array(times, "times", (None,), unit="s")
+    r = finite_array(shapes, "shapes", (None, None))
+    if t.ndim != 1 or r.ndim != 2 or len(t) != len(r):
+        raise ShapeError(f"times (N,) and shapes (N, n) are needed, got {t.shape} and {r.shape}")
+    check_reach(r, "shapes")
+    if len(t) < 2:
+        raise TrajectoryError(f"a path needs two samples or more, got {len(t)}")
+    late = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(late):
+        row = int(late[0]) + 1
+        raise TrajectoryError(f"times must ascend: sample {row} at {t[row]:.9g} s follows {t[row - 1]:.9g} s")
+    return t - t[0], r
+
+
+def _closes(a: Array, b: Array) -> bool:
+    return bool(np.all(np.abs(a - b) <= 1e-9 * np.maximum(1.0, np.abs(a))))
+
+
+def positive_argument(value: float, name: str = "duration", unit: str = "a time in s") -> float:
+    """A user's number, checked to be finite and above 0. Raises TrajectoryError, ShapeError."""
+    number = finite_array(value, name)
+    if number.ndim or number <= 0.0:
+        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value!r}")
+    return float(number)
+
+
+def _names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[str, ...] | None:
+    if joint_names is None:
+        return None
+    names = tuple(joint_names)
+    if len(names) != n_shape or len(set(names)) != len(names):
+        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {names}")
+    return names
+
+
+def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None:
+    if first.n_shape != second.n_shape:
+        raise TrajectoryError(f"paths of {first.n_shape} and {second.n_shape} joints cannot follow each other")
+    named = {path.joint_names for path in (first, second)} - {None}
+    if len(named) > 1:
+        raise TrajectoryError(
+            f"paths with other joints or another order of joints: {first.joint_names} and {second.joint_names}"
+        )
+    return named.pop() if named else None
+
+
+def _larger(a: float | None, b: float | None) -> float | None:
+    return None if a is None or b is None else max(a, b)
+
+
+def _check_rates(path: ShapePath) -> None:
+    """Compare the function's rates with differences of its shapes away from the breaks.
+
+    At two steps: where these disagree with each other, as on the flank of a burst, they tell nothing.
+    """
+    left, width = path.breaks[:-1], np.diff(path.breaks)
+    middle = left + 0.381 * width
+    coarse, _, _ = _differences(path, middle, 1e-4 * width)
+    slope, rate, size = _differences(path, middle, 1e-5 * width)
+    scale = np.abs(rate) + np.maximum(size, 1e-9) / path.duration
+    wrong = np.abs(slope - rate) > 1e-3 * scale + 10.0 * np.abs(slope - coarse)
+    if wrong.any():
+        where, joint = (int(i) for i in np.argwhere(wrong)[0])
+        raise TrajectoryError(
+            f"the path's function gives the rate {rate[where, joint]:.6g} of joint number {joint} at "
+            f"{middle[where]:.6g} s, but its shapes change at {slope[where, joint]:.6g}; return (shapes, rates)"
+        )
+
+
+def _differences(path: ShapePath, middle: Array, step: Array) -> tuple[Array, Array, Array]:
+    """Slopes of the shapes by central differences of order four, rates as given, spread of the shapes."""
+    shapes, rates = path.curve(np.concatenate([middle + k * step for k in (-2, -1, 0, 1, 2)]))
+    check_finite(shapes, "shapes of the path's function")
+    a, b, _, d, e = shapes.reshape(5, len(middle), -1)
+    slopes = (a - 8 * b + 8 * d - e) / (12 * step[:, None])
+    return slopes, rates.reshape(5, len(middle), -1)[2], np.ptp(shapes, axis=0)

@@ -1,0 +1,144 @@
+"""Named motions: their known answers, the files beside the bodies, the plausibility of the bodies."""
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.body.catalog import robots_folder
+from shapephase.errors import TrajectoryError, UnknownNameError
+from shapephase.examples.scenarios import CLOSED_ORBITS, MOTIONS, cat_righting, closed_orbit, kane_scher, named_motion
+
+FILES = {
+    "cat_righting": 400,
+    "astronaut_arm_circles": 100,
+    "astronaut_leg_swing": 100,
+    "antenna_deployment": 120,
+}
+
+
+def turned(name, path=None):
+    """The rotation of a named motion at zero momentum."""
+    body = sp.load_body(MOTIONS[name].body)
+    return sp.reconstruct(sp.articulated(body, path or named_motion(name)), np.zeros(3), tolerance=1e-11).final_attitude
+
+
+# Found by DOP853 on Pinocchio's ccrba and (all but the last) by fourth-order Magnus steps on kinematics in NumPy.
+KNOWN = {
+    "cat_righting": np.diag([1.0, -1.0, -1.0]),
+    "astronaut_arm_circles": so3.exp(np.array([0.0, 0.206999962449, 0.0])),
+    "astronaut_leg_swing": so3.exp(np.array([0.0, 0.214629350843, 0.0])),
+    "antenna_deployment": so3.exp(np.array([-0.003736510923, -0.085913209531, 0.048278938397])),
+    "satellite_sweep": so3.exp(np.array([-0.011417273673, 0.007584277655, -0.093342749251])),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_named_motions_turn_as_known(name):
+    assert so3.angle(turned(name).T @ KNOWN[name]) < 1e-11
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_rates_are_the_derivatives_of_the_shapes(name):
+    path = named_motion(name)
+    t = np.random.default_rng(0).uniform(0.02, 0.98, 40) * path.duration
+    h = 1e-4 * path.duration
+    ahead, behind = ([path.shape(t + s * k * h) for k in (1, 2, 3)] for s in (1, -1))
+    slope = sum(w * (a - b) for w, a, b in zip((0.75, -0.15, 1 / 60), ahead, behind, strict=True)) / h
+    np.testing.assert_allclose(path.rate(t), slope, atol=1e-8 * (1.0 + np.abs(slope).max()), rtol=0)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_joints_stay_within_their_limits(name):
+    path, body = named_motion(name), sp.load_body(MOTIONS[name].body)
+    shapes = path.matched(body.joint_names, body.name).shape(np.linspace(0.0, path.duration, 501))
+    assert np.all(shapes >= body.joint_limits[:, 0] - 1e-12)
+    assert np.all(shapes <= body.joint_limits[:, 1] + 1e-12)
+
+
+def test_the_cat_rights_itself_from_rest_to_rest():
+    path = cat_righting(0.7)
+    assert path.duration == 0.7
+    ends = path.rate([0.0, 0.7])
+    np.testing.assert_allclose(ends, 0.0, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(path.shape([0.0, 0.7]), 0.0, atol=1e-12, rtol=0)
+    assert so3.angle(turned("cat_righting", path) @ np.diag([1.0, -1.0, -1.0])) < 1e-10
+
+
+def test_the_pace_of_a_named_motion_does_not_matter():
+    slow = turned("kane_scher", kane_scher(np.radians(20.0), np.radians(61.813873), 3.0))
+    assert so3.angle(slow.T @ turned("kane_scher")) < 1e-11
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(0.5, 0.4), (-0.1, 0.5), (0.3, 1.6), (np.nan, 1.0)])
+def test_bends_that_no_waist_has_are_refused(alpha, beta):
+    with pytest.raises(TrajectoryError, match="alpha"):
+        kane_scher(alpha, beta)
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf])
+def test_durations_must_be_times(duration):
+    with pytest.raises(ValueError, match="duration"):
+        cat_righting(duration)
+
+
+def test_unknown_motions_are_named():
+    with pytest.raises(UnknownNameError, match="Did you mean 'cat_righting'"):
+        named_motion("cat_right")
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_files_beside_the_bodies_hold_the_same_motions(name):
+    body = sp.load_body(MOTIONS[name].body)
+    read, made = sp.read_shape_path(robots_folder() / f"{name}.csv", body), named_motion(name)
+    times = np.linspace(0.0, made.duration, FILES[name] + 1)
+    np.testing.assert_allclose(read.shape(times), made.shape(times), atol=1e-14, rtol=0)
+    assert so3.angle(turned(name, read).T @ KNOWN[name]) < 1e-7
+
+
+def test_the_astronaut_is_within_measured_people():
+    """Whole bodies measured standing, 66.8 to 92.1 kg: Santschi 1963, in robot-independent order (AP, ML, long)."""
+    body = sp.load_body("astronaut")
+    assert body.mass == pytest.approx(82.2, abs=1e-3)
+    assert body.n_shape >= 20
+    moments = np.diag(body.locked_inertia(np.zeros(body.n_shape)))
+    assert np.all(moments > np.array([10.8, 9.25, 1.0]))
+    assert np.all(moments < np.array([16.27, 14.57, 1.6]))
+
+
+def test_left_and_right_are_mirror_images():
+    """A mirrored posture has the mirrored inertia."""
+    mirror = np.diag([1.0, -1.0, 1.0])
+    rng = np.random.default_rng(3)
+    for name in ("cat", "astronaut", "diver"):
+        body = sp.load_body(name)
+        shape = rng.uniform(-0.6, 0.6, body.n_shape)
+        image = np.empty_like(shape)
+        for joint, value in zip(body.joint_names, shape, strict=True):
+            other = joint.replace("left", "\0").replace("right", "left").replace("\0", "right")
+            about_y = any(word in joint for word in ("pitch", "flexion", "elbow", "knee", "wrist", "ankle"))
+            image[body.joint_index(other)] = value if about_y else -value
+        inertia = body.locked_inertia(shape)
+        np.testing.assert_allclose(body.locked_inertia(image), mirror @ inertia @ mirror, atol=1e-12, rtol=0)
+
+
+@pytest.mark.parametrize("name", CLOSED_ORBITS)
+def test_closed_orbits_have_nothing_but_phase_and_holonomy(name):
+    """theory.md section 2: Delta R = exp(theta_M mu^) R_G in the horizontal gauge, exp(theta_M mu^) in the base."""
+    motion = closed_orbit(name)
+    split = sp.split(motion)
+    total = motion.final_attitude @ motion.initial_attitude.T
+    about = so3.exp(np.array([0.0, 0.0, split.montgomery_phase]))
+    assert so3.angle(total.T @ about @ split.holonomy) < 1e-9
+    assert split.momentum_gap < 1e-9
+    based = closed_orbit(name, "base")
+    total = based.final_attitude @ based.initial_attitude.T
+    about = so3.exp(np.array([0.0, 0.0, sp.split(based, "base").montgomery_phase]))
+    assert so3.angle(total.T @ about) < 1e-9
+
+
+def test_closed_orbits_are_known_by_name():
+    with pytest.raises(UnknownNameError, match="astronaut"):
+        closed_orbit("dog")
+    with pytest.raises(UnknownNameError, match="horizontal, base"):
+        closed_orbit("cat", "principal")

@@ -1,0 +1,339 @@
+"""The programs of optimal control: their splines, their derivatives, and one method against the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
+from shapephase.optimal_control.collocation import CollocationProgram, gauss_tableau
+from shapephase.optimal_control.guesses import guesses
+from shapephase.optimal_control.planning import plan_reorientation
+from shapephase.optimal_control.polish import end_derivative, polished
+from shapephase.optimal_control.reduced import ReducedProgram
+from shapephase.optimal_control.spline_basis import SplineBasis
+from shapephase.optimal_control.task import reorientation
+
+HALF_TURN = so3.exp(np.array([np.pi, 0.0, 0.0]))
+SLANTED = so3.exp(np.array([0.5, -0.4, 0.3]))
+AXIS = [[0.0, 0.6, 0.8], [0.0, 0.0, 1.0]]
+PLAIN = {
+    "momentum": 0.0,
+    "duration": 0.8,
+    "start": None,
+    "end": None,
+    "cost": "kinetic",
+    "joint_limits": True,
+    "rate_limits": None,
+    "joints": None,
+    "symmetric": None,
+}
+TASKS = {
+    "kinetic": (HALF_TURN, {}),
+    "momentum": (SLANTED, {"momentum": [0.01, -0.02, 0.03], "end": "free"}),
+    "rate": (SLANTED, {"cost": "rate", "rate_limits": 20.0}),
+    "acceleration": (SLANTED, {"cost": "acceleration"}),
+    "time": (SLANTED, {"cost": "time", "rate_limits": [20.0, 30.0, 25.0], "momentum": [0.0, 0.01, 0.0]}),
+    "axis": (AXIS, {}),
+    "tied": (SLANTED, {"joints": ["waist_pitch", "waist_yaw"], "start": [0.1, -0.2, 0.3]}),
+}
+
+
+def task_of(name, robot="cat_two_halves"):
+    target, changes = TASKS[name]
+    return reorientation(sp.load_body(robot), target, **PLAIN | changes)
+
+
+def random_control(task, basis, rng, size=0.5):
+    control = task.start + size * rng.uniform(-1.0, 1.0, (basis.size, task.size))
+    control[0] = task.start
+    if task.end is not None:
+        control[-1] = task.end
+    return np.clip(control, task.lower, task.upper)
+
+
+@pytest.mark.parametrize("stages", [2, 3, 8])
+def test_gauss_integrates_polynomials_up_to_every_node(stages):
+    nodes, weights, integrals = gauss_tableau(stages)
+    for power in range(stages):
+        assert_allclose(integrals @ nodes**power, nodes ** (power + 1) / (power + 1), atol=1e-14)
+    for power in range(2 * stages):
+        assert weights @ nodes**power == pytest.approx(1.0 / (power + 1), abs=1e-14)
+
+
+@pytest.mark.parametrize("pieces", [6, 20])
+def test_the_transcribed_spline_is_the_path(pieces, rng):
+    """Everywhere, not at the nodes alone; and SciPy's not-a-knot spline of the nodes' values is the same once more."""
+    basis = SplineBasis(pieces)
+    control = rng.normal(size=(basis.size, 2))
+    path = basis.path(control, 3.0, ("a", "b"))
+    places = np.linspace(0.0, 1.0, 203)
+    assert_allclose(path.shape(3.0 * places), basis.matrix(places) @ control, atol=2e-13)
+    assert_allclose(3.0 * path.rate(3.0 * places), basis.matrix(places, 1) @ control, atol=1e-11)
+    again = CubicSpline(basis.nodes, path.shape(3.0 * basis.nodes))
+    assert_allclose(again(places), basis.matrix(places) @ control, atol=2e-13)
+    assert_allclose(again(places, 2), basis.matrix(places, 2) @ control, atol=1e-8)
+
+
+def test_control_points_bound_the_spline_and_its_rate(rng):
+    basis = SplineBasis(9)
+    control = rng.normal(size=(basis.size, 4))
+    places = np.linspace(0.0, 1.0, 1001)
+    values, rates = basis.matrix(places) @ control, basis.matrix(places, 1) @ control
+    assert np.all(values <= control.max(axis=0) + 1e-14)
+    assert np.all(values >= control.min(axis=0) - 1e-14)
+    assert np.all(np.abs(rates) <= np.abs(basis.rate_control @ control).max(axis=0) * (1.0 + 1e-14))
+    # The rate is a quadratic spline with these control points: they average to its mean, the difference of the ends.
+    assert_allclose(rates[0], (basis.rate_control @ control)[0], atol=1e-12)
+
+
+def test_fitted_splines_are_fixed_points(rng):
+    basis = SplineBasis(8)
+    control = rng.normal(size=(basis.size, 3))
+    places = np.linspace(0.0, 1.0, 101)
+    assert_allclose(basis.fitted(basis.matrix(places) @ control, places), control, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_programs_derivatives_are_exact(name, rng):
+    """Against CasADi's own differentiation of the whole program, which knows nothing of nodes."""
+    task, basis = task_of(name), SplineBasis(6)
+    program = CollocationProgram(task, basis)
+    parts = program.program
+    unknown, cost, rows = parts["x"], parts["f"], parts["g"]
+    weights, of_cost = casadi.MX.sym("weights", rows.shape[0]), casadi.MX.sym("of_cost")
+    lagrangian = of_cost * cost + casadi.dot(weights, rows)
+    oracle = casadi.Function(
+        "oracle", [unknown, of_cost, weights], [casadi.jacobian(rows, unknown), casadi.hessian(lagrangian, unknown)[0]]
+    )
+    x = rng.uniform(0.2, 0.8, unknown.shape[0])
+    multipliers = rng.normal(size=rows.shape[0])
+    jacobian, hessian = (part.full() for part in oracle(x, 1.7, multipliers))
+    _, ours = program.derivatives["jac_g"](x, [])
+    assert_allclose(ours.full(), jacobian, atol=1e-12 * np.abs(jacobian).max())
+    second = program.derivatives["hess_lag"](x, [], 1.7, multipliers).full()
+    assert_allclose(second, np.triu(hessian), atol=1e-12 * np.abs(hessian).max())
+
+
+def test_collocation_is_of_order_six():
+    """The attitude of a given path, found from the collocation equations alone, against the integrator."""
+    task = task_of("momentum")
+    places = np.linspace(0.0, 1.0, 401)
+    swing = np.stack([np.sin(5.0 * places), np.cos(4.0 * places) - 1.0, np.sin(3.0 * places) ** 2], axis=1)
+    gaps = []
+    for pieces in (12, 24, 48):
+        basis = SplineBasis(pieces)
+        control = basis.fitted(swing, places)
+        path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
+        exact = sp.reconstruct(sp.articulated(task.body, path), task.momentum, tolerance=1e-13).final_attitude
+        found = collocated_end(CollocationProgram(task, basis), control, task.duration)
+        gaps.append(float(so3.angle(exact.T @ found)))
+    assert gaps[0] / gaps[1] > 2.0**5.3
+    assert gaps[1] / gaps[2] > 2.0**5.3
+
+
+def collocated_end(program, control, duration):
+    """The last quaternion of the collocation equations for given control points: Newton's method on them alone."""
+    unknown = program.program["x"]
+    rows = program.derivatives["jac_g"]
+    points = control.size + 1
+    x = np.concatenate([control.ravel(), [duration], np.zeros(unknown.shape[0] - points)])
+    x[points + 3 :: 4] = 1.0
+    kept = unknown.shape[0] - points - 4
+    for _ in range(30):
+        values, jacobian = rows(x, [])
+        right = values.full().ravel()[:kept]
+        step = np.linalg.solve(jacobian.full()[:kept][:, movable(points, unknown.shape[0], program)], right)
+        x[movable(points, unknown.shape[0], program)] -= step
+        if np.abs(step).max() < 1e-14:
+            break
+    assert np.linalg.norm(x[-4:]) == pytest.approx(1.0, abs=1e-12), "collocation keeps the norm"
+    return so3.matrix_from_quat(x[-4:])
+
+
+def movable(points, size, program):
+    """The attitudes, but for that of the start."""
+    start = points + 4 * len(program.places)
+    return np.concatenate([np.arange(points, start), np.arange(start + 4, size)])
+
+
+def test_the_ends_derivative_is_the_holonomys(rng):
+    task, basis = task_of("kinetic", "cat"), SplineBasis(7)
+    control = random_control(task, basis, rng)
+    path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
+    motion = sp.reconstruct(sp.articulated(task.body, path), task.momentum, tolerance=1e-12)
+    joints = np.eye(task.size)
+
+    def variation(times):
+        return (basis.matrix(times / task.duration)[:, 1:-1, None, None] * joints).reshape(len(times), -1, task.size)
+
+    _, expected = sp.holonomy_derivative(task.body, path, variation, 1e-11)
+    found = end_derivative(task, basis, path, motion)[:, 1:-1].reshape(3, -1).T
+    assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["momentum", "tied"])
+def test_the_ends_derivative_is_the_difference_of_ends(name, rng):
+    """Open paths, momentum, ties."""
+    task, basis = task_of(name), SplineBasis(7)
+    control, change = random_control(task, basis, rng), rng.normal(size=(8, task.size))
+
+    def moved(size):
+        path = basis.path(task.shapes(control + size * change), task.duration, task.body.joint_names)
+        return path, sp.reconstruct(sp.articulated(task.body, path), task.momentum, tolerance=1e-13)
+
+    slopes = end_derivative(task, basis, *moved(0.0))
+    step = 1e-3
+    ends = {k: moved(k * step)[1].final_attitude for k in (-2, -1, 1, 2)}
+    first, second = (so3.log(ends[k] @ ends[-k].T) / (2 * k * step) for k in (1, 2))
+    assert_allclose(np.einsum("ask,sk->a", slopes, change), (4.0 * first - second) / 3.0, atol=1e-8)
+
+
+def test_the_reduced_forms_derivative_far_from_the_goal(rng):
+    task, basis = task_of("momentum"), SplineBasis(7)
+    program = ReducedProgram(task, basis)
+    control, change = random_control(task, basis, rng), rng.normal(size=(8, task.size))
+    turn, slopes = program.end(control, task.duration)
+    assert np.linalg.norm(turn) > 0.3
+    step = 1e-3
+    ends = {k: program.end(control + k * step * change, task.duration)[0] for k in (-2, -1, 1, 2)}
+    first, second = ((ends[k] - ends[-k]) / (2 * k * step) for k in (1, 2))
+    assert_allclose(np.einsum("ask,sk->a", slopes, change), (4.0 * first - second) / 3.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("somersaults", "half_twists"), [(1.0, 2.0), (2.5, -3.0)])
+def test_windings_are_counted(somersaults, half_twists):
+    changes = {"momentum": [0.0, -2.0, 0.0], "somersaults": somersaults, "half_twists": half_twists}
+    task = reorientation(sp.load_body("diver"), None, **PLAIN | changes)
+    places = np.linspace(0.0, 1.0, 300)
+    quats = task.evenly_wound(places)
+    assert np.all(np.sum(quats[1:] * quats[:-1], axis=1) > 0.99)
+    attitudes = so3.matrix_from_quat(quats)
+    angles = [2.0 * np.pi * somersaults, np.pi * half_twists]
+    assert_allclose(task.wound(attitudes), angles, atol=1e-12)
+    assert_allclose(attitudes[-1], task.target, atol=1e-12)
+    # The long axis goes about the momentum, -y; a tilt that comes and goes changes no count.
+    seen = Rotation.from_rotvec([0.0, -angles[0] * places[30], 0.0]).apply([0.0, 0.0, 1.0])
+    assert_allclose(attitudes[30, :, 2], seen, atol=1e-14)
+    tilt = so3.exp(0.6 * np.sin(np.pi * places)[:, None] * task.winding_axes[:, 1])
+    tilted = (
+        so3.exp(angles[0] * places[:, None] * task.winding_axes[:, 0])
+        @ tilt
+        @ so3.exp(angles[1] * places[:, None] * task.winding_axes[:, 2])
+    )
+    assert_allclose(task.wound(tilted), angles, atol=1e-12)
+
+
+def test_guesses_turn_the_right_way():
+    """Small circles in the plane of largest curvature reach a small turn to a few percent, in the right sense."""
+    turn = so3.exp(np.array([-0.05, 0.0, 0.0]))
+    task = reorientation(sp.load_body("cat_two_halves"), turn, **PLAIN)
+    best = min(guesses(task, SplineBasis(20), 0, 20), key=lambda guess: guess.miss)
+    assert best.miss < 0.1 * 0.05
+
+
+def test_the_polish_is_newtons_method_and_keeps_ends_and_limits(rng):
+    task, basis = task_of("kinetic"), SplineBasis(8)
+    control = random_control(task, basis, rng, 0.8)
+    path = basis.path(control, task.duration, task.body.joint_names)
+    near = sp.reconstruct(sp.articulated(task.body, path), np.zeros(3), tolerance=1e-11).final_attitude
+    goal = so3.exp(np.array([2e-3, -1e-3, 3e-3])) @ near
+    task = reorientation(task.body, goal, **PLAIN)
+    # A control point at its limit stays there.
+    limited = np.minimum(task.upper, control.max(axis=0))
+    task = type(task)(**{**vars(task), "upper": limited})
+    done = polished(task, basis, control, task.duration)
+    assert done.first_miss == pytest.approx(np.sqrt(14e-6), rel=1e-6)
+    assert done.miss < 5e-10
+    assert done.steps <= 3
+    assert np.all(done.control <= limited)
+    assert_allclose(done.control[[0, -1]], control[[0, -1]], atol=0.0)
+    highest = control.argmax(axis=0)
+    assert_allclose(done.control[highest, range(3)], limited, atol=0.0)
+
+
+def test_the_polish_keeps_rates_at_their_limits(rng):
+    task, basis = task_of("kinetic"), SplineBasis(8)
+    control = random_control(task, basis, rng)
+    rates = basis.rate_control @ control / task.duration
+    near = sp.reconstruct(
+        sp.articulated(task.body, basis.path(control, task.duration, task.body.joint_names)), np.zeros(3)
+    ).final_attitude
+    limits = {"rate_limits": np.abs(rates).max(axis=0)}
+    task = reorientation(task.body, so3.exp(np.array([2e-5, 1e-5, -3e-5])) @ near, **PLAIN | limits)
+    done = polished(task, basis, control, task.duration)
+    assert 0 < done.steps < 3
+    assert done.miss < 5e-10
+    fastest = np.abs(rates).argmax(axis=0)
+    after = basis.rate_control @ done.control / task.duration
+    assert_allclose(after[fastest, range(3)], rates[fastest, range(3)], rtol=1e-13)
+    assert np.abs(after - rates).max() > 1e-6
+
+
+@pytest.mark.parametrize(
+    "name", ["rate", *(pytest.param(name, marks=pytest.mark.full) for name in TASKS if name not in ("rate", "time"))]
+)
+def test_both_methods_find_the_same_optimum(name):
+    """Interior points on a collocated attitude, sequential programming on the integrator's: they share no attitude."""
+    target, changes = TASKS[name]
+    body = sp.load_body("cat_two_halves")
+    task = reorientation(body, target, **PLAIN | changes)
+    options = PLAIN | changes | {"pieces": 12}
+    plans = [plan_reorientation(body, target, method=method, **options) for method in ("collocation", "reduced")]
+    assert plans[0].cost == pytest.approx(plans[1].cost, rel=1e-5)
+    for plan in plans:
+        assert task.miss(plan.motion.final_attitude) < 1e-8
+
+
+def test_the_reduced_form_has_no_time_to_choose():
+    with pytest.raises(UnknownNameError, match="kinetic, rate, acceleration"):
+        ReducedProgram(task_of("time"), SplineBasis(6))
+
+
+@pytest.mark.parametrize(
+    ("target", "changes", "error", "match"),
+    [
+        (np.eye(2), {}, ShapeError, "target"),
+        ([[0, 0, 0], [0, 0, 1]], {}, ShapeError, "not"),
+        (-np.eye(3), {}, ShapeError, "reflection"),
+        (HALF_TURN, {"momentum": 1.0}, ShapeError, "momentum"),
+        (HALF_TURN, {"duration": 0.0}, TrajectoryError, "duration"),
+        (HALF_TURN, {"start": [0.0, 4.0, 0.0]}, TrajectoryError, "waist_yaw"),
+        (HALF_TURN, {"start": [0.0, 4.0]}, ShapeError, "start"),
+        (HALF_TURN, {"end": "anywhere"}, UnknownNameError, "free"),
+        (HALF_TURN, {"cost": "speed"}, UnknownNameError, "kinetic"),
+        (HALF_TURN, {"cost": "time"}, TrajectoryError, "rate_limits"),
+        (HALF_TURN, {"rate_limits": [-1.0, 1.0, 1.0]}, ShapeError, "rate_limits"),
+        (HALF_TURN, {"joints": ["tail"]}, UnknownNameError, "waist_pitch"),
+        (HALF_TURN, {"joints": []}, TrajectoryError, "joints"),
+        (HALF_TURN, {"symmetric": {"waist_yaw": ("waist_yaw", 1.0)}}, TrajectoryError, "symmetric"),
+        (HALF_TURN, {"symmetric": {"waist_yaw": ("waist_roll", 1.0)}, "start": [0, 0.2, 0]}, TrajectoryError, "tied"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(target, changes, error, match):
+    with pytest.raises(error, match=match):
+        reorientation(sp.load_body("cat_two_halves"), target, **PLAIN | changes)
+
+
+def test_the_residual_of_the_reduced_method_knows_its_limits():
+    """With limits that bind: none is left of the conditions of optimality, and the other method costs the same."""
+    task, basis = task_of("kinetic"), SplineBasis(12)
+    task = replace(task, lower=np.full(3, -1.0), upper=np.full(3, 1.0))
+    guess = guesses(task, basis, 0, 1)[0]
+    turn = task.turn(guess.motion.final_attitude)
+    found, other = (
+        program.solve(guess.control, task.duration, lambda places: guess.quaternions(places, turn), iterations=300)
+        for program in (ReducedProgram(task, basis), CollocationProgram(task, basis))
+    )
+    assert np.any(np.abs(found.control) > 1.0 - 1e-9)
+    assert found.converged
+    assert found.kkt_residual < 1e-5
+    assert found.cost == pytest.approx(other.cost, rel=1e-3)

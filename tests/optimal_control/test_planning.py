@@ -1,0 +1,413 @@
+"""Plans of reorientation: they turn the body as asked, within its limits, and cost what the best can."""
+
+from __future__ import annotations
+
+import signal
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.errors import AccuracyNotReached, PlanNotFound, ShapeError, UnknownNameError
+from shapephase.examples.scenarios import kane_scher
+from shapephase.optimal_control.extremals import wong_residual
+from shapephase.optimal_control.jacobi_fields import conjugate_times, shoot
+from shapephase.optimal_control.planning import path_cost, plan_reorientation
+from shapephase.optimal_control.symbolic import symbolic_body
+from support.bodies import joint, link, urdf
+from support.independent import apart, pinocchio_motion
+
+HALF_TURN = so3.exp(np.array([np.pi, 0.0, 0.0]))
+RIGHTINGS = [(0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222), (60, 77.132402)]
+CASES = {
+    "kinetic": (HALF_TURN, {}),
+    "rate": (HALF_TURN, {"cost": "rate"}),
+    "acceleration": (HALF_TURN, {"cost": "acceleration"}),
+    "time": (HALF_TURN, {"cost": "time", "rate_limits": [15.0, 20.0, 25.0]}),
+    "limited rates": (HALF_TURN, {"rate_limits": 13.0}),
+    "momentum": (so3.exp(np.array([0.5, 0.4, 0.3])), {"momentum": [0.01, 0.0, 0.02]}),
+    "momentum in least time": (
+        so3.exp(np.array([0.2, 0.1, -0.3])),
+        {"momentum": [0.001, 0.0, 0.002], "cost": "time", "rate_limits": 20.0},
+    ),
+    "free end": (HALF_TURN, {"end": "free"}),
+    "another end": (HALF_TURN, {"start": [0.2, 0.0, 0.0], "end": [0.0, 0.3, -0.1]}),
+    "axis": ([[0.0, 0.0, 2.0], [0.0, 0.0, -1.0]], {}),
+    "two joints": (HALF_TURN, {"joints": ["waist_pitch", "waist_yaw"], "start": [0.0, 0.0, 0.2]}),
+    "tied": (so3.exp(np.array([0.0, 0.3, 0.0])), {"symmetric": {"waist_roll": ("waist_pitch", -0.5)}, "end": "free"}),
+}
+QUICK = ("axis", "momentum")
+LARGE = [
+    ("cat", np.array([np.pi, 0.0, 0.0])),
+    *(("astronaut", axis * np.pi / 2) for axis in np.eye(3)),
+]
+
+
+def rotor(load_urdf):
+    """A wheel about z on a body: J = 0.5 of I = 4.5 kg m^2."""
+    text = urdf(
+        link("hub", 1.0, (3.0, 3.5, 4.0)),
+        link("wheel", 0.5, (0.3, 0.3, 0.5)),
+        joint("spin", "continuous", "hub", "wheel"),
+    )
+    return load_urdf(text)
+
+
+def planar_chain(load_urdf):
+    """Three bars in a plane."""
+    text = urdf(
+        link("middle", 1.0, (0.001, 0.021, 0.02)),
+        link("left", 1.0, (0.001, 0.021, 0.02), com=(-0.25, 0.0, 0.0)),
+        link("right", 1.0, (0.001, 0.021, 0.02), com=(0.25, 0.0, 0.0)),
+        joint("one", "revolute", "middle", "left", xyz=(-0.25, 0.0, 0.0)),
+        joint("two", "revolute", "middle", "right", xyz=(0.25, 0.0, 0.0)),
+    )
+    return load_urdf(text)
+
+
+@pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.full) for name in CASES if name not in QUICK)]
+)
+def test_a_plan_does_what_it_is_asked(name):
+    """By Pinocchio's centroidal momentum and SciPy's integrator, with nothing of the library but the path."""
+    target, options = CASES[name]
+    body = sp.load_body("cat_two_halves")
+    plan = plan_reorientation(body, target, **{"pieces": 40, **options})
+    momentum = options.get("momentum", np.zeros(3))
+    truth = pinocchio_motion("cat_two_halves", body.joint_names, plan.path, momentum, breaks=plan.path.breaks[1:-1])
+    end = truth.attitude[-1]
+    if np.shape(target) == (3, 3):
+        assert apart(end, target) < 1e-8
+    else:
+        axis, direction = so3.normalised(np.asarray(target))
+        assert np.linalg.norm(end @ axis - direction) < 1e-8
+    assert plan.miss < 1e-8
+    assert plan.starts[0].converged
+    assert plan.kkt_residual < 1e-6
+    shapes, rates = plan.path.shape(plan.path.sample_times), plan.path.rate(plan.path.sample_times)
+    lower, upper = body.joint_limits.T
+    assert np.all((shapes >= lower) & (shapes <= upper))
+    assert np.all(np.abs(rates) <= np.asarray(options.get("rate_limits", np.inf)) * (1.0 + 1e-6))
+    start = np.asarray(options.get("start", np.zeros(3)))
+    assert_allclose(shapes[0], start, atol=1e-12)
+    end = options.get("end", start)
+    if not isinstance(end, str):
+        assert_allclose(shapes[-1], end, atol=1e-12)
+    if name == "acceleration":
+        assert_allclose(rates[[0, -1]], 0.0, atol=1e-8)
+    if name == "two joints":
+        assert_allclose(shapes[:, 2], 0.2, atol=1e-12)
+    if name == "tied":
+        assert_allclose(shapes[:, 2], -0.5 * shapes[:, 0], atol=1e-12)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "turn"), LARGE)
+def test_cat_and_astronaut_from_default_arguments(name, turn):
+    body = sp.load_body(name)
+    target = so3.exp(turn)
+    plan = plan_reorientation(body, target)
+    times = plan.path.breaks
+    truth = pinocchio_motion(name, body.joint_names, plan.path, np.zeros(3), breaks=times[1:-1])
+    assert apart(truth.attitude[-1], target) < 1e-8
+    shapes = plan.path.shape(np.linspace(0.0, 1.0, 2001))
+    lower, upper = body.joint_limits.T
+    assert max(np.max(lower - shapes), np.max(shapes - upper)) < 1e-15, "beyond a limit by more than rounding"
+    assert plan.kkt_residual < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("alpha", "beta"), [pytest.param(*pair, marks=[pytest.mark.full] * (pair[0] != 45)) for pair in RIGHTINGS]
+)
+def test_no_dearer_than_kane_and_scher(alpha, beta):
+    """With the first posture of their righting at both ends, and its own rotation."""
+    body = sp.load_body("cat_two_halves")
+    theirs = kane_scher(np.radians(alpha), np.radians(beta))
+    target = sp.holonomy(body, theirs, 1e-11)
+    plan = plan_reorientation(body, target, start=theirs.shape(0.0))
+    assert plan.cost <= path_cost(body, theirs) * (1.0 + 1e-6)
+    if alpha == 0:
+        # Bent without a lean theirs is the best: a circle of the curvature's symmetry.
+        assert plan.cost == pytest.approx(path_cost(body, theirs), rel=1e-6)
+
+
+@pytest.mark.full
+def test_twenty_starts_find_nothing_better():
+    body = sp.load_body("cat_two_halves")
+    one = plan_reorientation(body, HALF_TURN)
+    many = plan_reorientation(body, HALF_TURN, starts=20, seed=3)
+    assert len(many.starts) == 20
+    assert one.cost <= 1.01 * many.cost
+    assert many.cost <= one.cost * (1.0 + 1e-9)
+    assert many.cost == pytest.approx(min(start.cost for start in many.starts if start.converged), rel=1e-4)
+
+
+def test_the_cost_of_a_steady_loop():
+    """alpha = 0: in the frame of the bend nothing changes, so the energy is constant; and quadratic in the pace."""
+    body = sp.load_body("cat_two_halves")
+    path = kane_scher(0.0, np.radians(59.426459), 2.0)
+    times = np.linspace(0.0, 2.0, 7)
+    still = np.array(
+        [
+            body.kinetic_energy(r, v, -sp.mechanical_connection(body, r) @ v)
+            for r, v in zip(path.shape(times), path.rate(times))
+        ]
+    )
+    assert_allclose(still, still[0], rtol=1e-12)
+    assert path_cost(body, path) == pytest.approx(2.0 * still[0], rel=1e-12)
+    assert path_cost(body, path.stretched(3.0)) == pytest.approx(path_cost(body, path) / 3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [1.0, *(pytest.param(size, marks=pytest.mark.full) for size in (0.1, 0.01))])
+def test_small_turns_are_isoperimetric_circles(degrees):
+    """E T sigma/(2 pi theta) -> 1; sigma is the curvature's largest singular value in the kinetic metric."""
+    body = sp.load_body("cat_two_halves")
+    metric = symbolic_body(body).shape_metric(np.zeros(3)).full()
+    root = np.linalg.inv(np.linalg.cholesky(metric))
+    sigma = np.linalg.norm(root @ sp.curvature(body, np.zeros(3))[..., 0] @ root.T, 2)
+    theta = np.radians(degrees)
+    plan = plan_reorientation(body, so3.exp(np.array([theta, 0.0, 0.0])), duration=0.7, pieces=20)
+    assert plan.cost * 0.7 * sigma / (2.0 * np.pi * theta) == pytest.approx(1.0, abs=0.0045 * degrees + 5e-6)
+
+
+def test_a_rotor_in_closed_form(load_urdf):
+    """The wheel goes 9 times as far as the body turns back; without limits evenly, from rest to rest by a cubic."""
+    body = rotor(load_urdf)
+    turn, period = 1.2, 2.0
+    target, way = so3.exp(np.array([0.0, 0.0, turn])), -9.0 * turn
+    common = {"end": "free", "duration": period}
+    plan = plan_reorientation(body, target, **common)
+    times = np.linspace(0.0, period, 17)
+    assert_allclose(plan.path.shape(times)[:, 0], way * times / period, atol=1e-8)
+    assert plan.cost == pytest.approx(0.5 * (0.5 - 0.5**2 / 4.5) * way**2 / period, rel=1e-12)
+    by_rate = plan_reorientation(body, target, cost="rate", **common)
+    assert by_rate.cost == pytest.approx(0.5 * way**2 / period, rel=1e-12)
+    x = times / period
+    smooth = plan_reorientation(body, target, cost="acceleration", **common)
+    assert_allclose(smooth.path.shape(times)[:, 0], 0.5 * way * x**2 * (3.0 - x), atol=1e-7)
+    assert smooth.cost == pytest.approx(1.5 * way**2 / period**3, rel=1e-10)
+    rested = plan_reorientation(body, target, cost="acceleration", end=[way], duration=period)
+    assert_allclose(rested.path.shape(times)[:, 0], way * x**2 * (3.0 - 2.0 * x), atol=1e-7)
+    assert rested.cost == pytest.approx(6.0 * way**2 / period**3, rel=1e-10)
+    for one in (plan, by_rate, smooth, rested):
+        assert one.starts[0].cost == pytest.approx(one.cost, rel=1e-9), "the program counts as the quadrature does"
+    fast = plan_reorientation(body, target, cost="time", rate_limits=4.0, end="free", duration=5.0)
+    assert fast.path.duration == pytest.approx(abs(way) / 4.0, rel=1e-9)
+    assert fast.cost == fast.path.duration
+
+
+@pytest.mark.full
+def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
+    """In the plane of two joints an optimal loop bends by a constant times the curvature, at constant speed.
+
+    The equation is integrated anew from the loop's start; the constant and the first rates are fitted, and the cost of
+    what comes out is the plan's.
+    """
+    body = planar_chain(load_urdf)
+    period = 1.0
+    plan = plan_reorientation(body, so3.exp(np.array([0.0, 0.0, 0.35])), duration=period, pieces=240)
+    known = symbolic_body(body)
+    metric, by_shape = known.shape_metric, known.derivative("shape_metric")
+
+    def slope(_, y, charge):
+        r, v = y[:2], y[2:]
+        slopes = by_shape(r).full().reshape(2, 2, 2)
+        force = 0.5 * np.einsum("ijk,i,j->k", slopes, v, v) - np.einsum("kij,i,j->k", slopes, v, v)
+        field = charge * sp.curvature(body, r)[0, 1, 2]
+        return np.concatenate([v, np.linalg.solve(metric(r).full(), force + field * np.array([v[1], -v[0]]))])
+
+    times = np.linspace(0.0, period, 9)
+
+    def gap(unknown):
+        first = [*plan.path.shape(0.0), *unknown[:2]]
+        run = solve_ivp(slope, (0.0, period), first, args=(unknown[2],), rtol=1e-10, atol=1e-12, t_eval=times)
+        return (run.y[:2].T - plan.path.shape(times)).ravel()
+
+    fitted = least_squares(gap, [*plan.path.rate(0.0), 0.0])
+    assert np.abs(fitted.fun).max() < 1e-6
+    start = fitted.x[:2]
+    energy = 0.5 * start @ metric(plan.path.shape(0.0)).full() @ start
+    assert plan.cost == pytest.approx(energy * period, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"somersaults": 1}, "momentum"),
+        ({"somersaults": 1, "momentum": [0.0, 0.0, 1.0]}, "right angles"),
+        ({"half_twists": 1, "momentum": [0.0, 1.0, 0.0], "target": np.eye(3)}, "leave it None"),
+        ({}, "target"),
+    ],
+)
+def test_windings_need_a_momentum_across(options, match):
+    with pytest.raises(ShapeError, match=match):
+        plan_reorientation(sp.load_body("diver"), **options)
+
+
+@pytest.mark.parametrize("method", ["collocation", "reduced"])
+def test_a_closed_loop_of_one_joint_turns_nothing(method, load_urdf):
+    body = rotor(load_urdf)
+    with pytest.raises(PlanNotFound, match="no motion of the joints of body was found") as failure:
+        plan_reorientation(body, so3.exp(np.array([0.0, 0.0, 0.4])), method=method, iterations=40)
+    assert isinstance(failure.value, ArithmeticError)
+    best = failure.value.best
+    assert best.iterations <= 40
+    assert best.miss == pytest.approx(0.4, abs=1e-6)
+    assert not best.starts[0].converged
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"rate_limits": 4.0, "duration": 2.0}, {"rate_limits": 4.0, "duration": 2.0, "cost": "time"}],
+)
+def test_too_short_a_time(options, load_urdf):
+    """The wheel needs 2.7 s at 4 rad/s."""
+    with pytest.raises(PlanNotFound) as failure:
+        plan_reorientation(rotor(load_urdf), so3.exp(np.array([0.0, 0.0, 1.2])), end="free", **options, iterations=60)
+    assert failure.value.best.iterations <= 60
+
+
+def test_an_axis_that_no_joint_turns(load_urdf):
+    with pytest.raises(PlanNotFound):
+        plan_reorientation(rotor(load_urdf), so3.exp(np.array([0.3, 0.0, 0.0])), end="free", iterations=60)
+
+
+def test_the_same_seed_gives_the_same_plan():
+    body = sp.load_body("cat_two_halves")
+    first, second = (plan_reorientation(body, HALF_TURN, seed=7, starts=2, pieces=8) for _ in range(2))
+    assert np.array_equal(first.coefficients, second.coefficients)
+    assert [start.cost for start in first.starts] == [start.cost for start in second.starts]
+
+
+def test_nothing_to_turn_costs_nothing():
+    plan = plan_reorientation(sp.load_body("cat_two_halves"), np.eye(3))
+    assert plan.cost == pytest.approx(0.0, abs=1e-12)
+    assert plan.miss < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "match"),
+    [
+        ({"method": "shooting"}, UnknownNameError, "collocation, reduced"),
+        ({"pieces": 5}, ShapeError, "pieces"),
+        ({"starts": 0}, ShapeError, "starts"),
+        ({"iterations": 1.5}, ShapeError, "iterations"),
+    ],
+)
+def test_options_that_make_no_sense(options, error, match):
+    with pytest.raises(error, match=match):
+        plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, **options)
+
+
+def test_the_cost_of_a_wavy_path_without_breaks():
+    body = sp.load_body("cat_two_halves")
+    names = body.joint_names
+    pace = 2.0 * np.pi * 40.0
+
+    def curve(times):
+        turn = pace * times[:, None]
+        return 0.01 * np.sin(turn) * [1.0, 2.0, 0.0], 0.01 * pace * np.cos(turn) * [1.0, 2.0, 0.0]
+
+    path = sp.ShapePath.function(curve, 1.0, joint_names=names)
+    assert path_cost(body, path, "rate") == pytest.approx(0.25 * (0.01 * pace) ** 2 * 5.0, rel=1e-12)
+
+
+def test_the_cost_of_an_undeclared_jump_is_refused():
+    body = sp.load_body("cat_two_halves")
+
+    def curve(times):
+        late = np.maximum(times - 1.0 / 3.0, 0.0)
+        along = np.array([1.0, 0.0, 0.0])
+        return (times - 0.7 * late)[:, None] * along, np.where(late > 0.0, 0.3, 1.0)[:, None] * along
+
+    with pytest.raises(AccuracyNotReached, match="breaks"):
+        path_cost(body, sp.ShapePath.function(curve, 1.0, joint_names=body.joint_names), "rate")
+
+
+def test_the_cost_of_another_kind_is_refused():
+    with pytest.raises(UnknownNameError, match="kinetic, rate"):
+        path_cost(sp.load_body("cat_two_halves"), kane_scher(0.0, 1.0), "time")
+
+
+@pytest.mark.parametrize("cost", ["kinetic", "rate"])
+def test_a_plan_from_default_arguments_is_an_extremal(cost):
+    """Wong's equations hold, shooting finds the same optimum, and no conjugate time comes before its end, where the
+    kernel has the dimension of the symmetries that fix start and target: one, the optima come in circles."""
+    body, target = sp.load_body("cat_two_halves"), so3.exp(np.array([np.pi, 0.0, 0.0]))
+    plan = plan_reorientation(body, target, cost=cost)
+    assert wong_residual(body, plan.path, metric=cost).residual < 1e-4
+    found = shoot(body, plan.path, target, metric=cost)
+    assert found.cost == pytest.approx(plan.cost, rel=1e-6)
+    times = np.linspace(0.0, 1.0, 50)
+    assert_allclose(found.shape(times), plan.path.shape(times), atol=1e-5)
+    if cost == "kinetic":
+        ((time, multiplicity),) = [(c.time, c.multiplicity) for c in conjugate_times(found, 1.2)]
+        assert (round(time, 6), multiplicity) == (1.0, 1)
+
+
+@pytest.mark.parametrize("method", ["collocation", "reduced"])
+def test_the_search_is_told_and_stopped_with_the_best_so_far(method):
+    body = sp.load_body("cat_two_halves")
+    turn = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))
+    whole = plan_reorientation(body, turn, method=method, pieces=20)
+    told = []
+
+    def watch(now):
+        told.append(now)
+        return now.stage == "search" and now.iteration == 3
+
+    with pytest.raises(PlanNotFound, match=r"stopped as asked.*reaches the goal") as stopped:
+        plan_reorientation(body, turn, method=method, pieces=20, watch=watch)
+    assert (told[-1].stage, told[-1].iteration) == ("search", 3)
+    assert {now.stage for now in told[:-1]} == {"guesses", "search"}
+    best = stopped.value.best
+    assert so3.angle(best.motion.final_attitude.T @ turn) < 1e-8
+    assert whole.cost * (1.0 - 1e-6) < best.cost < 2.0 * whole.cost
+    assert not best.starts[-1].converged
+    assert best.cost == pytest.approx(path_cost(body, best.path), rel=1e-12)
+
+
+def test_a_search_stopped_among_its_guesses_keeps_one():
+    goal = so3.exp(np.array([0.6, 0.0, 0.0]))
+    with pytest.raises(PlanNotFound, match="stopped as asked") as stopped:
+        plan_reorientation(sp.load_body("cat_two_halves"), goal, pieces=20, watch=lambda now: now.iteration == 1)
+    assert so3.angle(stopped.value.best.motion.final_attitude.T @ goal) < 1e-8
+
+
+def test_a_search_stopped_after_a_start_has_its_plan():
+    body = sp.load_body("cat_two_halves")
+    options = {"pieces": 10, "starts": 3, "seed": 1}
+    plan = plan_reorientation(body, HALF_TURN, **options, watch=lambda now: (now.stage, now.start) == ("search", 2))
+    assert [start.converged for start in plan.starts] == [True, False]
+    assert plan.miss < 1e-8
+
+
+class OutOfPatience(Exception):
+    """Raised by one who watches."""
+
+
+@pytest.mark.parametrize("error", [OutOfPatience, KeyboardInterrupt])
+def test_what_a_watch_raises_comes_through(error):
+    def watch(now):
+        if now.iteration == 2:
+            raise error
+
+    with pytest.raises(error):
+        plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, pieces=10, watch=watch)
+
+
+@pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])
+def test_ctrl_c_is_not_taken_for_a_failed_search(seconds):
+    body = sp.load_body("cat_two_halves")
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            plan_reorientation(body, HALF_TURN, starts=50)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

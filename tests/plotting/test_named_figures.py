@@ -1,0 +1,203 @@
+"""Figures by name, the report's numbers, progress on a terminal only, and commands that write pictures."""
+
+from __future__ import annotations
+
+import html
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.errors import ShapeError, UnknownNameError
+from shapephase.examples.scenarios import cat_righting, satellite_sweep
+from shapephase.plotting.named_figures import FIGURES, figure_image, write_figure
+from shapephase.plotting.report import write_report
+from support.browser import furred, seen, stopped
+
+MAGIC = {"svg": b"<?xml", "pdf": b"%PDF-", "png": b"\x89PNG"}
+
+
+@pytest.fixture(scope="module")
+def sweep():
+    path = satellite_sweep()
+    deformation = sp.articulated(sp.load_body("satellite"), path)
+    return path, sp.reconstruct(deformation, [0.5, 0.2, 1.0]), sp.reconstruct(deformation, np.zeros(3))
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_every_figure_is_an_image(sweep, kind, tmp_path):
+    path, moving, _ = sweep
+    for ending, magic in MAGIC.items():
+        out = tmp_path / f"figure.{ending}"
+        write_figure(kind, moving, out, path)
+        assert out.read_bytes().startswith(magic)
+    again = figure_image(kind, moving, path)
+    assert b"<dc:date>" not in again
+
+
+def test_figures_that_would_show_nothing_are_refused(sweep, tmp_path):
+    path, moving, resting = sweep
+    with pytest.raises(UnknownNameError, match="momentum, phases, attitude"):
+        figure_image("phase", moving, path)
+    with pytest.raises(UnknownNameError, match="svg, pdf, png"):
+        write_figure("phases", moving, tmp_path / "figure.jpg", path)
+    for kind in ("momentum", "phases", "energy"):
+        with pytest.raises(ShapeError, match="angular momentum"):
+            figure_image(kind, resting, path)
+    with pytest.raises(ShapeError, match="path of the joints"):
+        figure_image("shape", moving)
+    assert not list(tmp_path.iterdir())
+
+
+def text_of(page):
+    """What a reader sees, without the animation and the pictures."""
+    page = re.sub(r'<iframe.*?</iframe>|src="data:[^"]*"|<style>.*?</style>', "", page, flags=re.DOTALL)
+    return html.unescape(re.sub(r"<[^>]+>", " ", page))
+
+
+@pytest.mark.parametrize("momentum", [True, False])
+def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum):
+    path, moving, resting = sweep
+    motion = moving if momentum else resting
+    result = sp.split(motion)
+    told = []
+    write_report(motion, result, tmp_path / "report.html", shape_path=path, title="a <satellite>", begin=told.append)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    text = text_of(page)
+    assert "a <satellite>" in text
+    assert len(page) < 6e6
+    assert page.count("<figure>") == (7 if momentum else 4)
+    assert len(told) == page.count("<figure>") + 1
+    assert f"{np.degrees(so3.angle(result.total_rotation)):.6f}°" in text
+    assert f"{np.degrees(so3.angle(result.holonomy)):.6f}°" in text
+    assert ("none: there is no angular momentum" in text) == (not momentum)
+    if momentum:
+        for phase in (result.montgomery_phase, result.dynamic_phase, result.geometric_phase):
+            assert f"{float(phase):.9f} rad" in text
+    for digest in motion.deformation.inputs.values():
+        assert digest in text
+    # Nothing is fetched from anywhere.
+    outside = re.sub(r'srcdoc="[^"]*"', "", page)
+    assert not re.findall(r"(?:src|href)=\"(?!data:)", outside)
+    assert list(tmp_path.iterdir()) == [tmp_path / "report.html"]
+
+
+def ran(*arguments, **options):
+    command = [sys.executable, "-m", "shapephase", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
+
+
+def test_the_plot_command(tmp_path):
+    out = tmp_path / "phases.svg"
+    done = ran("plot", "phases", "satellite", "satellite_sweep", "--momentum", 0, 0, 1, "--out", out)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"wrote {out}\n", "")
+    assert out.read_bytes().startswith(b"<?xml")
+    for arguments, words in (
+        (("plot", "phse", "satellite", "satellite_sweep", "--out", out), "Did you mean 'phases'"),
+        (("plot", "phases", "satellite", "satellite_sweep", "--out", out), "needs an angular momentum"),
+        (("plot", "phases", "satellite", "satellite_sweep", "--out", tmp_path / "x.gif"), r"--out: .*\.png"),
+        (("split", "satellite", "satellite_sweep", "--html", tmp_path / "x.txt"), r"--html: .*\.html"),
+        (("view", "satellite", "satellite_sweep", "--html", tmp_path / "none" / "x.html"), "no such folder"),
+    ):
+        failed = ran(*arguments)
+        assert failed.returncode == 2
+        assert re.search(words, failed.stderr)
+        assert failed.stderr.count("\n") == 1
+
+
+def test_the_report_command_writes_nothing_in_a_pipe_but_what_it_says(tmp_path):
+    out = tmp_path / "report.html"
+    done = ran("split", "satellite", "satellite_sweep", "--momentum", 0, 0, 1, "--html", out)
+    plain = ran("split", "satellite", "satellite_sweep", "--momentum", 0, 0, 1)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == plain.stdout
+    assert "satellite along satellite_sweep" in text_of(out.read_text(encoding="utf-8"))
+
+
+def on_a_terminal(source):
+    """What a program writes to a terminal."""
+    reader, writer = pty.openpty()
+    process = subprocess.Popen([sys.executable, "-c", source], stdout=writer, stderr=writer, close_fds=True)
+    os.close(writer)
+    told = b""
+    while True:
+        try:
+            part = os.read(reader, 65536)
+        except OSError:
+            break
+        if not part:
+            break
+        told += part
+    os.close(reader)
+    process.wait(timeout=30)
+    return told.decode()
+
+
+def test_progress_is_shown_after_a_second_on_a_terminal_only():
+    source = """
+import time
+from shapephase.cli.progress import steps
+with steps(2) as work:
+    work.begin("first things")
+    time.sleep({0})
+    work.begin("second things")
+    time.sleep({0})
+"""
+    assert "things" not in on_a_terminal(source.format(0.05))
+    shown = on_a_terminal(source.format(0.9))
+    assert "first things" in shown or "second things" in shown
+    piped = subprocess.run([sys.executable, "-c", source.format(0.7)], capture_output=True, text=True, timeout=60)
+    assert piped.stdout == piped.stderr == ""
+
+
+def test_an_interrupt_leaves_no_file_or_a_whole_one(tmp_path):
+    out = tmp_path / "report.html"
+    command = [sys.executable, "-m", "shapephase", "split", "cat", "cat_righting", "--html", str(out)]
+    for wait in (0.6, 1.4):
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        time.sleep(wait)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+        if process.returncode == 0 or out.exists():
+            assert out.read_text(encoding="utf-8").endswith("</html>")
+            out.unlink()
+        assert not list(tmp_path.iterdir())
+
+
+def test_the_report_of_the_righting_opens_offline_and_the_cat_lands_on_its_feet(tmp_path, chromium):
+    path = cat_righting()
+    on_its_back = np.diag([1.0, -1.0, -1.0])
+    motion = sp.reconstruct(sp.articulated(sp.load_body("cat"), path), np.zeros(3), on_its_back)
+    out = tmp_path / "righting.html"
+    write_report(motion, sp.split(motion), out, shape_path=path, title="The cat rights itself")
+    assert out.stat().st_size < 6e6
+    page = chromium.new_page()
+    said, asked = [], []
+    page.on("console", lambda message: said.append((message.type, message.text)))
+    page.on("pageerror", lambda error: said.append(("error", str(error))))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(out.as_uri())
+    scene = page.frame_locator("iframe")
+    scene.locator("canvas").first.wait_for(timeout=60_000)
+    scene.locator("input").first.wait_for()
+    for notice in scene.locator(".mantine-Notification-closeButton").all():
+        notice.click()
+    stopped(page, scene)
+    first, last = (seen(page, scene, second) for second in (0.2, 5.4))
+    assert [message for message in said if message[0] == "error"] == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert (np.abs(first - last).sum(axis=-1) > 60).mean() > 0.005
+    up, down = furred(first)[:, 0], furred(last)[:, 0]
+    assert np.median(up) - up.min() > 1.3 * (up.max() - np.median(up))
+    assert down.max() - np.median(down) > 1.3 * (np.median(down) - down.min())
+    # All pictures are there.
+    broken = page.evaluate("[...document.images].filter(image => !image.complete || !image.naturalWidth).length")
+    assert broken == 0

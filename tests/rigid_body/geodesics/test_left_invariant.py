@@ -1,0 +1,578 @@
+"""Left-invariant metrics on SO(3) against integration of the raw equations, quadratures, limits and conserved laws."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from shapephase import so3
+from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
+from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body.geodesics import conjugate_search
+from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
+
+METRICS = {
+    "triaxial": [3.0, 2.0, 1.0],
+    "unsorted": [1.0, 2.5, 1.7],
+    "flat": [1.0, 1.0, 3.0],
+    "rod": [0.3, 1.0, 1.0],
+    "round": [1.0, 1.0, 1.0],
+    "strong": [1.0, 20.0, 5.0],
+    "sub-Riemannian": [np.inf, 2.0, 1.0],
+    "sub-Riemannian about 2": [1.3, np.inf, 0.7],
+    "sub-Riemannian, equal": [1.0, 1.0, np.inf],
+}
+TRIAXIAL = np.array(METRICS["triaxial"])
+A1, A2, A3 = so3.hat(np.eye(3))
+
+
+def inverse(moments):
+    return 1.0 / np.array(moments)
+
+
+def variational(moments, momentum, end):
+    """R, Pi, Z and dPi of the raw equations and their linearisation: a function of time."""
+    a = inverse(moments)
+
+    def rate(_, y):
+        pi, attitude, z, d = y[:3], y[3:12].reshape(3, 3), y[12:21].reshape(3, 3), y[21:].reshape(3, 3)
+        u = a * pi
+        spin, turn = so3.hat(u), so3.hat(pi)
+        return np.concatenate(
+            [
+                np.cross(pi, u),
+                (attitude @ spin).ravel(),
+                (a[:, None] * d - spin @ z).ravel(),
+                (turn @ (a[:, None] * d) - spin @ d).ravel(),
+            ]
+        )
+
+    start = np.concatenate([momentum, np.eye(3).ravel(), np.zeros(9), np.eye(3).ravel()])
+    solution = solve_ivp(rate, (0.0, end), start, "DOP853", rtol=3e-14, atol=1e-15, dense_output=True)
+
+    def at(t):
+        y = solution.sol(t)
+        return y[3:12].reshape(3, 3), y[:3], y[12:21].reshape(3, 3), y[21:].reshape(3, 3)
+
+    return at
+
+
+def test_q1_the_controls_maximise_the_pseudo_hamiltonian():
+    rng = np.random.default_rng(1)
+    for name in ("triaxial", "unsorted", "sub-Riemannian about 2"):
+        moments = np.array(METRICS[name])
+        metric = left_invariant_metric(moments)
+        pi = rng.normal(size=(50, 3))
+        u = metric.angular_velocity(pi)
+        np.testing.assert_allclose(u, pi / moments, rtol=1e-15)
+        best = metric.pseudo_hamiltonian(pi, u)
+        np.testing.assert_allclose(best, metric.hamiltonian(pi), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(best, 0.5 * np.sum(pi**2 / moments, axis=-1), rtol=0, atol=1e-14)
+        step = rng.normal(size=(50, 3)) * np.isfinite(moments)
+        weights = np.where(np.isfinite(moments), moments, 0.0)
+        lost = 0.5 * np.sum(weights * step**2, axis=-1)
+        np.testing.assert_allclose(metric.pseudo_hamiltonian(pi, u + step), best - lost, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_q1_q2_geodesics_solve_the_extremal_equations(name):
+    rng = np.random.default_rng(2)
+    metric = left_invariant_metric(METRICS[name])
+    for _ in range(3):
+        start = metric.unit_speed(rng.normal(size=3))
+        at = variational(METRICS[name], start, 5.0)
+        t = np.array([0.3, 2.0, 5.0])
+        np.testing.assert_allclose(metric.attitude(start, t), [at(s)[0] for s in t], rtol=0, atol=1e-11)
+        np.testing.assert_allclose(metric.body_momentum(start, t), [at(s)[1] for s in t], rtol=0, atol=1e-11)
+
+
+def test_q2_eulers_equation_componentwise():
+    rng = np.random.default_rng(3)
+    metric = left_invariant_metric(TRIAXIAL)
+    h = rng.normal(size=(20, 3))
+    i1, i2, i3 = TRIAXIAL
+    printed = [
+        h[:, 1] * h[:, 2] * (1 / i3 - 1 / i2),
+        h[:, 0] * h[:, 2] * (1 / i1 - 1 / i3),
+        h[:, 0] * h[:, 1] * (1 / i2 - 1 / i1),
+    ]
+    np.testing.assert_allclose(metric.momentum_rate(h), np.transpose(printed), rtol=0, atol=1e-15)
+
+
+def test_b_e2_the_commutators_are_printed_with_the_wrong_sign():
+    for a, b, c in ((A1, A2, A3), (A2, A3, A1), (A3, A1, A2)):
+        np.testing.assert_array_equal(a @ b - b @ a, c)
+        assert np.abs((a @ b - b @ a) + c).max() == 2.0
+    # The paper's matrices are those of the cross product; its Euler equations come from {H_i, H_j} = -H([A_i, A_j]).
+    np.testing.assert_array_equal(A1, [[0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    metric, h = left_invariant_metric(TRIAXIAL), np.array([0.4, -0.7, 1.1])
+    lift = np.array([[-(so3.vee(x @ y - y @ x) @ h) for y in (A1, A2, A3)] for x in (A1, A2, A3)])
+    np.testing.assert_allclose(metric.momentum_rate(h), lift @ (h / TRIAXIAL), rtol=0, atol=1e-15)
+
+
+def test_q3_times_are_quadratures_of_the_two_integrals():
+    # Pi_2'^2 = (1/I_1 - 1/I_3)^2 Pi_1^2 Pi_3^2, both squares linear in Pi_2^2 by H and |Pi|.
+    start, t = np.array([1.0, 0.2, 0.9]), 0.6
+    for moments in (TRIAXIAL, np.array(METRICS["sub-Riemannian"])):
+        a, b, c = inverse(moments)
+        metric = left_invariant_metric(moments)
+        h, size = 2.0 * metric.hamiltonian(start), start @ start
+
+        def slowness(y, a=a, b=b, c=c, h=h, size=size):
+            first = (c * (size - y * y) - h + b * y * y) / (c - a)
+            third = (h - b * y * y - a * (size - y * y)) / (c - a)
+            return -1.0 / ((c - a) * np.sqrt(first * third))
+
+        end = metric.body_momentum(start, t)[1]
+        assert end < start[1]
+        assert abs(quad(slowness, start[1], end, epsabs=1e-13)[0] - t) < 1e-12
+
+
+def test_q4_momentum_in_inertial_axes_and_the_hamiltonian_are_conserved():
+    rng = np.random.default_rng(4)
+    for name, moments in METRICS.items():
+        metric = left_invariant_metric(moments)
+        start = metric.unit_speed(rng.normal(size=(20, 3)))
+        t = rng.uniform(-20.0, 20.0, 20)
+        at = metric.body_momentum(start, t)
+        np.testing.assert_allclose(so3.apply(metric.attitude(start, t), at), start, atol=1e-12, err_msg=name)
+        np.testing.assert_allclose(metric.hamiltonian(at), 0.5, rtol=0, atol=1e-11, err_msg=name)
+    # The lift of A_i R is one component of R Pi.
+    attitude, pi = metric.attitude(start[0], 1.3), metric.body_momentum(start[0], 1.3)
+    lifts = [so3.vee(attitude.T @ generator @ attitude) @ pi for generator in (A1, A2, A3)]
+    np.testing.assert_allclose(lifts, start[0], rtol=0, atol=1e-12)
+
+
+def test_geodesics_are_the_motions_of_the_euler_top():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        root = rng.normal(size=(3, 3))
+        inertia = root @ root.T + 0.3 * np.eye(3)
+        metric, start = left_invariant_metric(inertia), rng.normal(size=3)
+        top = EulerTop(inertia, start)
+        t = rng.uniform(-3.0, 10.0, 5)
+        np.testing.assert_allclose(metric.attitude(start, t), top.attitude(t), rtol=0, atol=1e-11)
+        np.testing.assert_allclose(metric.body_momentum(start, t), top.body_momentum(t), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(metric.axes @ np.diag(metric.moments) @ metric.axes.T, inertia, rtol=0, atol=1e-14)
+
+
+def test_q5_the_sub_riemannian_closed_form_is_a_top_turned_back_about_its_momentum():
+    # With a + c in place of a the attitude turns by c t more about Pi, in inertial axes.
+    rng = np.random.default_rng(6)
+    moments = np.array(METRICS["sub-Riemannian"])
+    metric = left_invariant_metric(moments)
+    for shift in (0.4, 1.0, 7.0):
+        start, t = rng.normal(size=3), rng.uniform(0.0, 8.0, 20)
+        top = EulerTop.principal(1.0 / (inverse(moments) + shift), start)
+        back = so3.exp(-shift * t[:, None] * start)
+        np.testing.assert_allclose(metric.attitude(start, t), back @ top.attitude(t), rtol=0, atol=1e-12)
+
+
+def test_q5_one_parameter_is_left_in_the_sub_riemannian_case():
+    # k^2 = I_2/I_3: multiplying both moments by a number only multiplies the momenta.
+    start, t = np.array([0.7, -0.4, 1.1]), 1.7
+    once, thrice = left_invariant_metric([np.inf, 2.0, 1.0]), left_invariant_metric([np.inf, 6.0, 3.0])
+    np.testing.assert_allclose(thrice.attitude(3.0 * start, t), once.attitude(start, t), rtol=0, atol=1e-14)
+    assert once.is_sub_riemannian
+    assert not left_invariant_metric(TRIAXIAL).is_sub_riemannian
+
+
+def test_q5_the_riemannian_case_converges_as_the_inverse_of_the_moment():
+    # The equations are linear in 1/I_1, so attitudes and conjugate times converge at the rate one; the slope of the
+    # attitude is the integral of Jacobi's inhomogeneous equation.
+    start = np.array([0.9, 0.5, -0.8])
+    limit = left_invariant_metric(METRICS["sub-Riemannian"])
+    at, conjugate = limit.attitude(start, 3.0), limit.conjugate_time(start)
+    inverse_moments = np.array([1e-2, 1e-3, 1e-4])
+    near = [left_invariant_metric([1.0 / e, 2.0, 1.0]) for e in inverse_moments]
+    gaps = np.array([np.linalg.norm(m.attitude(start, 3.0) - at) for m in near])
+    np.testing.assert_allclose(gaps[:-1] / gaps[1:], 10.0, rtol=0.05)
+    assert abs(gaps[1] / gaps[2] - 10.0) < 0.01
+    delays = [left_invariant_metric([1.0 / e, 2.0, 1.0]).conjugate_time(start) - conjugate for e in (1e-5, 1e-6, 1e-7)]
+    np.testing.assert_allclose([delays[0] / delays[1], delays[1] / delays[2]], 10.0, rtol=5e-3)
+
+    def rate(_, y):
+        # zeta, delta Pi of the derivative by the first inverse moment.
+        pi, z, d = y[:3], y[3:6], y[6:]
+        a = inverse(METRICS["sub-Riemannian"])
+        extra = np.array([pi[0], 0.0, 0.0])
+        u, change = a * pi, a * d + extra
+        return np.concatenate([np.cross(pi, u), change - np.cross(u, z), np.cross(d, u) + np.cross(pi, change)])
+
+    slope = solve_ivp(rate, (0.0, 3.0), np.append(start, np.zeros(6)), "DOP853", rtol=1e-12, atol=1e-13).y[3:6, -1]
+    measured = so3.log(at.T @ near[2].attitude(start, 3.0)) / inverse_moments[2]
+    np.testing.assert_allclose(measured, slope, rtol=0, atol=2e-3 * np.linalg.norm(slope))
+    tiny = left_invariant_metric([1e10, 2.0, 1.0])
+    np.testing.assert_allclose(so3.log(at.T @ tiny.attitude(start, 3.0)) * 1e10, slope, rtol=0, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", METRICS)
+def test_q6_the_differential_solves_the_variational_equation(name):
+    rng = np.random.default_rng(7)
+    metric = left_invariant_metric(METRICS[name])
+    for _ in range(2):
+        start = metric.unit_speed(rng.normal(size=3))
+        at = variational(METRICS[name], start, 6.0)
+        for t in (0.004, 0.3, 2.5, 6.0):
+            expected = at(t)[2]
+            np.testing.assert_allclose(
+                metric.differential(start, t), expected, rtol=0, atol=2e-11 * max(t, np.abs(expected).max())
+            )
+
+
+def test_q6_the_differential_at_special_momenta():
+    # At rest, along axes, on the separatrix, next to it and next to the unstable axis; t from tiny to long.
+    a, b, c = inverse(TRIAXIAL)
+    special = [
+        *np.eye(3),
+        [np.sqrt(c - b), 0.0, np.sqrt(b - a)],
+        [np.sqrt(c - b), 0.7, np.sqrt(b - a)],
+        [1e-7, 1.0, 0.0],
+        [1e-5, 1.0, 1e-5],
+        [0.0, 1.0, 1e-12],
+    ]
+    metric = left_invariant_metric(TRIAXIAL)
+    for start in np.array(special):
+        at = variational(TRIAXIAL, start, 12.0)
+        for t in (1e-3, 0.0199, 0.0201, 3.0, 12.0):
+            expected = at(t)[2]
+            np.testing.assert_allclose(
+                metric.differential(start, t), expected, rtol=0, atol=1e-11 * max(t, np.abs(expected).max())
+            )
+    np.testing.assert_allclose(metric.differential(np.zeros(3), 2.0), np.diag(2.0 / TRIAXIAL), rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(metric.differential(np.ones(3), 0.0), np.zeros((3, 3)))
+
+
+def test_q6_small_turns_keep_their_digits():
+    # Both sides of the switch from the integral to the difference, against 40 digits of the Taylor series.
+    mpmath.mp.dps = 40
+    a = [mpmath.mpf(1) / 3, mpmath.mpf(1) / 2, mpmath.mpf(1)]
+    metric, direction = left_invariant_metric(TRIAXIAL), np.array([0.6, 0.0, 0.8])
+
+    def cross(x, y):
+        return [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+
+    def series(column, t):
+        pi, d, z = [[mpmath.mpf(float(v)) for v in direction]], [[mpmath.mpf(i == column) for i in range(3)]], [[0] * 3]
+        for k in range(14):
+            new_pi, new_d, new_z = [0] * 3, [0] * 3, [a[i] * d[k][i] for i in range(3)]
+            for j in range(k + 1):
+                u, v = [a[i] * pi[j][i] for i in range(3)], [a[i] * d[j][i] for i in range(3)]
+                for i in range(3):
+                    new_pi[i] += cross(pi[k - j], u)[i]
+                    new_d[i] += cross(d[k - j], u)[i] + cross(pi[k - j], v)[i]
+                    new_z[i] += cross(z[k - j], u)[i]
+            pi.append([x / (k + 1) for x in new_pi])
+            d.append([x / (k + 1) for x in new_d])
+            z.append([x / (k + 1) for x in new_z])
+        return [float(sum(z[k][i] * mpmath.mpf(t) ** k for k in range(15))) for i in range(3)]
+
+    for t in (1e-6, 1e-3, 0.0199, 0.0201, 0.05):
+        expected = np.array([series(column, t) for column in range(3)]).T
+        np.testing.assert_allclose(metric.differential(direction, t), expected, rtol=0, atol=1e-13 * t)
+
+
+@pytest.mark.parametrize("name", [name for name in METRICS if name != "round"])
+def test_q6_conjugate_times_are_zeros_of_the_variational_determinant(name):
+    rng = np.random.default_rng(8)
+    metric = left_invariant_metric(METRICS[name])
+    for _ in range(2):
+        start = metric.unit_speed(rng.normal(size=3))
+        times = [float(metric.conjugate_time(start, order)) for order in (1, 2, 3)]
+        at = variational(METRICS[name], start, times[1] * 1.02)
+
+        def determinant(t, at=at):
+            return np.linalg.det(at(t)[2])
+
+        grid = np.linspace(0.03 * times[0], times[1] * 1.015, 250)
+        values = np.array([determinant(t) for t in grid])
+        change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+        found = [brentq(determinant, grid[k], grid[k + 1], xtol=1e-14) for k in change]
+        assert len(found) == 2
+        np.testing.assert_allclose(found, times[:2], rtol=0, atol=1e-10)
+        assert times[2] > times[1]
+
+
+def test_q6_conjugate_times_of_steady_rotations():
+    # About axis k the linear flow is a turn by a_k t of the exponential of a constant matrix.
+    a = inverse(TRIAXIAL)
+    metric = left_invariant_metric(TRIAXIAL)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        linear = np.array([[0.0, a[k] - a[j]], [a[i] - a[k], 0.0]])
+
+        def determinant(t, k=k, linear=linear):
+            turn = expm(t * a[k] * np.array([[0.0, -1.0], [1.0, 0.0]]))
+            return 2.0 - np.trace(turn @ expm(t * linear))
+
+        for order in (1, 2, 3):
+            time = float(metric.conjugate_time(np.eye(3)[k], order))
+            assert abs(determinant(time)) < 1e-12 * np.linalg.norm(expm(time * linear)) ** 2
+        if k:
+            first = float(metric.conjugate_time(np.eye(3)[k]))
+            grid = np.linspace(0.1, 0.999 * first, 200)
+            assert min(determinant(t) for t in grid) > 0.0
+
+
+def test_q6_double_conjugate_points_count_twice():
+    # The round metric: every geodesic meets two fields' zeros at each whole turn.
+    rng = np.random.default_rng(9)
+    metric = left_invariant_metric([2.0, 2.0, 2.0])
+    start = metric.unit_speed(rng.normal(size=(10, 3)))
+    for order in range(1, 7):
+        turn = 2.0 * np.pi * np.sqrt(2.0) * ((order + 1) // 2)
+        np.testing.assert_allclose(metric.conjugate_time(start, order), turn, rtol=1e-13)
+    # Along the axis of symmetry too, and next to it the two separate.
+    rod = left_invariant_metric([1.0, 1.0, 0.3])
+    np.testing.assert_allclose([rod.conjugate_time([0, 0, 1.0], k) for k in (1, 2)], 2.0 * np.pi, rtol=1e-13)
+    first, second = (float(rod.conjugate_time([0.3, 0, 1.0], k)) * np.hypot(0.3, 1.0) for k in (1, 2))
+    assert first < 2.0 * np.pi * (1.0 - 1e-4)
+    assert abs(second - 2.0 * np.pi) < 1e-12
+
+
+def test_q6_conjugate_times_scale_and_are_symmetric():
+    rng = np.random.default_rng(10)
+    metric = left_invariant_metric(TRIAXIAL)
+    start = rng.normal(size=(40, 3))
+    time = metric.conjugate_time(start)
+    np.testing.assert_allclose(metric.conjugate_time(2.5 * start), time / 2.5, rtol=1e-12)
+    for signs in ([-1, -1, 1], [1, -1, -1], [-1, 1, -1]):
+        np.testing.assert_allclose(metric.conjugate_time(start * signs), time, rtol=1e-12)
+    # The same from the end point backwards.
+    np.testing.assert_allclose(metric.conjugate_time(-metric.body_momentum(start, time)), time, rtol=1e-11)
+    # In other axes.
+    turn = so3.exp(np.array([0.3, -0.8, 0.5]))
+    turned = left_invariant_metric(turn @ np.diag(TRIAXIAL) @ turn.T)
+    np.testing.assert_allclose(turned.conjugate_time(start @ turn.T), time, rtol=1e-11)
+    locus = metric.conjugate_locus(start)
+    np.testing.assert_allclose(turned.conjugate_locus(start @ turn.T), turn @ locus @ turn.T, rtol=0, atol=1e-10)
+
+
+def test_q6_the_conjugate_locus_is_a_critical_value_of_the_exponential_map():
+    rng = np.random.default_rng(11)
+    for name in ("triaxial", "sub-Riemannian", "flat"):
+        metric = left_invariant_metric(METRICS[name])
+        start = metric.unit_speed(rng.normal(size=(30, 3)))
+        time = metric.conjugate_time(start)
+        values = np.linalg.svd(metric.differential(start, time), compute_uv=False)
+        assert (values[:, 2] / values[:, 0]).max() < 1e-12
+        # Along the null direction the end moves to second order only.
+        null = np.linalg.svd(metric.differential(start, time))[2][:, 2]
+        locus, step = metric.conjugate_locus(start), 1e-4
+        moved = so3.angle(so3.transpose(locus) @ metric.attitude(start + step * null, time))
+        assert moved.max() < 1e3 * step**2
+        np.testing.assert_array_equal(locus, metric.attitude(start, time))
+
+
+def test_q6_gauss_lemma():
+    # Pi . Z dPi = t u . dPi.
+    rng = np.random.default_rng(12)
+    for moments in METRICS.values():
+        metric = left_invariant_metric(moments)
+        start, t = rng.normal(size=(20, 3)), rng.uniform(0.1, 6.0, 20)
+        projected = np.einsum("ni,nij->nj", metric.body_momentum(start, t), metric.differential(start, t))
+        np.testing.assert_allclose(projected, t[:, None] * metric.angular_velocity(start), rtol=0, atol=1e-10)
+
+
+def test_q7_serret_andoyer_conjugate_points_are_not_those_on_so3():
+    # theory.md section 6: p, phi_1c, theta_1c of the Serret-Andoyer metric of I = (3, 2, 1), from the equator.
+    table = [
+        (1.70, -0.094594, 3.565678),
+        (1.60, -0.644765, 5.025759),
+        (1.50, -1.152362, 7.022735),
+        (1.43, -1.676710, 11.331023),
+        (1.42, -1.829686, 13.924233),
+    ]
+    a, b, c = inverse(TRIAXIAL)
+    metric = left_invariant_metric(TRIAXIAL)
+    for p, phi_conjugate, theta_conjugate in table:
+        momentum = np.array([0.0, 0.0, np.sqrt((1.0 - a * p * p) / (c - a))])
+        momentum[0] = np.sqrt(p * p - momentum[2] ** 2)
+        assert abs(metric.hamiltonian(momentum) - 0.5) < 1e-15
+
+        def rate(_, y, p=p):
+            angle, p_y = y[1], y[2]
+            half = a * np.sin(angle) ** 2 + b * np.cos(angle) ** 2
+            return [
+                p * half,
+                p_y * (c - half),
+                (b - a) * (p * p - p_y * p_y) * np.sin(angle) * np.cos(angle),
+                p_y * np.sqrt(c - half),
+            ]
+
+        def reached(_, y, phi=phi_conjugate):
+            return y[3] - phi
+
+        reached.direction, reached.terminal = -1.0, True
+        start = [0.0, 0.5 * np.pi, momentum[2], 0.0]
+        path = solve_ivp(rate, (0.0, 40.0), start, "DOP853", events=reached, rtol=1e-12, atol=1e-12)
+        time, end = path.t_events[0][0], path.y_events[0][0]
+        # The table's point lies on this extremal: the reduced motion is the same one.
+        assert abs(end[0] - theta_conjugate) < 5e-5
+        here = metric.body_momentum(momentum, time)
+        np.testing.assert_allclose(np.arctan2(here[0], here[1]), end[1], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(here[2], end[2], rtol=0, atol=1e-9)
+        # But the end of the geodesic on SO(3) is not conjugate there, and is elsewhere.
+        conjugates = np.array([metric.conjugate_time(momentum, order) for order in (1, 2, 3, 4)])
+        assert np.abs(conjugates / time - 1.0).min() > 0.01
+        values = np.linalg.svd(metric.differential(momentum, time), compute_uv=False)
+        assert values[2] / values[0] > 1e-3
+
+
+def test_q8_the_fibre_is_lagrangian_in_andoyer_variables():
+    # sum dG^dg + dK^dk + dL^dl vanishes on the momenta at one attitude, but not on all of the phase space.
+    mpmath.mp.dps = 40
+    angles = [mpmath.mpf("0.4"), mpmath.mpf("1.1"), mpmath.mpf("-0.7")]
+
+    def rotation(axis, angle):
+        cosine, sine, i, j = mpmath.cos(angle), mpmath.sin(angle), (axis + 1) % 3, (axis + 2) % 3
+        matrix = mpmath.eye(3)
+        matrix[i, i] = matrix[j, j] = cosine
+        matrix[i, j], matrix[j, i] = -sine, sine
+        return matrix
+
+    def andoyer(h1, h2, h3, phi_1=angles[0]):
+        attitude = rotation(2, phi_1) * rotation(1, angles[1]) * rotation(2, angles[2])
+        body = mpmath.matrix([h1, h2, h3])
+        spatial = attitude * body
+        size = mpmath.norm(body)
+        # Nodes of the plane at right angles to the momentum with both third planes.
+        node = mpmath.matrix([-spatial[1], spatial[0], 0])
+        across = mpmath.matrix([-spatial[0] * spatial[2], -spatial[1] * spatial[2], spatial[0] ** 2 + spatial[1] ** 2])
+        inner = attitude * mpmath.matrix([body[1], -body[0], 0])
+        g = mpmath.atan2((across.T * inner)[0] / size, (node.T * inner)[0])
+        return [g, mpmath.atan2(node[1], node[0]), mpmath.atan2(body[0], body[1]), size, spatial[2], body[2]]
+
+    point = [mpmath.mpf("0.8"), mpmath.mpf("-0.5"), mpmath.mpf("1.3")]
+
+    def column(order, k):
+        return mpmath.diff(lambda *x: andoyer(*x)[k], (*point, angles[0]), order)
+
+    orders = [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
+    slopes = [[column(order, k) for k in range(6)] for order in orders]
+
+    def form(x, y):
+        return sum(x[k + 3] * y[k] - y[k + 3] * x[k] for k in range(3))
+
+    for i in range(3):
+        for j in range(i):
+            assert abs(form(slopes[i], slopes[j])) < 1e-15
+    # Along the angle phi_1 the form is the differential of its momentum p_phi1 = K: not zero.
+    for i in range(3):
+        assert abs(abs(form(slopes[i], slopes[3])) - abs(slopes[i][4])) < 1e-15
+        assert abs(slopes[i][4]) > 0.1
+
+
+def test_batches_and_shapes():
+    metric = left_invariant_metric(TRIAXIAL)
+    start = np.random.default_rng(13).normal(size=(4, 1, 3))
+    t = np.linspace(0.0, 3.0, 5)
+    attitude, differential = metric.attitude(start, t), metric.differential(start, t)
+    assert attitude.shape == differential.shape == (4, 5, 3, 3)
+    assert metric.conjugate_time(start).shape == (4, 1)
+    assert np.shape(metric.conjugate_time(start[0, 0])) == ()
+    assert metric.conjugate_locus(start).shape == (4, 1, 3, 3)
+    np.testing.assert_allclose(attitude[2, 3], metric.attitude(start[2, 0], t[3]), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(differential[2, 3], metric.differential(start[2, 0], t[3]), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        metric.conjugate_time(start)[3, 0], metric.conjugate_time(start[3, 0]), rtol=1e-13, atol=0
+    )
+    assert metric.conjugate_time(np.zeros((0, 3))).shape == (0,)
+    assert metric.attitude(np.zeros((0, 3))).shape == (0, 3, 3)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "error"),
+    [
+        ([1.0, 2.0], ShapeError),
+        ([1.0, -2.0, 3.0], ShapeError),
+        ([np.inf, np.inf, 3.0], ShapeError),
+        ([-np.inf, 1.0, 3.0], ShapeError),
+        ([np.nan, 1.0, 3.0], ShapeError),
+        ([0.0, 1.0, 3.0], ShapeError),
+        ("abc", ShapeError),
+        (np.full((3, 3), np.inf), ShapeError),
+        (np.diag([1.0, 2.0, 0.0]), SingularInertiaError),
+        (np.triu(np.ones((3, 3))), UnphysicalInertiaError),
+    ],
+)
+def test_metrics_refused(inertia, error):
+    with pytest.raises(error):
+        left_invariant_metric(inertia)
+
+
+def test_momenta_refused():
+    metric, flat = left_invariant_metric(TRIAXIAL), left_invariant_metric([1.0, np.inf, 2.0])
+    with pytest.raises(ShapeError, match="nothing moves"):
+        metric.conjugate_time(np.zeros(3))
+    with pytest.raises(ShapeError, match="forbidden direction"):
+        flat.unit_speed([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    with pytest.raises(ShapeError, match="forbids"):
+        flat.pseudo_hamiltonian([1.0, 1.0, 1.0], [0.0, 0.1, 0.0])
+    with pytest.raises(ShapeError, match="do not broadcast"):
+        metric.attitude(np.ones((4, 3)), np.ones(3))
+    for order in (0, -1, 1.5, True):
+        with pytest.raises(ShapeError, match="order"):
+            metric.conjugate_time([1.0, 0.0, 0.0], order)
+    with pytest.raises(ShapeError):
+        metric.attitude([1.0, np.nan, 0.0])
+    with pytest.raises(ShapeError):
+        metric.differential([1.0, 0.0, 0.0], np.inf)
+    with pytest.raises(ShapeError, match="too far"):
+        metric.differential([1.0, 0.3, 0.2], 1e9)
+
+
+def test_q6_very_unequal_moments():
+    # Steady about the axis of the second moment, where the flow is a constant matrix.
+    for moments in ([1.0, 1e3, 20.0], [np.inf, 1.0, 1e-2], [1e4, 1.0, 1e-2]):
+        metric = left_invariant_metric(moments)
+        a = inverse(moments)
+        start = np.array([0.0, 1.0, 0.0])
+        time = float(metric.conjugate_time(start))
+        linear = np.array([[0.0, a[1] - a[0]], [a[2] - a[1], 0.0]])
+        turn = expm(time * a[1] * np.array([[0.0, -1.0], [1.0, 0.0]]))
+        flow = expm(time * linear)
+        assert abs(2.0 - np.trace(turn @ flow)) < 1e-11 * np.linalg.norm(flow) ** 2
+
+
+def test_no_conjugate_time_is_an_error(monkeypatch):
+    monkeypatch.setattr(conjugate_search, "_STEPS_EACH", 2)
+    with pytest.raises(AccuracyNotReached, match="conjugate point 1"):
+        left_invariant_metric(TRIAXIAL).conjugate_time([1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("part", "saddle"), [(0.9, False), (0.99, False), (1.01, True), (1.1, True)])
+def test_q6_geodesics_are_minima_of_the_length_up_to_the_conjugate_time(part, saddle):
+    # Of curves of two geodesics with the same ends, by where they meet off the middle: Morse's index.
+    metric = left_invariant_metric(TRIAXIAL)
+    start = metric.unit_speed([0.3, 0.8, -0.5])
+    time = part * float(metric.conjugate_time(start))
+    target, middle = metric.attitude(start, time), metric.attitude(start, 0.5 * time)
+    here = metric.body_momentum(start, 0.5 * time)
+    tangent = so3.normalised(metric.angular_velocity(here))
+    across = so3.perpendicular(tangent)
+    plane = np.stack([across, np.cross(tangent, across)])
+
+    def length(x, y):
+        total, meeting = 0.0, middle @ so3.exp(x * plane[0] + y * plane[1])
+        for attitude, pi in ((meeting, 0.5 * time * start), (meeting.T @ target, 0.5 * time * here)):
+            for _ in range(6):
+                pi = pi + np.linalg.solve(metric.differential(pi), so3.log(metric.attitude(pi).T @ attitude))
+            total += float(metric.speed(pi))
+        return total
+
+    h = 1e-3
+    straight = length(0.0, 0.0)
+    assert abs(straight - time) < 1e-12
+    second = np.empty((2, 2))
+    second[0, 0] = length(h, 0.0) + length(-h, 0.0) - 2.0 * straight
+    second[1, 1] = length(0.0, h) + length(0.0, -h) - 2.0 * straight
+    mixed = length(h, h) + length(-h, -h) - length(h, -h) - length(-h, h)
+    second[0, 1] = second[1, 0] = 0.25 * mixed
+    least, largest = np.linalg.eigvalsh(second) / h**2
+    assert largest > 0.0
+    assert (least < -1e-4) if saddle else (least > 1e-4)

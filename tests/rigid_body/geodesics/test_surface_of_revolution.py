@@ -1,0 +1,692 @@
+"""Surfaces of revolution against the raw equations integrated, mpmath's quadrature and differences of extremals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mpmath as mp
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
+from scipy.special import ellipj
+
+from shapephase import elliptic
+from shapephase.errors import AccuracyNotReached, ShapeError
+from shapephase.rigid_body.geodesics.conjugate_locus import (
+    conjugate_height_rate,
+    conjugate_locus,
+    conjugate_points,
+    conjugate_points_of_momentum,
+)
+from shapephase.rigid_body.geodesics.cut_locus import cut_locus, cut_time
+from shapephase.rigid_body.geodesics.ellipsoid import ellipsoid
+from shapephase.rigid_body.geodesics.extremal import extremal, variational_jacobi_field
+from shapephase.rigid_body.geodesics.metric_profile import assumptions, surface_of_metric
+from shapephase.rigid_body.geodesics.surface_of_revolution import surface_of_stretch
+
+ANDOYER = (1.0 / 3.0, 1.0 / 2.0, 1.0)
+"""Inverse moments A < B < C of I = (3, 2, 1)."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A metric d phi^2 + m d theta^2: m with two derivatives, the reach, and momenta of oscillating extremals."""
+
+    metric: object
+    reach: float
+    momenta: tuple[float, ...]
+
+    def surface(self):
+        return surface_of_metric(lambda phi: self.metric(phi)[:2], self.reach)
+
+
+def andoyer_metric(phi):
+    a, b, c = ANDOYER
+    alpha, m1 = np.sqrt(c - a), (c - b) / (c - a)
+    sn, cn, dn, _ = ellipj(alpha * phi, 1.0 - m1)
+    w = a * cn**2 + b * sn**2
+    first = 2.0 * alpha * (b - a) * sn * cn * dn
+    second = 2.0 * alpha**2 * (b - a) * ((cn**2 - sn**2) * dn**2 - (1.0 - m1) * sn**2 * cn**2)
+    return 1.0 / w, -first / w**2, 2.0 * first**2 / w**3 - second / w**2
+
+
+def torus_metric(phi):
+    r = 2.0 + np.cos(phi)
+    return r**2, -2.0 * np.sin(phi) * r, 2.0 * np.sin(phi) ** 2 - 2.0 * np.cos(phi) * r
+
+
+def pseudosphere_like(phi):
+    square = 1.0 / np.cosh(phi) ** 2
+    tanh = np.tanh(phi)
+    return square, -2.0 * tanh * square, square * (4.0 * tanh**2 - 2.0 * square)
+
+
+def bulged_sphere(phi):
+    """sqrt(m) = cos(phi) + sin^2(phi) cos^3(phi)/10: a smooth sphere whose curvature is least on the equator."""
+    s, c = np.sin(phi), np.cos(phi)
+    r = c + 0.1 * s**2 * c**3
+    r1 = -s + 0.1 * (2.0 * s * c**4 - 3.0 * s**3 * c**2)
+    r2 = -c + 0.1 * (2.0 * c**5 - 17.0 * s**2 * c**3 + 6.0 * s**4 * c)
+    return r**2, 2.0 * r * r1, 2.0 * (r1**2 + r * r2)
+
+
+CASES = {
+    "andoyer": Case(andoyer_metric, float(elliptic.complete_k(3.0 / 4.0)) / np.sqrt(2.0 / 3.0), (1.45, 1.6, 1.72)),
+    "torus": Case(torus_metric, np.pi, (1.2, 2.0, 2.9)),
+    "boundary": Case(pseudosphere_like, 2.0, (0.3, 0.6, 0.97)),
+    "bulged": Case(bulged_sphere, np.pi / 2, (0.1, 0.5, 0.95)),
+}
+
+
+@pytest.fixture(params=CASES, scope="module")
+def case(request):
+    return CASES[request.param]
+
+
+def hamiltonian_flow(metric, p, start, times, slope):
+    """phi, theta, p_phi and their derivatives by the initial momentum along the level set, from the raw equations."""
+
+    def rate(_, z):
+        phi, _, p_phi, d_phi, _, d_p, d_pt = z
+        m, m1, m2 = (float(a) for a in metric(np.asarray(phi)))
+        return [
+            p_phi,
+            p / m,
+            0.5 * p * p * m1 / m**2,
+            d_p,
+            d_pt / m - p * m1 / m**2 * d_phi,
+            p * d_pt * m1 / m**2 + 0.5 * p * p * (m2 / m**2 - 2.0 * m1**2 / m**3) * d_phi,
+            0.0,
+        ]
+
+    first = [start, 0.0, slope, 0.0, 0.0, -p / (float(metric(np.asarray(start))[0]) * slope), 1.0]
+    options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
+    solution = solve_ivp(rate, (0.0, times[-1]), first, t_eval=times, **options)
+    return solution.y
+
+
+def unit_slope(metric, p, start):
+    return np.sqrt(1.0 - p * p / float(metric(np.asarray(start))[0]))
+
+
+def unit_ellipsoid_stretch(aspect):
+    f = 1.0 - aspect**2
+
+    def stretch(square, _):
+        d = np.sqrt(aspect**2 + f * square)
+        return d, 0.5 * f / d, -0.25 * f * f / d**3
+
+    return stretch
+
+
+def test_o1_extremals_solve_hamiltons_equations(case):
+    surface = case.surface()
+    for p in case.momenta:
+        times = np.linspace(0.3, 1.7 * float(surface.period(p)), 13)
+        raw = hamiltonian_flow(case.metric, p, 0.0, times, unit_slope(case.metric, p, 0.0))
+        latitude, longitude, slope = extremal(surface, surface.direction_of(p)).state(times)
+        np.testing.assert_allclose(latitude, raw[0], rtol=0, atol=2e-11)
+        np.testing.assert_allclose(longitude, raw[1], rtol=0, atol=2e-11)
+        np.testing.assert_allclose(slope, raw[2], rtol=0, atol=2e-11)
+
+
+def test_o1_extremals_from_any_latitude_in_any_direction(case):
+    surface = case.surface()
+    start = 0.3 * case.reach
+    m = float(case.metric(np.asarray(start))[0])
+    widest = np.arccos(np.sqrt(max(float(case.metric(np.asarray(case.reach))[0]), 0.0) / m)) - 0.05
+    times = np.linspace(0.2, 4.0, 9)
+    for angle in (0.7 * widest, -0.6 * widest, np.pi - 0.5 * widest, np.pi + 0.8 * widest):
+        p = np.sqrt(m) * np.cos(angle)
+        raw = hamiltonian_flow(case.metric, p, start, times, np.sin(angle))
+        path = extremal(surface, angle, start)
+        latitude, longitude, slope = path.state(times)
+        np.testing.assert_allclose(np.stack([latitude, longitude, slope]), raw[:3], rtol=0, atol=5e-12)
+        d_phi, d_theta = path.direction_derivative(times)
+        scale = -np.sqrt(m) * np.sin(angle)
+        np.testing.assert_allclose(np.stack([d_phi, d_theta]) / scale, raw[3:5], rtol=0, atol=3e-10)
+
+
+def test_o2_clairaut_parallels_and_meridians(case):
+    surface = case.surface()
+    p = np.array(case.momenta)
+    times = np.linspace(0.0, 5.0, 21)
+    path = extremal(surface, surface.direction_of(p))
+    latitude, longitude, slope = path.state(times)
+    # m theta' = p: the angle to the parallels times the radius is kept.
+    np.testing.assert_allclose(surface.metric(latitude) * (1.0 - slope**2), (p**2)[:, None] + 0 * times, rtol=2e-13)
+    rate = 1e-4
+    _, ahead, _ = path.state(times + rate)
+    _, behind, _ = path.state(times - rate)
+    # An extremal may start 1e-4 before the start: time runs both ways.
+    np.testing.assert_allclose((ahead - behind) / (2 * rate) * surface.metric(latitude) / p[:, None], 1.0, atol=3e-7)
+    equator = extremal(surface, 0.0).state(times)
+    np.testing.assert_allclose(equator[0], 0.0, atol=1e-300)
+    np.testing.assert_allclose(equator[1], times / surface.greatest_momentum, rtol=1e-14)
+    assert longitude.shape == (len(p), len(times))
+
+
+def test_o2_a_meridian_runs_over_both_poles():
+    surface = ellipsoid(0.7)
+    times = np.linspace(0.1, 0.9, 5) * float(surface.period(0.0))
+    latitude, longitude, _ = extremal(surface, 0.5 * np.pi).state(times)
+    quarter = float(surface.period(0.0)) / 4.0
+    expected = np.array([t if t < quarter else 2 * quarter - t if t < 3 * quarter else t - 4 * quarter for t in times])
+    np.testing.assert_allclose(latitude, expected, atol=1e-14)
+    np.testing.assert_allclose(longitude, np.pi * np.round(times / (2 * quarter)), atol=1e-14)
+
+
+def test_o3_potential_and_turning_points(case):
+    surface = case.surface()
+    for p in case.momenta:
+        top = brentq(lambda x, p=p: float(case.metric(np.asarray(x))[0]) - p * p, 0.0, case.reach, xtol=1e-15)
+        turning, _, slope = extremal(surface, surface.direction_of(p)).state(float(surface.period(p)) / 4.0)
+        assert abs(float(turning) - top) < 2e-13
+        assert abs(float(slope)) < 1e-12
+        assert float(surface.potential(turning, p)) == pytest.approx(1.0, abs=1e-13)
+        assert float(surface.potential(0.4 * top, p)) == pytest.approx(
+            p * p / float(case.metric(np.asarray(0.4 * top))[0]), rel=1e-13
+        )
+
+
+def test_o4_assumptions_are_checked(case):
+    found = assumptions(lambda x: case.metric(x)[:2], case.reach)
+    assert found.equator_is_parallel
+    assert found.is_symmetric
+    assert found.falls_to_reach
+    curvature = curvature_of(case.metric, case.reach * np.linspace(0, 0.999, 400))
+    greatest = bool((curvature[1:] < curvature[0]).all() and curvature[0] > 0)
+    assert case.surface().is_greatest_curvature_on_equator() == greatest
+
+
+def test_o4_metrics_that_break_an_assumption_are_refused():
+    tilted = assumptions(lambda x: (np.cos(x - 0.1) ** 2, -np.sin(2 * x - 0.2)), 1.0)
+    assert not tilted.equator_is_parallel
+    assert not tilted.is_symmetric
+    with pytest.raises(ShapeError, match=r"\(A1\)"):
+        surface_of_metric(lambda x: (np.cos(x - 0.1) ** 2, -np.sin(2 * x - 0.2)), 1.0)
+    with pytest.raises(ShapeError, match=r"\(A2\)"):
+        surface_of_metric(lambda x: (np.exp(-(x**2) - x**3 / 9), -(2 * x + x**2 / 3) * np.exp(-(x**2) - x**3 / 9)), 1.0)
+    with pytest.raises(ShapeError, match="fall"):
+        surface_of_metric(lambda x: torus_metric(x)[:2], 4.0)
+    with pytest.raises(ShapeError, match="derivative"):
+        surface_of_metric(lambda x: (np.cos(x) ** 2, -1.01 * np.sin(2 * x)), 1.0)
+    with pytest.raises(ShapeError, match="reach"):
+        surface_of_metric(lambda x: torus_metric(x)[:2], -1.0)
+    with pytest.raises(ShapeError, match="finite"):
+        surface_of_metric(lambda x: (np.cos(x) ** 2, np.full_like(x, np.nan)), 1.0)
+    with pytest.raises(ShapeError, match="positive"):
+        surface_of_metric(lambda x: (np.cos(x) ** 2 - 0.5, -np.sin(2 * x)), 1.0)
+    with pytest.raises(AccuracyNotReached):
+        surface_of_metric(lambda x: (1 - x**2 + np.abs(x) ** 3 / 9, -2 * x + x * np.abs(x) / 3), 0.8)
+
+
+def test_o5_jacobi_fields_by_two_routes_and_the_raw_equations(case):
+    surface = case.surface()
+    for p in case.momenta:
+        angle = float(surface.direction_of(p))
+        times = np.linspace(0.2, 1.1 * float(surface.period(p)), 8)
+        field = extremal(surface, angle).jacobi_field(times)
+        size = np.abs(field).max()
+        np.testing.assert_allclose(variational_jacobi_field(surface, angle, times), field, rtol=0, atol=1e-10 * size)
+        raw = hamiltonian_flow(case.metric, p, 0.0, times, unit_slope(case.metric, p, 0.0))
+        d_phi, d_theta = extremal(surface, angle).direction_derivative(times)
+        scale = -float(surface.greatest_momentum) * np.sin(angle)
+        np.testing.assert_allclose(d_phi / scale, raw[3], rtol=0, atol=1e-10 * np.abs(raw[3]).max())
+        np.testing.assert_allclose(d_theta / scale, raw[4], rtol=0, atol=1e-10 * np.abs(raw[4]).max())
+
+
+def test_o5_poincare_field_and_homogeneity(case):
+    surface = case.surface()
+    p = case.momenta[1]
+    times = np.array([0.7, 2.9])
+    path = extremal(surface, surface.direction_of(p))
+    by_phi, by_theta = path.poincare_field(times)
+    _, _, slope = path.state(times)
+    # alpha(J_2) = t 2H = t, alpha(J_1) = 0.
+    np.testing.assert_allclose(slope * by_phi + p * by_theta, times, rtol=1e-13)
+    # q(t, lambda p) = q(lambda t, p): the derivative by lambda.
+    h = 1e-5
+    ahead, behind = path.state(times * (1 + h)), path.state(times * (1 - h))
+    np.testing.assert_allclose(by_phi, (ahead[0] - behind[0]) / (2 * h), atol=1e-8)
+    np.testing.assert_allclose(by_theta, (ahead[1] - behind[1]) / (2 * h), atol=1e-8)
+
+
+def test_o6_vertical_field_is_normal_to_the_extremal(case):
+    surface = case.surface()
+    for p in case.momenta:
+        path = extremal(surface, surface.direction_of(p))
+        times = np.linspace(0.1, 7.0, 15)
+        _, _, slope = path.state(times)
+        d_phi, d_theta = path.direction_derivative(times)
+        np.testing.assert_allclose(slope * d_phi + p * d_theta, 0.0, atol=1e-13 * np.abs(d_phi).max())
+
+
+def test_o7_no_conjugate_time_before_the_turning_point(case):
+    surface = case.surface()
+    p = np.array(case.momenta)
+    fraction = np.linspace(0.01, 1.0, 30)
+    for one in p:
+        times = fraction * float(surface.period(one)) / 4.0
+        assert (extremal(surface, surface.direction_of(one)).jacobi_field(times) > 0.0).all()
+    assert (conjugate_points_of_momentum(surface, p).time > surface.period(p) / 4.0).all()
+
+
+def test_o8_period_and_first_return_against_quadrature(case):
+    surface = case.surface()
+    for p in case.momenta:
+        top = brentq(lambda x, p=p: float(case.metric(np.asarray(x))[0]) - p * p, 0.0, case.reach, xtol=1e-15)
+
+        def weight(u, p=p, top=top):
+            phi = top * (1.0 - u * u)
+            m = float(case.metric(np.asarray(phi))[0])
+            return phi, m, 2.0 * top * u * np.sqrt(m / (m - p * p))
+
+        options = {"epsabs": 1e-12, "epsrel": 1e-12, "limit": 200}
+        period = 4.0 * quad(lambda u, w=weight: w(u)[2], 1e-5, 1.0, **options)[0]
+        turn = 2.0 * quad(lambda u, w=weight, p=p: p / w(u)[1] * w(u)[2], 1e-5, 1.0, **options)[0]
+        rest = weight(1e-5)
+        assert float(surface.period(p)) == pytest.approx(period + 4e-5 * rest[2], rel=1e-8)
+        assert float(surface.first_return(p)) == pytest.approx(turn + 2e-5 * p / rest[1] * rest[2], rel=1e-8)
+        times = np.array([0.5, 1.0]) * float(surface.period(p))
+        raw = hamiltonian_flow(case.metric, p, 0.0, times, unit_slope(case.metric, p, 0.0))
+        np.testing.assert_allclose(raw[0], 0.0, atol=2e-11)
+        np.testing.assert_allclose(raw[1], float(surface.first_return(p)) * np.array([1.0, 2.0]), rtol=1e-11)
+
+
+def test_o8_reference_values_of_the_andoyer_metric():
+    """theory.md section 6, to all printed digits."""
+    surface = CASES["andoyer"].surface()
+    table = {
+        1.70: (11.3634614556, 3.2816745281, -0.094594, 3.565678),
+        1.60: (13.3636563838, 3.8894133371, -0.644765, 5.025759),
+        1.50: (17.0851557433, 5.0954738015, -1.152362, 7.022735),
+        1.43: (25.3967481375, 7.9511732331, -1.676710, 11.331023),
+        1.42: (30.3253866338, 9.6815243490, -1.829686, 13.924233),
+    }
+    for p, (period, turn, latitude, longitude) in table.items():
+        point = conjugate_points_of_momentum(surface, p)
+        assert f"{float(surface.period(p)):.10f}" == f"{period:.10f}"
+        assert f"{float(surface.first_return(p)):.10f}" == f"{turn:.10f}"
+        assert f"{float(point.latitude):.6f}" == f"{latitude:.6f}"
+        assert f"{float(point.longitude):.6f}" == f"{longitude:.6f}"
+    assert surface.reach == pytest.approx(2.0646141015, abs=5e-11)
+    assert float(surface.first_return(np.sqrt(3.0))) == pytest.approx(np.pi, abs=1e-13)
+    assert float(surface.curvature(0.0)) == pytest.approx(1 / 3, abs=1e-13)
+    assert float(surface.curvature(surface.reach)) == pytest.approx(-1 / 6, abs=1e-9)
+
+
+def test_o8_the_stretch_of_the_andoyer_metric_in_closed_form_gives_the_same():
+    a, b, c = ANDOYER
+
+    def stretch(square, rest):
+        u, v = b * rest, c - a - c * square
+        d = np.sqrt(a / (u * v))
+        first = 0.5 * d * (b / u + c / v)
+        return d, first, 0.5 * first * (b / u + c / v) + 0.5 * d * (b * b / u**2 + c * c / v**2)
+
+    closed = surface_of_stretch(stretch, 1.0 / a, 1.0 - a / b, "parallel")
+    table = CASES["andoyer"].surface()
+    for surface in (closed, table):
+        assert float(surface.curvature(surface.reach)) == pytest.approx(-1 / 6, abs=1e-9)
+    p = np.sqrt(3.0 - np.array([1e-12, 1e-4, 0.1, 0.5, 0.9, 0.99, 0.99999]))
+    for name in ("period", "first_return"):
+        np.testing.assert_allclose(getattr(table, name)(p), getattr(closed, name)(p), rtol=1e-11)
+    np.testing.assert_allclose(table.first_return_rate(p), closed.first_return_rate(p), rtol=1e-9)
+    np.testing.assert_allclose(table.first_return_second_rate(p), closed.first_return_second_rate(p), rtol=1e-7)
+
+
+def test_o9_tame_flows_and_proposition_2(case):
+    surface = case.surface()
+    kinds = {"andoyer": "decreasing", "torus": "decreasing", "boundary": "decreasing", "bulged": "neither"}
+    name = next(n for n, c in CASES.items() if c is case)
+    assert surface.tameness() == kinds[name]
+    p = np.array(case.momenta)
+    half = surface.period(p) / 2.0
+    tame = surface.first_return(p + 1e-6) < surface.first_return(p - 1e-6)
+    np.testing.assert_array_equal(conjugate_points_of_momentum(surface, p).time > half, tame)
+    for one in p[tame]:
+        inside = float(surface.period(one)) / 2.0 * np.linspace(0.01, 0.999, 50)
+        assert (extremal(surface, surface.direction_of(one)).jacobi_field(inside) > 0.0).all()
+
+
+def curvature_of(metric, phi):
+    m, m1, m2 = metric(np.asarray(phi))
+    return (m1**2 - 2.0 * m * m2) / (4.0 * m**2)
+
+
+def test_o10_gauss_curvature(case):
+    surface = case.surface()
+    phi = case.reach * np.array([0.0, 1e-3, 0.1, -0.4, 0.7, 0.9])
+    np.testing.assert_allclose(surface.curvature(phi), curvature_of(case.metric, phi), rtol=0, atol=2e-11)
+
+
+def test_o11_first_conjugate_point_of_the_equator_is_a_cusp(case):
+    surface = case.surface()
+    curvature = float(curvature_of(case.metric, 0.0))
+    times = [float(conjugate_points(surface, 0.0, i).time) for i in (1, 2, 3)]
+    np.testing.assert_allclose(times, np.pi / np.sqrt(curvature) * np.array([1, 2, 3]), rtol=1e-12)
+    angles = np.linspace(-0.3, 0.3, 61)
+    points = conjugate_points(surface, angles)
+    # A cusp: the locus goes as (angle^2, angle^3) there.
+    step = 0.01
+    near = conjugate_points(surface, step * np.array([1.0, 2.0]))
+    tip = float(conjugate_points(surface, 0.0).longitude)
+    assert (near.longitude[1] - tip) / (near.longitude[0] - tip) == pytest.approx(4.0, rel=0.02)
+    assert near.latitude[1] / near.latitude[0] == pytest.approx(8.0, rel=0.02)
+    if surface.is_greatest_curvature_on_equator():
+        assert points.time.argmin() == 30
+
+
+def test_o11_the_injectivity_radius_is_the_first_conjugate_time_on_the_equator():
+    for aspect in (0.3, 0.9):
+        times = cut_time(ellipsoid(aspect), np.linspace(-np.pi / 2, np.pi / 2, 101))
+        assert times.argmin() == 50
+        # G = 1/epsilon^2 on the equator.
+        assert times.min() == pytest.approx(np.pi * aspect, abs=1e-14)
+
+
+def envelope_latitude(case, p, order):
+    """Latitude of the envelope of neighbouring extremals on their branch, by differences of integrated extremals."""
+    h = 1e-3
+    surface_period = case.surface().period
+
+    def longitude_at(latitude, momentum):
+        quarter = float(surface_period(momentum)) / 4.0
+
+        def rate(_, z):
+            m, m1, _ = (float(a) for a in case.metric(np.asarray(z[0])))
+            return [z[2], momentum / m, 0.5 * momentum**2 * m1 / m**2]
+
+        def crossing(_, z):
+            return z[0] - latitude
+
+        first = [0.0, 0.0, unit_slope(case.metric, momentum, 0.0)]
+        at_turn = solve_ivp(rate, (0.0, (2 * order - 1) * quarter), first, method="DOP853", rtol=1e-13, atol=1e-14).y
+        span = (0.0, 2.0 * quarter)
+        branch = solve_ivp(
+            rate, span, at_turn[:, -1], method="DOP853", rtol=1e-13, atol=1e-14, events=crossing
+        ).y_events
+        return float(branch[0][0][1])
+
+    def slope(latitude):
+        values = [longitude_at(latitude, p + k * h) for k in (-2, -1, 1, 2)]
+        return (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
+
+    return slope
+
+
+@pytest.mark.parametrize(
+    ("name", "p", "order"),
+    [("andoyer", 1.6, 1), ("torus", 2.0, 1), pytest.param("torus", 2.3, 2, marks=pytest.mark.full)],
+)
+def test_o12_conjugate_points_by_three_routes(name, p, order):
+    case = CASES[name]
+    surface = case.surface()
+    point = conjugate_points_of_momentum(surface, p, order)
+    angle = float(surface.direction_of(p))
+    time = float(point.time)
+
+    def field(t):
+        return float(variational_jacobi_field(surface, angle, [t])[0])
+
+    assert brentq(field, time - 0.01, time + 0.01, xtol=1e-13) == pytest.approx(time, abs=1e-10)
+
+    def raw(t):
+        return hamiltonian_flow(case.metric, p, 0.0, [t], unit_slope(case.metric, p, 0.0))[3][0]
+
+    assert brentq(raw, time - 0.01, time + 0.01, xtol=1e-13) == pytest.approx(time, abs=1e-10)
+    slope = envelope_latitude(case, p, order)
+    found = brentq(slope, float(point.latitude) - 0.01, float(point.latitude) + 0.01, xtol=1e-10)
+    assert found == pytest.approx(float(point.latitude), abs=1e-7)
+
+
+def test_o12_general_points_and_orders_against_the_raw_equations(case):
+    surface = case.surface()
+    start = 0.35 * case.reach
+    m = float(case.metric(np.asarray(start))[0])
+    end = max(float(case.metric(np.asarray(case.reach))[0]), 0.0)
+    widest = np.arccos(np.sqrt(end / m))
+    for fraction, order in ((0.6, 1), (-0.5, 1), (0.8, 2), (-0.3, 3)):
+        angle = fraction * widest
+        time = float(conjugate_points(surface, angle, order, start).time)
+        p = np.sqrt(m) * np.cos(angle)
+        normal = hamiltonian_flow(case.metric, p, start, np.linspace(time / 40, time - 1e-6, 500), np.sin(angle))
+        # The sign of the field normal to the extremal: that of d phi/p, as d theta = -p_phi d phi/p.
+        assert np.count_nonzero(np.diff(np.sign(normal[3]))) == order - 1
+
+        def raw(t, p=p, angle=angle):
+            return hamiltonian_flow(case.metric, p, start, [t], np.sin(angle))[3][0]
+
+        assert brentq(raw, time - 0.01, time + 0.01, xtol=1e-13) == pytest.approx(time, abs=1e-10)
+
+
+def test_o12_from_a_turning_point_the_next_turning_points_are_conjugate(case):
+    surface = case.surface()
+    latitude = 0.4 * case.reach
+    p = float(surface.momentum_of(0.0, latitude))
+    for order in (1, 2):
+        point = conjugate_points(surface, 0.0, order, latitude)
+        assert float(point.time) == pytest.approx(order * float(surface.period(p)) / 2, rel=1e-12)
+        assert float(point.longitude) == pytest.approx(order * float(surface.first_return(p)), rel=1e-12)
+        assert float(point.latitude) == pytest.approx((-1) ** order * latitude, abs=1e-12)
+
+
+def test_o13_derivative_of_the_conjugate_latitude(case):
+    """phi_1c' = (R'' + integral of f_pp)/f_p, each by itself."""
+    surface = case.surface()
+    h = 1e-4
+    for p in case.momenta[:2]:
+        phi = float(conjugate_points_of_momentum(surface, p).latitude)
+        m = float(case.metric(np.asarray(phi))[0])
+        f_p = np.sqrt(m) / (m - p * p) ** 1.5
+        values = conjugate_points_of_momentum(surface, p + h * np.array([-2, -1, 1, 2])).latitude
+        slope = (values[0] - 8 * values[1] + 8 * values[2] - values[3]) / (12 * h)
+
+        def f_pp(x, p=p):
+            m = float(case.metric(np.asarray(x))[0])
+            return 3.0 * p * np.sqrt(m) / (m - p * p) ** 2.5
+
+        combined = float(surface.first_return_second_rate(p)) + quad(f_pp, phi, 0.0, epsabs=1e-12, epsrel=1e-12)[0]
+        assert float(conjugate_height_rate(surface, p)) == pytest.approx(combined, rel=1e-8)
+        assert slope * f_p == pytest.approx(combined, rel=1e-6)
+        second = float(conjugate_points_of_momentum(surface, p, 2).latitude)
+        combined = 2.0 * float(surface.first_return_second_rate(p)) + quad(f_pp, 0.0, second, epsrel=1e-12)[0]
+        assert float(conjugate_height_rate(surface, p, 2)) == pytest.approx(combined, rel=1e-8)
+
+
+def test_o13_proposition_3_no_cusp_on_a_branch_where_the_first_return_is_convex():
+    surface = CASES["andoyer"].surface()
+    p = np.sqrt(np.linspace(2.01, 2.999, 200))
+    assert (surface.first_return_second_rate(p) > 0.0).all()
+    assert (conjugate_height_rate(surface, p) > 0.0).all()
+    assert (np.diff(conjugate_points_of_momentum(surface, p).latitude) > 0.0).all()
+    locus = conjugate_locus(surface, 200)
+    np.testing.assert_allclose(np.mod(locus.cusp_directions + 0.1, np.pi), 0.1, atol=1e-12)
+    assert locus.cusps == 2
+
+
+def test_o14_rates_of_the_first_return_and_of_the_period(case):
+    surface = case.surface()
+    p = np.array(case.momenta)
+    h = 2e-3
+    for values, rate in (
+        (surface.period, 2.0 * p * surface.first_return_rate(p)),
+        (surface.first_return, surface.first_return_rate(p)),
+        (surface.first_return_rate, surface.first_return_second_rate(p)),
+        (surface.period_rate, surface.period_second_rate(p)),
+    ):
+        # Richardson's sixth-order difference.
+        around = {k: values(p + k * h) for k in (-3, -2, -1, 1, 2, 3)}
+        slope = (45 * (around[1] - around[-1]) - 9 * (around[2] - around[-2]) + around[3] - around[-3]) / (60 * h)
+        np.testing.assert_allclose(slope, rate, rtol=2e-5, atol=1e-9)
+
+
+def test_o14_r_rate_is_half_the_period_rate_over_p_in_high_precision():
+    """Lemma 2.8 by mpmath's derivatives of quadratures of the torus, to 1e-10 and far below."""
+    surface = CASES["torus"].surface()
+    with mp.workdps(40):
+        for p in (1.1, 2.0, 2.8):
+
+            def along(momentum, power):
+                top = mp.acos(momentum - 2)
+
+                def integrand(u):
+                    phi = top * (1 - u * u)
+                    r = 2 + mp.cos(phi)
+                    # r - p as a product: a difference has no digits next to the turning point.
+                    rest = 2 * mp.sin((top + phi) / 2) * mp.sin(top * u * u / 2) * (r + momentum)
+                    return 2 * top * u * r / mp.sqrt(rest) * (momentum / r**2) ** power
+
+                return mp.quad(integrand, [0, 1])
+
+            period_rate = mp.diff(lambda q: 4 * along(q, 0), mp.mpf(p), h=mp.mpf(10) ** -12)
+            return_rate = mp.diff(lambda q: 2 * along(q, 1), mp.mpf(p), h=mp.mpf(10) ** -12)
+            assert abs(float(return_rate - period_rate / (2 * mp.mpf(p)))) < 1e-10
+            assert float(surface.first_return_rate(p)) == pytest.approx(float(return_rate), rel=1e-11)
+            assert float(surface.period_rate(p)) == pytest.approx(float(period_rate), rel=1e-11)
+            assert float(surface.period(p)) == pytest.approx(float(4 * along(mp.mpf(p), 0)), rel=1e-13)
+            assert float(surface.first_return(p)) == pytest.approx(float(2 * along(mp.mpf(p), 1)), rel=1e-13)
+
+
+def reversals(surface, order, latitude):
+    points = conjugate_points(surface, 2.0 * np.pi * (np.arange(360) + 0.3) / 360, order, latitude)
+    step = np.stack([np.roll(points.latitude, -1) - points.latitude, np.roll(points.longitude, -1) - points.longitude])
+    step[1] = (step[1] + np.pi) % (2 * np.pi) - np.pi
+    return np.count_nonzero(np.sum(step * np.roll(step, 1, axis=1), axis=0) < 0.0)
+
+
+@pytest.mark.parametrize("aspect", [0.6, 0.9, 1.3])
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("latitude", [0.0, 0.4])
+def test_o15_four_cusps_of_every_caustic(aspect, order, latitude):
+    surface = ellipsoid(aspect)
+    locus = conjugate_locus(surface, 360, order, latitude)
+    assert locus.cusps == 4
+    # The same by the locus itself: the velocity of the point reverses four times. No direction is along an axis.
+    assert reversals(surface, order, latitude) == 4
+
+
+@pytest.mark.parametrize("latitude", [0.0, -0.3])
+def test_o15_the_sampled_locus_is_that_of_its_directions(case, latitude):
+    surface = case.surface()
+    locus = conjugate_locus(surface, 24, 2, latitude)
+    assert (np.diff(locus.points.direction) > 0.0).all()
+    points = conjugate_points(surface, locus.points.direction, 2, latitude)
+    for name, values in vars(points).items():
+        np.testing.assert_allclose(getattr(locus.points, name), values, rtol=0, atol=1e-10, err_msg=name)
+    rate = conjugate_locus(surface, locus.points.direction, 2, latitude).time_rate
+    np.testing.assert_allclose(locus.time_rate, rate, rtol=1e-7, atol=1e-8)
+
+
+def test_o15_eight_cusps_where_the_curvature_is_not_monotone_and_the_rate_of_the_time():
+    surface = CASES["bulged"].surface()
+    angles = np.array([-2.6, -1.1, 0.3, 1.0, 2.2])
+    assert conjugate_locus(surface, 200).cusps == reversals(surface, 1, 0.0) == 8
+    for latitude in (0.0, 0.3):
+        for order in (1, 2):
+            h = 1e-3
+            times = {k: conjugate_points(surface, angles + k * h, order, latitude).time for k in (-2, -1, 1, 2)}
+            slope = (times[-2] - 8 * times[-1] + 8 * times[1] - times[2]) / (12 * h)
+            rate = conjugate_locus(surface, angles, order, latitude).time_rate
+            np.testing.assert_allclose(rate, slope, rtol=0, atol=1e-9)
+
+
+def test_o16_cut_locus_is_an_arc_of_the_opposite_parallel_or_meridian():
+    oblate, prolate, sphere = ellipsoid(0.7), ellipsoid(1.4), ellipsoid(1.0)
+    for latitude in (0.0, 0.5):
+        arc = cut_locus(oblate, latitude)
+        assert arc.kind == "parallel"
+        assert arc.latitudes == (-latitude, -latitude)
+        p = float(oblate.momentum_of(0.0, latitude))
+        np.testing.assert_allclose(
+            arc.longitudes, np.pi + np.array([-1, 1]) * (np.pi - oblate.first_return(p)), atol=1e-12
+        )
+        arc = cut_locus(prolate, latitude)
+        assert arc.kind == "meridian"
+        assert arc.longitudes == (np.pi, np.pi)
+    assert cut_locus(oblate).longitudes[0] == pytest.approx(0.7 * np.pi, abs=1e-13)
+    assert cut_locus(sphere, 0.3).kind == "point"
+    assert cut_time(sphere, 0.7) == pytest.approx(np.pi, abs=1e-13)
+    with pytest.raises(ShapeError, match="smooth spheres"):
+        cut_locus(CASES["torus"].surface())
+    with pytest.raises(ShapeError, match="poles"):
+        cut_locus(oblate, oblate.reach)
+
+
+@pytest.mark.parametrize("aspect", [0.7, 1.4])
+def test_o16_at_the_cut_time_the_mirror_image_arrives_and_no_shorter_way_exists(aspect):
+    surface = ellipsoid(aspect)
+    latitude = 0.3
+    angles = np.array([0.2, 0.9, 1.4, -0.5, 2.1])
+    times = cut_time(surface, angles, latitude)
+    assert (times <= conjugate_points(surface, angles, 1, latitude).time + 1e-12).all()
+    fan = np.linspace(-np.pi, np.pi, 1441)
+    paths = extremal(surface, fan, latitude)
+    for angle, time in zip(angles, times):
+        end = [float(a) for a in extremal(surface, angle, latitude).state(time)]
+        mirror = np.pi - angle if aspect > 1 else -angle
+        other = [float(a) for a in extremal(surface, mirror, latitude).state(time)]
+        assert other[0] == pytest.approx(end[0], abs=1e-11)
+        assert np.cos(other[1] - end[1]) == pytest.approx(1.0, abs=1e-11)
+        # The sphere of radius slightly less: none of its points is the end, as that is farther.
+        shorter = paths.state(0.98 * time)
+        distance = np.hypot(
+            shorter[0] - end[0], np.sin(0.5 * (shorter[1] - end[1])) * 2 * np.sqrt(surface.metric(end[0]))
+        )
+        assert distance.min() > 0.015 * time
+
+
+def test_o16_cut_times_end_in_the_conjugate_time_at_the_ends_of_the_arc():
+    for aspect, tips in ((0.7, (0.0, np.pi)), (1.4, (0.5 * np.pi, -0.5 * np.pi))):
+        surface = ellipsoid(aspect)
+        np.testing.assert_allclose(
+            cut_time(surface, np.array(tips), 0.2), conjugate_points(surface, np.array(tips), 1, 0.2).time, atol=1e-11
+        )
+        near = cut_time(surface, np.array(tips) + 1e-4, 0.2)
+        np.testing.assert_allclose(near, cut_time(surface, np.array(tips), 0.2), atol=1e-6)
+
+
+def test_momenta_and_directions_out_of_range_are_refused():
+    torus = CASES["torus"].surface()
+    for bad in (3.1, 1.0 + 1e-10, 1.0, 0.5, -0.9, np.nan):
+        with pytest.raises(ShapeError, match="momentum"):
+            torus.period(bad)
+    with pytest.raises(ShapeError, match="momentum"):
+        extremal(torus, 1.5)
+    with pytest.raises(ShapeError, match="order"):
+        conjugate_points(torus, 0.3, 0)
+    with pytest.raises(ShapeError, match="infinite"):
+        conjugate_height_rate(torus, 3.0)
+    with pytest.raises(ShapeError, match="ascending"):
+        conjugate_locus(torus, [0.3, 0.2])
+    with pytest.raises(ShapeError, match="latitude"):
+        torus.height(3.2)
+    with pytest.raises(ShapeError, match="height"):
+        torus.latitude(1.0)
+    with pytest.raises(ShapeError, match="8"):
+        conjugate_locus(torus, 4)
+    with pytest.raises(ShapeError, match="end"):
+        surface_of_stretch(unit_ellipsoid_stretch(0.5), 1.0, 1.0, "edge")
+    with pytest.raises(ShapeError, match="depth"):
+        surface_of_stretch(unit_ellipsoid_stretch(0.5), 1.0, 0.9)
+    with pytest.raises(ShapeError, match="stretch"):
+        surface_of_stretch(lambda y, _: (y - 0.5, 0 * y + 1, 0 * y), 1.0, 1.0)
+    with pytest.raises(ShapeError, match="times"):
+        variational_jacobi_field(torus, 0.2, [1.0, 0.5])
+    cone = surface_of_stretch(unit_ellipsoid_stretch(0.5), 2.0, 1.0)
+    assert not cone.has_smooth_poles
+    with pytest.raises(ShapeError, match="tip"):
+        cone.period(0.0)
+
+
+def test_results_are_odd_and_even_as_they_should_be():
+    torus = CASES["torus"].surface()
+    p = np.array([[1.5, -1.5], [2.0, -2.0]])
+    assert torus.first_return(p).shape == (2, 2)
+    np.testing.assert_array_equal(torus.first_return(p)[:, 0], -torus.first_return(p)[:, 1])
+    np.testing.assert_array_equal(torus.period(p)[:, 0], torus.period(p)[:, 1])
+    points = conjugate_points(torus, np.array([0.4, -0.4, np.pi - 0.4, np.pi + 0.4]), 1)
+    np.testing.assert_allclose(points.latitude, points.latitude[0] * np.array([1, -1, 1, -1]), atol=1e-13)
+    np.testing.assert_allclose(points.longitude, points.longitude[0] * np.array([1, 1, -1, -1]), atol=1e-13)

@@ -1,0 +1,577 @@
+"""Lie algebras, the Euler-Poincare equations and Poinsot's theorem on them, against laws and other representations."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm, logm
+
+from shapephase import so3 as rotations
+from shapephase.errors import AccuracyNotReached, ShapeError, ShapePhaseError, SingularInertiaError
+from shapephase.inertia_tensor import second_moment
+from shapephase.rigid_body.lie.euler_poincare import euler_poincare_motion, euler_poincare_rate
+from shapephase.rigid_body.lie.generalised_poinsot import (
+    contact_conormal,
+    contact_velocity,
+    invariable_hyperplane,
+    rolling_contact,
+)
+from shapephase.rigid_body.lie.group_kinematics import (
+    adjoint_action,
+    body_momentum,
+    body_velocity,
+    coadjoint_action,
+    group_exponential,
+    space_momentum,
+    space_velocity,
+)
+from shapephase.rigid_body.lie.lagrangian import reduce_translations, se3_inertia
+from shapephase.rigid_body.lie.lie_algebra import (
+    LieAlgebra,
+    LieAlgebraError,
+    heisenberg,
+    lie_algebra_from_matrices,
+    se2,
+    se3,
+    sl2r,
+    so,
+    so3,
+    su2,
+)
+from shapephase.rigid_body.lie.lie_poisson import hamiltonian_vector_field, lie_poisson_bracket
+from shapephase.rigid_body.lie.n_dimensional_rigid_body import (
+    manakov_integrals,
+    momentum_traces,
+    n_dimensional_angular_velocity,
+    n_dimensional_inertia,
+    n_dimensional_momentum,
+    n_dimensional_rate,
+    pfaffian,
+)
+
+ALGEBRAS = [so3(), so(2), so(4), so(5), sl2r(), se2(), se3(), su2(), heisenberg()]
+each_algebra = pytest.mark.parametrize("algebra", ALGEBRAS, ids=lambda a: a.name)
+# The algebras on which the generalised theorem of Poinsot is followed in time.
+rolling_algebra = pytest.mark.parametrize("algebra", [so3(), se3(), so(4), sl2r(), su2()], ids=lambda a: a.name)
+
+
+def inertia_of(algebra, rng):
+    root = rng.normal(size=(algebra.dimension,) * 2)
+    return root @ root.T + np.eye(algebra.dimension)
+
+
+def commutator(a, b):
+    return a @ b - b @ a
+
+
+# The algebra
+
+
+@each_algebra
+def test_bracket_is_the_commutator_of_matrices(algebra, rng):
+    a, b = rng.normal(size=(2, 4, algebra.dimension))
+    expected = commutator(algebra.matrix(a), algebra.matrix(b))
+    np.testing.assert_allclose(algebra.matrix(algebra.bracket(a, b)), expected, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(algebra.coordinates(expected), algebra.bracket(a, b), atol=1e-13, rtol=0)
+    np.testing.assert_allclose(algebra.ad(a) @ b[..., None], algebra.bracket(a, b)[..., None], atol=1e-14, rtol=0)
+
+
+@each_algebra
+def test_laws_of_the_algebra_are_exact_in_rational_numbers(algebra):
+    c = [[[Fraction(x) for x in row] for row in plane] for plane in algebra.structure.tolist()]
+    d = algebra.dimension
+    for i, j, k in product(range(d), repeat=3):
+        assert c[i][j][k] == -c[j][i][k]
+    for i, j, k, m in product(range(d), repeat=4):
+        terms = (c[i][j][s] * c[s][k][m] + c[j][k][s] * c[s][i][m] + c[k][i][s] * c[s][j][m] for s in range(d))
+        assert sum(terms) == 0
+
+
+@each_algebra
+def test_coad_is_the_dual_of_ad(algebra, rng):
+    a, b, mu = rng.normal(size=(3, 5, algebra.dimension))
+    np.testing.assert_allclose(
+        np.sum(algebra.coad(a, mu) * b, axis=-1),
+        np.sum(mu * algebra.bracket(a, b), axis=-1),
+        atol=1e-13,
+        rtol=0,
+    )
+
+
+def test_so3_is_the_cross_product_and_coad_gives_pi_cross_omega(rng):
+    a, b = rng.normal(size=(2, 6, 3))
+    for algebra in (so3(), so(3), su2()):
+        np.testing.assert_allclose(algebra.bracket(a, b), np.cross(a, b), atol=1e-15, rtol=0)
+        np.testing.assert_allclose(algebra.coad(a, b), np.cross(b, a), atol=1e-15, rtol=0)
+    np.testing.assert_array_equal(so3().matrix(a), rotations.hat(a))
+
+
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_killing_form_of_so_n_is_the_known_multiple_of_the_trace(n, rng):
+    # B(A, B) = (n - 2) tr(AB), an identity of so(n).
+    algebra = so(n)
+    a, b = rng.normal(size=(2, algebra.dimension))
+    known = (n - 2) * np.trace(algebra.matrix(a) @ algebra.matrix(b))
+    assert a @ algebra.killing_form @ b == pytest.approx(known, rel=1e-14)
+
+
+def test_killing_form_of_sl2r_and_of_the_others():
+    # 4 tr(AB) on sl(2, R); zero on a nilpotent algebra; degenerate on a semidirect product.
+    expected = [[8.0, 0.0, 0.0], [0.0, 0.0, 4.0], [0.0, 4.0, 0.0]]
+    np.testing.assert_array_equal(sl2r().killing_form, expected)
+    np.testing.assert_array_equal(heisenberg().killing_form, 0.0)
+    assert np.linalg.matrix_rank(se3().killing_form) == 3
+    np.testing.assert_array_equal(so3().killing_form, -2.0 * np.eye(3))
+    # The affine group of the line is the smallest algebra that is not unimodular.
+    affine = np.zeros((2, 2, 2))
+    affine[0, 1, 1], affine[1, 0, 1] = 1.0, -1.0
+    assert not LieAlgebra(affine).is_unimodular
+    assert all(algebra.is_unimodular for algebra in ALGEBRAS)
+
+
+def test_m2_se3_dual_carries_the_heavy_top_bracket(rng):
+    # {F, G} = -Pi.(F_Pi x G_Pi) - Gamma.(F_Pi x G_Gamma - G_Pi x F_Gamma), and with it the heavy top's equations.
+    pi, gamma, f_pi, f_gamma, g_pi, g_gamma = rng.normal(size=(6, 20, 3))
+    known = -np.sum(pi * np.cross(f_pi, g_pi), -1)
+    known -= np.sum(gamma * (np.cross(f_pi, g_gamma) - np.cross(g_pi, f_gamma)), -1)
+    mu, df, dg = (np.concatenate(x, axis=-1) for x in ((pi, gamma), (f_pi, f_gamma), (g_pi, g_gamma)))
+    np.testing.assert_allclose(lie_poisson_bracket(df, dg, mu, se3()), known, atol=1e-13, rtol=0)
+    moments, weight, chi = np.array([1.0, 2.0, 2.7]), 1.3, np.array([0.0, 0.6, 0.8])
+    gradient = np.concatenate([pi / moments, np.broadcast_to(weight * chi, pi.shape)], axis=-1)
+    top = np.concatenate(
+        [np.cross(pi, pi / moments) + weight * np.cross(gamma, chi), np.cross(gamma, pi / moments)], axis=-1
+    )
+    np.testing.assert_allclose(hamiltonian_vector_field(gradient, mu, se3()), top, atol=1e-13, rtol=0)
+
+
+def test_b_e2_commutators_have_the_opposite_sign_to_the_printed_ones():
+    one, two, three = so3().matrix_basis
+    printed = ((one, two, -three), (one, three, two), (two, three, -one))
+    for a, b, said in printed:
+        assert np.abs(commutator(a, b) - said).max() == 2.0
+        np.testing.assert_array_equal(commutator(a, b), -said)
+    # With them Euler's equations come out right only because the bracket's sign is chosen wrong as well.
+    pi, moments = np.array([0.3, -1.1, 0.7]), np.array([1.0, 2.0, 3.0])
+    euler = [(1 / moments[k] - 1 / moments[j]) * pi[j] * pi[k] for j, k in ((1, 2), (2, 0), (0, 1))]
+    np.testing.assert_allclose(euler_poincare_rate(so3(), np.diag(moments), pi), euler, atol=1e-15, rtol=0)
+    flipped = LieAlgebra(-so3().structure)
+    np.testing.assert_allclose(
+        euler_poincare_rate(flipped, np.diag(moments), pi), np.negative(euler), atol=1e-15, rtol=0
+    )
+
+
+def test_any_basis_of_matrices_gives_its_algebra(rng):
+    mixing = rng.normal(size=(3, 3))
+    for algebra in (so3(), sl2r(), su2()):
+        other = lie_algebra_from_matrices(np.einsum("ij,jab->iab", mixing, algebra.matrix_basis))
+        # A change of basis is a congruence of the Killing form.
+        np.testing.assert_allclose(other.killing_form, mixing @ algebra.killing_form @ mixing.T, atol=1e-11, rtol=0)
+    with pytest.raises(LieAlgebraError, match="not linearly independent"):
+        lie_algebra_from_matrices([np.eye(2), 2.0 * np.eye(2)])
+    with pytest.raises(LieAlgebraError, match="closed"):
+        lie_algebra_from_matrices([[[0, 1], [0, 0]], [[0, 0], [1, 0]]])
+
+
+def test_numbers_that_are_no_lie_algebra_are_refused():
+    crossed = np.array(so3().structure)
+    crossed[0, 1, 2] += 1e-9
+    with pytest.raises(LieAlgebraError, match="antisymmetric"):
+        LieAlgebra(crossed)
+    bent = np.zeros((3, 3, 3))
+    bent[0, 1, 0], bent[1, 2, 0], bent[2, 0, 1] = 1.0, 1.0, 1.0
+    with pytest.raises(LieAlgebraError, match="Jacobi"):
+        LieAlgebra(bent - bent.swapaxes(0, 1))
+    with pytest.raises(LieAlgebraError, match="another basis"):
+        LieAlgebra(so3().structure, -so3().matrix_basis)
+    with pytest.raises(ShapeError, match="square"):
+        LieAlgebra(so3().structure, np.ones((3, 2, 3)))
+    for wrong in (np.zeros((2, 3, 3)), np.zeros(3), np.full((3, 3, 3), np.nan), "so3", np.zeros((0, 0, 0))):
+        with pytest.raises(ShapeError):
+            LieAlgebra(wrong)
+    for n in (1, 2.5, True, "3"):
+        with pytest.raises(LieAlgebraError, match="whole number"):
+            so(n)
+    masked = np.ma.masked_array(so3().matrix_basis, mask=np.zeros((3, 3, 3)) == 0)
+    with pytest.raises(ShapeError, match="masked"):
+        lie_algebra_from_matrices(masked)
+    with pytest.raises(ShapeError, match="rectangular"):
+        lie_algebra_from_matrices([[[1.0, 2.0], [3.0]]])
+    assert issubclass(LieAlgebraError, ShapePhaseError)
+    assert issubclass(LieAlgebraError, ValueError)
+
+
+def test_what_is_not_of_the_algebra_is_refused():
+    algebra = so3()
+    with pytest.raises(LieAlgebraError, match="not an element"):
+        algebra.coordinates(np.eye(3))
+    with pytest.raises(LieAlgebraError, match="only structure constants"):
+        LieAlgebra(algebra.structure).matrix([1.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match="n = 3"):
+        algebra.coordinates(np.eye(4))
+    with pytest.raises(ShapeError):
+        algebra.bracket([1.0, 2.0], [1.0, 2.0, 3.0])
+    with pytest.raises(ValueError, match="read-only"):
+        algebra.structure[0, 1, 2] = 5.0
+
+
+# Kinematics on the group
+
+
+@each_algebra
+def test_g5_body_and_space_trivialisations(algebra, rng):
+    g = group_exponential(algebra, 0.7 * rng.normal(size=(4, algebra.dimension)))
+    np.testing.assert_allclose(g[0], expm(algebra.matrix(algebra.coordinates(logm(g[0])))), atol=1e-10, rtol=0)
+    a = rng.normal(size=(4, algebra.dimension))
+    moved = g @ algebra.matrix(a)
+    np.testing.assert_allclose(body_velocity(algebra, g, moved), a, atol=1e-12, rtol=0)
+    # (15.4.6): V^S = Ad_g V^B.
+    in_space = space_velocity(algebra, g, moved)
+    np.testing.assert_allclose((adjoint_action(algebra, g) @ a[..., None])[..., 0], in_space, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(algebra.matrix(in_space) @ g, moved, atol=1e-12, rtol=0)
+    # (15.4.5): alpha^S = Ad*_{g^-1} alpha^B, and both pair with velocities as alpha does with V.
+    alpha = rng.normal(size=g.shape) + (1j * rng.normal(size=g.shape) if np.iscomplexobj(g) else 0.0)
+    body, space = body_momentum(algebra, g, alpha), space_momentum(algebra, g, alpha)
+    np.testing.assert_allclose((coadjoint_action(algebra, g) @ body[..., None])[..., 0], space, atol=1e-11, rtol=0)
+    value = np.sum(alpha.conj() * moved, axis=(-1, -2)).real
+    np.testing.assert_allclose(np.sum(body * a, axis=-1), value, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(np.sum(space * in_space, axis=-1), value, atol=1e-11, rtol=0)
+
+
+@each_algebra
+def test_adjoint_action_is_a_homomorphism_with_ad_as_its_rate(algebra, rng):
+    a, b, x = 0.5 * rng.normal(size=(3, algebra.dimension))
+    g, h = group_exponential(algebra, a), group_exponential(algebra, b)
+    np.testing.assert_allclose(
+        adjoint_action(algebra, g @ h),
+        adjoint_action(algebra, g) @ adjoint_action(algebra, h),
+        atol=1e-12,
+        rtol=0,
+    )
+    np.testing.assert_allclose(adjoint_action(algebra, g), expm(algebra.ad(a)), atol=1e-12, rtol=0)
+    turned = adjoint_action(algebra, g)
+    np.testing.assert_allclose(
+        algebra.bracket(turned @ b, turned @ x), turned @ algebra.bracket(b, x), atol=1e-12, rtol=0
+    )
+    np.testing.assert_allclose(coadjoint_action(algebra, g), np.linalg.inv(turned).T, atol=1e-12, rtol=0)
+
+
+def test_g5_spatial_momentum_of_so3_is_the_turned_one(rng):
+    rotation = rotations.exp(rng.normal(size=3))
+    np.testing.assert_allclose(adjoint_action(so3(), rotation), rotation, atol=1e-15, rtol=0)
+    np.testing.assert_allclose(coadjoint_action(so3(), rotation), rotation, atol=1e-15, rtol=0)
+
+
+def test_what_is_not_of_the_group_is_refused():
+    with pytest.raises(LieAlgebraError, match="singular"):
+        adjoint_action(so3(), np.zeros((3, 3)))
+    with pytest.raises(LieAlgebraError, match="not an element"):
+        adjoint_action(so3(), np.diag([1.0, 2.0, 3.0]))
+    with pytest.raises(LieAlgebraError, match="not an element"):
+        body_velocity(so3(), np.eye(3), np.eye(3))
+    with pytest.raises(ShapeError, match="complex"):
+        adjoint_action(so3(), 1j * np.eye(3))
+    with pytest.raises(ShapeError):
+        adjoint_action(so3(), np.eye(4))
+
+
+# The Euler-Poincare equations
+
+
+def raw_euler(moments, pi, times):
+    """Euler's equations by components, and R' = R hat(Omega), by SciPy: (N, 3), (N, 3, 3)."""
+
+    def rate(_, y):
+        omega = y[:3] / moments
+        return np.concatenate([np.cross(y[:3], omega), (y[3:].reshape(3, 3) @ rotations.hat(omega)).ravel()])
+
+    start = np.concatenate([pi, np.eye(3).ravel()])
+    run = solve_ivp(rate, (times[0], times[-1]), start, "DOP853", times, rtol=1e-13, atol=1e-15)
+    return run.y[:3].T, run.y[3:].T.reshape(-1, 3, 3)
+
+
+def test_g7_on_so3_it_is_the_free_rigid_body():
+    moments, pi, times = np.array([3.0, 2.0, 1.0]), np.array([0.4, 1.5, -0.7]), np.linspace(0.0, 10.0, 21)
+    momentum, attitude = raw_euler(moments, pi, times)
+    motion = euler_poincare_motion(so3(), np.diag(moments), pi, times)
+    np.testing.assert_allclose(motion.momentum, momentum, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(motion.attitude, attitude, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(motion.adjoint, motion.attitude, atol=1e-13, rtol=0)
+    # The same motion on the double cover.
+    covered = euler_poincare_motion(su2(), np.diag(moments), pi, times)
+    np.testing.assert_allclose(covered.momentum, momentum, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(adjoint_action(su2(), covered.attitude), attitude, atol=1e-11, rtol=0)
+
+
+def test_g7_a_batch_and_a_later_start_give_the_same_motions(rng):
+    inertia, momenta = inertia_of(so3(), rng), rng.normal(size=(2, 2, 3))
+    motion = euler_poincare_motion(so3(), inertia, momenta, np.linspace(1.0, 4.0, 4))
+    assert motion.momentum.shape == (2, 2, 4, 3)
+    assert motion.attitude.shape == (2, 2, 4, 3, 3)
+    for i, j in np.ndindex(2, 2):
+        alone = euler_poincare_motion(so3(), inertia, momenta[i, j], np.linspace(0.0, 3.0, 4))
+        np.testing.assert_allclose(motion.momentum[i, j], alone.momentum, atol=1e-13, rtol=0)
+        np.testing.assert_allclose(motion.attitude[i, j], alone.attitude, atol=1e-13, rtol=0)
+
+
+@each_algebra
+def test_g7_energy_and_space_momentum_are_constant_and_attitude_follows(algebra, rng):
+    motion = euler_poincare_motion(algebra, inertia_of(algebra, rng), rng.normal(size=algebra.dimension), [0, 0.7, 2.0])
+    np.testing.assert_allclose(motion.energy, motion.energy[0], rtol=3e-13)
+    np.testing.assert_allclose(
+        motion.space_momentum,
+        np.broadcast_to(motion.momentum[0], (3, algebra.dimension)),
+        atol=1e-12,
+        rtol=0,
+    )
+    np.testing.assert_allclose(adjoint_action(algebra, motion.attitude), motion.adjoint, atol=1e-12, rtol=0)
+    # The same constants through the group's matrices.
+    by_matrices = np.einsum("nij,nj->ni", coadjoint_action(algebra, motion.attitude), motion.momentum)
+    np.testing.assert_allclose(by_matrices, np.broadcast_to(motion.momentum[0], by_matrices.shape), atol=1e-12, rtol=0)
+
+
+def test_g7_on_se3_the_centre_of_mass_moves_straight_and_the_rest_turns_as_on_so3(rng):
+    masses, positions = rng.uniform(0.5, 2.0, 6), rng.normal(size=(6, 3))
+    twist, times = np.array([0.8, -0.3, 1.1, 0.2, 0.5, -0.4]), np.linspace(0.0, 6.0, 13)
+    operator = se3_inertia(masses, positions)
+    body = reduce_translations(masses, positions)
+    motion = euler_poincare_motion(se3(), operator, operator @ twist, times)
+    rotation, origin = motion.attitude[:, :3, :3], motion.attitude[:, :3, 3]
+    start = twist[3:] + np.cross(twist[:3], body.centre)
+    np.testing.assert_allclose(
+        origin + rotation @ body.centre, body.centre + times[:, None] * start, atol=1e-11, rtol=0
+    )
+    alone = euler_poincare_motion(so3(), body.inertia, body.inertia @ twist[:3], times)
+    np.testing.assert_allclose(rotation, alone.attitude, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(body.momentum(motion.momentum), alone.momentum, atol=1e-11, rtol=0)
+
+
+def test_g7_structure_constants_alone_are_enough(rng):
+    known = sl2r()
+    abstract, inertia, mu = LieAlgebra(known.structure), inertia_of(known, rng), rng.normal(size=3)
+    motion = euler_poincare_motion(abstract, inertia, mu, [0.0, 1.0, 2.0])
+    assert motion.attitude is None
+    with_matrices = euler_poincare_motion(known, inertia, mu, [0.0, 1.0, 2.0])
+    np.testing.assert_allclose(motion.adjoint, with_matrices.adjoint, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(np.linalg.det(with_matrices.attitude), 1.0, atol=1e-12, rtol=0)
+
+
+def test_motions_that_run_away_and_wrong_operators_are_refused():
+    # On the affine group of the line y' = y^2: infinite at t = 1.
+    affine = np.zeros((2, 2, 2))
+    affine[0, 1, 1], affine[1, 0, 1] = 1.0, -1.0
+    algebra = LieAlgebra(affine)
+    indefinite = np.array([[0.0, 1.0], [1.0, 0.0]])
+    assert euler_poincare_motion(algebra, indefinite, [0.0, 1.0], [0.0, 0.9]).momentum[-1, 1] == pytest.approx(10.0)
+    with pytest.raises(AccuracyNotReached, match="cannot be followed"):
+        euler_poincare_motion(algebra, indefinite, [0.0, 1.0], [0.0, 2.0])
+    for wrong, match in ((np.diag([1.0, 0.0, 1.0]), "singular"), (np.triu(np.ones((3, 3))), "symmetric")):
+        with pytest.raises(LieAlgebraError, match=match):
+            euler_poincare_rate(so3(), wrong, [1.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match="one"):
+        euler_poincare_rate(so3(), np.ones((2, 3, 3)), [1.0, 0.0, 0.0])
+    for times in ([1.0, 0.0], [], [0.0, np.nan], 3.0):
+        with pytest.raises(ShapeError):
+            euler_poincare_motion(so3(), np.eye(3), [1.0, 0.0, 0.0], times)
+
+
+# The rigid body in n dimensions
+
+
+def test_g7_three_dimensional_case_is_the_usual_inertia(rng):
+    inertia = inertia_of(so3(), rng)
+    j = second_moment(inertia)
+    j += (1.0 - np.linalg.eigvalsh(j)[0]) * np.eye(3)
+    np.testing.assert_allclose(n_dimensional_inertia(j), np.trace(j) * np.eye(3) - j, atol=1e-13, rtol=0)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
+def test_g7_n_dimensional_rigid_body_keeps_all_its_integrals(n, rng):
+    root = rng.normal(size=(n, n)) / n
+    j, algebra = root @ root.T + 0.5 * np.eye(n), so(n)
+    m = algebra.matrix(rng.normal(size=algebra.dimension))
+    omega = n_dimensional_angular_velocity(j, m)
+    np.testing.assert_allclose(omega @ j + j @ omega, m, atol=1e-13, rtol=0)
+    np.testing.assert_allclose(n_dimensional_momentum(j, omega), m, atol=1e-13, rtol=0)
+    np.testing.assert_allclose(n_dimensional_rate(j, m), commutator(m, omega), atol=1e-13, rtol=0)
+    by_algebra = euler_poincare_rate(algebra, n_dimensional_inertia(j), algebra.coordinates(m))
+    np.testing.assert_allclose(algebra.matrix(by_algebra), commutator(m, omega), atol=1e-12, rtol=0)
+    times = [0.0, 1.0, 3.0]
+    motion = euler_poincare_motion(algebra, n_dimensional_inertia(j), algebra.coordinates(m), times)
+    raw = solve_ivp(
+        lambda _, y: n_dimensional_rate(j, y.reshape(n, n)).ravel(),
+        (0, 3),
+        m.ravel(),
+        "DOP853",
+        times,
+        rtol=1e-13,
+        atol=1e-14,
+    )
+    matrices = algebra.matrix(motion.momentum)
+    np.testing.assert_allclose(matrices, raw.y.T.reshape(-1, n, n), atol=1e-10, rtol=0)
+    for constants in (momentum_traces(matrices), *(manakov_integrals(j, matrices, k) for k in range(1, n + 1))):
+        np.testing.assert_allclose(constants, np.broadcast_to(constants[0], constants.shape), rtol=1e-11, atol=1e-10)
+    # The space momentum R M R^T, through the attitude.
+    in_space = motion.attitude @ matrices @ np.swapaxes(motion.attitude, -1, -2)
+    np.testing.assert_allclose(in_space, np.broadcast_to(m, in_space.shape), atol=1e-11, rtol=0)
+
+
+def test_g7_manakov_coefficients_are_the_traces(rng):
+    root = rng.normal(size=(4, 4))
+    j, m = root @ root.T, so(4).matrix(rng.normal(size=(3, 6)))
+    for power, shift in product((1, 2, 3, 5), (-0.7, 0.0, 1.3)):
+        traces = np.trace(np.linalg.matrix_power(m + shift * j @ j, power), axis1=-2, axis2=-1)
+        values = manakov_integrals(j, m, power) @ shift ** np.arange(power + 1)
+        np.testing.assert_allclose(values, traces, rtol=1e-12, atol=1e-10)
+    np.testing.assert_allclose(momentum_traces(m)[:, 1], np.trace(m @ m @ m @ m, axis1=-2, axis2=-1), rtol=1e-13)
+
+
+def test_g7_manakov_is_conserved_only_with_the_square_of_j(rng):
+    # d/dt tr (M + lambda S)^3 at lambda^1 is 3 tr([M, Omega] (M S + S M)): zero for S = J^2, not for S = J.
+    j, m = np.diag([1.0, 2.0, 3.5, 5.0]), so(4).matrix(5.0 * rng.normal(size=6))
+    rate = n_dimensional_rate(j, m)
+    assert abs(np.trace(rate @ (m @ j @ j + j @ j @ m))) < 1e-10
+    assert abs(np.trace(rate @ (m @ j + j @ m))) > 0.1
+
+
+def test_g7_pfaffian_squares_to_the_determinant_and_is_constant(rng):
+    for n in (2, 4, 6, 8):
+        m = so(n).matrix(rng.normal(size=(5, n * (n - 1) // 2)))
+        np.testing.assert_allclose(pfaffian(m) ** 2, np.linalg.det(m), rtol=1e-10)
+        # pf(B M B^T) = det(B) pf(M) fixes the sign.
+        b = rng.normal(size=(n, n))
+        np.testing.assert_allclose(pfaffian(b @ m @ b.T), np.linalg.det(b) * pfaffian(m), rtol=1e-9)
+    m = so(4).matrix(rng.normal(size=6))
+    assert pfaffian(m) == pytest.approx(m[0, 1] * m[2, 3] - m[0, 2] * m[1, 3] + m[0, 3] * m[1, 2], rel=1e-14)
+    motion = euler_poincare_motion(
+        so(4), n_dimensional_inertia(np.diag([1.0, 2, 3, 4])), so(4).coordinates(m), [0, 1, 4]
+    )
+    np.testing.assert_allclose(pfaffian(so(4).matrix(motion.momentum)), pfaffian(m), rtol=1e-11)
+
+
+def test_wrong_n_dimensional_bodies_are_refused():
+    with pytest.raises(ShapeError, match="even dimension"):
+        pfaffian(np.zeros((3, 3)))
+    with pytest.raises(ShapeError, match="not antisymmetric"):
+        momentum_traces(np.eye(3))
+    with pytest.raises(ShapeError, match="not symmetric"):
+        n_dimensional_inertia(np.triu(np.ones((3, 3))))
+    with pytest.raises(SingularInertiaError, match="no inertia"):
+        n_dimensional_inertia(np.diag([1.0, 0.0, 0.0]))
+    with pytest.raises(ShapeError, match="whole number"):
+        manakov_integrals(np.eye(3), np.zeros((3, 3)), 0)
+    with pytest.raises(ShapeError):
+        n_dimensional_rate(np.eye(3), np.zeros((4, 4)))
+
+
+# Poinsot's theorem on any Lie algebra
+
+
+def rolling(algebra, rng, nodes=41, duration=1.5):
+    """A motion at Chebyshev's points of [0, duration]."""
+    inertia = inertia_of(algebra, rng)
+    times = 0.5 * duration * (1.0 - np.cos(np.pi * np.arange(nodes) / (nodes - 1)))
+    return euler_poincare_motion(algebra, inertia, rng.normal(size=algebra.dimension), times)
+
+
+@rolling_algebra
+def test_i6_a_spatial_velocity_stays_in_the_invariable_hyperplane(algebra, rng):
+    motion = rolling(algebra, rng)
+    # xi_s through the group's matrices, and the plane through xi(0) with the conormal mu(0), by hand.
+    g = motion.attitude
+    in_space = algebra.coordinates(g @ algebra.matrix(motion.velocity) @ np.linalg.inv(g))
+    offsets = (in_space - motion.velocity[0]) @ motion.momentum[0]
+    np.testing.assert_allclose(offsets, 0.0, atol=1e-11, rtol=0)
+    contact = rolling_contact(motion)
+    np.testing.assert_allclose(contact.point, in_space, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(contact.hyperplane_offset, offsets, atol=1e-11, rtol=0)
+    assert np.abs(in_space - in_space[0]).max() > 0.01
+
+
+@rolling_algebra
+def test_i6_b_moved_energy_quadric_is_tangent_to_the_hyperplane_there(algebra, rng):
+    motion = rolling(algebra, rng)
+    contact = rolling_contact(motion)
+    np.testing.assert_allclose(contact.quadric_offset, 0.0, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(contact.tangency_defect, 0.0, atol=1e-11, rtol=0)
+    # By hand: along every direction v of the plane the energy starts without a linear term.
+    normal = contact.hyperplane.normal
+    v = rng.normal(size=(6, algebra.dimension))
+    v -= np.outer(v @ normal / (normal @ normal), normal)
+    for i in (0, 7, 20, 40):
+        back = np.linalg.inv(adjoint_action(algebra, motion.attitude[i]))
+
+        def energy(x, back=back):
+            return 0.5 * np.einsum("...i,ij,...j->...", x @ back.T, motion.inertia, x @ back.T)
+
+        linear = energy(contact.point[i] + v) - energy(contact.point[i] - v)
+        np.testing.assert_allclose(linear, 0.0, atol=1e-10, rtol=0)
+        assert energy(contact.point[i]) == pytest.approx(motion.energy[0], rel=1e-11)
+
+
+@rolling_algebra
+def test_i6_c_it_rolls_without_slipping(algebra, rng):
+    motion = rolling(algebra, rng)
+    contact = rolling_contact(motion)
+    np.testing.assert_allclose(contact.contact_velocity, 0.0, atol=1e-12, rtol=0)
+    # By hand: the rate of Ad_g(t) eta, eta the body's point that touches at a node, by Chebyshev's differentiation.
+    slope = chebyshev_slope(motion.times)
+    for i in (6, 20, 33):
+        carried = motion.adjoint @ motion.velocity[i]
+        np.testing.assert_allclose(slope[i] @ carried, 0.0, atol=1e-9, rtol=0)
+        other = motion.velocity[i] + np.eye(algebra.dimension)[0]
+        moving = slope[i] @ (motion.adjoint @ other)
+        np.testing.assert_allclose(
+            moving,
+            contact_velocity(algebra, motion.adjoint[i], motion.velocity[i], other),
+            atol=1e-9,
+            rtol=0,
+        )
+        assert np.abs(moving).max() > 1e-3
+    # The contact runs along quadric and plane alike: the two rates are one vector, seen from the body and from space.
+    np.testing.assert_allclose(slope @ motion.velocity, contact.body_rate, atol=1e-9, rtol=0)
+    np.testing.assert_allclose(slope @ contact.point, contact.space_rate, atol=1e-9, rtol=0)
+
+
+def chebyshev_slope(times):
+    """The differentiation matrix at Chebyshev's points (Trefethen 2000, chapter 6)."""
+    n = len(times)
+    weight = np.r_[2.0, np.ones(n - 2), 2.0] * (-1.0) ** np.arange(n)
+    matrix = np.outer(weight, 1.0 / weight) / (times[:, None] - times + np.eye(n))
+    return matrix - np.diag(matrix.sum(axis=1))
+
+
+def test_i6_in_so3_it_is_poinsots_theorem(rng):
+    motion = rolling(so3(), rng)
+    contact = rolling_contact(motion)
+    plane = contact.hyperplane
+    # Distance 2K/|pi| from the origin, and equal arc lengths on ellipsoid and plane.
+    assert plane.level / np.linalg.norm(plane.normal) == pytest.approx(
+        2 * motion.energy[0] / np.linalg.norm(motion.momentum[0])
+    )
+    np.testing.assert_allclose(
+        np.linalg.norm(contact.body_rate, axis=-1), np.linalg.norm(contact.space_rate, axis=-1), rtol=1e-12
+    )
+    rotation = motion.attitude[9]
+    conormal = contact_conormal(motion.inertia, rotation, contact.point[9])
+    np.testing.assert_allclose(conormal, rotation @ motion.inertia @ rotation.T @ contact.point[9], atol=1e-12, rtol=0)
+
+
+def test_i6_holds_for_an_indefinite_operator_and_a_batch(rng):
+    algebra = sl2r()
+    inertia = np.diag([1.0, -2.0, 0.7])
+    motion = euler_poincare_motion(algebra, inertia, 0.3 * rng.normal(size=(4, 3)), [0.0, 0.3, 0.6])
+    contact = rolling_contact(motion)
+    assert contact.point.shape == (4, 3, 3)
+    for defect in (
+        contact.hyperplane_offset,
+        contact.quadric_offset,
+        contact.tangency_defect,
+        contact.contact_velocity,
+    ):
+        np.testing.assert_allclose(defect, 0.0, atol=1e-12, rtol=0)
+    with pytest.raises(LieAlgebraError, match="at rest"):
+        invariable_hyperplane(algebra, inertia, np.zeros((2, 3)))

@@ -1,0 +1,814 @@
+"""Lie-Poisson brackets in exact arithmetic and along motions; the Lagrangian from particles; the book's exercises."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import product
+
+import casadi
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from shapephase import so3 as rotations
+from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError
+from shapephase.rigid_body.lie.cayley_klein import (
+    cayley_klein_attitude,
+    cayley_klein_bracket,
+    cayley_klein_equations,
+    cayley_klein_gradient,
+    cayley_klein_hamiltonian,
+    cayley_klein_momentum,
+    cayley_klein_motion,
+    cayley_klein_spinor,
+)
+from shapephase.rigid_body.lie.dissipation import (
+    dissipated_power,
+    double_bracket_equations,
+    double_bracket_motion,
+    symmetric_bracket,
+)
+from shapephase.rigid_body.lie.lagrangian import (
+    body_angular_velocity,
+    convective_lagrangian,
+    convective_velocity,
+    legendre_transform,
+    mass_inertia,
+    mass_inner_product,
+    material_lagrangian,
+    material_velocity,
+    reduce_translations,
+    se3_inertia,
+    spatial_angular_velocity,
+    spatial_lagrangian,
+    spatial_momentum,
+    spatial_velocity,
+)
+from shapephase.rigid_body.lie.lie_algebra import heisenberg, se2, se3, sl2r, so, so3, su2
+from shapephase.rigid_body.lie.lie_poisson import (
+    angular_velocity,
+    bracket_gradient,
+    casimir_defect,
+    coadjoint_orbit_form,
+    euler_equations,
+    hamiltonian_vector_field,
+    kinetic_energy,
+    lie_poisson_bracket,
+    lie_poisson_motion,
+    linear_casimirs,
+    poisson_tensor,
+    quadratic_casimirs,
+    sphere_area_form,
+    sphere_symplectic_form,
+)
+from shapephase.rigid_body.lie.magnetic_moment import (
+    magnetic_equilibria,
+    magnetic_hamiltonian,
+    magnetic_precession,
+    magnetic_precession_rate,
+)
+
+ALGEBRAS = [so3(), so(4), sl2r(), se2(), se3(), su2(), heisenberg()]
+each_algebra = pytest.mark.parametrize("algebra", ALGEBRAS, ids=lambda a: a.name)
+INERTIA = np.array([[2.0, 0.3, -0.1], [0.3, 3.1, 0.2], [-0.1, 0.2, 1.4]])
+
+
+class Polynomial:
+    """A polynomial with rational coefficients, {exponents: coefficient}; just what brackets need."""
+
+    def __init__(self, terms):
+        self.terms = {e: c for e, c in terms.items() if c}
+
+    def __add__(self, other):
+        terms = dict(self.terms)
+        for e, c in other.terms.items():
+            terms[e] = terms.get(e, 0) + c
+        return Polynomial(terms)
+
+    def __mul__(self, other):
+        terms = {}
+        for (e, c), (f, b) in product(self.terms.items(), other.terms.items()):
+            both = tuple(i + j for i, j in zip(e, f))
+            terms[both] = terms.get(both, 0) + c * b
+        return Polynomial(terms)
+
+    def slope(self, i):
+        return Polynomial({(*e[:i], e[i] - 1, *e[i + 1 :]): c * e[i] for e, c in self.terms.items() if e[i]})
+
+    def at(self, point):
+        return sum((c * np.prod([x**n for x, n in zip(point, e)]) for e, c in self.terms.items()), Fraction(0))
+
+    def gradient(self, point):
+        return np.array([float(self.slope(i).at(point)) for i in range(len(point))])
+
+    def hessian(self, point):
+        d = len(point)
+        return np.array([[float(self.slope(i).slope(j).at(point)) for j in range(d)] for i in range(d)])
+
+
+def exact_bracket(f, g, algebra):
+    """-mu_k c_ij^k dF_i dG_j with rational numbers, written out again here."""
+    d = algebra.dimension
+    total = Polynomial({})
+    for i, j, k in product(range(d), repeat=3):
+        if algebra.structure[i, j, k]:
+            unit = tuple(int(n == k) for n in range(d))
+            total += Polynomial({unit: -Fraction(algebra.structure[i, j, k])}) * f.slope(i) * g.slope(j)
+    return total
+
+
+def random_polynomials(d, rng, count, terms=5, degree=3):
+    def one():
+        exponents = (
+            tuple(np.bincount(rng.integers(0, d, rng.integers(1, degree + 1)), minlength=d)) for _ in range(terms)
+        )
+        return Polynomial({tuple(int(n) for n in e): Fraction(int(rng.integers(-9, 10)), 7) for e in exponents})
+
+    return [one() for _ in range(count)]
+
+
+def rational_point(d, rng):
+    return [Fraction(int(n), 8) for n in rng.integers(-16, 17, d)]
+
+
+# K1: the bracket
+
+
+@each_algebra
+def test_k1_jacobi_identity_and_leibniz_rule_are_exact_for_polynomials(algebra, rng):
+    for _ in range(3):
+        f, g, h = random_polynomials(algebra.dimension, rng, 3)
+        nested = (
+            exact_bracket(exact_bracket(a, b, algebra), c, algebra) for a, b, c in ((f, g, h), (g, h, f), (h, f, g))
+        )
+        assert (next(nested) + next(nested) + next(nested)).terms == {}
+        left = exact_bracket(f * g, h, algebra)
+        right = f * exact_bracket(g, h, algebra) + exact_bracket(f, h, algebra) * g
+        assert (left + Polynomial({(0,) * algebra.dimension: Fraction(-1)}) * right).terms == {}
+        assert (exact_bracket(f, g, algebra) + exact_bracket(g, f, algebra)).terms == {}
+
+
+@each_algebra
+def test_k1_bracket_and_its_gradient_are_those_of_exact_arithmetic(algebra, rng):
+    f, g, h = random_polynomials(algebra.dimension, rng, 3)
+    for _ in range(4):
+        point = rational_point(algebra.dimension, rng)
+        mu = np.array([float(x) for x in point])
+        inner = exact_bracket(f, g, algebra)
+        value = lie_poisson_bracket(f.gradient(point), g.gradient(point), mu, algebra)
+        scale = 1e-13 * (1.0 + np.abs(f.gradient(point)).max() * np.abs(g.gradient(point)).max() * np.abs(mu).max())
+        assert value == pytest.approx(float(inner.at(point)), rel=1e-12, abs=scale)
+        pair = [(x.gradient(point), x.hessian(point)) for x in (f, g)]
+        slope = bracket_gradient(*pair, mu, algebra)
+        np.testing.assert_allclose(slope, inner.gradient(point), rtol=1e-11, atol=20 * scale)
+        nested = lie_poisson_bracket(slope, h.gradient(point), mu, algebra)
+        outer = float(exact_bracket(inner, h, algebra).at(point))
+        assert nested == pytest.approx(outer, rel=1e-10, abs=1e3 * scale)
+
+
+@each_algebra
+def test_k1_jacobi_identity_of_the_computed_bracket(algebra, rng):
+    for _ in range(5):
+        point = rational_point(algebra.dimension, rng)
+        mu = np.array([float(x) for x in point])
+        pairs = [(x.gradient(point), x.hessian(point)) for x in random_polynomials(algebra.dimension, rng, 3)]
+        terms = [
+            lie_poisson_bracket(bracket_gradient(pairs[i], pairs[j], mu, algebra), pairs[k][0], mu, algebra)
+            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+        ]
+        assert abs(sum(terms)) <= 1e-12 * max(1.0, *np.abs(terms))
+
+
+def test_k1_so3_bracket_proved_with_symbols():
+    # For three quadratics whose coefficients are symbols. (For all functions it follows from the coordinates, whose
+    # identity is that of the structure constants, exact in test_lie_algebra.)
+    pi = casadi.SX.sym("pi", 3)
+
+    def quadratic(name):
+        linear, square = casadi.SX.sym(name, 3), casadi.SX.sym(name * 2, 3, 3)
+        return casadi.dot(linear, pi) + casadi.bilin(square + square.T, pi, pi), [linear, square]
+
+    (f, p), (g, q), (h, r) = (quadratic(n) for n in "fgh")
+
+    def bracket(a, b):
+        return -casadi.dot(pi, casadi.cross(casadi.gradient(a, pi), casadi.gradient(b, pi)))
+
+    cyclic = bracket(bracket(f, g), h) + bracket(bracket(g, h), f) + bracket(bracket(h, f), g)
+    symbols = [pi, *p, *q, *r]
+    value = casadi.Function("value", symbols, [cyclic, bracket(f, g), casadi.gradient(f, pi), casadi.gradient(g, pi)])
+    # On integers up to 6 every product is an exact double, so a zero is a zero. A polynomial of degree 7 that is not
+    # zero vanishes at one such random point with a chance of 7/13 at most, at all fifty of 1e-13.
+    rng = np.random.default_rng(15)
+    for _ in range(50):
+        numbers = [rng.integers(-6, 7, s.shape).astype(float) for s in symbols]
+        jacobi, fg, df, dg = (np.array(x).squeeze() for x in value(*numbers))
+        assert jacobi == 0.0
+        assert lie_poisson_bracket(df, dg, numbers[0].ravel()) == fg
+
+
+def test_k1_gradients_may_be_callables_and_batches(rng):
+    pi = rng.normal(size=(4, 5, 3))
+    linear, axis = rng.normal(size=3), np.array([0.0, 0.0, 1.0])
+    by_call = lie_poisson_bracket(lambda p: angular_velocity(INERTIA, p), linear, pi)
+    assert by_call.shape == (4, 5)
+    np.testing.assert_allclose(
+        by_call, -np.sum(pi * np.cross(pi @ np.linalg.inv(INERTIA), linear), -1), atol=1e-14, rtol=0
+    )
+    np.testing.assert_allclose(
+        lie_poisson_bracket(linear, axis, pi),
+        np.einsum("i,abij,j->ab", linear, poisson_tensor(pi), axis),
+        atol=1e-14,
+        rtol=0,
+    )
+    np.testing.assert_array_equal(poisson_tensor(pi), rotations.hat(pi))
+    with pytest.raises(ShapeError, match="first gradient"):
+        lie_poisson_bracket([1.0, 2.0], axis, pi)
+    with pytest.raises(ShapeError, match="second gradient"):
+        lie_poisson_bracket(axis, lambda p: np.full_like(p, np.nan), pi)
+
+
+# G1, G2: Euler's equations and the Casimirs
+
+
+def test_g1_bracket_with_the_energy_gives_eulers_equations(rng):
+    pi = rng.normal(size=(50, 3))
+    moments = np.array([3.0, 2.0, 1.0])
+    omega = pi / moments
+    # (15.3.10) by components.
+    first, second, third = pi.T
+    components = np.stack(
+        [
+            (moments[1] - moments[2]) / (moments[1] * moments[2]) * second * third,
+            (moments[2] - moments[0]) / (moments[2] * moments[0]) * third * first,
+            (moments[0] - moments[1]) / (moments[0] * moments[1]) * first * second,
+        ],
+        axis=-1,
+    )
+    by_bracket = np.stack([lie_poisson_bracket(e, omega, pi) for e in np.eye(3)], axis=-1)
+    np.testing.assert_allclose(by_bracket, components, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(euler_equations(np.diag(moments), pi), components, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(hamiltonian_vector_field(omega, pi), components, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(
+        euler_equations(INERTIA, pi), np.cross(pi, np.linalg.solve(INERTIA, pi.T).T), atol=1e-14, rtol=0
+    )
+    np.testing.assert_allclose(kinetic_energy(np.diag(moments), pi), 0.5 * np.sum(pi**2 / moments, axis=-1), rtol=1e-14)
+
+
+@each_algebra
+def test_g1_bracket_is_the_rate_of_functions_along_a_motion(algebra, rng):
+    # F(T) - F(0) is the integral of {F, H} along the motion, by Gauss's formula of 24 nodes.
+    d = algebra.dimension
+    f = 0.3 * rng.normal(size=(d, d))
+    h = np.eye(d) + 0.1 * (f + f.T)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    times = np.concatenate([[0.0], 0.5 * (nodes + 1.0), [1.0]])
+    motion = lie_poisson_motion(lambda mu: mu @ h, rng.normal(size=d), times, algebra)
+    values = np.sin(np.einsum("ni,ij,nj->n", motion, f, motion))
+    slope = np.cos(np.einsum("ni,ij,nj->n", motion, f, motion))[:, None] * (motion @ (f + f.T))
+    rate = lie_poisson_bracket(slope, motion @ h, motion, algebra)
+    assert 0.5 * weights @ rate[1:-1] == pytest.approx(values[-1] - values[0], abs=1e-10)
+
+
+def test_g1_motion_is_that_of_the_raw_equations():
+    times, start = np.linspace(0.0, 20.0, 41), np.array([0.3, 1.2, -0.8])
+    raw = solve_ivp(
+        lambda _, p: np.cross(p, np.linalg.solve(INERTIA, p)), (0, 20), start, "DOP853", times, rtol=1e-13, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), start, times),
+        raw.y.T,
+        atol=1e-11,
+        rtol=0,
+    )
+
+
+def test_g2_casimirs_of_so3_are_functions_of_the_length(rng):
+    pi = rng.normal(size=(30, 3))
+    half = 0.5 * np.sum(pi**2, axis=-1, keepdims=True)
+    for slope in (1.0, 2.0 * half, np.cos(half), np.exp(-half)):
+        gradient = slope * pi
+        np.testing.assert_allclose(casimir_defect(gradient, pi), 0.0, atol=1e-15 * np.abs(gradient).max() * 10, rtol=0)
+        np.testing.assert_allclose(lie_poisson_bracket(gradient, rng.normal(size=3), pi), 0.0, atol=1e-13, rtol=0)
+    assert casimir_defect(angular_velocity(INERTIA, pi), pi).min() > 1e-3
+    times = np.linspace(0.0, 30.0, 31)
+    motion = lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), pi[0], times)
+    np.testing.assert_allclose(np.linalg.norm(motion, axis=-1), np.linalg.norm(pi[0]), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("algebra", "linear", "quadratic"),
+    [
+        (so3(), 0, [np.eye(3)]),
+        (su2(), 0, [np.eye(3)]),
+        # The inverse of the Killing form: h^2/2 + 2 x y.
+        (sl2r(), 0, [[[0.5, 0, 0], [0, 0, 1.0], [0, 1.0, 0]]]),
+        (se2(), 0, [np.diag([0.0, 1.0, 1.0])]),
+        (
+            se3(),
+            0,
+            [np.diag([0.0] * 3 + [1.0] * 3), np.block([[np.zeros((3, 3)), np.eye(3)], [np.eye(3), np.zeros((3, 3))]])],
+        ),
+        # |M|^2 and the Pfaffian M_12 M_34 - M_13 M_24 + M_14 M_23.
+        (so(4), 0, [np.eye(6), np.fliplr(np.diag([1.0, -1.0, 1.0, 1.0, -1.0, 1.0]))]),
+        (heisenberg(), 1, [np.diag([0.0, 0.0, 1.0])]),
+        (so(2), 1, [np.eye(1)]),
+        (so(5), 0, [np.eye(10)]),
+    ],
+    ids=lambda x: getattr(x, "name", None),
+)
+def test_g2_casimirs_found_from_structure_constants_are_the_known_ones(algebra, linear, quadratic, rng):
+    lines, forms = linear_casimirs(algebra), quadratic_casimirs(algebra)
+    assert len(lines) == linear
+    assert forms.shape == (len(quadratic), algebra.dimension, algebra.dimension)
+    np.testing.assert_allclose(forms, np.swapaxes(forms, -1, -2), atol=1e-15, rtol=0)
+    mu = rng.normal(size=(10, algebra.dimension))
+    for form in forms:
+        np.testing.assert_allclose(casimir_defect(2.0 * mu @ form, mu, algebra), 0.0, atol=1e-13, rtol=0)
+    for line in lines:
+        np.testing.assert_allclose(casimir_defect(line, mu, algebra), 0.0, atol=1e-14, rtol=0)
+    basis = forms.reshape(len(forms), -1)
+    np.testing.assert_allclose(basis @ basis.T, np.eye(len(forms)), atol=1e-13, rtol=0)
+    for known in quadratic:
+        flat = np.ravel(known)
+        np.testing.assert_allclose(basis.T @ (basis @ flat), flat, atol=1e-13, rtol=0)
+
+
+def test_g2_casimirs_of_a_large_algebra_and_an_empty_batch():
+    assert len(quadratic_casimirs(so(7))) == 1
+    assert lie_poisson_motion(lambda p: p, np.zeros((0, 3)), [0.0, 1.0]).shape == (0, 2, 3)
+    np.testing.assert_array_equal(lie_poisson_motion(lambda p: p, np.zeros(3), [0.0, 1.0]), 0.0)
+
+
+# K2: the leaves
+
+
+def test_k2_sphere_carries_minus_the_area_form(rng):
+    pi, dh, df, w = rng.normal(size=(4, 40, 3))
+    length = np.linalg.norm(pi, axis=-1)
+    v = np.cross(pi, w)
+    field = hamiltonian_vector_field(dh, pi)
+    # omega(X_H, v) = dH . v, {F, H} = omega(X_F, X_H), and omega = -dA/|Pi|.
+    np.testing.assert_allclose(sphere_symplectic_form(pi, field, v), np.sum(dh * v, axis=-1), atol=1e-12, rtol=0)
+    np.testing.assert_allclose(
+        sphere_symplectic_form(pi, hamiltonian_vector_field(df, pi), field),
+        lie_poisson_bracket(df, dh, pi),
+        atol=1e-12,
+        rtol=0,
+    )
+    np.testing.assert_allclose(
+        sphere_symplectic_form(pi, field, v), -sphere_area_form(pi, field, v) / length, rtol=1e-12
+    )
+    # The area is positive for vectors that turn to the left seen from outside, and that of a unit square is 1.
+    across = rotations.perpendicular(pi)
+    np.testing.assert_allclose(sphere_area_form(pi, across, np.cross(pi, across) / length[:, None]), 1.0, rtol=1e-13)
+
+
+def test_k2_area_of_the_whole_sphere():
+    theta, weights = np.polynomial.legendre.leggauss(20)
+    theta = 0.5 * np.pi * (theta + 1.0)
+    radius, phi = 1.7, 0.4
+    s, c = np.sin(theta), np.cos(theta)
+    point = radius * np.stack([s * np.cos(phi), s * np.sin(phi), c], -1)
+    south = radius * np.stack([c * np.cos(phi), c * np.sin(phi), -s], -1)
+    east = radius * np.stack([-s * np.sin(phi), s * np.cos(phi), 0 * s], -1)
+    total = 2.0 * np.pi * 0.5 * np.pi * weights @ sphere_area_form(point, south, east)
+    assert total == pytest.approx(4.0 * np.pi * radius**2, rel=1e-13)
+    whole = 2.0 * np.pi * 0.5 * np.pi * weights @ sphere_symplectic_form(point, south, east)
+    assert whole == pytest.approx(-4.0 * np.pi * radius, rel=1e-13)
+
+
+@each_algebra
+def test_k2_orbit_form_on_any_algebra(algebra, rng):
+    mu, a, b = rng.normal(size=(3, 10, algebra.dimension))
+    u, v = algebra.coad(a, mu), algebra.coad(b, mu)
+    form = coadjoint_orbit_form(u, v, mu, algebra)
+    np.testing.assert_allclose(form, lie_poisson_bracket(a, b, mu, algebra), atol=1e-11, rtol=0)
+    np.testing.assert_allclose(coadjoint_orbit_form(v, u, mu, algebra), -form, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(form, np.sum(a * v, axis=-1), atol=1e-11, rtol=0)
+    if algebra.dimension == 3 and algebra.name in ("so(3)", "su(2)"):
+        np.testing.assert_allclose(form, sphere_symplectic_form(mu, u, v), atol=1e-11, rtol=0)
+
+
+def test_k2_what_is_not_tangent_or_no_sphere_is_refused():
+    with pytest.raises(ShapeError, match="not tangent"):
+        coadjoint_orbit_form([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0])
+    with pytest.raises(ShapeError, match="radius 0"):
+        sphere_area_form(np.zeros(3), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+
+
+def test_wrong_inertia_is_refused():
+    with pytest.raises(ShapeError, match="not symmetric"):
+        euler_equations(np.triu(np.ones((3, 3))), [1.0, 0.0, 0.0])
+    with pytest.raises(SingularInertiaError):
+        euler_equations(np.diag([1.0, 1.0, 0.0]), [1.0, 0.0, 0.0])
+    with pytest.raises(ShapeError):
+        euler_equations([1.0, 2.0, 3.0], [1.0, 0.0, 0.0])
+
+
+# A12 to A15, G3, G4: the Lagrangian
+
+
+@pytest.fixture
+def particles(rng):
+    return rng.uniform(0.2, 2.0, 7), rng.normal(size=(7, 3))
+
+
+def moving(rng, count=5):
+    """Attitudes, their rates and body rates: (count, 3, 3), (count, 3, 3), (count, 3)."""
+    attitude, omega = rotations.exp(rng.normal(size=(count, 3))), rng.normal(size=(count, 3))
+    return attitude, attitude @ rotations.hat(omega), omega
+
+
+def test_a12_three_velocities_are_the_rates_of_positions(particles, rng):
+    _, positions = particles
+    turn, omega = rng.normal(size=3), rng.normal(size=3)
+    attitude = rotations.exp(turn)
+    rate = attitude @ rotations.hat(omega)
+
+    def placed(t):
+        return positions @ (attitude @ rotations.exp(t * omega)).T
+
+    step = 1e-3
+    # A formula of sixth order for the rate of x(t) = R(t) X at a fixed X, and of X(t) = R(t)^-1 x at a fixed x.
+    coefficients = {1: 45.0, 2: -9.0, 3: 1.0}
+
+    def rate_of(f):
+        return sum(c * (f(k * step) - f(-k * step)) for k, c in coefficients.items()) / (60.0 * step)
+
+    material = material_velocity(rate, positions)
+    np.testing.assert_allclose(material, rate_of(placed), atol=1e-12, rtol=0)
+    x = placed(0.0)
+    np.testing.assert_allclose(spatial_velocity(attitude, rate, x), material, atol=1e-14, rtol=0)
+    back = rate_of(lambda t: x @ (attitude @ rotations.exp(t * omega)))
+    np.testing.assert_allclose(convective_velocity(attitude, rate, positions), -back, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(convective_velocity(attitude, rate, positions), material @ attitude, atol=1e-14, rtol=0)
+
+
+def test_a12_three_lagrangians_are_equal(particles, rng):
+    masses, positions = particles
+    attitude, rate, omega = moving(rng)
+    by_hand = 0.5 * np.array([sum(m * np.sum((r @ x) ** 2) for m, x in zip(masses, positions)) for r in rate])
+    for value in (
+        material_lagrangian(masses, positions, rate),
+        spatial_lagrangian(masses, positions, attitude, rate),
+        convective_lagrangian(masses, positions, attitude, rate),
+        0.5 * mass_inner_product(masses, positions, omega, omega),
+        kinetic_energy(mass_inertia(masses, positions), legendre_transform(masses, positions, omega)),
+    ):
+        np.testing.assert_allclose(value, by_hand, rtol=1e-13)
+
+
+def test_a13_the_lagrangian_is_left_invariant_and_not_right_invariant(particles, rng):
+    masses, positions = particles
+    attitude, rate, _ = moving(rng)
+    turn = rotations.exp(rng.normal(size=3))
+    value = material_lagrangian(masses, positions, rate)
+    np.testing.assert_allclose(material_lagrangian(masses, positions, turn @ rate), value, rtol=1e-13)
+    np.testing.assert_allclose(spatial_lagrangian(masses, positions, turn @ attitude, turn @ rate), value, rtol=1e-13)
+    assert np.abs(material_lagrangian(masses, positions, rate @ turn) / value - 1.0).max() > 0.01
+
+
+def test_a14_inner_product_inertia_and_legendre_transform(particles, rng):
+    masses, positions = particles
+    a, b = rng.normal(size=(2, 6, 3))
+    inertia = mass_inertia(masses, positions)
+    np.testing.assert_allclose(
+        mass_inner_product(masses, positions, a, b), np.sum((a @ inertia) * b, -1), atol=1e-12, rtol=0
+    )
+    by_entries = [[mass_inner_product(masses, positions, e, f) for f in np.eye(3)] for e in np.eye(3)]
+    np.testing.assert_allclose(inertia, by_entries, atol=1e-13, rtol=0)
+    momentum = legendre_transform(masses, positions, a)
+    np.testing.assert_allclose(momentum, a @ inertia, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(angular_velocity(inertia, momentum), a, atol=1e-12, rtol=0)
+    # dL/dOmega = Pi: the quadratic is differenced exactly.
+    slope = [
+        0.5 * (convective_lagrangian(masses, positions, np.eye(3), rotations.hat(a[0] + e))
+        - convective_lagrangian(masses, positions, np.eye(3), rotations.hat(a[0] - e)))
+        for e in np.eye(3)
+    ]  # fmt: skip
+    np.testing.assert_allclose(slope, momentum[0], atol=1e-12, rtol=0)
+
+
+def test_a15_translations_reduce_out(particles, rng):
+    masses, positions = particles
+    body = reduce_translations(masses, positions)
+    np.testing.assert_allclose(masses @ body.positions, 0.0, atol=1e-14, rtol=0)
+    twist = rng.normal(size=(8, 6))
+    omega, velocity = twist[:, :3], twist[:, 3:]
+    speeds = velocity[:, None] + np.cross(omega[:, None], positions)
+    energy = 0.5 * np.einsum("p,npi,npi->n", masses, speeds, speeds)
+    operator = se3_inertia(masses, positions)
+    np.testing.assert_allclose(0.5 * np.einsum("ni,ij,nj->n", twist, operator, twist), energy, rtol=1e-13)
+    both = twist @ operator
+    np.testing.assert_allclose(
+        both[:, :3], np.einsum("p,npi->ni", masses, np.cross(positions, speeds)), atol=1e-12, rtol=0
+    )
+    np.testing.assert_allclose(both[:, 3:], np.einsum("p,npi->ni", masses, speeds), atol=1e-12, rtol=0)
+    # Koenig: the energy splits, and the reduced momentum is that of turning about the centre of mass.
+    of_centre = 0.5 * np.sum(both[:, 3:] ** 2, axis=-1) / body.mass
+    reduced = body.momentum(both)
+    np.testing.assert_allclose(reduced, omega @ body.inertia, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(of_centre + kinetic_energy(body.inertia, reduced), energy, rtol=1e-13)
+
+
+def test_a15_reduction_is_a_poisson_map(particles, rng):
+    body = reduce_translations(*particles)
+    both, df, dg = rng.normal(size=(20, 6)), rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
+
+    def lifted(gradient):
+        return np.concatenate([gradient, np.cross(body.centre, gradient)], axis=-1)
+
+    # The pull-back of a gradient, by differences of the linear map.
+    by_columns = np.stack([body.momentum(e) for e in np.eye(6)])
+    np.testing.assert_allclose(lifted(df), df @ by_columns.T, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(
+        lie_poisson_bracket(lifted(df), lifted(dg), both, se3()),
+        lie_poisson_bracket(df, dg, body.momentum(both)),
+        atol=1e-12,
+        rtol=0,
+    )
+
+
+def test_g3_spatial_momentum_is_turned_and_constant(particles, rng):
+    masses, positions = particles
+    attitude, rate, omega = moving(rng)
+    expected = (attitude @ legendre_transform(masses, positions, omega)[..., None])[..., 0]
+    np.testing.assert_allclose(spatial_momentum(masses, positions, attitude, rate), expected, atol=1e-12, rtol=0)
+    # Along a motion of the raw second-order equations of the particles' attitude.
+    inertia = mass_inertia(masses, positions)
+
+    def slope(_, y):
+        spin = y[:3]
+        turned = y[3:].reshape(3, 3) @ rotations.hat(spin)
+        return np.concatenate([np.linalg.solve(inertia, np.cross(inertia @ spin, spin)), turned.ravel()])
+
+    times = np.linspace(0.0, 5.0, 11)
+    run = solve_ivp(slope, (0, 5), [*omega[0], *np.eye(3).ravel()], "DOP853", times, rtol=1e-13, atol=1e-14)
+    rotation = run.y[3:].T.reshape(-1, 3, 3)
+    rotation = rotations.orthonormalised(rotation)
+    along = spatial_momentum(masses, positions, rotation, rotation @ rotations.hat(run.y[:3].T))
+    np.testing.assert_allclose(along, np.broadcast_to(along[0], along.shape), atol=1e-10, rtol=0)
+
+
+def test_g4_angular_velocities_in_body_and_space(rng):
+    attitude, rate, omega = moving(rng)
+    np.testing.assert_allclose(body_angular_velocity(attitude, rate), omega, atol=1e-14, rtol=0)
+    in_space = spatial_angular_velocity(attitude, rate)
+    np.testing.assert_allclose(in_space, (attitude @ omega[..., None])[..., 0], atol=1e-14, rtol=0)
+    np.testing.assert_allclose(rotations.hat(in_space), rate @ np.swapaxes(attitude, -1, -2), atol=1e-14, rtol=0)
+
+
+def test_wrong_particles_and_rates_are_refused():
+    with pytest.raises(ShapeError, match="above 0 kg"):
+        mass_inertia([1.0, -1.0], np.eye(3)[:2])
+    with pytest.raises(ShapeError, match="one"):
+        mass_inertia([1.0, 1.0], np.eye(3))
+    with pytest.raises(ShapeError, match="not the rate of a rotation"):
+        body_angular_velocity(np.eye(3), np.eye(3))
+    with pytest.raises(ShapeError, match="reflection"):
+        body_angular_velocity(-np.eye(3), np.zeros((3, 3)))
+
+
+def test_motions_no_method_can_follow_are_refused(monkeypatch):
+    with pytest.raises(AccuracyNotReached, match="no finite rate"):
+        double_bracket_motion(1e-200 * np.eye(3), [1e200, 1.0, 1.0], 1.0, [0.0, 1.0])
+    monkeypatch.setattr("shapephase.rigid_body.flow._STEPS", 50)
+    with pytest.raises(AccuracyNotReached, match="more than 50 steps"):
+        double_bracket_motion(INERTIA, [1.0, 2.0, 3.0], 1e12, [0.0, 1.0])
+    # What stops being finite on the way is refused as well.
+    with pytest.raises(AccuracyNotReached, match="cannot be followed"):
+        lie_poisson_motion(lambda p: np.where(p > 1.5, np.nan, [0.0, 0.0, 1.0]), [0.0, -1.6, 0.0], [0.0, 5.0])
+
+
+# G6: Cayley-Klein parameters
+
+
+def spinors(rng, *shape):
+    return rng.normal(size=(*shape, 2)) + 1j * rng.normal(size=(*shape, 2))
+
+
+def test_g6_momentum_map_written_out(rng):
+    z = spinors(rng, 9)
+    first, second = np.moveaxis(z, -1, 0)
+    product_ = first.conj() * second
+    known = -0.25 * np.stack([2 * product_.real, 2 * product_.imag, abs(first) ** 2 - abs(second) ** 2], -1)
+    np.testing.assert_allclose(cayley_klein_momentum(z), known, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(np.linalg.norm(known, axis=-1), 0.25 * np.linalg.norm(z, axis=-1) ** 2, rtol=1e-14)
+    # Equivariance: z -> U^H z turns Pi by R^T, U over R.
+    unitary = su2_element(rng.normal(size=3))
+    rotation = rotations.exp(2.0 * unitary[1])
+    np.testing.assert_allclose(
+        cayley_klein_momentum(z @ unitary[0].conj()),
+        cayley_klein_momentum(z) @ rotation,
+        atol=1e-13,
+        rtol=0,
+    )
+
+
+def su2_element(half_turn):
+    """exp(-i half_turn . sigma) by Rodrigues' formula, and the vector itself."""
+    length = np.linalg.norm(half_turn)
+    x, y, z = half_turn / length
+    sigma = np.array([[z, x - 1j * y], [x + 1j * y, -z]])
+    return np.cos(length) * np.eye(2) - 1j * np.sin(length) * sigma, half_turn
+
+
+def test_g6_momentum_map_is_poisson_proved_with_symbols():
+    # {Pi_i o J, Pi_j o J} = -eps_ijk Pi_k o J, a polynomial identity of degree 2, checked on integers without rounding.
+    q, p = casadi.SX.sym("q", 2), casadi.SX.sym("p", 2)
+    cross = [q[0] * q[1] + p[0] * p[1], q[0] * p[1] - p[0] * q[1]]
+    pi = [-2 * cross[0], -2 * cross[1], -(q[0] ** 2 + p[0] ** 2 - q[1] ** 2 - p[1] ** 2)]
+
+    def bracket(f, g):
+        return casadi.dot(casadi.gradient(f, q), casadi.gradient(g, p)) - casadi.dot(
+            casadi.gradient(f, p), casadi.gradient(g, q)
+        )
+
+    # Four times Pi, so that all coefficients are whole: {4 Pi_i, 4 Pi_j} = 4 (-4 Pi_k).
+    defects = [bracket(pi[i], pi[j]) + 4 * pi[k] for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+    value = casadi.Function("value", [q, p], [casadi.vertcat(*defects), casadi.vertcat(*pi)])
+    for numbers in product(range(-1, 2), repeat=4):
+        defect, momentum = value(numbers[:2], numbers[2:])
+        assert not np.any(np.array(defect))
+        z = np.array(numbers[:2]) + 1j * np.array(numbers[2:])
+        np.testing.assert_array_equal(4.0 * cayley_klein_momentum(z), np.array(momentum).ravel())
+
+
+def test_g6_poisson_map_for_any_functions(rng):
+    z, df, dg = spinors(rng, 20), rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
+    pulled = cayley_klein_bracket(cayley_klein_gradient(df, z), cayley_klein_gradient(dg, z))
+    np.testing.assert_allclose(pulled, lie_poisson_bracket(df, dg, cayley_klein_momentum(z)), atol=1e-12, rtol=0)
+    # The gradient itself, by exact differences of the quadratic Pi(z).
+    for direction in (np.array([1, 0]), np.array([0, 1]), np.array([1j, 0]), np.array([0, 1j])):
+        slope = 0.5 * (cayley_klein_momentum(z + direction) - cayley_klein_momentum(z - direction))
+        expected = np.sum((cayley_klein_gradient(df, z).conj() * direction).real, axis=-1)
+        np.testing.assert_allclose(np.sum(slope * df, axis=-1), expected, atol=1e-12, rtol=0)
+
+
+def test_g6_collective_hamiltonian_gives_eulers_equations(rng):
+    z = spinors(rng, 12)
+    pi, rate = cayley_klein_momentum(z), cayley_klein_equations(INERTIA, z)
+    step = 1e-3
+    along = (cayley_klein_momentum(z + step * rate) - cayley_klein_momentum(z - step * rate)) / (2.0 * step)
+    np.testing.assert_allclose(along, euler_equations(INERTIA, pi), atol=1e-11, rtol=0)
+    np.testing.assert_allclose(
+        cayley_klein_hamiltonian(INERTIA, z), 0.5 * np.sum(pi * np.linalg.solve(INERTIA, pi.T).T, -1)
+    )
+    # Hamilton's equations q' = dH/dp, p' = -dH/dq of K(Pi(z)).
+    gradient = cayley_klein_gradient(angular_velocity(INERTIA, pi), z)
+    np.testing.assert_allclose(rate, gradient.imag - 1j * gradient.real, atol=1e-13, rtol=0)
+
+
+def test_g6_flow_on_c2_covers_the_rigid_body_with_its_attitude(rng):
+    z, times = spinors(rng), np.linspace(0.0, 12.0, 25)
+    path = cayley_klein_motion(INERTIA, z, times)
+    start = cayley_klein_momentum(z)
+
+    def slope(_, y):
+        omega = np.linalg.solve(INERTIA, y[:3])
+        return np.concatenate([np.cross(y[:3], omega), (y[3:].reshape(3, 3) @ rotations.hat(omega)).ravel()])
+
+    run = solve_ivp(slope, (0, 12), [*start, *np.eye(3).ravel()], "DOP853", times, rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(cayley_klein_momentum(path), run.y[:3].T, atol=1e-11, rtol=0)
+    attitude = cayley_klein_attitude(z, path)
+    np.testing.assert_allclose(attitude, run.y[3:].T.reshape(-1, 3, 3), atol=1e-11, rtol=0)
+    np.testing.assert_allclose(np.linalg.norm(path, axis=-1), np.linalg.norm(z), rtol=1e-12)
+    batch = cayley_klein_motion(INERTIA, np.stack([z, 1j * z]), times)
+    np.testing.assert_allclose(batch[1], 1j * path, atol=1e-12, rtol=0)
+
+
+def test_g6_spinor_over_a_momentum(rng):
+    pi = np.concatenate([rng.normal(size=(20, 3)), 2.0 * np.eye(3), -np.eye(3), np.zeros((1, 3)), [[1e-9, 0, 1.0]]])
+    for phase in (0.0, 0.7):
+        np.testing.assert_allclose(cayley_klein_momentum(cayley_klein_spinor(pi, phase)), pi, atol=1e-15, rtol=0)
+    np.testing.assert_allclose(cayley_klein_spinor(pi, 0.7), np.exp(0.7j) * cayley_klein_spinor(pi), atol=1e-15, rtol=0)
+    with pytest.raises(ShapeError, match="equal lengths"):
+        cayley_klein_attitude([1.0, 0.0], [2.0, 0.0])
+    with pytest.raises(ShapeError, match="equal lengths"):
+        cayley_klein_attitude([0.0, 0.0], [0.0, 0.0])
+    with pytest.raises(ShapeError):
+        cayley_klein_momentum([1.0, 2.0, 3.0])
+    with pytest.raises(ShapeError):
+        cayley_klein_momentum([np.nan * 1j, 1.0])
+
+
+# K3: a moment in a magnetic field
+
+
+def test_k3_precession_is_hamiltonian_with_energy_m_dot_b(rng):
+    moment, field = rng.normal(size=(2, 15, 3))
+    np.testing.assert_array_equal(magnetic_precession_rate(moment, field), np.cross(moment, field))
+    np.testing.assert_allclose(hamiltonian_vector_field(field, moment), np.cross(moment, field), atol=1e-15, rtol=0)
+    by_bracket = np.stack([lie_poisson_bracket(e, field, moment) for e in np.eye(3)], axis=-1)
+    np.testing.assert_allclose(by_bracket, np.cross(moment, field), atol=1e-15, rtol=0)
+    shift = rng.normal(size=3)
+    difference = magnetic_hamiltonian(moment + shift, field) - magnetic_hamiltonian(moment, field)
+    np.testing.assert_allclose(difference, field @ shift, atol=1e-13, rtol=0)
+
+
+def test_k3_closed_form_solves_the_equation(rng):
+    moment, field, times = rng.normal(size=3), rng.normal(size=3), np.linspace(0.0, 8.0, 17)
+    run = solve_ivp(lambda _, m: np.cross(m, field), (0, 8), moment, "DOP853", times, rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(magnetic_precession(moment, field, times), run.y.T, atol=1e-12, rtol=0)
+    assert magnetic_precession(np.ones((4, 3)), field, times).shape == (4, 17, 3)
+    np.testing.assert_allclose(lie_poisson_motion(lambda m: 0 * m + field, moment, times), run.y.T, atol=1e-12, rtol=0)
+
+
+def test_k3_equilibria_are_two_stable_centres(rng):
+    field = np.array([0.3, -1.2, 0.8])
+    strength = np.linalg.norm(field)
+    pair = magnetic_equilibria(2.5, field)
+    assert [e.energy > 0 for e in pair] == [True, False]
+    for equilibrium in pair:
+        np.testing.assert_allclose(magnetic_precession_rate(equilibrium.moment, field), 0.0, atol=1e-15, rtol=0)
+        assert np.linalg.norm(equilibrium.moment) == pytest.approx(2.5, rel=1e-15)
+        # The linearisation is the equation itself: its matrix by columns.
+        matrix = np.stack([np.cross(e, field) for e in np.eye(3)], axis=-1)
+        found = np.linalg.eigvals(matrix)
+        np.testing.assert_allclose(np.sort(found.imag), np.sort(equilibrium.spectrum.imag), atol=1e-14, rtol=0)
+        np.testing.assert_allclose(found.real, equilibrium.spectrum.real, atol=1e-14, rtol=0)
+        assert equilibrium.spectrum.imag.max() == pytest.approx(strength)
+        # Stable: the distance from it never changes.
+        near = equilibrium.moment + 0.1 * rng.normal(size=3)
+        along = magnetic_precession(near, field, np.linspace(0.0, 50.0, 101))
+        distance = np.linalg.norm(along - equilibrium.moment, axis=-1)
+        np.testing.assert_allclose(distance, distance[0], rtol=1e-12)
+    with pytest.raises(ShapeError, match="no field"):
+        magnetic_equilibria(1.0, np.zeros(3))
+    with pytest.raises(ShapeError, match="above 0"):
+        magnetic_equilibria(0.0, field)
+
+
+# K4: double-bracket dissipation
+
+
+def test_k4_a_spheres_are_kept(rng):
+    pi, times = rng.normal(size=(6, 3)), np.linspace(0.0, 20.0, 41)
+    np.testing.assert_allclose(
+        np.sum(pi * double_bracket_equations(INERTIA, pi, 0.8), axis=-1), 0.0, atol=1e-14, rtol=0
+    )
+    motion = double_bracket_motion(INERTIA, pi, 0.8, times)
+    np.testing.assert_allclose(
+        np.linalg.norm(motion, axis=-1), np.broadcast_to(np.linalg.norm(pi, axis=-1)[:, None], (6, 41)), rtol=1e-12
+    )
+
+
+def test_k4_b_energy_falls_everywhere_but_at_equilibria(rng):
+    pi, times = 2.0 * rotations.normalised(rng.normal(size=(6, 3))), np.linspace(0.0, 80.0, 81)
+    rate = np.sum(angular_velocity(INERTIA, pi) * double_bracket_equations(INERTIA, pi, 0.8), axis=-1)
+    np.testing.assert_allclose(rate, -dissipated_power(INERTIA, pi, 0.8), rtol=1e-12)
+    assert rate.max() < 0.0
+    motion = double_bracket_motion(INERTIA, pi, 0.8, times)
+    energy = kinetic_energy(INERTIA, motion)
+    assert np.all(np.diff(energy, axis=-1) < 1e-14)
+    # It ends about the axis of the largest moment, the least energy on the sphere.
+    moments, axes = np.linalg.eigh(INERTIA)
+    np.testing.assert_allclose(energy[:, -1], 0.5 * np.sum(pi**2, axis=-1) / moments[-1], rtol=1e-9)
+    np.testing.assert_allclose(dissipated_power(INERTIA, 2.0 * axes.T, 0.8), 0.0, atol=1e-28, rtol=0)
+    driven = kinetic_energy(INERTIA, double_bracket_motion(INERTIA, pi, -0.8, times))
+    assert np.all(np.diff(driven, axis=-1) > -1e-14)
+
+
+def test_k4_energy_balance_along_a_motion():
+    nodes, weights = np.polynomial.legendre.leggauss(30)
+    times = np.concatenate([[0.0], nodes + 1.0, [2.0]])
+    motion = double_bracket_motion(INERTIA, [0.5, -1.0, 1.3], 0.6, times)
+    energy = kinetic_energy(INERTIA, motion)
+    assert energy[0] - energy[-1] == pytest.approx(weights @ dissipated_power(INERTIA, motion[1:-1], 0.6), abs=1e-12)
+    raw = solve_ivp(
+        lambda _, p: np.cross(p, w := np.linalg.solve(INERTIA, p)) + 0.6 * (p * (p @ w) - w * (p @ p)),
+        (0, 2), [0.5, -1.0, 1.3], "DOP853", times, rtol=1e-13, atol=1e-14,
+    )  # fmt: skip
+    np.testing.assert_allclose(motion, raw.y.T, atol=1e-12, rtol=0)
+
+
+def test_k4_c_equations_are_the_sum_of_the_two_brackets(rng):
+    pi, df = rng.normal(size=(2, 30, 3))
+    omega = angular_velocity(INERTIA, pi)
+    rate = np.sum(df * double_bracket_equations(INERTIA, pi, 0.37), axis=-1)
+    both = lie_poisson_bracket(df, omega, pi) + symmetric_bracket(df, omega, pi, 0.37)
+    np.testing.assert_allclose(rate, both, atol=1e-13, rtol=0)
+    np.testing.assert_allclose(
+        symmetric_bracket(df, omega, pi, 0.37),
+        symmetric_bracket(omega, df, pi, 0.37),
+        atol=1e-15,
+        rtol=0,
+    )
+    assert symmetric_bracket(df, df, pi, 0.37).max() < 0.0
+    by_call = symmetric_bracket(lambda p: angular_velocity(INERTIA, p), df, pi, np.full(30, 0.37))
+    np.testing.assert_allclose(by_call, symmetric_bracket(omega, df, pi, 0.37), atol=1e-15, rtol=0)
+
+
+def test_m_e8_printed_symmetric_bracket_has_the_wrong_sign(rng):
+    pi, df = rng.normal(size=(2, 30, 3))
+    omega = pi @ np.linalg.inv(INERTIA)
+    alpha = 0.37
+    equations = np.cross(pi, omega) + alpha * np.cross(pi, np.cross(pi, omega))
+    rate = np.sum(df * equations, axis=-1)
+    rigid = -np.sum(pi * np.cross(df, omega), axis=-1)
+    printed = alpha * np.sum(np.cross(pi, df) * np.cross(pi, omega), axis=-1)
+    assert np.abs(rigid + printed - rate).max() > 0.1
+    np.testing.assert_allclose(rigid - printed, rate, atol=1e-13, rtol=0)
+    np.testing.assert_allclose(symmetric_bracket(df, omega, pi, alpha), -printed, atol=1e-14, rtol=0)
+    # Read the printed way, the energy would grow.
+    assert np.min(alpha * np.sum(np.cross(pi, omega) ** 2, axis=-1)) > 0.0

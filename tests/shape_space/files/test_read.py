@@ -1,0 +1,211 @@
+"""Motion files: what is written is read back, columns find their joints by name, faults are named with their place.
+
+`ODD_FILES` lists hostile and odd files of every kind with what must become of each.
+"""
+
+import time
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.errors import InputFileNotFoundError, TrajectoryError, UnknownNameError
+from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files.recording import TrajectoryWarning
+from support.odd_motion_files import GOOD_ARRAYS, HEADER, LEFT, ODD_FILES, csv_text, npz_bytes, odd_file, points
+
+
+@pytest.fixture(scope="module")
+def satellite():
+    return sp.load_body("satellite")
+
+
+@pytest.fixture(scope="module")
+def diver():
+    return sp.load_body("diver")
+
+
+def recorded(body, seed, closed=False, count=9):
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.uniform(0.05, 0.2, count))
+    shapes = rng.uniform(0.0, 0.8, size=(count, body.n_shape))
+    if closed:
+        shapes[-1] = shapes[0]
+    return times, shapes
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".CSV", ".tsv"])
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_spline_comes_back_as_it_was(tmp_path, satellite, suffix, closed):
+    times, shapes = recorded(satellite, 1, closed)
+    path = sp.ShapePath.spline(times, shapes, joint_names=satellite.joint_names)
+    sp.write_shape_path(path, tmp_path / f"motion{suffix}")
+    back = sp.read_shape_path(tmp_path / f"motion{suffix}", satellite)
+    assert back.joint_names == satellite.joint_names
+    assert back.duration == pytest.approx(times[-1] - times[0], abs=1e-15)
+    np.testing.assert_array_equal(back.breaks, path.breaks)
+    t = np.linspace(0.0, path.duration, 101)
+    # Closed samples with the ends not knotted together are read as a loop: what a closed file means.
+    np.testing.assert_allclose(back.shape(t), path.shape(t), atol=1e-14, rtol=0)
+    np.testing.assert_allclose(back.rate(t), path.rate(t), atol=1e-12, rtol=0)
+
+
+def test_any_path_is_written_finely(tmp_path, diver):
+    loop = sp.ShapePath.fourier(
+        [0.1, 0.2], [[0.3, 0.1], [0.2, 0.0]], [[0.0, 0.2], [0.1, 0.3]], 2.0, joint_names=diver.joint_names
+    )
+    sp.write_shape_path(loop, tmp_path / "loop.csv")
+    back = sp.read_shape_path(tmp_path / "loop.csv", diver)
+    t = np.linspace(0.0, 2.0, 333)
+    np.testing.assert_allclose(back.shape(t), loop.shape(t), atol=1e-8, rtol=0)
+
+
+def test_columns_in_any_order_and_in_degrees(tmp_path, diver):
+    (tmp_path / "a.csv").write_text(
+        "right_shoulder_abduction_deg, time ,left_shoulder_abduction\n90,10,0.5\n-45,10.5,0.25\n\n0,12,1\n"
+    )
+    path = sp.read_shape_path(tmp_path / "a.csv", diver)
+    assert path.duration == 2.0
+    left, right = diver.joint_index("left_shoulder_abduction"), diver.joint_index("right_shoulder_abduction")
+    shapes = path.shape([0.0, 0.5, 2.0])
+    np.testing.assert_allclose(shapes[:, left], [0.5, 0.25, 1.0], atol=1e-15, rtol=0)
+    np.testing.assert_allclose(shapes[:, right], np.radians([90, -45, 0]), atol=1e-15, rtol=0)
+
+
+GOOD = HEADER + "0,0,0\n1,1,1\n2,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "empty"),
+        ("left_shoulder_abduction,right_shoulder_abduction\n0,0\n1,1\n", "no column `time`"),
+        (HEADER + "0,0,0\n", "two samples or more"),
+        (HEADER + "0,0,0\n1,nan,1\n", "row 3, column 'left_shoulder_abduction': 'nan'"),
+        (HEADER + "0,0,0\n1,1,inf\n", "row 3, column 'right_shoulder_abduction': 'inf'"),
+        (HEADER + "0,0,0\n1,1,x\n", "'x' is no finite number"),
+        (HEADER + "0,0,0\n1,1\n", "row 3 has 2 entries, the header 3"),
+        (HEADER + "0,0,0\n2,1,1\n\n1,0,0\n", "row 5: time 1 s does not come after 2 s"),
+        (HEADER + "0,0,0\n1,1,1\n1,0,0\n", "row 4: time 1 s does not come after 1 s"),
+        ("time,left_shoulder_abduction\n0,0\n1,1\n", "no column for right_shoulder_abduction"),
+        ("time,left_shoulder_abduction,left_shoulder_abduction\n0,0,0\n1,1,1\n", "stands twice"),
+        (
+            "time,left_shoulder_abduction,left_shoulder_abduction_deg,right_shoulder_abduction\n0,0,0,0\n1,1,1,1\n",
+            "are the same joint",
+        ),
+    ],
+)
+def test_faults_of_a_csv_are_named(tmp_path, diver, text, message):
+    (tmp_path / "m.csv").write_text(text)
+    with pytest.raises(TrajectoryError, match=r"m\.csv") as caught:
+        sp.read_shape_path(tmp_path / "m.csv", diver)
+    assert message in str(caught.value)
+
+
+def test_a_joint_that_does_not_exist_is_named_with_the_valid_ones(tmp_path, diver):
+    (tmp_path / "m.csv").write_text(GOOD.replace("left_shoulder_abduction", "left_sholder_abduction"))
+    with pytest.raises(UnknownNameError, match="Did you mean 'left_shoulder_abduction'"):
+        sp.read_shape_path(tmp_path / "m.csv", diver)
+
+
+def test_degrees_of_a_slide_are_refused(tmp_path, satellite):
+    header = ",".join(["time", *satellite.joint_names]).replace("boom_extension", "boom_extension_deg")
+    rows = [",".join([str(t)] + ["0"] * satellite.n_shape) for t in range(3)]
+    (tmp_path / "m.csv").write_text("\n".join([header, *rows]))
+    with pytest.raises(TrajectoryError, match="boom_extension slides"):
+        sp.read_shape_path(tmp_path / "m.csv", satellite)
+
+
+def test_files_that_are_not_there_or_no_motion(tmp_path, diver):
+    with pytest.raises(InputFileNotFoundError, match="no such file"):
+        sp.read_shape_path(tmp_path / "m.csv", diver)
+    with pytest.raises(UnknownNameError, match=r"\.csv, \.npz"):
+        sp.read_shape_path(tmp_path / "m.xlsx", diver)
+    (tmp_path / "m.npz").write_bytes(b"PK nothing")
+    with pytest.raises(TrajectoryError, match="no NPZ file"):
+        sp.read_shape_path(tmp_path / "m.npz", diver)
+    np.savez(tmp_path / "n.npz", time=[0.0, 1.0], shapes=np.zeros((2, 2)))
+    with pytest.raises(TrajectoryError, match="'joint_names' is missing"):
+        sp.read_shape_path(tmp_path / "n.npz", diver)
+    (tmp_path / "latin.csv").write_bytes(GOOD.encode() + b"\xe4,0,0\n")
+    with pytest.raises(TrajectoryError, match="not UTF-8"):
+        sp.read_shape_path(tmp_path / "latin.csv", diver)
+
+
+def test_a_path_without_names_cannot_be_written(tmp_path):
+    with pytest.raises(TrajectoryError, match="no joint names"):
+        sp.write_shape_path(sp.ShapePath.fourier([0.0], [[1.0]], [[0.0]], 1.0), tmp_path / "m.csv")
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, diver, monkeypatch):
+    times, shapes = recorded(diver, 2)
+    path = sp.ShapePath.spline(times, shapes, joint_names=diver.joint_names)
+    target = tmp_path / "m.npz"
+    sp.write_shape_path(path, target)
+    before = target.read_bytes()
+
+    def broken(stream, **_arrays):
+        stream.write(b"half")
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(np, "savez", broken)
+    with pytest.raises(OSError, match="full"):
+        sp.write_shape_path(path, target)
+    assert target.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["m.npz"]
+
+
+@pytest.mark.parametrize("case", ODD_FILES)
+def test_an_odd_file_has_the_outcome_of_the_list(tmp_path, diver, case):
+    name, _, outcome, words = ODD_FILES[case]
+    file = odd_file(case, tmp_path)
+    message, started = "", time.perf_counter()
+    if outcome is None:
+        motion = read_recorded_motion(file, diver)
+        assert np.isfinite(motion.path.shape(motion.times)).all()
+    elif outcome is TrajectoryWarning:
+        with pytest.warns(TrajectoryWarning) as seen:
+            motion = read_recorded_motion(file, diver)
+        assert len(seen) == 1
+        message = str(seen[0].message)
+        assert np.isfinite(motion.path.shape(motion.times)).all()
+    else:
+        with pytest.raises(outcome) as caught:
+            read_recorded_motion(file, diver)
+        assert type(caught.value) is outcome
+        message = str(caught.value)
+    assert time.perf_counter() - started < 5.0
+    if outcome is not None:
+        assert name in message
+        assert [word for word in words if word not in message] == [], message
+        assert len(message) < 1000
+
+
+def test_a_whole_turn_from_one_sample_to_the_next_is_told(tmp_path, satellite):
+    shapes = np.full((5, satellite.n_shape), 0.1)
+    wheel = satellite.joint_index("wheel_spin")
+    shapes[:, wheel] = [2.9, 3.0, 3.1, 3.2 - 2 * np.pi, 3.3 - 2 * np.pi]
+    np.savez(tmp_path / "m.npz", time=np.arange(5.0), shapes=shapes, joint_names=satellite.joint_names)
+    with pytest.warns(TrajectoryWarning, match=r"sample 3: joint wheel_spin jumps by -6\.18319 rad.*numpy\.unwrap"):
+        path = sp.read_shape_path(tmp_path / "m.npz", satellite)
+    np.testing.assert_allclose(path.shape(path.breaks), shapes, atol=1e-15, rtol=0)
+
+
+def test_options_that_do_not_fit_the_file_are_refused(tmp_path, diver):
+    (tmp_path / "m.csv").write_text(csv_text())
+    (tmp_path / "m.npz").write_bytes(npz_bytes(**GOOD_ARRAYS))
+    for file in ("m.csv", "m.npz"):
+        with pytest.raises(TrajectoryError, match="topic='/a' is for bags"):
+            read_recorded_motion(tmp_path / file, diver, topic="/a")
+        with pytest.raises(TrajectoryError, match="timestep is for"):
+            read_recorded_motion(tmp_path / file, diver, timestep=0.1)
+    (tmp_path / "m.csv").write_text(csv_text().replace(LEFT, f"{LEFT}_deg"))
+    with pytest.raises(TrajectoryError, match="is in degrees by its name, and degrees=False was given"):
+        read_recorded_motion(tmp_path / "m.csv", diver, degrees=False)
+
+
+def test_a_yaml_file_of_too_many_entries_is_refused(tmp_path, diver, monkeypatch):
+    monkeypatch.setattr("shapephase.shape_space.files.strict_yaml._MOST_ENTRIES", 100)
+    (tmp_path / "m.yaml").write_text(points(*[("[0, 0]", str(k)) for k in range(20)]))
+    with pytest.raises(TrajectoryError, match="more than 100 entries; use NPZ or a bag"):
+        read_recorded_motion(tmp_path / "m.yaml", diver)

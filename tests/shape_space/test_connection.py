@@ -1,0 +1,433 @@
+"""The mechanical connection, its curvature and holonomies against differences, closed forms and a plain integrator."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase.errors import OpenPathError, ShapeError, SingularInertiaError, TrajectoryError
+from support.bodies import joint, link, random_loop, random_shapes, urdf
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def about(axis, angle):
+    return Rotation.from_rotvec(np.asarray(axis, dtype=float) * angle).as_matrix()
+
+
+def angle_of(rotation):
+    return Rotation.from_matrix(rotation).magnitude()
+
+
+def lift(body, path, start, end):
+    """U' = -U hat(A r'), by DOP853 on the nine entries."""
+
+    def slope(t, u):
+        omega = -sp.mechanical_connection(body, path.shape(t)) @ path.rate(t)
+        return (u.reshape(3, 3) @ np.cross(np.eye(3), omega)).ravel()
+
+    u = np.eye(3).ravel()
+    edges = [start, *(b for b in path.breaks if start < b < end), end]
+    for a, b in itertools.pairwise(edges):
+        u = solve_ivp(slope, (a, b), u, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+    return u.reshape(3, 3)
+
+
+# ---- Connection -----------------------------------------------------------------------------------------------------
+
+
+def test_the_connection_cancels_the_angular_momentum(body, rng):
+    """B1: I (-A r') + L_o = 0 for every motion of the joints."""
+    shapes, rates = random_shapes(body, rng, 5), rng.normal(size=(5, body.n_shape))
+    connection = sp.mechanical_connection(body, shapes)
+    assert connection.shape == (5, 3, body.n_shape)
+    omega = -np.einsum("bij,bj->bi", connection, rates)
+    momentum = body.internal_momentum(shapes, rates)
+    left = np.einsum("bij,bj->bi", body.locked_inertia(shapes), omega) + momentum
+    np.testing.assert_allclose(left, 0.0, atol=1e-13 * np.abs(momentum).max(), rtol=0)
+    alone = np.linalg.solve(body.locked_inertia(shapes[2]), body.momentum_matrix(shapes[2]))
+    np.testing.assert_allclose(connection[2], alone, atol=1e-12 * np.abs(alone).max(), rtol=0)
+
+
+def test_connection_and_curvature_check_their_shapes(load_urdf):
+    diver = sp.load_body("diver")
+    for function in (sp.mechanical_connection, sp.curvature):
+        with pytest.raises(ShapeError, match="left_shoulder_abduction"):
+            function(diver, np.zeros(3))
+        with pytest.raises(ShapeError, match="nan"):
+            function(diver, [0.0, np.nan])
+    line = load_urdf(
+        urdf(link("a", 1, [0, 0, 0]), link("b", 1, [0, 0, 0]), joint("s", "prismatic", "a", "b", (1, 0, 0), (1, 0, 0)))
+    )
+    for function in (sp.mechanical_connection, sp.curvature):
+        with pytest.raises(SingularInertiaError):
+            function(line, [0.5])
+
+
+# ---- Curvature ------------------------------------------------------------------------------------------------------
+
+
+def test_curvature_against_central_differences_of_the_connection(body, rng):
+    """B6: F_ij = d_i A_j - d_j A_i - A_i x A_j, the slopes taken numerically."""
+    n, step = body.n_shape, 1e-3
+    shape = random_shapes(body, rng, 1)[0]
+    around = shape + step * np.array([-2, -1, 1, 2])[:, None, None] * np.eye(n)
+    a, b, c, d = sp.mechanical_connection(body, around)
+    slopes = np.swapaxes((a - 8 * b + 8 * c - d) / (12 * step), -1, -2)  # (i, j, axis)
+    columns = sp.mechanical_connection(body, shape).T
+    want = slopes - np.swapaxes(slopes, 0, 1) - np.cross(columns[:, None], columns[None])
+    found = sp.curvature(body, shape)
+    assert found.shape == (n, n, 3)
+    np.testing.assert_allclose(found, want, atol=1e-7 * max(1.0, np.abs(want).max()) * 1e-2, rtol=0)
+    np.testing.assert_array_equal(found, -np.swapaxes(found, 0, 1))
+
+
+def test_curvature_of_a_batch(rng):
+    cat = sp.load_body("cat_two_halves")
+    shapes = random_shapes(cat, rng, 6).reshape(2, 3, 3)
+    together = sp.curvature(cat, shapes)
+    assert together.shape == (2, 3, 3, 3, 3)
+    np.testing.assert_array_equal(together[1, 2], sp.curvature(cat, shapes[1, 2]))
+
+
+@pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 2), (2, 0)])
+@pytest.mark.parametrize("name", ["cat_two_halves", "cat", "satellite"])
+def test_a_small_square_turns_the_body_by_the_curvature(name, first, second, rng):
+    """B6: exp(-e^2 F_ij) from i to j. Centred, so the next term is e^4; it is taken out by halving e."""
+    body = sp.load_body(name)
+    shape = random_shapes(body, rng, 1)[0]
+    i, j = np.eye(body.n_shape)[[first, second]]
+    turned = []
+    for e in (0.04, 0.02):
+        steps = [0 * i, (-i - j) / 2, (i - j) / 2, (i + j) / 2, (-i + j) / 2, (-i - j) / 2, 0 * i]
+        path = sp.ShapePath.waypoints(np.arange(7.0), shape + e * np.array(steps))
+        turned.append(Rotation.from_matrix(sp.holonomy(body, path, 1e-12)).as_rotvec() / e**2)
+    found = (4.0 * turned[1] - turned[0]) / 3.0
+    want = -sp.curvature(body, shape)[first, second]
+    assert np.abs(want).max() > 1e-5
+    np.testing.assert_allclose(found, want, atol=2e-5 * np.abs(want).max() + 2e-8, rtol=0)
+
+
+# ---- The square cat: unit masses at the ends of two crossed rods, one of variable length ----------------------------
+
+
+@pytest.fixture
+def square_cat(load_urdf):
+    return load_urdf(
+        urdf(
+            link("rod", 2.0, [0.0, 2.0, 2.0]),
+            '<link name="hub"/>',
+            link("east", 1.0, [0, 0, 0]),
+            link("west", 1.0, [0, 0, 0]),
+            joint("angle", "continuous", "rod", "hub"),
+            joint("reach", "prismatic", "hub", "east", (1, 0, 0)),
+            joint("west_reach", "prismatic", "hub", "west", (-1, 0, 0), extra='<mimic joint="reach"/>'),
+        )
+    )
+
+
+def test_square_cat_connection_and_curvature(square_cat):
+    """r^2/(1 + r^2) dphi (theory.md section 7), hence F_(r, phi) = 2 r/(1 + r^2)^2."""
+    phi, r = square_cat.joint_index("angle"), square_cat.joint_index("reach")
+    for angle, reach in ((0.3, 0.7), (1.1, 1.9), (-2.0, 0.2)):
+        shape = square_cat.shape({"angle": angle, "reach": reach})
+        connection = sp.mechanical_connection(square_cat, shape)
+        np.testing.assert_allclose(connection[:, phi], reach**2 / (1 + reach**2) * Z, atol=1e-13, rtol=0)
+        np.testing.assert_allclose(connection[:, r], 0.0, atol=1e-13, rtol=0)
+        np.testing.assert_allclose(
+            sp.curvature(square_cat, shape)[r, phi],
+            2 * reach / (1 + reach**2) ** 2 * Z,
+            atol=1e-12,
+            rtol=0,
+        )
+
+
+def test_square_cat_holonomy(square_cat):
+    """Reach out, turn, draw in, turn back: the difference of r^2/(1 + r^2) times the angle, against the turn."""
+    near, far, sweep = 0.6, 1.7, 1.2
+    corners = [(0.3, near), (0.3, far), (0.3 + sweep, far), (0.3 + sweep, near), (0.3, near)]
+    shapes = [square_cat.shape({"angle": a, "reach": r}) for a, r in corners]
+    path = sp.ShapePath.waypoints([0.0, 0.5, 1.1, 2.0, 3.0], shapes)
+    turn = (far**2 / (1 + far**2) - near**2 / (1 + near**2)) * sweep
+    np.testing.assert_allclose(sp.holonomy(square_cat, path, 1e-12), about(Z, -turn), atol=1e-11, rtol=0)
+
+
+# ---- Elroy's beanie and reaction wheels -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["continuous", "revolute"])
+def test_elroys_beanie(kind, load_urdf):
+    """Two planar bodies on a pin through both centres: -2 pi I2/(I1 + I2) a turn (theory.md section 7)."""
+    first, second = 3.0, 0.7
+    body = load_urdf(
+        urdf(
+            link("head", 2.0, [2, 2, first]),
+            link("beanie", 1.0, [0.4, 0.4, second]),
+            joint("pin", kind, "head", "beanie"),
+        )
+    )
+    for turns in (1, -1, 3):
+        path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [2.0 * np.pi * turns]])
+        if kind == "revolute":
+            with pytest.raises(OpenPathError, match="pin"):
+                sp.holonomy(body, path)
+            continue
+        want = about(Z, -2.0 * np.pi * turns * second / (first + second))
+        np.testing.assert_allclose(sp.holonomy(body, path, 1e-12), want, atol=1e-11, rtol=0)
+
+
+def test_elroys_beanie_with_its_centres_off_the_pin(load_urdf):
+    """The planar connection by the reduced mass, integrated by quadrature."""
+    m1, m2, i1, i2, d1, d2 = 2.0, 1.0, 3.0, 0.7, 0.8, 0.5
+    body = load_urdf(
+        urdf(
+            link("head", m1, [2, 2, i1], (-d1, 0, 0)),
+            link("beanie", m2, [0.4, 0.4, i2], (d2, 0, 0)),
+            joint("pin", "continuous", "head", "beanie"),
+        )
+    )
+    reduced = m1 * m2 / (m1 + m2)
+
+    def connection(angle):
+        mixed = d1 * d2 * np.cos(angle)
+        return (i2 + reduced * (d2**2 + mixed)) / (i1 + i2 + reduced * (d1**2 + d2**2 + 2 * mixed))
+
+    turn, _ = quad(connection, 0.0, 2.0 * np.pi, epsabs=1e-13)
+    path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [2.0 * np.pi]])
+    np.testing.assert_allclose(sp.holonomy(body, path, 1e-12), about(Z, -turn), atol=1e-11, rtol=0)
+    np.testing.assert_allclose(sp.mechanical_connection(body, [0.9])[:, 0], connection(0.9) * Z, atol=1e-13, rtol=0)
+
+
+def test_a_reaction_wheel_in_a_lopsided_body(load_urdf):
+    """Balanced and round, it leaves I alone: one turn gives exp(-2 pi I^-1 I_w a), about no axis of symmetry."""
+    turn = about(Rotation.from_rotvec([0.3, -0.5, 0.9]).apply([1, 0, 0]), 0.8)
+    bus = turn @ np.diag([1.0, 1.7, 2.2]) @ turn.T
+    wheel, axis = np.array([0.2, 0.2, 0.3]), Rotation.from_euler("xyz", [0.4, -0.9, 0.0])
+    a = axis.apply(Z)
+    body = load_urdf(
+        urdf(
+            link("bus", 5.0, 0.5 * (bus + bus.T)),
+            link("wheel", 1.0, wheel),
+            joint("spin", "continuous", "bus", "wheel", Z, (0.4, -0.2, 0.3), (0.4, -0.9, 0.0)),
+        )
+    )
+    reduced, arm = 5.0 / 6.0, np.array([0.4, -0.2, 0.3])
+    inertia = bus + axis.as_matrix() @ np.diag(wheel) @ axis.as_matrix().T
+    inertia += reduced * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    rate = np.linalg.solve(inertia, wheel[2] * a)
+    np.testing.assert_allclose(sp.mechanical_connection(body, [2.0])[:, 0], rate, atol=1e-13, rtol=0)
+    path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [2.0 * np.pi]])
+    want = expm(-2.0 * np.pi * np.cross(np.eye(3), rate))
+    np.testing.assert_allclose(sp.holonomy(body, path, 1e-12), want, atol=1e-11, rtol=0)
+
+
+# ---- Cats and astronauts --------------------------------------------------------------------------------------------
+
+
+def kane_scher(bend, duration=1.0):
+    """The two halves go round with a constant bend and no twist: R = exp(bend n(h)), n = (0, cos h, -sin h)."""
+
+    def f(t):
+        h = 2.0 * np.pi * t / duration
+        y, z, s, c = np.cos(h), -np.sin(h), np.sin(bend), np.cos(bend)
+        dy, dz = z, -y  # by h
+        yaw_sine, dyaw_sine = z * s, dz * s
+        top, dtop = -(1 - c) * y * z, -(1 - c) * (dy * z + y * dz)
+        low, dlow = c + (1 - c) * y * y, 2 * (1 - c) * y * dy
+        shapes = np.stack([np.arctan2(y * s, c + 0 * t), np.arcsin(yaw_sine), np.arctan2(top, low)], -1)
+        rates = np.stack(
+            [
+                dy * s * c / (y * y * s * s + c * c),
+                dyaw_sine / np.sqrt(1 - yaw_sine**2),
+                (dtop * low - top * dlow) / (top**2 + low**2),
+            ],
+            -1,
+        )
+        return shapes, rates * 2.0 * np.pi / duration
+
+    return sp.ShapePath.function(f, duration, joint_names=["waist_pitch", "waist_yaw", "waist_roll"])
+
+
+@pytest.mark.parametrize("half_bend", [0.2, 0.5, 0.9])
+def test_kane_and_scher(half_bend):
+    """Turn 2 pi j cos(g/2)/(sin^2(g/2) + j cos^2(g/2)), j = 1/4, about the axis between the two halves.
+
+    Seen from the plane of the bend both halves spin by +2 pi about their axes; the plane turns the other way
+    (theory.md section 7).
+    """
+    j, s, c = 0.25, np.sin(half_bend), np.cos(half_bend)
+    turn = 2.0 * np.pi * j * c / (s**2 + j * c**2)
+    found = sp.holonomy(sp.load_body("cat_two_halves"), kane_scher(2 * half_bend), 1e-11)
+    np.testing.assert_allclose(found, about([c, 0.0, -s], -turn), atol=1e-10, rtol=0)
+
+
+def test_kane_and_schers_cat_lands_on_its_feet():
+    """The turn is 180 degrees at a bend g between the halves with cos(g/2) = (-j + sqrt(j^2 - j + 1))/(1 - j)."""
+    cat = sp.load_body("cat_two_halves")
+    bend = 2.0 * np.arccos((-0.25 + np.sqrt(0.25**2 - 0.25 + 1)) / 0.75)
+    assert np.degrees(bend) == pytest.approx(59.426458741516, abs=1e-11)
+    assert angle_of(sp.holonomy(cat, kane_scher(bend), 1e-11)) == pytest.approx(np.pi, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("moves", "duration", "turn"),
+    [
+        (
+            {
+                "left_shoulder_flexion": (-1.05, 2.05, 0.0),
+                "right_shoulder_flexion": (-1.05, 2.05, 0.0),
+                "left_shoulder_abduction": (0.75, 0.0, -0.75),
+                "right_shoulder_abduction": (-0.75, 0.0, 0.75),
+            },
+            2.0,
+            0.206999962449,
+        ),
+        (
+            {
+                "left_hip_flexion": (-0.75, 1.2, 0.0),
+                "right_hip_flexion": (-0.75, 1.2, 0.0),
+                "left_knee": (1.15, 0.0, -1.15),
+                "right_knee": (1.15, 0.0, -1.15),
+                "lumbar_flexion": (0.25, -0.5, 0.0),
+            },
+            4.0,
+            0.214629350843,
+        ),
+    ],
+    ids=["arm circles", "lower body"],
+)
+def test_an_astronaut_pitches_forward(moves, duration, turn):
+    """Values found by a program without Pinocchio (Magnus steps on NumPy sums), to 12 digits."""
+    astronaut = sp.load_body("astronaut")
+    mean, a, b = (astronaut.shape({name: row[k] for name, row in moves.items()}) for k in range(3))
+    path = sp.ShapePath.fourier(mean, a[:, None], b[:, None], duration)
+    np.testing.assert_allclose(sp.holonomy(astronaut, path, 1e-12), about([0, 1, 0], turn), atol=2e-12, rtol=0)
+
+
+# ---- Laws of the holonomy -------------------------------------------------------------------------------------------
+
+
+def test_holonomy_against_a_plain_integrator(body, rng):
+    """B2, B7: the horizontal lift once round, by DOP853."""
+    path = random_loop(body, rng, amplitude=0.6)
+    found = sp.holonomy(body, path, 1e-11)
+    assert angle_of(found) > 1e-4
+    np.testing.assert_allclose(found, lift(body, path, 0.0, path.duration), atol=1e-10, rtol=0)
+    np.testing.assert_allclose(found @ found.T, np.eye(3), atol=1e-13, rtol=0)
+
+
+def test_a_loop_backwards_undoes_it(body, rng):
+    path = random_loop(body, rng)
+    forth, back = sp.holonomy(body, path, 1e-11), sp.holonomy(body, path.reversed(), 1e-11)
+    np.testing.assert_allclose(back, forth.T, atol=3e-11, rtol=0)
+
+
+def test_one_loop_after_another_multiplies_from_the_right(rng):
+    cat = sp.load_body("cat_two_halves")
+    start = np.array([0.3, -0.2, 0.1])
+    loops = []
+    for _ in range(2):
+        corners = np.vstack([start, rng.uniform(-1.2, 1.2, (3, 3)), start])
+        loops.append(sp.ShapePath.waypoints([0, 1, 2, 3, 4], corners))
+    first, second = (sp.holonomy(cat, loop, 1e-11) for loop in loops)
+    both = sp.holonomy(cat, loops[0].then(loops[1]), 1e-11)
+    np.testing.assert_allclose(both, first @ second, atol=1e-10, rtol=0)
+    assert np.abs(first @ second - second @ first).max() > 1e-3
+
+
+def test_going_round_again_is_a_power(rng):
+    cat = sp.load_body("cat")
+    path = random_loop(cat, rng, amplitude=0.8)
+    once = sp.holonomy(cat, path, 1e-12)
+    for count in (2, 7, 200):
+        many = sp.holonomy(cat, path.repeated(count), 1e-10)
+        np.testing.assert_allclose(many, np.linalg.matrix_power(once, count), atol=1e-9, rtol=0)
+    cubed = np.linalg.matrix_power(once, 3)
+    for three in (path.repeated(2).then(path), path.stretched(2.0).repeated(3), path.repeated(3).stretched(0.1)):
+        np.testing.assert_allclose(sp.holonomy(cat, three, 1e-10), cubed, atol=1e-9, rtol=0)
+    np.testing.assert_allclose(sp.holonomy(cat, path.repeated(3).reversed(), 1e-10), cubed.T, atol=1e-9, rtol=0)
+    np.testing.assert_allclose(sp.holonomy(cat, path.reversed().repeated(3), 1e-10), cubed.T, atol=1e-9, rtol=0)
+    corners = sp.ShapePath.waypoints([0, 1, 2, 3], path.shape(path.duration * np.array([0.0, 0.3, 0.7, 1.0])))
+    cornered = sp.holonomy(cat, corners, 1e-12)
+    np.testing.assert_allclose(
+        sp.holonomy(cat, corners.repeated(5), 1e-10),
+        np.linalg.matrix_power(cornered, 5),
+        atol=1e-9,
+        rtol=0,
+    )
+
+
+def test_only_the_loop_counts_not_how_fast_it_is_gone_round(rng):
+    cat = sp.load_body("cat_two_halves")
+    path = random_loop(cat, rng, duration=1.0, amplitude=1.0)
+    want = sp.holonomy(cat, path, 1e-11)
+
+    def uneven(t):
+        s, rate = t / 3.0 + 0.1 * np.sin(2 * np.pi * t / 3.0), 1 / 3.0 + 0.2 * np.pi / 3.0 * np.cos(2 * np.pi * t / 3.0)
+        return path.shape(s), path.rate(s) * rate[:, None]
+
+    assert angle_of(want) > 0.01
+    np.testing.assert_allclose(sp.holonomy(cat, sp.ShapePath.function(uneven, 3.0), 1e-11), want, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(sp.holonomy(cat, path.stretched(1e4), 1e-11), want, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(sp.holonomy(cat, path.stretched(1e-4), 1e-11), want, atol=1e-10, rtol=0)
+
+
+def test_another_starting_point_turns_the_axis(rng):
+    """U(s)^T R_G U(s), U the lift from the old start to the new one."""
+    cat = sp.load_body("cat_two_halves")
+    path = random_loop(cat, rng, duration=1.0, amplitude=1.0)
+    shift = 0.3
+    later = sp.ShapePath.function(
+        lambda t: (path.shape(np.mod(t + shift, 1.0)), path.rate(np.mod(t + shift, 1.0))), 1.0, [1.0 - shift]
+    )
+    to_there = lift(cat, path, 0.0, shift)
+    want = to_there.T @ sp.holonomy(cat, path, 1e-11) @ to_there
+    np.testing.assert_allclose(sp.holonomy(cat, later, 1e-11), want, atol=1e-10, rtol=0)
+    assert np.abs(want - sp.holonomy(cat, path)).max() > 1e-3
+
+
+def test_there_and_back_again_is_nothing(rng):
+    cat = sp.load_body("cat")
+    path = sp.ShapePath.waypoints([0, 1, 2], random_shapes(cat, rng, 3))
+    np.testing.assert_allclose(sp.holonomy(cat, path.then(path.reversed()), 1e-11), np.eye(3), atol=1e-10, rtol=0)
+    np.testing.assert_allclose(
+        sp.holonomy(cat, sp.ShapePath.waypoints([0, 1], np.zeros((2, 23)))),
+        np.eye(3),
+        atol=1e-15,
+        rtol=0,
+    )
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9, 1e-12])
+def test_the_tolerance_is_kept(tolerance, rng):
+    cat = sp.load_body("cat")
+    path = random_loop(cat, rng, harmonics=4, amplitude=1.0)
+    want = lift(cat, path, 0.0, path.duration)
+    assert angle_of(sp.holonomy(cat, path, tolerance) @ want.T) < tolerance + 1e-11
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, np.nan, np.inf, "tight", None, [1e-9, 1e-6]])
+def test_a_tolerance_is_a_positive_number(tolerance):
+    path = sp.ShapePath.waypoints([0, 1, 2], [[0.0, 0.0], [1.0, 0.3], [0.0, 0.0]])
+    with pytest.raises(ValueError, match="tolerance"):
+        sp.holonomy(sp.load_body("diver"), path, tolerance)
+
+
+def test_an_open_path_has_no_holonomy():
+    """The joint that is farthest from closing is named, with its gap."""
+    diver = sp.load_body("diver")
+    path = sp.ShapePath.waypoints([0, 1], [[0.0, 0.0], [0.25, -0.5]])
+    with pytest.raises(OpenPathError, match=r"right_shoulder_abduction ends -0\.5") as caught:
+        sp.holonomy(diver, path)
+    assert isinstance(caught.value, TrajectoryError)
+    assert isinstance(caught.value, ValueError)
+    with pytest.raises(OpenPathError):
+        sp.holonomy(diver, sp.ShapePath.waypoints([0, 1], [[0.0, 0.0], [0.0, 2 * np.pi]]))
+    nearly = sp.ShapePath.waypoints([0, 1, 2], [[0.0, 0.0], [1.0, 0.3], [5e-10, 0.0]])
+    assert sp.holonomy(diver, nearly).shape == (3, 3)

@@ -1,0 +1,1 @@
+"""What tests share: bodies, independent computations, writers of files, a browser."""

@@ -1,0 +1,417 @@
+"""Oracles for the tests: the motion of a free body by other routes than the library's, sharing no code with it.
+
+`pinocchio_motion` conserves angular momentum with Pinocchio's `ccrba` at the true attitude; `mujoco_motion` knows
+nothing of conservation and integrates MuJoCo's floating-base dynamics with the joints prescribed (theory.md U10).
+Both carry a quaternion of their own through SciPy's DOP853 at rtol = 1e-12. The rest are closed forms.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase.body.catalog import example_file
+from support.places import ROBOTS
+
+Array = NDArray[np.float64]
+RTOL = 1e-12
+
+# A momentum for each body [kg m^2/s] that turns it by about a turn in the two seconds of `random_loop`.
+BODIES = {
+    "example:human": 8.0,
+    "astronaut": 8.0,
+    "cat": 0.05,
+    "cat_two_halves": 0.02,
+    "diver": 10.0,
+    "satellite": 12.0,
+}
+
+
+class JointMotion(Protocol):
+    """Joint coordinates and rates at one time."""
+
+    @property
+    def duration(self) -> float: ...
+    def shape(self, t: float, /) -> Array: ...
+    def rate(self, t: float, /) -> Array: ...
+
+
+@dataclass(frozen=True)
+class FourierLoop:
+    """r = mean + spin t + sum_k a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T), with its first two derivatives.
+
+    `spin` is for joints that turn without end.
+    """
+
+    mean: Array
+    cosines: Array
+    sines: Array
+    duration: float
+    spin: float | Array = 0.0
+
+    @cached_property
+    def path(self) -> sp.ShapePath:
+        """The same motion for the library."""
+        if np.any(self.spin):
+            return sp.ShapePath.function(lambda t: self.at(t), self.duration)
+        return sp.ShapePath.fourier(self.mean, self.cosines, self.sines, self.duration)
+
+    def at(self, times: Array) -> tuple[Array, Array]:
+        """Shapes and rates at times (N,)."""
+        return np.array([self.shape(t) for t in times]), np.array([self.rate(t) for t in times])
+
+    def shape(self, t: float) -> Array:
+        return self.mean + self.spin * t + self._derivative(t, 0)
+
+    def rate(self, t: float) -> Array:
+        return self.spin + self._derivative(t, 1)
+
+    def acceleration(self, t: float) -> Array:
+        return self._derivative(t, 2)
+
+    def _derivative(self, t: float, order: int) -> Array:
+        frequency = 2.0 * np.pi / self.duration * np.arange(1, self.cosines.shape[1] + 1)
+        # Each derivative turns the phase by a quarter.
+        phase = frequency * t + 0.5 * np.pi * order
+        return self.cosines @ (frequency**order * np.cos(phase)) + self.sines @ (frequency**order * np.sin(phase))
+
+
+def random_loop(seed: int, joints: int, *, size: float = 0.5, duration: float = 2.0, harmonics: int = 3) -> FourierLoop:
+    """A closed loop with `harmonics` harmonics, the amplitudes of the higher ones smaller."""
+    random = np.random.default_rng(seed)
+    decay = size / np.arange(1, harmonics + 1)
+    return FourierLoop(
+        random.uniform(-0.3, 0.3, joints),
+        decay * random.uniform(-1.0, 1.0, (joints, harmonics)),
+        decay * random.uniform(-1.0, 1.0, (joints, harmonics)),
+        duration,
+    )
+
+
+@lru_cache(maxsize=16)
+def body_of(name: str) -> sp.Body:
+    return sp.load_body(name)
+
+
+def random_vector(seed: int, size: float) -> Array:
+    vector = np.random.default_rng(seed).normal(size=3)
+    return size * vector / np.linalg.norm(vector)
+
+
+def random_rotation(seed: int) -> Array:
+    return Rotation.random(rng=np.random.default_rng(seed)).as_matrix()
+
+
+def hat(v: ArrayLike) -> Array:
+    x, y, z = np.asarray(v, dtype=float)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def turn(axis: ArrayLike, angle: float) -> Array:
+    """The rotation by `angle` about `axis` (Rodrigues), of any length."""
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    k = hat(unit)
+    return np.eye(3) + np.sin(angle) * k + (1.0 - np.cos(angle)) * k @ k
+
+
+def apart(first: Array, second: Array) -> float:
+    """The largest angle between two (stacks of) rotations [rad], exact to rounding for small angles."""
+    difference = np.asarray(first) - np.asarray(second)
+    # |A - B|_F = 2 sqrt(2) sin(angle/2) for rotations.
+    norm = np.sqrt(np.sum(difference**2, axis=(-1, -2))) / (2.0 * np.sqrt(2.0))
+    return float(np.max(2.0 * np.arcsin(np.minimum(norm, 1.0))))
+
+
+def wrapped(angle: ArrayLike) -> Array:
+    """An angle modulo 2 pi, nearest to zero."""
+    return np.angle(np.exp(1j * np.asarray(angle, dtype=float)))
+
+
+def geodesic_turn(start: Array, end: Array) -> Array:
+    """The least rotation that takes one unit vector to another (not opposite) one."""
+    k = hat(np.cross(start, end))
+    return np.eye(3) + k + k @ k / (1.0 + start @ end)
+
+
+def urdf_file(name: str) -> Path:
+    """The file of a catalog name, or of "example:human"."""
+    return example_file(name.removeprefix("example:")) if name.startswith("example:") else ROBOTS / f"{name}.urdf"
+
+
+# ---- Pinocchio: momentum conserved at the true attitude -------------------------------------------------------------
+
+
+class FreeFloating:
+    """A Pinocchio model with a free-flyer, and its momentum at any attitude."""
+
+    def __init__(self, name: str, joint_names: Sequence[str]) -> None:
+        self.model = pin.buildModelFromUrdf(str(urdf_file(name)), pin.JointModelFreeFlyer())
+        self.data = self.model.createData()
+        joints = [self.model.joints[self.model.getJointId(joint)] for joint in joint_names]
+        self.position = np.array([joint.idx_q for joint in joints])
+        self.velocity = np.array([joint.idx_v for joint in joints])
+        self.endless = np.array([joint.nq == 2 for joint in joints])
+
+    def rates(self, quat_xyzw: Array, shape: Array, rate: Array, momentum: Array) -> tuple[Array, Array]:
+        """I^-1 Pi and I^-1 L_o, base axes [rad/s], from the momentum map at this attitude."""
+        q = np.zeros(self.model.nq)
+        q[3:7] = quat_xyzw
+        q[self.position] = np.where(self.endless, np.cos(shape), shape)
+        q[self.position[self.endless] + 1] = np.sin(shape[self.endless])
+        v = np.zeros(self.model.nv)
+        v[self.velocity] = rate
+        pin.ccrba(self.model, self.data, q, v)
+        both = np.stack([momentum, self.data.hg.angular], axis=-1)
+        solved = np.linalg.solve(self.data.Ag[3:, 3:6], both)
+        return solved[:, 0], solved[:, 1]
+
+
+@dataclass(frozen=True)
+class IndependentMotion:
+    """Attitude and lift at `times`, and at the end the dynamic phases and solid angles in two gauges."""
+
+    attitude: Array
+    lift: Array
+    dynamic_phase: dict[str, float]
+    solid_angle: dict[str, float]
+    gap: dict[str, float]
+
+
+def pinocchio_motion(
+    name: str,
+    joint_names: Sequence[str],
+    joints: JointMotion,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    times: ArrayLike | None = None,
+    breaks: Sequence[float] = (),
+) -> IndependentMotion:
+    """One integration of everything: R, the lift U, theta_D, and tangent vectors carried along Pi/|Pi|.
+
+    The solid angle is the turn of a tangent vector carried parallel round the curve, closed by a great circle
+    (Gauss and Bonnet), known modulo 2 pi. Seen from the horizontal gauge Pi is U Pi and the rate is U I^-1 Pi.
+    """
+    body = FreeFloating(name, joint_names)
+    spatial = np.asarray(momentum, dtype=float)
+    size = float(np.linalg.norm(spatial))
+    axis = spatial / size if size else np.zeros(3)
+    start = np.eye(3) if attitude is None else np.asarray(attitude, dtype=float)
+    first = start.T @ axis
+    tangent = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
+    tangent = tangent / (np.linalg.norm(tangent) or 1.0)
+
+    def slope(t: float, y: Array) -> Array:
+        quat, lift, in_base, in_lift = y[:4] / np.linalg.norm(y[:4]), y[4:13].reshape(3, 3), y[13:16], y[16:19]
+        by_momentum, by_shape = body.rates(quat, joints.shape(t), joints.rate(t), spatial)
+        omega = by_momentum - by_shape
+        u = Rotation.from_quat(quat).as_matrix().T @ axis
+        u_rate = np.cross(u, omega)
+        v, v_rate = lift @ u, lift @ np.cross(u, by_momentum)
+        return np.concatenate(
+            [
+                0.5 * (y[3] * omega + np.cross(y[:3], omega)),
+                [-0.5 * y[:3] @ omega],
+                (-lift @ hat(by_shape)).ravel(),
+                -(in_base @ u_rate) * u,
+                -(in_lift @ v_rate) * v,
+                [u @ omega, u @ by_momentum],
+            ]
+        )
+
+    y = np.concatenate([Rotation.from_matrix(start).as_quat(), np.eye(3).ravel(), tangent, tangent, [0.0, 0.0]])
+    wanted = np.linspace(0.0, joints.duration, 41) if times is None else np.asarray(times, dtype=float)
+    values = np.empty((len(wanted), len(y)))
+    edges = np.unique([0.0, *breaks, joints.duration])
+    for left, right in pairwise(edges):
+        inside = (wanted >= left) & (wanted <= right)
+        run = solve_ivp(
+            slope, (left, right), y, "DOP853", rtol=RTOL, atol=1e-14, max_step=(right - left) / 4, dense_output=True
+        )
+        assert run.success, run.message
+        values[inside] = run.sol(wanted[inside]).T
+        y = run.y[:, -1]
+    end = Rotation.from_quat(y[:4]).as_matrix()
+    lift = y[4:13].reshape(3, 3)
+    directions = {"base": end.T @ axis, "horizontal": lift @ end.T @ axis}
+    carried = {"base": y[13:16], "horizontal": y[16:19]}
+    solid_angle, gap = {}, {}
+    for gauge, last in directions.items():
+        closed = geodesic_turn(last, first) @ carried[gauge] if size else tangent
+        solid_angle[gauge] = float(np.arctan2(first @ np.cross(tangent, closed), tangent @ closed))
+        gap[gauge] = float(np.linalg.norm(last - first))
+    return IndependentMotion(
+        Rotation.from_quat(values[:, :4]).as_matrix(),
+        values[:, 4:13].reshape(-1, 3, 3),
+        {"base": float(y[19]), "horizontal": float(y[20])},
+        solid_angle,
+        gap,
+    )
+
+
+# ---- MuJoCo: forces and accelerations, no conservation law ----------------------------------------------------------
+
+
+@lru_cache(maxsize=8)
+def mujoco_model(name: str):
+    """A MuJoCo model of a URDF with a floating base and without drawing or gravity.
+
+    MuJoCo wants every moving link to weigh something: links without mass get 1e-14 kg.
+    """
+    import mujoco
+
+    root = ElementTree.parse(urdf_file(name)).getroot()
+    for link in root.findall("link"):
+        for kind in ("visual", "collision"):
+            for element in link.findall(kind):
+                link.remove(element)
+    children = {joint.find("child").get("link") for joint in root.findall("joint")}  # type: ignore[union-attr]
+    (base,) = {link.get("name") for link in root.findall("link")} - children
+    ElementTree.SubElement(root, "link", name="inertial_frame")
+    floating = ElementTree.SubElement(root, "joint", name="floating_base", type="floating")
+    ElementTree.SubElement(floating, "parent", link="inertial_frame")
+    ElementTree.SubElement(floating, "child", link=base or "")
+    settings = ElementTree.SubElement(root, "mujoco")
+    ElementTree.SubElement(
+        settings,
+        "compiler",
+        fusestatic="true",
+        discardvisual="true",
+        balanceinertia="false",
+        inertiafromgeom="false",
+        boundmass="1e-14",
+        boundinertia="1e-14",
+    )
+    ElementTree.SubElement(settings, "option", gravity="0 0 0")
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+
+
+class MujocoBody:
+    """A floating body in MuJoCo: velocities are (base velocity, world; base rate, base axes; joint rates)."""
+
+    def __init__(self, name: str, joint_names: Sequence[str]) -> None:
+        import mujoco
+
+        self.mujoco, self.model = mujoco, mujoco_model(name)
+        self.data = mujoco.MjData(self.model)
+        joints = [self.model.joint(joint) for joint in joint_names]
+        self.position = np.array([int(np.ravel(joint.qposadr)[0]) for joint in joints])
+        self.velocity = np.array([int(np.ravel(joint.dofadr)[0]) for joint in joints])
+        assert len(joint_names) == self.model.nv - 6
+
+    def place(self, position: Array, attitude: Array, shape: Array) -> None:
+        """Set the configuration and compute all that depends on it alone."""
+        qpos = self.data.qpos
+        qpos[:3] = position
+        qpos[3:7] = np.roll(Rotation.from_matrix(attitude).as_quat(), 1)
+        qpos[self.position] = shape
+        self.mujoco.mj_fwdPosition(self.model, self.data)
+
+    def move(self, velocity: Array, omega: Array, rate: Array) -> None:
+        """Set the velocity and compute all that depends on it."""
+        self.data.qvel[:] = self.full([*velocity, *omega], rate)
+        self.mujoco.mj_fwdVelocity(self.model, self.data)
+
+    def full(self, base: ArrayLike, joints: ArrayLike) -> Array:
+        vector = np.zeros(self.model.nv)
+        vector[:6] = base
+        vector[self.velocity] = joints
+        return vector
+
+    def mass_times(self, vector: Array) -> Array:
+        result = np.zeros(self.model.nv)
+        self.mujoco.mj_mulM(self.model, self.data, result, vector)
+        return result
+
+    def base_mass(self) -> Array:
+        return np.array([self.mass_times(row)[:6] for row in np.eye(6, self.model.nv)])
+
+    def momentum_about_centre(self) -> Array:
+        """Angular momentum about the centre of mass, world axes, as MuJoCo sums it over the links."""
+        self.mujoco.mj_subtreeVel(self.model, self.data)
+        return self.data.subtree_angmom[1].copy()
+
+    def centre_of_mass(self) -> Array:
+        return self.data.subtree_com[1].copy()
+
+
+@dataclass(frozen=True)
+class SimulatedMotion:
+    """Attitude (N, 3, 3), position of the base origin (N, 3), angular velocity in base axes (N, 3)."""
+
+    attitude: Array
+    position: Array
+    angular_velocity: Array
+
+
+def mujoco_motion(
+    name: str,
+    joint_names: Sequence[str],
+    loop: FourierLoop,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    times: ArrayLike | None = None,
+) -> SimulatedMotion:
+    """The motion from M a + bias = 0 on the base, joints as prescribed.
+
+    The centre of mass starts at rest at the origin; the momentum enters only through the initial velocity.
+    """
+    body = MujocoBody(name, joint_names)
+    start = np.eye(3) if attitude is None else np.asarray(attitude, dtype=float)
+    body.place(np.zeros(3), start, loop.shape(0.0))
+    position = -body.centre_of_mass()
+    body.place(position, start, loop.shape(0.0))
+    # Of the base's six generalised momenta the last three are angular, about the base origin in base axes: without
+    # linear momentum that is the momentum about the centre of mass.
+    wanted = np.concatenate([np.zeros(3), start.T @ np.asarray(momentum, dtype=float)])
+    carried = body.mass_times(body.full(np.zeros(6), loop.rate(0.0)))[:6]
+    velocity = np.linalg.solve(body.base_mass(), wanted - carried)
+
+    def slope(t: float, y: Array) -> Array:
+        quat = y[3:7]
+        body.place(y[:3], Rotation.from_quat(quat).as_matrix(), loop.shape(t))
+        body.move(y[7:10], y[10:13], loop.rate(t))
+        force = body.data.qfrc_bias + body.mass_times(body.full(np.zeros(6), loop.acceleration(t)))
+        omega = y[10:13]
+        return np.concatenate(
+            [
+                y[7:10],
+                0.5 * (quat[3] * omega + np.cross(quat[:3], omega)),
+                [-0.5 * quat[:3] @ omega],
+                np.linalg.solve(body.base_mass(), -force[:6]),
+            ]
+        )
+
+    y = np.concatenate([position, Rotation.from_matrix(start).as_quat(), velocity])
+    wanted_times = np.linspace(0.0, loop.duration, 41) if times is None else np.asarray(times, dtype=float)
+    run = solve_ivp(
+        slope, (0.0, loop.duration), y, "DOP853", rtol=RTOL, atol=1e-14, max_step=loop.duration / 20, dense_output=True
+    )
+    assert run.success, run.message
+    values = run.sol(wanted_times).T
+    return SimulatedMotion(Rotation.from_quat(values[:, 3:7]).as_matrix(), values[:, :3], values[:, 10:13])
+
+
+# ---- Closed forms ---------------------------------------------------------------------------------------------------
+
+
+def axisymmetric_attitude(across: float, along: float, momentum: ArrayLike, attitude: Array, times: Array) -> Array:
+    """R(t) of a rigid body with moments (across, across, along): precession about mu, spin about the body's z.
+
+    R = exp(t mu/across) R_0 exp(t Pi_3 (1/along - 1/across) e_3).
+    """
+    spatial = np.asarray(momentum, dtype=float)
+    size = np.linalg.norm(spatial)
+    spin = (1.0 / along - 1.0 / across) * (attitude.T @ spatial)[2]
+    return np.array([turn(spatial, size * t / across) @ attitude @ turn([0.0, 0.0, 1.0], spin * t) for t in times])

@@ -1,0 +1,187 @@
+"""A process that loads body files, watched from outside.
+
+Run as a script this is the process: it reads requests as lines of JSON and answers each with lines of JSON, so that a
+crash, a hang or a hunger for memory is seen from outside and tells which file did it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import selectors
+import subprocess
+import sys
+import time
+import traceback
+import warnings
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+from support.damaged_files import mutated
+
+# Seconds of the processor, which do not count what else the machine does; a hang is seen by the clock.
+MOST_SECONDS, HANG_SECONDS, MOST_MEMORY = 5.0, 30.0, 2**30
+
+
+class Worker:
+    """A process that loads files, started anew after a crash."""
+
+    def __init__(self, memory: int = MOST_MEMORY) -> None:
+        self.memory = memory
+        self.start()
+
+    def start(self) -> None:
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        self.process = subprocess.Popen(
+            [sys.executable, __file__, str(self.memory)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+        )
+        self.rest = b""
+        assert self._line(60.0) == {"ready": True}
+
+    def ask(self, request: dict[str, Any], answers: int = 1) -> list[dict[str, Any]]:
+        """The answers to a request; what stops the process is the last one."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps(request).encode() + b"\n")
+        self.process.stdin.flush()
+        found = []
+        for _ in range(answers):
+            found.append(self._line(HANG_SECONDS))
+            if found[-1]["outcome"] in ("hang", "died"):
+                self.stop()
+                self.start()
+                break
+        return found
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            if stream is not None:
+                stream.close()
+
+    def _line(self, seconds: float) -> dict[str, Any]:
+        assert self.process.stdout is not None
+        deadline = time.monotonic() + seconds
+        with selectors.DefaultSelector() as selector:
+            selector.register(self.process.stdout, selectors.EVENT_READ)
+            while b"\n" not in self.rest:
+                if not selector.select(max(0.0, deadline - time.monotonic())):
+                    return {"outcome": "hang", "message": f"no answer in {seconds} s"}
+                piece = os.read(self.process.stdout.fileno(), 65536)
+                if not piece:
+                    return {"outcome": "died", "message": f"the process ended with {self.process.wait()}"}
+                self.rest += piece
+        line, self.rest = self.rest.split(b"\n", 1)
+        return json.loads(line)
+
+
+def outcome_of(path: str, **options: str) -> dict[str, Any]:
+    """Load a file here: "loads" with what is warned of and the mass, or the error."""
+    import numpy as np
+
+    import shapephase as sp
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            body = sp.load_body(path, **options)
+        except sp.ShapePhaseError as error:
+            return {"outcome": type(error).__name__, "message": str(error)}
+        except BaseException as error:
+            return {"outcome": "escaped", "message": repr(error)}
+    shape = 0.1 * np.ones(body.n_shape)
+    numbers = [body.mass, *body.locked_inertia(shape).ravel(), *body.internal_momentum(shape, shape)]
+    return {
+        "outcome": "loads" if np.isfinite(numbers).all() and body.mass > 0.0 else "not finite",
+        "message": "; ".join(str(warning.message) for warning in caught),
+        "mass": body.mass,
+    }
+
+
+def timed_outcome(path: str, **options: str) -> dict[str, Any]:
+    """The outcome, "slow" if it took more than is allowed."""
+    start = time.process_time()
+    answer = outcome_of(path, **options)
+    seconds = time.process_time() - start
+    return answer if seconds < MOST_SECONDS else {"outcome": "slow", "message": f"{seconds} s for {answer}"[:1000]}
+
+
+def written_mass(path: str) -> float:
+    """The sum of the masses of a URDF, by another parser."""
+    root = ElementTree.parse(path).getroot()
+    return sum(float(mass.get("value", "nan")) for mass in root.findall("link/inertial/mass"))
+
+
+def commanded(arguments: list[str], folder: str) -> dict[str, Any]:
+    """The command line in a process of its own, forked from this one: how it ended and what it printed."""
+    import resource
+
+    printed, said = Path(folder) / "stdout.txt", Path(folder) / "stderr.txt"
+    child = os.fork()
+    if child == 0:
+        for number, file in ((1, printed), (2, said)):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        limit = int(time.process_time() + MOST_SECONDS) + 1
+        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+        code = 70
+        try:
+            from shapephase.cli.main import main
+
+            main(arguments)
+            code = 0
+        except SystemExit as stopped:
+            code = int(stopped.code or 0)
+        except BaseException:
+            traceback.print_exc()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    _, status, used = os.wait4(child, 0)
+    code = os.waitstatus_to_exitcode(status)
+    return {
+        "outcome": f"signal {-code}" if code < 0 else f"exit {code}",
+        "message": said.read_text(encoding="utf-8", errors="replace"),
+        "printed": printed.read_text(encoding="utf-8", errors="replace"),
+        "memory": used.ru_maxrss * 1024,
+    }
+
+
+def work(memory: int) -> None:
+    import resource
+
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    import shapephase.cli.main  # noqa: F401
+
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+
+    def say(answer: dict[str, Any]) -> None:
+        print(json.dumps(answer), file=answers, flush=True)
+
+    say({"ready": True})
+    for line in sys.stdin:
+        request = json.loads(line)
+        if "command" in request:
+            say(commanded(request["command"], request["folder"]))
+            continue
+        path = request["path"]
+        if "seeds" not in request:
+            say(timed_outcome(path, **request.get("options", {})))
+            continue
+        good = Path(request["base"]).read_bytes()
+        for seed in range(*request["seeds"]):
+            Path(path).write_bytes(mutated(good, seed))
+            answer = timed_outcome(path, on_unphysical="warn" if seed % 2 else "error")
+            if answer["outcome"] == "loads" and path.endswith(".urdf"):
+                answer["written"] = written_mass(path)
+            say({"seed": seed, **answer})
+
+
+if __name__ == "__main__":
+    work(int(sys.argv[1]))
