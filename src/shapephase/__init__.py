@@ -9,7 +9,7 @@ from .body.link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
 from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .errors import ShapePhaseError
-from .integrator.compilation import MachineCodeWarning
+from .integrator.compilation import CompiledCodeWarning
 from .integrator.compiled_steps import compile_steps
 from .phases.continuation import OrbitBranch, continued_orbits
 from .phases.phases import (
@@ -41,7 +41,7 @@ from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_s
 from .shape_space.files.recording import TrajectoryWarning
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
 from .shape_space.shape_path import ShapePath
-from .shape_space.summaries import ModelCard, PathCard, model_card, path_card
+from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_summary
 
 __version__ = "0.1.0"
 
@@ -49,6 +49,8 @@ __all__ = [
     "ArcPhases",
     "BaseDifference",
     "Body",
+    "BodySummary",
+    "CompiledCodeWarning",
     "Crossings",
     "Deformation",
     "EulerTop",
@@ -56,11 +58,9 @@ __all__ = [
     "FixedPoints",
     "HorizontalLift",
     "IgnoredElementWarning",
-    "MachineCodeWarning",
-    "ModelCard",
     "Motion",
     "OrbitBranch",
-    "PathCard",
+    "PathSummary",
     "PhaseSplit",
     "RecordedMotion",
     "ReturnMap",
@@ -74,6 +74,7 @@ __all__ = [
     "arc_phases",
     "articulated",
     "base_difference",
+    "body_summary",
     "closed_orbits",
     "compile_steps",
     "continued_orbits",
@@ -94,14 +95,13 @@ __all__ = [
     "load_motion",
     "mean_body_gauge",
     "mechanical_connection",
-    "model_card",
     "momentum_crossings",
     "momentum_from_rate",
     "momentum_returns",
     "motion_page",
     "parallel_transport",
     "particles",
-    "path_card",
+    "path_summary",
     "prescribed",
     "principal_gauge",
     "read_recorded_motion",

@@ -146,13 +146,13 @@ def turning(seed):
 def test_a1_positions_count_from_the_centre_of_mass(seed):
     """Sum of m r = 0 for particles, and for an extended body: the integral of r dm of a boom and a hull."""
     cloud = Cloud(seed)
-    at, speed = cloud.deformation.source.centred(TIMES)
+    at, speed = cloud.deformation.description.centred(TIMES)
     size = np.abs(at).max()
     np.testing.assert_allclose(np.einsum("m,nmi->ni", cloud.masses, at), np.zeros((5, 3)), rtol=0, atol=1e-14 * size)
     np.testing.assert_allclose(np.einsum("m,nmi->ni", cloud.masses, speed), np.zeros((5, 3)), rtol=0, atol=1e-13 * size)
     made = assembly_case(seed)
     centre = made.centre_of_mass(TIMES)
-    parts = made.source.parts
+    parts = made.description.parts
     about = [sum(part.moments(np.array([t]), c).first[0] for part in parts) for t, c in zip(TIMES, centre, strict=True)]
     np.testing.assert_allclose(about, np.zeros((5, 3)), rtol=0, atol=1e-13)
 

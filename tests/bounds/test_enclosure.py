@@ -20,7 +20,7 @@ def cells_of(known, times):
 
 
 def channels_of(deformation, times):
-    inertia, internal = deformation.source.sample(times)
+    inertia, internal = deformation.description.sample(times)
     inverse = np.linalg.inv(inertia)
     return inverse, np.einsum("nij,nj->ni", inverse, internal)
 

@@ -29,7 +29,7 @@ def swarm(request):
 
 def particle_energies(motion, times):
     """T and T_0 from the inertial velocities of every particle, by their positions at the attitude."""
-    source = motion.deformation.source
+    source = motion.deformation.description
     points, speeds = (np.asarray(part) for part in source.positions(times))
     share = source.masses / source.masses.sum()
     points, speeds = points - (share @ points)[:, None], speeds - (share @ speeds)[:, None]
@@ -122,8 +122,8 @@ def test_c_e9_internal_momentum_and_not_that_of_the_shape_itself(swarm):
     """Printed L(d_0) is the sum of m d_0 x d_0 = 0: then neither the rate nor k(t) is right; with L(d_0') both are."""
     times = inner_times(swarm)
     inverse, internal, _ = pieces(swarm, times)
-    points, _ = (np.asarray(part) for part in swarm.deformation.source.positions(times))
-    printed = np.einsum("m,nmi->ni", swarm.deformation.source.masses, np.cross(points, points))
+    points, _ = (np.asarray(part) for part in swarm.deformation.description.positions(times))
+    printed = np.einsum("m,nmi->ni", swarm.deformation.description.masses, np.cross(points, points))
     assert np.all(printed == 0.0)
     expected = differentiated(lambda t: energy_along(swarm, t), times, 2e-3 * swarm.duration)
     rate = energy_rate(swarm, times)

@@ -56,7 +56,9 @@ def check_equal(one, other, atol=1e-13, *, gauges=True):
         want = other.kinetic_energy(TIMES, omega)
         np.testing.assert_allclose(one.kinetic_energy(TIMES, omega), want, rtol=0, atol=atol * np.abs(want).max())
     if gauges:
-        for found, want in zip(one.source.correlation(TIMES, 0.7), other.source.correlation(TIMES, 0.7), strict=True):
+        for found, want in zip(
+            one.description.correlation(TIMES, 0.7), other.description.correlation(TIMES, 0.7), strict=True
+        ):
             np.testing.assert_allclose(found, want, rtol=0, atol=atol * np.abs(want).max())
 
 
@@ -153,7 +155,7 @@ def test_a_boom_is_made_of_bits_that_keep_their_mass():
     )
     want = with_hull(np.full(2 * count, 8.0 / count), bits)
     check_equal(made, want, atol=1e-3)
-    found, there = made.source.correlation(TIMES, 0.7), want.source.correlation(TIMES, 0.7)
+    found, there = made.description.correlation(TIMES, 0.7), want.description.correlation(TIMES, 0.7)
     assert np.abs(found[0] - there[0]).max() < 1e-5 * np.abs(there[0]).max()
 
 
@@ -169,11 +171,11 @@ def test_rates_are_derivatives_and_the_energy_is_that_of_the_masses():
     t = np.array([0.1, 0.5, 0.9, 1.5, 1.8])
     np.testing.assert_allclose(made.inertia_rate(t), derivative(made.inertia, t), rtol=0, atol=1e-9)
     for reference in (0.3, 1.9):
-        rate = derivative(lambda s, r=reference: made.source.correlation(s, r)[0], t)
-        np.testing.assert_allclose(made.source.correlation(t, reference)[1], rate, rtol=0, atol=1e-8)
-        own = made.source.correlation(np.array([reference]), reference)[0][0]
+        rate = derivative(lambda s, r=reference: made.description.correlation(s, r)[0], t)
+        np.testing.assert_allclose(made.description.correlation(t, reference)[1], rate, rtol=0, atol=1e-8)
+        own = made.description.correlation(np.array([reference]), reference)[0][0]
         np.testing.assert_allclose(np.trace(own) * np.eye(3) - own, made.inertia(reference), rtol=0, atol=1e-12)
-        flow = made.source.correlation(np.array([reference]), reference)[1][0]
+        flow = made.description.correlation(np.array([reference]), reference)[1][0]
         momentum = -np.array([flow[1, 2] - flow[2, 1], flow[2, 0] - flow[0, 2], flow[0, 1] - flow[1, 0]])
         np.testing.assert_allclose(momentum, made.internal_momentum(reference), rtol=0, atol=1e-12)
 
@@ -341,7 +343,7 @@ def test_the_mean_frame_of_an_assembly_is_that_of_its_particles():
     frames = [mean_body_gauge(each).frame(TIMES) for each in (made, want)]
     np.testing.assert_allclose(frames[0], frames[1], rtol=0, atol=1e-12)
     with pytest.raises(GaugeError, match="link"):
-        made.source.link_frames(TIMES, "hull")
+        made.description.link_frames(TIMES, "hull")
 
 
 def test_an_assembly_without_moving_parts_is_rigid():

@@ -696,7 +696,7 @@ def frames_of(loop):
         "two": mean_body_gauge(sp.in_gauge(loop, swaying), 0.8),
     }
     if loop.label != "5 particles":
-        names = loop.source.body.link_names
+        names = loop.description.body.link_names
         seen["link"] = link_gauge(loop, names[-1])
         seen["link of the mean"] = link_gauge(seen["mean"], names[len(names) // 2])
     return seen

@@ -31,7 +31,7 @@ def folder(tmp_path, monkeypatch):
 
 def is_compiled():
     forget_functions()
-    return compilation.in_machine_code(step_loop.rest_step_function()).class_name() == "External"
+    return compilation.compiled_or_interpreted(step_loop.rest_step_function()).class_name() == "External"
 
 
 def computed():
@@ -133,8 +133,8 @@ def test_a_library_that_is_none_is_told_and_left_alone(folder):
     library = compilation._library(function.name(), compilation._source(function))
     folder.mkdir()
     library.write_bytes(b"no machine code")
-    with pytest.warns(sp.MachineCodeWarning, match="shapephase compile"):
-        assert compilation.in_machine_code(function) is function
+    with pytest.warns(sp.CompiledCodeWarning, match="shapephase compile"):
+        assert compilation.compiled_or_interpreted(function) is function
 
 
 def test_what_another_user_wrote_is_not_run(folder, monkeypatch):
@@ -146,4 +146,4 @@ def test_what_another_user_wrote_is_not_run(folder, monkeypatch):
         os.chown(library, 12345, -1)
     else:
         monkeypatch.setattr(os, "getuid", lambda: 12345)
-    assert compilation.in_machine_code(function) is function
+    assert compilation.compiled_or_interpreted(function) is function

@@ -80,7 +80,7 @@ def drawn_momentum(scene, body):
 def test_the_drawn_links_have_the_momentum_of_the_motion(tumbling):
     """Differences of the drawn poses alone: the centre of mass rests, the angular momentum is the one shown."""
     scene = moving_scene(tumbling, 801)
-    middle, momentum = drawn_momentum(scene, tumbling.deformation.source.body)
+    middle, momentum = drawn_momentum(scene, tumbling.deformation.description.body)
     np.testing.assert_allclose(middle, np.zeros((801, 3)), atol=1e-12)
     np.testing.assert_allclose(momentum, np.broadcast_to([3.0, -2.0, 4.0], momentum.shape), atol=1e-8)
     np.testing.assert_array_equal(scene.momentum, [3.0, -2.0, 4.0])
@@ -89,7 +89,7 @@ def test_the_drawn_links_have_the_momentum_of_the_motion(tumbling):
 
 def test_the_drawn_cat_turns_without_momentum(righting):
     scene = moving_scene(righting, 2001)
-    middle, momentum = drawn_momentum(scene, righting.deformation.source.body)
+    middle, momentum = drawn_momentum(scene, righting.deformation.description.body)
     np.testing.assert_allclose(middle, np.zeros((2001, 3)), atol=1e-12)
     np.testing.assert_allclose(momentum, np.zeros(momentum.shape), atol=1e-9)
 
@@ -109,7 +109,7 @@ def test_the_cat_starts_on_its_back_and_ends_on_its_feet(righting):
 def test_free_fall_is_a_parabola(tumbling):
     fall = {"start": [1.0, 2.0, 3.0], "velocity": [0.5, 0.0, 2.0], "gravity": [0.0, 0.0, -9.81]}
     scene = moving_scene(tumbling, 21, **fall)
-    middle, _ = drawn_momentum(scene, tumbling.deformation.source.body)
+    middle, _ = drawn_momentum(scene, tumbling.deformation.description.body)
     t = scene.times[:, None]
     expected = np.array(fall["start"]) + t * fall["velocity"] + 0.5 * t**2 * np.array(fall["gravity"])
     np.testing.assert_allclose(middle, expected, atol=1e-12)
@@ -130,7 +130,7 @@ def test_a_gauge_changes_nothing_of_what_is_seen(tumbling, gauge):
 
 
 def test_the_trail_is_the_way_of_a_link(tumbling):
-    body, path = tumbling.deformation.source.body, tumbling.deformation.source.path
+    body, path = tumbling.deformation.description.body, tumbling.deformation.description.path
     scene = moving_scene(tumbling, 5, trail="head")
     for t, base, place in zip(scene.times, scene.base, scene.trail, strict=True):
         np.testing.assert_allclose((base @ body.link_pose(path.shape(t), "head"))[:3, 3], place, atol=1e-13)
@@ -336,7 +336,7 @@ def test_the_page_moves_as_reconstructed(righting, cat_page):
     np.testing.assert_allclose(Rotation.from_quat(np.roll(wxyz, -1)).as_matrix(), UPSIDE_DOWN, atol=1e-6)
     np.testing.assert_allclose(place, righting.base_position(0.0), atol=1e-6)
     place, _ = pose_at(messages, "/trail_now")
-    body, path = righting.deformation.source.body, righting.deformation.source.path
+    body, path = righting.deformation.description.body, righting.deformation.description.path
     head = righting.final_attitude @ body.link_pose(path.shape(0.5), "head")[:3, 3] + righting.base_position(0.5)
     np.testing.assert_allclose(place, head, atol=1e-6)
     names = {message["name"] for _, message in messages if "name" in message}

@@ -32,7 +32,8 @@ class Worker:
         self.start()
 
     def start(self) -> None:
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path}
         self.process = subprocess.Popen(
             [sys.executable, __file__, str(self.memory)],
             stdin=subprocess.PIPE,

@@ -287,7 +287,7 @@ def _sampling_error(deformation: Deformation, sampled: Interpolant) -> Array:
     left, right = sampled.edges[:panels], sampled.edges[1 : panels + 1]
     times = (left[:, None] + (right - left)[:, None] * _VETTED).ravel()
     inverse, drift = sampled.inverse_and_drift(times)
-    inertia, internal = deformation.source.sample(times)
+    inertia, internal = deformation.description.sample(times)
     truth = inverse_inertia(inertia, times)
     gaps = (
         np.linalg.norm(inverse - truth, axis=(1, 2)).max(),

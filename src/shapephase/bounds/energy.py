@@ -87,7 +87,7 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
     Source: Cabrera 2006, section 4.1, where L_o stands for what is printed L(d_0) (theory.md C-E9); E3.
     """
     times, inverse, drift, pi = _along(motion, t)
-    inverse_rate = -inverse @ motion.deformation.source.inertia_rate(times.ravel()) @ inverse
+    inverse_rate = -inverse @ motion.deformation.description.inertia_rate(times.ravel()) @ inverse
     shape = (*motion.batch, *times.shape)
     by_inertia = 0.5 * np.sum(pi * so3.apply(inverse_rate, pi), axis=-1)
     by_drift = np.sum(np.cross(pi, so3.apply(inverse, pi)) * drift, axis=-1)
@@ -102,10 +102,10 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
     """
     times = times_argument(t, motion.duration)
     flat = times.ravel()
-    inertia, internal = motion.deformation.source.sample(flat)
+    inertia, internal = motion.deformation.description.sample(flat)
     omega = motion.angular_velocity(flat).reshape(-1, flat.size, 3)
     turning = np.sum(omega * (0.5 * so3.apply(inertia, omega) + internal), axis=-1)
-    shape_only = motion.deformation.source.kinetic_energy(flat, np.zeros((1, flat.size, 3)))
+    shape_only = motion.deformation.description.kinetic_energy(flat, np.zeros((1, flat.size, 3)))
     return (turning + shape_only).reshape((*motion.batch, *times.shape))[()]
 
 
@@ -163,7 +163,7 @@ def _along(motion: Motion, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
     """Times, I^-1 (N, 3, 3), w (N, 3) and Pi (B, N, 3)."""
     times = times_argument(t, motion.duration)
     flat = times.ravel()
-    inertia, internal = motion.deformation.source.sample(flat)
+    inertia, internal = motion.deformation.description.sample(flat)
     inverse = inverse_inertia(inertia, flat)
     pi = motion.body_momentum(flat).reshape(-1, flat.size, 3)
     return times, inverse, so3.apply(inverse, internal), pi

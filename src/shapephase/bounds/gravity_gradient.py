@@ -318,7 +318,7 @@ def _steps(motion: Motion, orbit: KeplerOrbit, edges: Array) -> tuple[Array, flo
     times = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
     attitude = motion.attitude(times)
     turned = so3.transpose(attitude)
-    inertia = motion.deformation.source.sample(times)[0]
+    inertia = motion.deformation.description.sample(times)[0]
     position = orbit.position(times) - orbit.centre
     torque = so3.apply(attitude, gravity_gradient_torque(inertia, so3.apply(turned, position), orbit.gm))
     inverse = attitude @ inverse_inertia(inertia, times) @ turned

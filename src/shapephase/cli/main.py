@@ -26,7 +26,7 @@ from ..phases.return_map import fixed_points
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
-from ..shape_space.summaries import model_card, path_card
+from ..shape_space.summaries import body_summary, path_summary
 from .conjugate import conjugate_command
 from .plan import plan_command
 from .progress import steps
@@ -261,11 +261,11 @@ def check_command(
         print JSON
     """
     loaded = load_body(body, isolate=True)
-    card = model_card(loaded)
+    card = body_summary(loaded)
     lines, data = body_lines(card), {"body": plain(card)}
     if motion is not None:
         path, recorded = _motion(motion, loaded, smooth, topic)
-        moved = path_card(loaded, path)
+        moved = path_summary(loaded, path)
         lines += ["", *path_lines(loaded, motion, moved, recorded)]
         data["motion"] = plain(moved) | record_data(loaded, recorded)
     return Outcome("\n".join(lines), data, judged=True)

@@ -18,7 +18,7 @@ from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..reconstruction.recorded_base import base_difference
 from ..shape_space.files.read import RecordedMotion
-from ..shape_space.summaries import ModelCard, PathCard
+from ..shape_space.summaries import BodySummary, PathSummary
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def orbit_data(
     }
 
 
-def body_lines(card: ModelCard) -> list[str]:
+def body_lines(card: BodySummary) -> list[str]:
     """The card of a body for people."""
     width = max(map(len, ("joint", *(joint.name for joint in card.joints))))
     lines = [
@@ -157,7 +157,7 @@ def body_lines(card: ModelCard) -> list[str]:
     return lines
 
 
-def path_lines(body: Body, name: str, card: PathCard, recorded: RecordedMotion | None) -> list[str]:
+def path_lines(body: Body, name: str, card: PathSummary, recorded: RecordedMotion | None) -> list[str]:
     """The card of a joint motion for people."""
     worst = int(np.argmax(np.abs(card.gap))) if len(card.gap) else 0
     closes = "yes" if card.is_loop else f"no: {body.joint_names[worst]} ends {card.gap[worst]:.6g} from its start"

@@ -19,7 +19,7 @@ from ..integrator.sampling import Sampler, sampler
 from ..shape_space.connection import CLOSED
 from ..shape_space.shape_path import ShapePath, positive_argument
 from .deformation import Deformation
-from .descriptions import Original, inertia_of
+from .descriptions import UngaugedDescription, inertia_of
 from .physical_validity import check_never_on_a_line, check_triangle, least_over, on_unphysical_argument
 
 
@@ -176,7 +176,7 @@ class Boom:
 
 
 @dataclass(frozen=True, eq=False)
-class AssemblySource(Original):
+class AssemblyDescription(UngaugedDescription):
     """The sum of parts, seen from the frame they are described in.
 
     Attributes
@@ -210,21 +210,21 @@ class AssemblySource(Original):
         return self.about_centre(times).second
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """As `Source`."""
+        """As `Description`."""
         total = self.about_centre(times)
         return inertia_of(total.second), so3.vee(np.swapaxes(total.flow, -1, -2) - total.flow)
 
     def inertia_rate(self, times: Array) -> Array:
-        """As `Source`."""
+        """As `Description`."""
         flow = self.about_centre(times).flow
         return inertia_of(flow + np.swapaxes(flow, -1, -2))
 
     def centre_of_mass(self, times: Array) -> Array:
-        """As `Source`."""
+        """As `Description`."""
         return self.origin + self.about_centre(times).first / self.mass
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """As `Source`."""
+        """As `Description`."""
         pairs = [part.correlation(times, reference, self.origin) for part in self.parts]
         total = self.about_centre(times)
         there = self.about_centre(np.array([reference])).first[0] / self.mass
@@ -233,13 +233,13 @@ class AssemblySource(Original):
         return value, rate
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
-        """As `Source`."""
+        """As `Description`."""
         inertia, momentum = self.sample(times)
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
     def sampler(self, breaks: Array) -> Sampler:
-        """As `Source`."""
+        """As `Description`."""
         return sampler(
             self.sample, breaks, oscillations=self.oscillations, loops=self.loops, smooth_loop=self.smooth_loop
         )
@@ -374,13 +374,13 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     smooth = all(path.smooth_loop for path in paths)
     count = loops.pop() if together else 1
     still = np.zeros(3)
-    rough = AssemblySource(everything, still, known, count, smooth)
-    source = replace(rough, origin=rough.centre_of_mass(np.zeros(1))[0])
-    check_never_on_a_line(source.moment, breaks)
+    rough = AssemblyDescription(everything, still, known, count, smooth)
+    description = replace(rough, origin=rough.centre_of_mass(np.zeros(1))[0])
+    check_never_on_a_line(description.moment, breaks)
     gap = max((float(np.abs(path.gap).max()) for path in paths), default=0.0)
     closure = np.eye(3) if gap <= CLOSED else None
     names = f"a spacecraft with {len(parts)} parts" if len(parts) != 1 else "a spacecraft with one part"
-    return Deformation(source, length, breaks, closure, gap, names, count)
+    return Deformation(description, length, breaks, closure, gap, names, count)
 
 
 def _vector(value: ArrayLike, name: str, unit: str = "") -> Array:

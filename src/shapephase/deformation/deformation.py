@@ -17,13 +17,13 @@ from ..integrator.sampling import Sampler
 from ..shape_space.connection import CLOSED, path_gap
 from ..shape_space.shape_path import ShapePath, breaks_argument, positive_argument, times_argument
 from .descriptions import (
-    ArticulatedSource,
+    ArticulatedDescription,
+    Description,
+    ParticleDescription,
     ParticlePath,
-    ParticleSource,
-    PrescribedSource,
-    RigidSource,
-    SampledSource,
-    Source,
+    PrescribedDescription,
+    RigidDescription,
+    SampledDescription,
 )
 from .physical_validity import check_never_on_a_line, check_triangle, least_over, on_unphysical_argument
 
@@ -36,7 +36,7 @@ class Deformation:
 
     Attributes
     ----------
-    source : the functions themselves
+    description : the functions themselves
     duration : [s]
     breaks : (M,) times between which all is smooth, first 0, last `duration` [s]
     closure : (3, 3) where the shape at the end is the one at the start turned by it (the identity for a closed
@@ -47,7 +47,7 @@ class Deformation:
     inputs : SHA-256 of the files it was made from, "body" and "path", as far as there are any
     """
 
-    source: Source
+    description: Description
     duration: float
     breaks: Array
     closure: Array | None
@@ -59,27 +59,27 @@ class Deformation:
     def inertia(self, t: ArrayLike) -> Array:
         """Locked inertia: times (...) -> (..., 3, 3), base axes, about the centre of mass [kg m^2]."""
         times = times_argument(t, self.duration)
-        return self.source.sample(times.ravel())[0].reshape(*times.shape, 3, 3)
+        return self.description.sample(times.ravel())[0].reshape(*times.shape, 3, 3)
 
     def internal_momentum(self, t: ArrayLike) -> Array:
         """L_o, angular momentum with the base at rest: times (...) -> (..., 3), base axes [kg m^2/s]."""
         times = times_argument(t, self.duration)
-        return self.source.sample(times.ravel())[1].reshape(*times.shape, 3)
+        return self.description.sample(times.ravel())[1].reshape(*times.shape, 3)
 
     def inertia_rate(self, t: ArrayLike) -> Array:
         """Rate of the locked inertia: times (...) -> (..., 3, 3) [kg m^2/s]."""
         times = times_argument(t, self.duration)
-        return self.source.inertia_rate(times.ravel()).reshape(*times.shape, 3, 3)
+        return self.description.inertia_rate(times.ravel()).reshape(*times.shape, 3, 3)
 
     def frame(self, t: ArrayLike) -> Array:
         """U(t), this description's frame in the original one, d_here = U d: times (...) -> (..., 3, 3)."""
         times = times_argument(t, self.duration)
-        return self.source.frame(times.ravel()).reshape(*times.shape, 3, 3)
+        return self.description.frame(times.ravel()).reshape(*times.shape, 3, 3)
 
     def centre_of_mass(self, t: ArrayLike) -> Array:
         """Centre of mass from the base origin: times (...) -> (..., 3), this description's axes [m]."""
         times = times_argument(t, self.duration)
-        return self.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
+        return self.description.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
 
     def kinetic_energy(self, t: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """Kinetic energy about the centre of mass while this frame turns: times (...) -> (...) [J].
@@ -102,7 +102,7 @@ class Deformation:
                 f"angular_velocity: (3,) or one for each time, {(*times.shape, 3)}, is needed, got {omega.shape}"
             )
         turning = np.broadcast_to(omega, (*times.shape, 3)).reshape(1, -1, 3)
-        return self.source.kinetic_energy(times.ravel(), turning).reshape(times.shape)[()]
+        return self.description.kinetic_energy(times.ravel(), turning).reshape(times.shape)[()]
 
     def triangle_defect(self) -> tuple[float, float]:
         """By how much the triangle inequality fails at worst, relative to the largest moment, and when [s].
@@ -110,12 +110,12 @@ class Deformation:
         Negative where every inertia of [0, duration] is that of some distribution of mass. Found at 65 points
         between any two breaks and around the worst of them. Source: theory.md A4.
         """
-        least, when = least_over(lambda t: -triangle_defect(self.source.sample(t)[0]), self.breaks)
+        least, when = least_over(lambda t: -triangle_defect(self.description.sample(t)[0]), self.breaks)
         return -least, when
 
     def sampler(self) -> Sampler:
         """A fresh sampler for the integrator."""
-        return self.source.sampler(self.breaks)
+        return self.description.sampler(self.breaks)
 
 
 def articulated(body: Body, path: ShapePath) -> Deformation:
@@ -131,11 +131,11 @@ def articulated(body: Body, path: ShapePath) -> Deformation:
     route = path.matched(body.joint_names, body.name)
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
-    source = ArticulatedSource(body, route)
+    description = ArticulatedDescription(body, route)
     files = {"body": body.sha256, "path": route.sha256}
     inputs = {name: digest for name, digest in files.items() if digest}
     label = f"{body.name} along a path"
-    return Deformation(source, route.duration, route.breaks, closure, gap, label, route.loops, inputs)
+    return Deformation(description, route.duration, route.breaks, closure, gap, label, route.loops, inputs)
 
 
 def rigid(inertia: ArrayLike, duration: float) -> Deformation:
@@ -145,7 +145,7 @@ def rigid(inertia: ArrayLike, duration: float) -> Deformation:
     """
     tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3))[None])[0]
     length = positive_argument(duration)
-    return Deformation(RigidSource(tensor), length, np.array([0.0, length]), np.eye(3), 0.0, "rigid body")
+    return Deformation(RigidDescription(tensor), length, np.array([0.0, length]), np.eye(3), 0.0, "rigid body")
 
 
 def prescribed(
@@ -183,14 +183,14 @@ def prescribed(
     """
     length = positive_argument(duration)
     edges = breaks_argument(breaks, length)
-    source = PrescribedSource(inertia, internal_momentum, edges)
-    ends = source.sample(np.array([0.0, length]))[0]
+    description = PrescribedDescription(inertia, internal_momentum, edges)
+    ends = description.sample(np.array([0.0, length]))[0]
     if on_unphysical_argument(on_unphysical) != "allow":
-        _, worst = least_over(lambda t: -triangle_defect(source.sample(t)[0]), edges)
-        check_triangle(source.sample(np.array([worst]))[0], np.array([worst]), on_unphysical)
-        source = replace(source, on_unphysical=on_unphysical)
+        _, worst = least_over(lambda t: -triangle_defect(description.sample(t)[0]), edges)
+        check_triangle(description.sample(np.array([worst]))[0], np.array([worst]), on_unphysical)
+        description = replace(description, on_unphysical=on_unphysical)
     gap = float(np.max(np.abs(ends[1] - ends[0])) / np.max(np.abs(ends[0])))
-    return Deformation(source, length, edges, np.eye(3) if gap <= CLOSED else None, gap, "prescribed inertia")
+    return Deformation(description, length, edges, np.eye(3) if gap <= CLOSED else None, gap, "prescribed inertia")
 
 
 def particles(
@@ -231,24 +231,24 @@ def particles(
             raise ShapeError("positions given by a function need a duration [s]")
         length = positive_argument(duration)
         edges = breaks_argument(breaks, length)
-        source = ParticleSource(weights, positions)
+        description = ParticleDescription(weights, positions)
     else:
         path = _sampled_positions(positions, weights)
         length = path.duration
         if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
             raise ShapeError(f"duration: the samples last {length:.9g} s, got {duration!r}; leave it out")
         edges = np.union1d(path.breaks, breaks_argument(breaks, length))
-        source = ParticleSource(weights, ParticlePath(path), path.oscillations)
-    ends, _ = source.centred(np.array([0.0, length]))
+        description = ParticleDescription(weights, ParticlePath(path), path.oscillations)
+    ends, _ = description.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
     size = float(np.max(np.linalg.norm(ends[0], axis=-1)))
     if size == 0.0:
         raise SingularInertiaError("all particles are in one place: there is no inertia that could turn")
     if not callable(positions):
-        check_never_on_a_line(source.moment, edges)
+        check_never_on_a_line(description.moment, edges)
     gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / size
     closure = turn if gap <= CLOSED else None
-    return Deformation(source, length, edges, closure, gap, f"{len(weights)} particles")
+    return Deformation(description, length, edges, closure, gap, f"{len(weights)} particles")
 
 
 def _sampled_positions(samples: tuple[ArrayLike, ArrayLike], masses: Array) -> ShapePath:
@@ -272,8 +272,8 @@ def sampled_deformation(
     inputs: Mapping[str, str],
 ) -> Deformation:
     """A deformation known only by its interpolant, as kept in a file; `centre` are Chebyshev coefficients (P, n, 3)."""
-    source = SampledSource(interpolant, centre)
-    return Deformation(source, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs)
+    description = SampledDescription(interpolant, centre)
+    return Deformation(description, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs)
 
 
 def _best_turn(masses: Array, start: Array, end: Array) -> Array:

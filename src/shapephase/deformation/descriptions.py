@@ -21,7 +21,7 @@ from ..shape_space.shape_path import ShapePath
 from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 
 
-class Source(Protocol):
+class Description(Protocol):
     """What a deformation is made of; all functions take times (N,) in [0, duration]."""
 
     def sample(self, times: Array, /) -> tuple[Array, Array]:
@@ -57,7 +57,7 @@ class Source(Protocol):
         ...
 
 
-class Original:
+class UngaugedDescription:
     """The frame of a description that no gauge has turned, with its origin at the centre of mass; masses unknown."""
 
     def frame(self, times: Array) -> Array:
@@ -84,7 +84,7 @@ def _unknown_masses(what: str) -> GaugeError:
 
 
 @dataclass(frozen=True, eq=False)
-class ArticulatedSource(Original):
+class ArticulatedDescription(UngaugedDescription):
     """An articulated body whose joints follow a path."""
 
     body: Body
@@ -114,7 +114,7 @@ class ArticulatedSource(Original):
 
 
 @dataclass(frozen=True, eq=False)
-class RigidSource(Original):
+class RigidDescription(UngaugedDescription):
     """A tensor that stays as it is."""
 
     tensor: Array
@@ -137,7 +137,7 @@ class RigidSource(Original):
 
 
 @dataclass(frozen=True, eq=False)
-class PrescribedSource(Original):
+class PrescribedDescription(UngaugedDescription):
     """Functions of time for the inertia and the internal momentum; `on_unphysical` "error" checks every tensor."""
 
     inertia: Callable[[Array], ArrayLike]
@@ -161,7 +161,7 @@ class PrescribedSource(Original):
 
 
 @dataclass(frozen=True, eq=False)
-class ParticleSource(Original):
+class ParticleDescription(UngaugedDescription):
     """Point masses that move as seen from a frame; `oscillations` as `sampler` has it."""
 
     masses: Array
@@ -224,7 +224,7 @@ class ParticlePath:
 
 
 @dataclass(frozen=True, eq=False)
-class SampledSource(Original):
+class SampledDescription(UngaugedDescription):
     """What a file keeps of a deformation: its interpolant, and the centre of mass."""
 
     interpolant: Interpolant

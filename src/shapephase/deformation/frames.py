@@ -169,7 +169,7 @@ def link_frames(deformation: Deformation, link: str) -> Frames:
     """U(t) and its body rates of the frame of a link. Raises as `link_gauge`."""
 
     def frames(times: Array) -> tuple[Array, Array]:
-        turned, turning = deformation.source.link_frames(times, link)
+        turned, turning = deformation.description.link_frames(times, link)
         return so3.transpose(turned), -turning
 
     frames(deformation.breaks[:1])
@@ -188,7 +188,7 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
     time = float(time)
 
     def frames(times: Array) -> tuple[Array, Array]:
-        correlation, slope = deformation.source.correlation(times, time)
+        correlation, slope = deformation.description.correlation(times, time)
         left, sizes, right = np.linalg.svd(correlation)
         sign = np.sign(np.linalg.det(left @ right))
         sizes[:, 2] *= sign

@@ -20,7 +20,7 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import Sampler, sampler
 from .deformation import Deformation
-from .descriptions import Source
+from .descriptions import Description
 from .frames import (
     Frames,
     frames_argument,
@@ -124,7 +124,7 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
     lift = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
 
     def frames(times: Array) -> tuple[Array, Array]:
-        inertia, momentum = deformation.source.sample(times)
+        inertia, momentum = deformation.description.sample(times)
         return lift.rotation(times)[0], -so3.apply(inverse_inertia(inertia, times), momentum)
 
     return _seen_from(deformation, frames, "horizontal")
@@ -153,14 +153,16 @@ def _seen_from(deformation: Deformation, frames: Frames, name: str) -> Deformati
     if closure is not None:
         ends, _ = frames(np.array([0.0, deformation.duration]))
         closure = ends[1] @ closure @ ends[0].T
-    source = _Gauged(deformation.source, frames)
+    description = _Gauged(deformation.description, frames)
     # U(t) need not come back with the loops.
-    return replace(deformation, source=source, closure=closure, loops=1, label=f"{deformation.label}, {name} gauge")
+    return replace(
+        deformation, description=description, closure=closure, loops=1, label=f"{deformation.label}, {name} gauge"
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class _Gauged:
-    original: Source
+    original: Description
     frames: Frames
 
     def sample(self, times: Array) -> tuple[Array, Array]:

@@ -56,7 +56,7 @@ class Example:
 
 
 @dataclass(frozen=True, eq=False)
-class RigidInOwnTime:
+class TimeReparametrisedRigid:
     """A body that moves as a rigid one does, by a clock of its own: R(t) = R_RB(tau(t)), Pi(t) = Pi_RB(tau(t))."""
 
     top: EulerTop

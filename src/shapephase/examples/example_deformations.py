@@ -28,9 +28,9 @@ from ..shape_space.shape_path import ShapePath
 from .closed_form_motions import (
     AxialMotion,
     Example,
-    RigidInOwnTime,
     Scale,
     SteadyTurn,
+    TimeReparametrisedRigid,
     clock_of,
     diagonal,
     first_time,
@@ -83,7 +83,7 @@ def homothety(
         lambda t: growing.at(t)[:, None, None] ** 2 * top.inertia, None, length, breaks, on_unphysical="error"
     )
     phase = top.montgomery_phase if duration is None else None
-    return Example(deformation, top.momentum, RigidInOwnTime(top, clock), phase, rigid=top)
+    return Example(deformation, top.momentum, TimeReparametrisedRigid(top, clock), phase, rigid=top)
 
 
 def axial_as_printed(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from .compilation import in_machine_code
+from .compilation import compiled_or_interpreted
 
 Formula = Callable[[list[Any]], list[Any]]
 _MOST_BUFFERS = 128
@@ -37,7 +37,7 @@ class _Buffers(threading.local):
 _buffers = _Buffers()
 
 
-def called(function: Any, rows: int, *arguments: Array) -> list[Array]:
+def call_casadi(function: Any, rows: int, *arguments: Array) -> list[Array]:
     """A CasADi function on arrays, on memory that nobody else sees, so that threads can call it at the same time.
 
     Arguments hold numbers in the order of the function's inputs (column-major); each result is (rows, entries / rows).
@@ -53,15 +53,15 @@ def called(function: Any, rows: int, *arguments: Array) -> list[Array]:
     return results
 
 
-def for_rows(formula: Formula, entries: int, values: Array) -> Array:
+def map_rows(formula: Formula, entries: int, values: Array) -> Array:
     """A formula of numbers applied to every row: (N, entries) -> (N, results)."""
     count = len(values)
-    return called(_mapped(formula, entries, count), count, values)[0] if count else np.empty((0, 0))
+    return call_casadi(_mapped(formula, entries, count), count, values)[0] if count else np.empty((0, 0))
 
 
 @lru_cache(maxsize=512)
 def _mapped(formula: Formula, entries: int, count: int) -> Any:
-    return in_machine_code(row_function(formula, entries)).map(count)
+    return compiled_or_interpreted(row_function(formula, entries)).map(count)
 
 
 @lru_cache(maxsize=32)

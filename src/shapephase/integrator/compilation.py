@@ -29,7 +29,7 @@ _PATIENCE = 120.0
 _TRIALS = 20
 
 
-class MachineCodeWarning(UserWarning):
+class CompiledCodeWarning(UserWarning):
     """Compiled steps were found but cannot be used; the interpreted ones give the same results."""
 
 
@@ -44,7 +44,7 @@ def code_folder() -> Path:
 
 
 @lru_cache(maxsize=64)
-def in_machine_code(function: Any) -> Any:
+def compiled_or_interpreted(function: Any) -> Any:
     """The compiled twin of a CasADi function if there is one in `code_folder`, else the function itself.
 
     Looked for once.
@@ -65,7 +65,7 @@ def in_machine_code(function: Any) -> Any:
     except RuntimeError:
         warnings.warn(
             f"{library} cannot be loaded; the steps are interpreted. `shapephase compile` writes it anew",
-            MachineCodeWarning,
+            CompiledCodeWarning,
             stacklevel=2,
         )
         return function

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from . import casadi_calls, error_propagator, step_loop
-from .compilation import compile_functions, in_machine_code
+from .compilation import compile_functions, compiled_or_interpreted
 from .spectral_error import inverted
 
 
@@ -43,6 +43,6 @@ def compile_steps() -> list[Path]:
 
 def forget_functions() -> None:
     """Look for compiled functions anew when they are next needed."""
-    in_machine_code.cache_clear()
+    compiled_or_interpreted.cache_clear()
     for module in (casadi_calls, step_loop, error_propagator):
         module.forget_functions()

@@ -9,8 +9,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .casadi_calls import called, for_rows
-from .compilation import in_machine_code
+from .casadi_calls import call_casadi, map_rows
+from .compilation import compiled_or_interpreted
 from .rotation_step import STAGES, attitude_step
 from .step_loop import BLOCK, adjugate_of, matrix_product, momentum_step_function
 
@@ -27,7 +27,7 @@ def amplification(growth: Array) -> Array:
     if count == 0:
         return np.ones(1)
     chosen = growth[:, np.arange(CHECKPOINTS) * (count - 1) // (CHECKPOINTS - 1)].reshape(len(growth), -1)
-    largest = for_rows(largest_growth, 9 * CHECKPOINTS, chosen)[:, 0]
+    largest = map_rows(largest_growth, 9 * CHECKPOINTS, chosen)[:, 0]
     # Where steps were so long that they overflowed, nothing is known.
     return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
 
@@ -46,8 +46,8 @@ def largest_growth(entries: Any) -> list[Any]:
     return [(rest + (rest * rest - 1.0) ** 0.5) ** 0.5]
 
 
-def exact_growth(channels: Array, directions: Array, sizes: Array, loops: int) -> Array:
-    """Growth matrices at the step ends: (B, K + 1, 3, 3). Parameters as `march.marched`.
+def exact_propagators(channels: Array, directions: Array, sizes: Array, loops: int) -> Array:
+    """Growth matrices at the step ends: (B, K + 1, 3, 3). Parameters as `march.integrate_steps`.
 
     A turn delta of the start is carried over as S^T delta, and changes the momentum's direction by p x delta.
     """
@@ -76,7 +76,7 @@ def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
         for _ in range(loops):
             for first in range(0, count, BLOCK):
                 block = channels[first : first + BLOCK]
-                (states,) = called(_slope_function(len(block)), len(block), state, block)
+                (states,) = call_casadi(_slope_function(len(block)), len(block), state, block)
                 state = states[-1]
         result[row] = so3.turn_of(state[:4], state[7:].reshape(3, 4)).T
     return result
@@ -93,7 +93,7 @@ def _derivatives(channels: Array, direction: Array, size: float, loops: int, see
     for _ in range(loops):
         for first in range(0, count, BLOCK):
             block = channels[first : first + BLOCK]
-            (states,) = called(_derivative_function(len(block), columns), len(block), state, block)
+            (states,) = call_casadi(_derivative_function(len(block), columns), len(block), state, block)
             quaternions = states[:, 3:7]
             slopes = so3.turn_of(quaternions[:, None], states[:, 8:].reshape(-1, columns, 8)[:, :, 3:7])
             yield slice(done + 1, done + len(block) + 1), quaternions, slopes
@@ -103,7 +103,7 @@ def _derivatives(channels: Array, direction: Array, size: float, loops: int, see
 @lru_cache(maxsize=512)
 def _slope_function(length: int) -> Any:
     """`length` steps as one CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
-    return in_machine_code(slope_step_function()).mapaccum("steps", length)
+    return compiled_or_interpreted(slope_step_function()).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1)
@@ -125,7 +125,7 @@ def slope_step_function() -> Any:
 @lru_cache(maxsize=512)
 def _derivative_function(length: int, columns: int) -> Any:
     """`length` steps as one CasADi function of the state with its derivatives, and the channels."""
-    return in_machine_code(derivative_step_function(columns)).mapaccum("steps", length)
+    return compiled_or_interpreted(derivative_step_function(columns)).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1)

@@ -17,13 +17,13 @@ import numpy as np
 from .. import so3, sphere
 from ..arrays import Array, Integers, finite_array
 from ..errors import AccuracyNotReached, ShapeError
-from .error_propagator import amplification, exact_growth, momentum_slope
+from .error_propagator import amplification, exact_propagators, momentum_slope
 from .interpolant import Interpolant, chebyshev, inside
 from .rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
 from .sampling import Sampler
 from .spectral_error import Evaluate
-from .step_control import Needs, carried_over, finer
-from .step_loop import FEW, March, marched, marched_at_rest
+from .step_control import StepRequirements, carried_over, finer
+from .step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest
 
 _EPS = np.finfo(float).eps
 _MOST_STEPS = 4_000_000
@@ -226,7 +226,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
         rounds += 1
         sampler.refine(size, sampling_target)
         interpolant = sampler.interpolant()
-        needs = Needs.of(interpolant, size, tolerance)
+        needs = StepRequirements.of(interpolant, size, tolerance)
         # For each of many the derivative would take too long: steps so short that it is not needed.
         short = needs.far and len(momentum) > FEW
         least = needs.least_steps(short=short)
@@ -292,19 +292,19 @@ def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> 
 
     What is but nearly right drifts off in the end.
     """
-    least = Needs.of(interpolant, float(sizes.max()), _LOOSEST).least_steps()
+    least = StepRequirements.of(interpolant, float(sizes.max()), _LOOSEST).least_steps()
     steps = np.ceil(np.maximum(least, 1.0)).astype(int)
     channels, directions = _stage_channels(interpolant, steps), _directions(momentum, sizes)
     amplified, last = np.empty(len(sizes)), np.empty((len(sizes), 3, 3))
     with np.errstate(all="ignore"):
         for row in range(len(sizes)):
             part = slice(row, row + 1)
-            growth = exact_growth(channels, directions[part], sizes[part], interpolant.loops)
+            growth = exact_propagators(channels, directions[part], sizes[part], interpolant.loops)
             amplified[part], last[part] = amplification(growth), growth[:, -1]
     return amplified, last
 
 
-def _last(march: March) -> Array:
+def _last(march: StepRecord) -> Array:
     """How a small turn of the start reaches the end."""
     if march.growth.shape[1]:
         return march.growth[:, -1]
@@ -313,12 +313,12 @@ def _last(march: March) -> Array:
 
 def _run(
     interpolant: Interpolant, momentum: Array, sizes: Array, steps: Integers, *, with_growth: bool = True
-) -> March:
+) -> StepRecord:
     """All steps."""
     channels = _stage_channels(interpolant, steps)
     if not sizes.any():
-        return marched_at_rest(channels, interpolant.loops)
-    return marched(channels, _directions(momentum, sizes), sizes, interpolant.loops, with_growth=with_growth)
+        return integrate_steps_at_rest(channels, interpolant.loops)
+    return integrate_steps(channels, _directions(momentum, sizes), sizes, interpolant.loops, with_growth=with_growth)
 
 
 def _directions(momentum: Array, sizes: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array, Integers, Mask
 from ..errors import AccuracyNotReached
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
-from .spectral_error import Channels, Judgement, judged, spectral_sizes
+from .spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_sizes
 
 # Degrees to begin with, by tolerance, on many panels and on a few.
 _FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
@@ -31,7 +31,7 @@ class _Group:
     right: Array
     values: Array  # (G, degree + 1, 9) at the ascending Chebyshev points
     gaps: Array  # (G, 2) errors seen between the nodes; NaN: not looked for
-    judgement: Judgement
+    judgement: SpectralEstimate
 
     @property
     def width(self) -> Array:
@@ -43,7 +43,7 @@ class _Group:
 
 def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
     rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
-    judgement = judged(spectral_sizes(values_to_coefficients(degree) @ values), rounding)
+    judgement = estimate_spectrum(spectral_sizes(values_to_coefficients(degree) @ values), rounding)
     if gaps is None:
         return _Group(degree, left, right, values, np.full((len(left), 2), np.nan), judgement)
     seen = ~np.isnan(gaps[:, 0])

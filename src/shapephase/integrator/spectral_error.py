@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
-from .casadi_calls import for_rows
+from .casadi_calls import map_rows
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
@@ -39,7 +39,7 @@ class Channels:
         self.count += len(times)
         flat = np.empty((len(times), 12))
         flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
-        channels = for_rows(inverted, 12, flat)
+        channels = map_rows(inverted, 12, flat)
         if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
             inverse = inverse_inertia(inertia, times)
             channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
@@ -77,7 +77,7 @@ class Tail(NamedTuple):
 
     @classmethod
     def of(cls, sizes: list[float], time_rounding: float) -> Tail:
-        """As `judged`, of the sizes of one series at degrees 0, 1, 2 ..."""
+        """As `estimate_spectrum`, of the sizes of one series at degrees 0, 1, 2 ..."""
         degree = len(sizes) - 1
         top = max(sizes)
         if degree == 0:
@@ -101,7 +101,7 @@ def averaged(converging: bool, phase: float, turn: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class SpectralEstimate:
     """What the spectra of some panels say: (G,) each."""
 
     inverse: Array  # error estimate of I^-1
@@ -120,7 +120,7 @@ class Judgement:
         left = np.where(self.converging, np.minimum(1.0, 8.0 / np.maximum(phase - turn, 8.0)), 1.0)
         return 0.5 * width * rate * left
 
-    def raised(self, gaps: Array, seen: Mask) -> Judgement:
+    def raised(self, gaps: Array, seen: Mask) -> SpectralEstimate:
         """The same with errors at least as large as those seen (G, 2), which are not expected to average out."""
         return replace(
             self,
@@ -131,7 +131,7 @@ class Judgement:
         )
 
 
-def judged(size: Array, time_rounding: Array | float) -> Judgement:
+def estimate_spectrum(size: Array, time_rounding: Array | float) -> SpectralEstimate:
     """Error estimates from the tails of spectra; size (G, degree + 1, 2) of I^-1 and of I^-1 L_o.
 
     `time_rounding` is the rounding of the sample times in units of half a panel (or of a radian): it limits what
@@ -141,7 +141,7 @@ def judged(size: Array, time_rounding: Array | float) -> Judgement:
     if degree == 0:
         zero = np.zeros(len(size))
         sure = zero == 0.0
-        return Judgement(zero, zero, zero + np.inf, sure, sure, size[:, 0, 0], size[:, 0, 1], size[:, 0] * EPS)
+        return SpectralEstimate(zero, zero, zero + np.inf, sure, sure, size[:, 0, 0], size[:, 0, 1], size[:, 0] * EPS)
     centre, tail = degree // 2, degree + 1 - max(2, degree // 10)
     parts = np.maximum.reduceat(size, (0, centre - 1, centre + 2, tail), axis=1)
     top, middle, late = parts.max(axis=1), parts[:, 1], parts[:, 3]
@@ -152,7 +152,7 @@ def judged(size: Array, time_rounding: Array | float) -> Judgement:
     calm = late <= floor
     # A tail that has sunk into rounding says nothing of its decay any more; what lies beyond it is less than it.
     error = np.maximum(np.minimum(left_over, np.where(calm, 2.0, degree) * late), 0.02 * floor)
-    return Judgement(
+    return SpectralEstimate(
         error[:, 0],
         error[:, 1],
         np.where(calm, np.inf, np.maximum(decay, 0.0)).min(axis=1),

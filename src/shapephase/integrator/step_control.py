@@ -19,7 +19,7 @@ _DEGREES_A_STEP, _DEGREES_A_STEP_AT_REST = 3.0, 2.0
 _TURN_A_STEP, _SHORT_TURN_A_STEP, _FAR = 1.0, 0.3, 80.0
 
 
-class Needs(NamedTuple):
+class StepRequirements(NamedTuple):
     """What the panels of an interpolant ask of the steps on them.
 
     Attributes
@@ -38,7 +38,7 @@ class Needs(NamedTuple):
     moving: bool
 
     @classmethod
-    def of(cls, interpolant: Interpolant, size: float, tolerance: float) -> Needs:
+    def of(cls, interpolant: Interpolant, size: float, tolerance: float) -> StepRequirements:
         """For momenta up to a size [kg m^2/s] and a tolerance [rad]."""
         count, degrees, _ = interpolant.coefficients.shape
         edges = interpolant.edges[: count + 1]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from .casadi_calls import called
-from .compilation import in_machine_code
+from .casadi_calls import call_casadi
+from .compilation import compiled_or_interpreted
 from .rotation_step import STAGES, local_error, momentum_step, product, rest_step, turned, unit, variation
 
 BLOCK = 256
@@ -22,7 +22,7 @@ _INNER = (5, 8)
 
 
 @dataclass(frozen=True, eq=False)
-class March:
+class StepRecord:
     """What the steps came to, for a batch of B momenta and K steps.
 
     Attributes
@@ -43,7 +43,9 @@ class March:
     growth: Array
 
 
-def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, with_growth: bool = True) -> March:
+def integrate_steps(
+    channels: Array, directions: Array, sizes: Array, loops: int, *, with_growth: bool = True
+) -> StepRecord:
     """All steps of all loops, from the identity.
 
     Parameters
@@ -54,7 +56,7 @@ def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, wit
     with_growth : whether to carry along how errors grow, to a few thousandths for every ten radians turned
     """
     total = loops * len(channels)
-    march = March(
+    march = StepRecord(
         quaternions=np.empty((len(sizes), total + 1, 4)),
         directions=np.empty((len(sizes), total + 1, 3)),
         turns=np.empty((len(sizes), total)),
@@ -75,7 +77,7 @@ def marched(channels: Array, directions: Array, sizes: Array, loops: int, *, wit
     return march
 
 
-def marched_at_rest(channels: Array, loops: int) -> March:
+def integrate_steps_at_rest(channels: Array, loops: int) -> StepRecord:
     """All steps of all loops without momentum, from the identity: a batch of one.
 
     The equation is linear, so steps do not depend on each other, and a further loop is the first one's rotation, once
@@ -87,11 +89,13 @@ def marched_at_rest(channels: Array, loops: int) -> March:
     drifts = np.ascontiguousarray(channels.reshape(count, STAGES, 9)[:, :, 6:]).reshape(count, -1)
     for first in range(0, count, BLOCK):
         part = slice(first, first + BLOCK)
-        states, sides = called(_rest_function(len(drifts[part])), len(drifts[part]), quaternions[first], drifts[part])
+        states, sides = call_casadi(
+            _rest_function(len(drifts[part])), len(drifts[part]), quaternions[first], drifts[part]
+        )
         quaternions[first + 1 : first + BLOCK + 1], errors[part] = states, sides[:, 0]
     whole = _repeated(quaternions, loops) if loops > 1 else quaternions
     nothing = np.zeros((1, loops * count))
-    return March(
+    return StepRecord(
         quaternions=whole[None],
         directions=np.empty((1, 0, 3)),
         turns=nothing,
@@ -112,7 +116,7 @@ def _repeated(quaternions: Array, loops: int) -> Array:
     return np.concatenate([quaternions[:1], further])
 
 
-def _march_one(march: March, row: int, size: float, channels: Array, loops: int) -> None:
+def _march_one(march: StepRecord, row: int, size: float, channels: Array, loops: int) -> None:
     count, with_growth = len(channels), bool(march.growth.shape[1])
     state = np.zeros(17 if with_growth else 8)
     state[:3], state[6], state[7] = march.directions[row, 0], 1.0, size
@@ -121,7 +125,7 @@ def _march_one(march: March, row: int, size: float, channels: Array, loops: int)
     for _ in range(loops):
         for first in range(0, count, BLOCK):
             block = channels[first : first + BLOCK]
-            states, sides = called(_momentum_function(len(block), with_growth), len(block), state, block)
+            states, sides = call_casadi(_momentum_function(len(block), with_growth), len(block), state, block)
             after = slice(done + 1, done + len(block) + 1)
             march.directions[row, after] = states[:, :3]
             march.quaternions[row, after] = states[:, 3:7]
@@ -132,7 +136,7 @@ def _march_one(march: March, row: int, size: float, channels: Array, loops: int)
             state, done = states[-1], done + len(block)
 
 
-def _march_many(march: March, rows: slice, sizes: Array, channels: Array, loops: int) -> None:
+def _march_many(march: StepRecord, rows: slice, sizes: Array, channels: Array, loops: int) -> None:
     direction = list(march.directions[rows, 0].T)
     quaternion: Any = [0.0, 0.0, 0.0, 1.0]
     growth: Any = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
@@ -157,14 +161,14 @@ def _march_many(march: March, rows: slice, sizes: Array, channels: Array, loops:
         direction = end
 
 
-def _march_many_compiled(march: March, rows: slice, sizes: Array, channels: Array, loops: int) -> None:
+def _march_many_compiled(march: StepRecord, rows: slice, sizes: Array, channels: Array, loops: int) -> None:
     count, with_growth = len(sizes[rows]), bool(march.growth.shape[1])
     state = np.zeros((count, 17 if with_growth else 8))
     state[:, :3], state[:, 6], state[:, 7] = march.directions[rows, 0], 1.0, sizes[rows]
     state[:, 8::4] = 1.0
     function = _many_function(count, with_growth)
     for number in range(loops * len(channels)):
-        state, sides = called(function, count, state, channels[number % len(channels)])
+        state, sides = call_casadi(function, count, state, channels[number % len(channels)])
         march.directions[rows, number + 1] = state[:, :3]
         march.quaternions[rows, number + 1] = state[:, 3:7]
         if with_growth:
@@ -208,26 +212,26 @@ def matrix_product(a: Any, b: Any) -> list[list[Any]]:
 @lru_cache(maxsize=1024)
 def _momentum_function(length: int, with_growth: bool) -> Any:
     """`length` steps as one CasADi function of the state (direction, quaternion, size, growth) and the channels."""
-    return in_machine_code(momentum_step_function(with_growth)).mapaccum("steps", length)
+    return compiled_or_interpreted(momentum_step_function(with_growth)).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=2)
 def _is_compiled(with_growth: bool) -> bool:
     """Whether steps are machine code: only then are those of many sooner done one by one than on whole arrays."""
     function = momentum_step_function(with_growth)
-    return in_machine_code(function) is not function
+    return compiled_or_interpreted(function) is not function
 
 
 @lru_cache(maxsize=16)
 def _many_function(count: int, with_growth: bool) -> Any:
     """One step of many states as one CasADi function, for machine code."""
-    return in_machine_code(momentum_step_function(with_growth)).map("many", "serial", count, [1], [])
+    return compiled_or_interpreted(momentum_step_function(with_growth)).map("many", "serial", count, [1], [])
 
 
 @lru_cache(maxsize=512)
 def _rest_function(length: int) -> Any:
     """`length` steps without momentum as one CasADi function of the quaternion and the drifts."""
-    return in_machine_code(rest_step_function()).mapaccum("steps", length)
+    return compiled_or_interpreted(rest_step_function()).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=2)

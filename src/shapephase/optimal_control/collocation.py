@@ -12,7 +12,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from .solver_watch import Followed, Watch, ipopt_callback
+from .solver_watch import BestIterate, Watch, ipopt_callback
 from .spline_basis import SplineBasis
 from .symbolic import solved, symbolic_body
 from .task import Reorientation
@@ -225,7 +225,7 @@ class CollocationProgram:
             "linear_solver": "mumps",
             "mu_strategy": "adaptive",
         }
-        followed = Followed(watch)
+        followed = BestIterate(watch)
         # CasADi does not keep it alive.
         heard = ipopt_callback(followed, len(guess), self._low, self._high)
         solver = casadi.nlpsol(

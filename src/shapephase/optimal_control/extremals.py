@@ -18,7 +18,7 @@ from .. import so3
 from ..arrays import Array, check_reach, finite_array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError, unknown_name
-from ..integrator.casadi_calls import called
+from ..integrator.casadi_calls import call_casadi
 from ..integrator.integrate import tolerance_argument
 from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ..shape_space.shape_path import ShapePath, positive_argument, times_argument
@@ -134,7 +134,7 @@ class Extremal:
     def _rates(self, states: Array) -> Array:
         field = hamiltonian(self.body, self.metric).field
         n = self.body.n_shape
-        rates = [called(field, 1, row, self.charge)[0][0, :n] for row in states.T]
+        rates = [call_casadi(field, 1, row, self.charge)[0][0, :n] for row in states.T]
         return np.array(rates).reshape(-1, n)
 
 
@@ -202,11 +202,11 @@ def extremal(
     state = initial_state(equations, start, speed, moment)
 
     def field(now: Array) -> Array:
-        return called(equations.field, 1, now, moment)[0][0]
+        return call_casadi(equations.field, 1, now, moment)[0][0]
 
     momenta, _ = natural_sizes(body, equations, start, speed, moment)
     answer = integrated(field, span, state, goal, np.concatenate([np.ones(body.n_shape), momenta, np.ones(4)]))
-    energies = np.array([called(equations.energy, 1, row, moment)[0][0, 0] for row in answer.y.T])
+    energies = np.array([call_casadi(equations.energy, 1, row, moment)[0][0, 0] for row in answer.y.T])
     energy = float(energies[0])
     drift = float(np.abs(energies - energy).max() / energy) if energy else 0.0
     return Extremal(body, metric, span, moment, energy, drift, answer.sol)
@@ -264,7 +264,7 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
 def initial_state(equations: Hamiltonian, shape: Array, rate: Array, charge: Array) -> Array:
     """State at the start, where the base is at the identity: -> (2 n + 4,)."""
     n = len(shape)
-    momentum = called(equations.slopes, 1, shape, rate, charge)[0][0, n : 2 * n]
+    momentum = call_casadi(equations.slopes, 1, shape, rate, charge)[0][0, n : 2 * n]
     return np.concatenate([shape, momentum, [0.0, 0.0, 0.0, 1.0]])
 
 
@@ -364,7 +364,9 @@ def _fit(body: Body, known: Hamiltonian, route: ShapePath, attitude: Callable[[A
     times = (edges[:-1, None] + half[:, None] * (_NODES + 1.0)).ravel()
     shapes, rates = route.curve(times)
     n, uncharged = body.n_shape, np.zeros(3)
-    gradients = np.array([called(known.slopes, 1, *row, uncharged)[0][0] for row in zip(shapes, rates, strict=True)])
+    gradients = np.array(
+        [call_casadi(known.slopes, 1, *row, uncharged)[0][0] for row in zip(shapes, rates, strict=True)]
+    )
     columns, by_shape = connection_slopes(body, shapes)
     back = so3.transpose(attitude(times))
     # Without charge, then by each component of the charge in inertial axes: (N, n, 4).

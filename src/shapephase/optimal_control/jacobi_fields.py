@@ -13,7 +13,7 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError
-from ..integrator.casadi_calls import called
+from ..integrator.casadi_calls import call_casadi
 from ..integrator.integrate import tolerance_argument
 from ..shape_space.connection import horizontal_lift, mechanical_connection
 from ..shape_space.shape_path import ShapePath, positive_argument
@@ -98,8 +98,8 @@ def jacobi_fields(
         state, spread = now[: 2 * n + 4], now[2 * n + 4 :].reshape(2 * n + 3, n + 3)
         attitude = so3.matrix_from_quat(so3.normalised(state[2 * n :]))
         moment = charge @ attitude
-        flow = called(equations.field, 1, state, charge)[0][0]
-        second = called(equations.second, 1, state[:n], flow[:n], moment)[0].reshape(2 * n + 3, 2 * n + 3)
+        flow = call_casadi(equations.field, 1, state, charge)[0][0]
+        second = call_casadi(equations.second, 1, state[:n], flow[:n], moment)[0].reshape(2 * n + 3, 2 * n + 3)
         shapes, momenta_there, turns = spread[:n], spread[n : 2 * n], spread[2 * n :]
         moments = attitude.T @ (charges + so3.hat(charge) @ turns)
         known = second[:, :n] @ shapes + second[:, 2 * n :] @ moments
@@ -255,7 +255,7 @@ def shoot(
         size = np.concatenate([np.ones(n), momenta, np.ones(4)])
 
         def field(now: Array) -> Array:
-            return called(equations.field, 1, now, moment)[0][0]
+            return call_casadi(equations.field, 1, now, moment)[0][0]
 
         last = integrated(field, route.duration, state, accuracy, size, most).y[:, -1]
         attitude = so3.matrix_from_quat(so3.normalised(last[2 * n :]))

@@ -16,7 +16,7 @@ from ..shape_space.shape_path import ShapePath
 from .collocation import Solved, gauss_tableau
 from .guesses import start_metric
 from .polish import end_derivative, movable_points
-from .solver_watch import Followed, Watch
+from .solver_watch import BestIterate, Watch
 from .spline_basis import SplineBasis
 from .symbolic import symbolic_body
 from .task import COSTS, Reorientation
@@ -107,7 +107,7 @@ class ReducedProgram:
         limited = bool(np.isfinite(task.rates).any())
         if limited:
             constraints.append(self._within_rates(guess, free, unit, duration))
-        followed = Followed(watch)
+        followed = BestIterate(watch)
 
         def left(x: Array) -> tuple[float, float]:
             """Of the conditions of Karush, Kuhn and Tucker, without limits of rates, and of the constraints."""

@@ -16,7 +16,7 @@ Watch = Callable[[int, float, float], bool]
 _FEASIBLE = 1e-3
 
 
-class Followed:
+class BestIterate:
     """A solver at work, and the best of its iterates.
 
     Attributes
@@ -45,7 +45,7 @@ class Followed:
         return self.stopped
 
 
-def ipopt_callback(followed: Followed, unknowns: int, low: Array, high: Array) -> Any:
+def ipopt_callback(followed: BestIterate, unknowns: int, low: Array, high: Array) -> Any:
     """The `iteration_callback` of `casadi.nlpsol` with rows g between low and high."""
     import casadi
 

@@ -328,12 +328,12 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
     edges = motion.solution.times
     nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
     times = nodes.ravel()
-    source = motion.deformation.source
-    inertia, internal = source.sample(times)
+    description = motion.deformation.description
+    inertia, internal = description.sample(times)
     drift = so3.apply(inverse_inertia(inertia, times), internal)
     turning = motion.angular_velocity(times).reshape(-1, len(times), 3)
     momentum = motion.body_momentum(times).reshape(-1, len(times), 3)
-    whole, shape_only = source.kinetic_energy(times, turning), source.kinetic_energy(times, 0.0 * turning)
+    whole, shape_only = description.kinetic_energy(times, turning), description.kinetic_energy(times, 0.0 * turning)
     along = 2.0 * (whole - shape_only) + np.sum(drift * (internal - momentum), axis=-1)
     size = np.linalg.norm(motion.momentum.reshape(-1, 3), axis=-1)
     phase = along @ weights.ravel() / np.where(size > 0.0, size, 1.0)

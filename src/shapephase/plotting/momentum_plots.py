@@ -102,7 +102,7 @@ def plot_momentum_curve(
         drawn.text(axis, name, 0.13, alpha=1.0 if axis @ drawn.eye >= 0.0 else 0.45)
     if frozen_at is not None:
         time = times_argument(finite_array(frozen_at, "frozen_at", unit="s"), motion.duration).reshape(1)
-        inertia = motion.deformation.source.sample(time)[0][0]
+        inertia = motion.deformation.description.sample(time)[0][0]
         if curve.frames is not None:
             turn = curve.frames(time)[0][0]
             inertia = turn @ inertia @ turn.T

@@ -13,7 +13,7 @@ from .. import so3
 from ..arrays import Array
 from ..body.appearance import BOX_COLOUR, Visual, visuals
 from ..deformation.deformation import Deformation
-from ..deformation.descriptions import ArticulatedSource, ParticleSource, Source
+from ..deformation.descriptions import ArticulatedDescription, Description, ParticleDescription
 from ..deformation.frames import principal_frames
 from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
@@ -134,49 +134,52 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MOST_FRAMES:
         raise ShapeError(f"frames: a whole number from 2 to {_MOST_FRAMES} is needed, got {frames!r}")
     times = np.linspace(0.0, motion.duration, int(frames))
-    source = _original(motion.deformation)
+    description = _original(motion.deformation)
     base = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
     base[:, :3, :3] = motion.attitude(times) @ motion.deformation.frame(times)
     base[:, :3, 3] = motion.base_position(times, **fall)
-    in_base = source.centre_of_mass(times)
+    in_base = description.centre_of_mass(times)
     centre = base[:, :3, 3] + so3.apply(base[:, :3, :3], in_base)
     way = None
-    if isinstance(source, ArticulatedSource):
-        nodes = _link_nodes(source, times)
+    if isinstance(description, ArticulatedDescription):
+        nodes = _link_nodes(description, times)
         if trail is not None:
-            place = source.body.link_pose(source.path.curve(times)[0], trail)
+            place = description.body.link_pose(description.path.curve(times)[0], trail)
             way = (base @ place)[:, :3, 3]
     else:
         if trail is not None:
             raise unknown_name(f"link of what has none ({motion.deformation.label})", trail, ())
-        particles = isinstance(source, ParticleSource)
-        nodes = _particle_nodes(source, times) if particles else (_inertia_node(motion.deformation, in_base, times),)
-    articulated = isinstance(source, ArticulatedSource)
+        particles = isinstance(description, ParticleDescription)
+        nodes = (
+            _particle_nodes(description, times) if particles else (_inertia_node(motion.deformation, in_base, times),)
+        )
+    articulated = isinstance(description, ArticulatedDescription)
     return MovingScene(motion.deformation.label, times, base, nodes, centre, motion.momentum, way, articulated)
 
 
-def _original(deformation: Deformation) -> Source:
+def _original(deformation: Deformation) -> Description:
     """What a gauge has turned; its `frame` turns it back."""
-    source = deformation.source
-    while hasattr(source, "original"):
-        source = source.original  # pyright: ignore[reportAttributeAccessIssue]
-    return source
+    description = deformation.description
+    while hasattr(description, "original"):
+        description = description.original  # pyright: ignore[reportAttributeAccessIssue]
+    return description
 
 
-def _link_nodes(source: ArticulatedSource, times: Array) -> tuple[MovingNode, ...]:
+def _link_nodes(description: ArticulatedDescription, times: Array) -> tuple[MovingNode, ...]:
     by_link: dict[str, list[Visual]] = {}
-    for shape in visuals(source.body):
+    for shape in visuals(description.body):
         by_link.setdefault(shape.link, []).append(shape)
-    configuration = source.path.curve(times)[0]
+    configuration = description.path.curve(times)[0]
     return tuple(
-        MovingNode(link, tuple(shapes), source.body.link_pose(configuration, link)) for link, shapes in by_link.items()
+        MovingNode(link, tuple(shapes), description.body.link_pose(configuration, link))
+        for link, shapes in by_link.items()
     )
 
 
-def _particle_nodes(source: ParticleSource, times: Array) -> tuple[MovingNode, ...]:
-    points, _ = source.centred(times)
+def _particle_nodes(description: ParticleDescription, times: Array) -> tuple[MovingNode, ...]:
+    points, _ = description.centred(times)
     largest = _PARTICLE * float(np.linalg.norm(points, axis=-1).max())
-    radii = largest * np.cbrt(source.masses / source.masses.max())
+    radii = largest * np.cbrt(description.masses / description.masses.max())
     nodes = []
     for number, radius in enumerate(radii.tolist()):
         poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
@@ -188,12 +191,12 @@ def _particle_nodes(source: ParticleSource, times: Array) -> tuple[MovingNode, .
 
 def _inertia_node(deformation: Deformation, in_base: Array, times: Array) -> MovingNode:
     """The box of the locked inertia, stretched frame by frame."""
-    source = _original(deformation)
-    moment = second_moment(source.sample(times)[0])
-    axes = _continuous_axes(replace(deformation, source=source, closure=None), moment, times)
+    description = _original(deformation)
+    moment = second_moment(description.sample(times)[0])
+    axes = _continuous_axes(replace(deformation, description=description, closure=None), moment, times)
     moments = np.maximum(np.einsum("nji,njk,nki->ni", axes, moment, axes), 0.0)
     # Of a box m a^2 / 12 is the second moment along an edge a; without a mass, the start sets the scale.
-    mass = getattr(source, "mass", 12.0 * moments[0].sum())
+    mass = getattr(description, "mass", 12.0 * moments[0].sum())
     edges = np.sqrt(12.0 * moments / mass)
     poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
     poses[:, :3, :3], poses[:, :3, 3] = axes, in_base

@@ -51,7 +51,7 @@ class Figure:
 def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
     if path is None:
         raise ShapeError("the figure 'shape' needs the path of the joints, and there is none")
-    plot_shape_path(ax, path, getattr(motion.deformation.source, "body", None))
+    plot_shape_path(ax, path, getattr(motion.deformation.description, "body", None))
 
 
 FIGURES: Mapping[str, Figure] = {

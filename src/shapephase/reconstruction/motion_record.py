@@ -165,5 +165,5 @@ def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> 
     edges = interpolant.edges[: len(interpolant.coefficients) + 1]
     left, right = edges[:-1, None], edges[1:, None]
     times = np.clip(0.5 * (left + right) + 0.5 * (right - left) * nodes, left, right)
-    values = deformation.source.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
+    values = deformation.description.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
     return values_to_coefficients(_CENTRE_DEGREE) @ values

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
-from ..deformation.descriptions import RigidSource
+from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
@@ -124,7 +124,7 @@ class Motion:
     def angular_velocity(self, t: ArrayLike) -> Array:
         """omega(t) = I^-1 (Pi - L_o): times (...) -> batch + (..., 3), base axes [rad/s]."""
         times = times_argument(t, self.duration)
-        inertia, internal = self.deformation.source.sample(times.ravel())
+        inertia, internal = self.deformation.description.sample(times.ravel())
         pi = self.body_momentum(times).reshape(-1, times.size, 3)
         omega = so3.apply(inverse_inertia(inertia, times.ravel()), pi - internal)
         return omega.reshape(*self.batch, *times.shape, 3)
@@ -173,7 +173,7 @@ class Motion:
             [0.3, 0.7], len(self.solution.times) - 1
         )
         times = inner[np.linspace(0, len(inner) - 1, 20).astype(int)]
-        inertia, internal = self.deformation.source.sample(times)
+        inertia, internal = self.deformation.description.sample(times)
         omega = self._differentiated(times)
         pi = self.body_momentum(times).reshape(-1, len(times), 3)
         defect = so3.apply(inertia[None], omega) + internal - pi
@@ -322,10 +322,10 @@ def reconstruct(
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     at_start = at_start.reshape(-1, 3)
     if method == "closed_form":
-        if not isinstance(deformation.source, RigidSource):
+        if not isinstance(deformation.description, RigidDescription):
             others = [name for name in METHODS if name != method]
             raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", method, others)
-        exact = rigid_rotation(deformation.source.tensor, at_start, deformation.duration, goal)
+        exact = rigid_rotation(deformation.description.tensor, at_start, deformation.duration, goal)
         return Motion(deformation, spatial, start, goal, method, 1, exact)
     if method == "dop853":
         solution = _dop853(deformation, at_start, goal)
@@ -392,8 +392,8 @@ def _dop853(deformation: Deformation, at_start: Array, tolerance: float) -> _Dop
         )
     )
     for start in at_start:
-        loose, first = dop853_rotation(deformation.source.sample, deformation.breaks, start, rtol)
-        tight, second = dop853_rotation(deformation.source.sample, deformation.breaks, start, 0.1 * rtol)
+        loose, first = dop853_rotation(deformation.description.sample, deformation.breaks, start, rtol)
+        tight, second = dop853_rotation(deformation.description.sample, deformation.breaks, start, 0.1 * rtol)
         between = times[:-1] + 0.37 * np.diff(times)
         there = np.concatenate([times, between])
         gap = so3.angle(so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there)))

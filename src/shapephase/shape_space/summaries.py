@@ -27,7 +27,7 @@ class JointCard:
 
 
 @dataclass(frozen=True, eq=False)
-class ModelCard:
+class BodySummary:
     """A body at its neutral shape.
 
     Attributes
@@ -54,7 +54,7 @@ class ModelCard:
 
 
 @dataclass(frozen=True, eq=False)
-class PathCard:
+class PathSummary:
     """A joint motion for a body.
 
     Attributes
@@ -80,7 +80,7 @@ class PathCard:
     is_loop: bool
 
 
-def model_card(body: Body) -> ModelCard:
+def body_summary(body: Body) -> BodySummary:
     """The card of a body."""
     neutral = body.shape()
     inertia = body.locked_inertia(neutral)
@@ -90,7 +90,7 @@ def model_card(body: Body) -> ModelCard:
         for endless, unit in zip(body.continuous, body.joint_units, strict=True)
     ]
     joints = zip(body.joint_names, kinds, body.joint_limits.tolist(), body.joint_units, strict=True)
-    return ModelCard(
+    return BodySummary(
         body.name,
         body.sha256,
         body.mass,
@@ -103,7 +103,7 @@ def model_card(body: Body) -> ModelCard:
     )
 
 
-def path_card(body: Body, path: ShapePath) -> PathCard:
+def path_summary(body: Body, path: ShapePath) -> PathSummary:
     """The card of a joint motion. Raises TrajectoryError, UnknownNameError for joints of another body."""
     route = path.matched(body.joint_names, body.name)
     times = np.union1d(np.linspace(0.0, route.duration, _SAMPLES), route.breaks)
@@ -113,7 +113,7 @@ def path_card(body: Body, path: ShapePath) -> PathCard:
     slack = CLOSED * (1.0 + np.abs(shapes).max(axis=0))
     beyond = (lowest < lower - slack) | (highest > upper + slack)
     gap = path_gap(body, route)
-    return PathCard(
+    return PathSummary(
         route.duration,
         len(route.breaks),
         lowest,
