@@ -23,8 +23,8 @@ from functools import partial
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from shapephase.rigid_body.geodesics.conjugate_locus import conjugate_locus, conjugate_points
-from shapephase.rigid_body.geodesics.ellipsoid import ellipsoid
+from shapephase.rigid_body.geodesics._conjugate_locus import conjugate_locus, conjugate_points
+from shapephase.rigid_body.geodesics._ellipsoid import ellipsoid
 from shapephase.rigid_body.geodesics.metric_profile import surface_of_metric
 from shapephase.rigid_body.geodesics.surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 

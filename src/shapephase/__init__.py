@@ -1,118 +1,13 @@
-"""shapephase: a free body changes its shape in a known way; how does it turn?"""
+"""shapephase: a free body changes its shape in a known way; how does it turn?
 
-from __future__ import annotations
+The folders are the rooms of the theory, from the bottom up: `body` (a model and its inertia), `integrator` and
+`rigid_body` (rotations, in general and in closed form), `shape_space` (paths, connection, holonomy), `deformation`
+(inertia and internal momentum in time), `reconstruction` (the attitude), `phases`, `bounds` and `optimal_control`,
+`plotting` and `examples`. Names are loaded when they are first used.
+"""
 
-from . import errors
-from .body.body import Body
-from .body.catalog import load_body, robot_names
-from .body.link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
-from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
-from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
-from .errors import ShapePhaseError
-from .integrator.compilation import CompiledCodeWarning
-from .integrator.compiled_steps import compile_steps
-from .phases.continuation import OrbitBranch, continued_orbits
-from .phases.phases import (
-    ArcPhases,
-    PhaseSplit,
-    RunningPhases,
-    arc_phases,
-    dynamic_phase_from_energy,
-    parallel_transport,
-    running_phases,
-    split,
-)
-from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
-from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
-from .plotting.viewer import motion_page, view
-from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
-from .reconstruction.recorded_base import BaseDifference, base_difference
-from .rigid_body.euler_top import EulerTop
-from .shape_space.connection import (
-    HorizontalLift,
-    curvature,
-    holonomy,
-    holonomy_derivative,
-    horizontal_lift,
-    mechanical_connection,
-)
-from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
-from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
-from .shape_space.files.recording import TrajectoryWarning
-from .shape_space.many_paths import FinalAttitudes, final_attitudes
-from .shape_space.shape_path import ShapePath
-from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_summary
+from lazy_loader import attach_stub
 
 __version__ = "0.1.0"
 
-__all__ = [
-    "ArcPhases",
-    "BaseDifference",
-    "Body",
-    "BodySummary",
-    "CompiledCodeWarning",
-    "Crossings",
-    "Deformation",
-    "EulerTop",
-    "FinalAttitudes",
-    "FixedPoints",
-    "HorizontalLift",
-    "IgnoredElementWarning",
-    "Motion",
-    "OrbitBranch",
-    "PathSummary",
-    "PhaseSplit",
-    "RecordedMotion",
-    "ReturnMap",
-    "Returns",
-    "RunningPhases",
-    "Sensitivity",
-    "ShapePath",
-    "ShapePhaseError",
-    "TrajectoryWarning",
-    "UnphysicalInertiaWarning",
-    "arc_phases",
-    "articulated",
-    "base_difference",
-    "body_summary",
-    "closed_orbits",
-    "compile_steps",
-    "continued_orbits",
-    "curvature",
-    "curvature_on_plane",
-    "dynamic_phase_from_energy",
-    "errors",
-    "final_attitudes",
-    "fixed_points",
-    "holonomy",
-    "holonomy_derivative",
-    "horizontal_gauge",
-    "horizontal_lift",
-    "in_gauge",
-    "is_flat",
-    "link_gauge",
-    "load_body",
-    "load_motion",
-    "mean_body_gauge",
-    "mechanical_connection",
-    "momentum_crossings",
-    "momentum_from_rate",
-    "momentum_returns",
-    "motion_page",
-    "parallel_transport",
-    "particles",
-    "path_summary",
-    "prescribed",
-    "principal_gauge",
-    "read_recorded_motion",
-    "read_shape_path",
-    "reconstruct",
-    "rigid",
-    "robot_names",
-    "running_phases",
-    "split",
-    "stokes_holonomy",
-    "stroboscopic_map",
-    "view",
-    "write_shape_path",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -9,10 +9,10 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import shapephase as sp
+from shapephase.bounds._energy_bounds import energy_bounds
 from shapephase.bounds.all_bounds import Bound, bounds
 from shapephase.bounds.arc_bounds import arc_length_bounds, azimuth_bounds, azimuth_rate, return_time_bounds
 from shapephase.bounds.energy import energy_along, homoclinic_energy
-from shapephase.bounds.energy_bounds import energy_bounds
 from shapephase.bounds.phase_bounds import (
     PhaseBounds,
     dynamic_phase_bounds,

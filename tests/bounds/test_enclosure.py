@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.bounds.enclosure import enclosure, interval_argument, restricted, series_bounds
+from shapephase.bounds._enclosure import enclosure, interval_argument, restricted, series_bounds
 from support.independent import body_of, random_loop
 from support.random_deformations import KINDS, random_case
 

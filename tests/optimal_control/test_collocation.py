@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
+from shapephase.optimal_control._guesses import guesses
 from shapephase.optimal_control.collocation import CollocationProgram, gauss_tableau
-from shapephase.optimal_control.guesses import guesses
 from shapephase.optimal_control.planning import plan_reorientation
 from shapephase.optimal_control.polish import end_derivative, polished
 from shapephase.optimal_control.reduced import ReducedProgram

@@ -11,8 +11,8 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import extremals
+from shapephase.optimal_control._jacobi_fields import conjugate_times, jacobi_fields, shoot
 from shapephase.optimal_control.extremals import extremal, wong_residual
-from shapephase.optimal_control.jacobi_fields import conjugate_times, jacobi_fields, shoot
 from support.bodies import joint, link, random_loop, urdf
 
 X = np.array([1.0, 0.0, 0.0])

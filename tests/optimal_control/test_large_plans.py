@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached
+from shapephase.optimal_control._jacobi_fields import conjugate_times, shoot
 from shapephase.optimal_control.extremals import integrated, wong_residual
-from shapephase.optimal_control.jacobi_fields import conjugate_times, shoot
 from shapephase.optimal_control.planning import path_cost, plan_reorientation
 from support.independent import apart, mujoco_motion, pinocchio_motion
 

@@ -14,8 +14,8 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, PlanNotFound, ShapeError, UnknownNameError
 from shapephase.examples.scenarios import kane_scher
+from shapephase.optimal_control._jacobi_fields import conjugate_times, shoot
 from shapephase.optimal_control.extremals import wong_residual
-from shapephase.optimal_control.jacobi_fields import conjugate_times, shoot
 from shapephase.optimal_control.planning import path_cost, plan_reorientation
 from shapephase.optimal_control.symbolic import symbolic_body
 from support.bodies import joint, link, urdf

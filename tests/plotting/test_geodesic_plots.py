@@ -16,9 +16,9 @@ from shapephase.cli.conjugate import conjugate_command
 from shapephase.errors import InputFileNotFoundError, ShapeError, UnknownNameError
 from shapephase.plotting.geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from shapephase.plotting.plot_style import column_axes
+from shapephase.rigid_body.geodesics._conjugate_locus import conjugate_locus
+from shapephase.rigid_body.geodesics._ellipsoid import astroid, ellipsoid, meridian_length
 from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric
-from shapephase.rigid_body.geodesics.conjugate_locus import conjugate_locus
-from shapephase.rigid_body.geodesics.ellipsoid import astroid, ellipsoid, meridian_length
 from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
 from shapephase.rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
 

@@ -24,7 +24,7 @@ from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import MissingExtraError, ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting
 from shapephase.plotting import scene_drawing, viewer
-from shapephase.plotting.moving_scene import moving_scene
+from shapephase.plotting._moving_scene import moving_scene
 from shapephase.plotting.viewer import motion_page, view
 from support.bodies import link, random_loop, urdf
 from support.browser import furred, seen, stopped

@@ -10,8 +10,8 @@ from scipy.special import ellipj, ellipk
 import shapephase as sp
 from shapephase import so3, sphere
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError
+from shapephase.rigid_body._momentum_orbit import separatrix_solid_angle
 from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.momentum_orbit import separatrix_solid_angle
 
 MOMENTS = np.array([1.0, 2.0, 3.0])
 

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError
-from shapephase.rigid_body.half_twist import half_twist, half_twist_from_tilt, twist_defect
+from shapephase.rigid_body._half_twist import half_twist, half_twist_from_tilt, twist_defect
 from shapephase.rigid_body.stability import steady_rotations
 
 

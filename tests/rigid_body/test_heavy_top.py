@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
+from shapephase.rigid_body._nutation import nutation
 from shapephase.rigid_body.heavy_top import HeavyTop, casimirs, semidirect_bracket
 from shapephase.rigid_body.lagrange_top import (
     LagrangeTop,
@@ -19,7 +20,6 @@ from shapephase.rigid_body.lagrange_top import (
     sleeping_top,
     stability_chart,
 )
-from shapephase.rigid_body.nutation import nutation
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -13,8 +13,8 @@ from scipy.linalg import expm
 
 from shapephase import elliptic, so3
 from shapephase.errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body.andoyer_pendulum import andoyer_pendulum
-from shapephase.rigid_body.lie.nambu_pair import (
+from shapephase.rigid_body._andoyer_pendulum import andoyer_pendulum
+from shapephase.rigid_body.lie._nambu_pair import (
     cylinder_matrix,
     lie_group,
     maxwell_bloch_invariants,

@@ -19,7 +19,7 @@ from .. import so3
 from ..arrays import Array, check_reach, finite_array
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
-from .joint_chain import joint_chain
+from ._joint_chain import joint_chain
 from .joint_map import JointMap
 from .link_tree import Mimic
 

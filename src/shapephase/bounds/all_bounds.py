@@ -14,10 +14,10 @@ from .. import so3, sphere
 from ..arrays import Array
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
+from ._enclosure import interval_argument
+from ._energy_bounds import EnergyBounds
 from .arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds
-from .enclosure import interval_argument
 from .energy import energy_along, energy_rate
-from .energy_bounds import EnergyBounds
 from .phase_bounds import dynamic_phase_bounds, dynamic_phase_bounds_by_extremes
 from .regimes import CrownRegion, RegimeCertificate, regime_certificate
 

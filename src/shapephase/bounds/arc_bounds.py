@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from .energy_bounds import EnergyBounds, turning
+from ._energy_bounds import EnergyBounds, turning
 from .regimes import ABOUT_SMALLEST, RegimeCertificate
 
 _ROUND_UP = 1.0 + 1e-12

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ShapeError
+from ._energy_bounds import EnergyBounds
 from .arc_bounds import azimuth_bounds
-from .energy_bounds import EnergyBounds
 from .regimes import RegimeCertificate
 
 _ROOM = 1e-12

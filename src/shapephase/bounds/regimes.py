@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, Mask, finite_array
 from ..deformation.deformation import Deformation
-from .enclosure import Enclosure
-from .energy_bounds import EnergyBounds, energy_bounds, momentum_argument
+from ._enclosure import Enclosure
+from ._energy_bounds import EnergyBounds, energy_bounds, momentum_argument
 
 _FRAMES = 9
 _CHUNK = 2_000_000

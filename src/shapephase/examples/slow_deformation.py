@@ -18,8 +18,8 @@ from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
 from ..inertia_tensor import moments_argument
 from ..reconstruction.reconstruction import Motion
+from ..rigid_body._momentum_orbit import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop
-from ..rigid_body.momentum_orbit import separatrix_solid_angle
 from .closed_form_motions import Example, diagonal, positive
 
 _ROUND = (0.0, 2.0 * np.pi)

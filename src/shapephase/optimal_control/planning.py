@@ -16,8 +16,8 @@ from ..body.body import Body
 from ..errors import AccuracyNotReached, PlanNotFound, ShapeError, ShapePhaseError, unknown_name
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
+from ._guesses import PLACES, Guess, guess_of, guesses
 from .collocation import CollocationProgram, Solved, gauss_tableau
-from .guesses import PLACES, Guess, guess_of, guesses
 from .plan import Plan, Progress, Start
 from .polish import REACHED, Polished, panel_nodes, polished
 from .reduced import ReducedProgram

@@ -13,8 +13,8 @@ from ..deformation.deformation import articulated
 from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
+from ._guesses import start_metric
 from .collocation import Solved, gauss_tableau
-from .guesses import start_metric
 from .polish import end_derivative, movable_points
 from .solver_watch import BestIterate, Watch
 from .spline_basis import SplineBasis

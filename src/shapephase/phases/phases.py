@@ -13,7 +13,7 @@ from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import times_argument
-from .momentum_curve import Gauge, horizontal_lift_of, momentum_curve
+from ._momentum_curve import Gauge, horizontal_lift_of, momentum_curve
 
 
 @dataclass(frozen=True, eq=False)

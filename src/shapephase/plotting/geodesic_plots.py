@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, Integers, finite_array
 from ..errors import ShapeError
-from ..rigid_body.geodesics.conjugate_locus import conjugate_locus, conjugate_points
-from ..rigid_body.geodesics.ellipsoid import ellipsoid
-from ..rigid_body.geodesics.extremal import extremal
+from ..rigid_body.geodesics._conjugate_locus import conjugate_locus, conjugate_points
+from ..rigid_body.geodesics._ellipsoid import ellipsoid
+from ..rigid_body.geodesics._extremal import extremal
 from ..rigid_body.geodesics.left_invariant import left_invariant_metric
 from ..rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
 from ..rigid_body.geodesics.surface_of_revolution import SurfaceOfRevolution

@@ -9,7 +9,7 @@ import numpy as np
 from .. import so3, sphere
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..phases.momentum_curve import Gauge, MomentumCurve, horizontal_lift_of, momentum_curve
+from ..phases._momentum_curve import Gauge, MomentumCurve, horizontal_lift_of, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes

@@ -13,7 +13,7 @@ from ..arrays import Array
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, unknown_name
-from ..phases.momentum_curve import Gauge
+from ..phases._momentum_curve import Gauge
 from ..phases.phases import running_phases
 from ..reconstruction.reconstruction import Motion
 from .plot_style import (

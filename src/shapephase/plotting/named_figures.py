@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ShapeError, unknown_name
 from ..files import write_whole
-from ..phases.momentum_curve import Gauge
+from ..phases._momentum_curve import Gauge
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from .plot_style import axes_image

@@ -13,7 +13,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers
 from ..body.appearance import Visual
-from .moving_scene import MovingNode, MovingScene
+from ._moving_scene import MovingNode, MovingScene
 
 # The colours of Okabe and Ito: told apart by everybody, and dark or light in grey as well.
 _VERMILION, _PURPLE, _GREEN, _BLUE, _SKY = (213, 94, 0), (204, 121, 167), (0, 158, 115), (0, 114, 178), (86, 180, 233)

@@ -21,7 +21,7 @@ from ..body.appearance import VisualWarning
 from ..errors import MissingExtraError, ShapeError
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
-from .moving_scene import MovingScene, moving_scene
+from ._moving_scene import MovingScene, moving_scene
 from .scene_drawing import DrawnScene, set_camera
 
 if TYPE_CHECKING:

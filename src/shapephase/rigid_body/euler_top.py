@@ -23,7 +23,7 @@ from .. import elliptic, so3
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inertia_argument, principal_axes
-from .momentum_orbit import MomentumOrbit, momentum_orbit
+from ._momentum_orbit import MomentumOrbit, momentum_orbit
 
 _TURNS = 1e12
 _EPS = float(np.finfo(float).eps)

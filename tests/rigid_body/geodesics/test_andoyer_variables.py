@@ -8,10 +8,10 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ChartPoleError, ShapeError, UnphysicalInertiaError
-from shapephase.rigid_body.andoyer_pendulum import andoyer_pendulum
+from shapephase.rigid_body._andoyer_pendulum import andoyer_pendulum
 from shapephase.rigid_body.euler_angles import ZXZ, ZYZ
 from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.geodesics.andoyer_variables import (
+from shapephase.rigid_body.geodesics._andoyer_variables import (
     AndoyerVariables,
     andoyer_from_euler,
     andoyer_motion,

@@ -9,21 +9,21 @@ from geographiclib.geodesic import Geodesic
 from scipy.optimize import brentq
 
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.geodesics.conjugate_locus import (
+from shapephase.rigid_body.geodesics._conjugate_locus import (
     conjugate_height_rate,
     conjugate_locus,
     conjugate_points,
     conjugate_points_of_momentum,
 )
-from shapephase.rigid_body.geodesics.cut_locus import cut_locus, cut_time
-from shapephase.rigid_body.geodesics.ellipsoid import (
+from shapephase.rigid_body.geodesics._cut_locus import cut_locus, cut_time
+from shapephase.rigid_body.geodesics._ellipsoid import (
     astroid,
     ellipsoid,
     ellipsoid_period,
     meridian_length,
     metric_coefficients,
 )
-from shapephase.rigid_body.geodesics.extremal import extremal
+from shapephase.rigid_body.geodesics._extremal import extremal
 from shapephase.rigid_body.geodesics.metric_profile import surface_of_metric
 
 ASPECTS = [0.02, 0.5, 0.6, 0.99, 1.0, 1.5, 20.0]

@@ -12,8 +12,8 @@ from scipy.integrate import quad, solve_ivp
 from shapephase import so3
 from shapephase.errors import ShapeError
 from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.geodesics.andoyer_variables import AndoyerVariables, andoyer_motion, andoyer_variables
-from shapephase.rigid_body.geodesics.sadov_variables import sadov_frequencies, sadov_variables
+from shapephase.rigid_body.geodesics._andoyer_variables import AndoyerVariables, andoyer_motion, andoyer_variables
+from shapephase.rigid_body.geodesics._sadov_variables import sadov_frequencies, sadov_variables
 from shapephase.rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
 
 MOMENTS = np.array([3.0, 2.0, 1.0])

@@ -572,7 +572,7 @@ def test_wrong_particles_and_rates_are_refused():
 def test_motions_no_method_can_follow_are_refused(monkeypatch):
     with pytest.raises(AccuracyNotReached, match="no finite rate"):
         double_bracket_motion(1e-200 * np.eye(3), [1e200, 1.0, 1.0], 1.0, [0.0, 1.0])
-    monkeypatch.setattr("shapephase.rigid_body.flow._STEPS", 50)
+    monkeypatch.setattr("shapephase.rigid_body._flow._STEPS", 50)
     with pytest.raises(AccuracyNotReached, match="more than 50 steps"):
         double_bracket_motion(INERTIA, [1.0, 2.0, 3.0], 1e12, [0.0, 1.0])
     # What stops being finite on the way is refused as well.

@@ -18,7 +18,7 @@ import numpy as np
 from ... import so3
 from ...arrays import Array, Integers
 from ...errors import AccuracyNotReached
-from .momentum_flow import attitude_flow, exponential_fields, momentum_flow
+from ._momentum_flow import attitude_flow, exponential_fields, momentum_flow
 
 _TURN = 2.0 * np.pi
 _STEPS_EACH = 10_000

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arrays import Array
 from ...errors import AccuracyNotReached, ShapeError
+from ._momentum_flow import attitude_flow, exponential_derivative
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .left_invariant import LeftInvariantMetric
-from .momentum_flow import attitude_flow, exponential_derivative
 
 _FRACTIONS = (0.25, 0.5, 0.75, 0.95)
 _ROUNDS = (48, 384)

@@ -22,8 +22,8 @@ from ... import so3
 from ...arrays import Array, finite_array, real_array
 from ...errors import ShapeError
 from ...inertia_tensor import inertia_argument, moments_argument, principal_axes
+from ._momentum_flow import attitude_flow, exponential_derivative
 from .conjugate_search import conjugate_times
-from .momentum_flow import attitude_flow, exponential_derivative
 
 
 @dataclass(frozen=True, eq=False)

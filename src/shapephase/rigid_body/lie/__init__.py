@@ -1,1 +1,8 @@
-"""."""
+"""Lie algebras, Lie-Poisson brackets and Euler-Poincare equations, and what of the rigid body lives on them.
+
+Mostly after Marsden and Ratiu, Introduction to Mechanics and Symmetry, chapters 13 to 15.
+"""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

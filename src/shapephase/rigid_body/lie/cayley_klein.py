@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ..flow import ascending_times, flow
+from .._flow import ascending_times, flow
 from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, inverse_inertia_argument, kinetic_energy
 

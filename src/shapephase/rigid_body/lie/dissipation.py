@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
-from ..flow import ascending_times, flow
+from .._flow import ascending_times, flow
 from .lie_poisson import Gradient, angular_velocity, gradient_at, inverse_inertia_argument
 
 

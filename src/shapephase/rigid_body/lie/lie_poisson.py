@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from ...inertia_tensor import inverse_inertia
-from ..flow import ascending_times, flow
+from .._flow import ascending_times, flow
 from .lie_algebra import LieAlgebra, so3
 
 Gradient = ArrayLike | Callable[[Array], ArrayLike]

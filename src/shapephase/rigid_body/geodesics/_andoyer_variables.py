@@ -69,7 +69,7 @@ class AndoyerVariables:
     axial: Array
     """L, conjugate to l: the component along the body's third axis."""
 
-    def __post_init__(self) -> None:  # noqa: D105
+    def __post_init__(self) -> None:
         names = ("g", "k", "l", "total", "vertical", "axial")
         values = [finite_array(getattr(self, name), name) for name in names]
         try:

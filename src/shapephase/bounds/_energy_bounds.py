@@ -23,7 +23,7 @@ from .. import so3
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError
-from .enclosure import Enclosure, enclosure
+from ._enclosure import Enclosure, enclosure
 
 _EPS = float(np.finfo(float).eps)
 

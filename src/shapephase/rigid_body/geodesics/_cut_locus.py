@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from ...roots import root
-from .conjugate_locus import conjugate_points
-from .extremal import start_of
+from ._conjugate_locus import conjugate_points
+from ._extremal import start_of
 from .surface_of_revolution import SurfaceOfRevolution
 
 

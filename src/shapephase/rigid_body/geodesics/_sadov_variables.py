@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from ... import elliptic, so3
 from ...arrays import Array, Mask, finite_array
 from ...errors import ShapeError
-from .andoyer_variables import AndoyerVariables
+from ._andoyer_variables import AndoyerVariables
 from .serret_andoyer import serret_andoyer_metric
 
 

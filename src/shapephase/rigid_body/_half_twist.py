@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, common_shape, finite_array
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
-from .momentum_orbit import momentum_orbit
+from ._momentum_orbit import momentum_orbit
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,151 @@
+from . import (
+    body,
+    bounds,
+    deformation,
+    elliptic,
+    errors,
+    examples,
+    inertia_tensor,
+    integrator,
+    optimal_control,
+    phases,
+    plotting,
+    reconstruction,
+    rigid_body,
+    shape_space,
+    so3,
+    sphere,
+)
+from .body.body import Body
+from .body.catalog import load_body, robot_names
+from .body.link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
+from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
+from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
+from .errors import ShapePhaseError
+from .integrator.compilation import CompiledCodeWarning
+from .integrator.compiled_steps import compile_steps
+from .optimal_control.planning import plan_reorientation
+from .phases.continuation import OrbitBranch, continued_orbits
+from .phases.phases import (
+    ArcPhases,
+    PhaseSplit,
+    RunningPhases,
+    arc_phases,
+    dynamic_phase_from_energy,
+    parallel_transport,
+    running_phases,
+    split,
+)
+from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
+from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .plotting import plots
+from .plotting.viewer import motion_page, view
+from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
+from .reconstruction.recorded_base import BaseDifference, base_difference
+from .rigid_body import geodesics
+from .rigid_body.euler_top import EulerTop
+from .shape_space.connection import (
+    HorizontalLift,
+    curvature,
+    holonomy,
+    holonomy_derivative,
+    horizontal_lift,
+    mechanical_connection,
+)
+from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
+from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
+from .shape_space.files.recording import TrajectoryWarning
+from .shape_space.many_paths import FinalAttitudes, final_attitudes
+from .shape_space.shape_path import ShapePath
+from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_summary
+
+__version__: str
+__all__ = [
+    "ArcPhases",
+    "BaseDifference",
+    "Body",
+    "BodySummary",
+    "CompiledCodeWarning",
+    "Crossings",
+    "Deformation",
+    "EulerTop",
+    "FinalAttitudes",
+    "FixedPoints",
+    "HorizontalLift",
+    "IgnoredElementWarning",
+    "Motion",
+    "OrbitBranch",
+    "PathSummary",
+    "PhaseSplit",
+    "RecordedMotion",
+    "ReturnMap",
+    "Returns",
+    "RunningPhases",
+    "Sensitivity",
+    "ShapePath",
+    "ShapePhaseError",
+    "TrajectoryWarning",
+    "UnphysicalInertiaWarning",
+    "arc_phases",
+    "articulated",
+    "base_difference",
+    "body",
+    "body_summary",
+    "bounds",
+    "closed_orbits",
+    "compile_steps",
+    "continued_orbits",
+    "curvature",
+    "curvature_on_plane",
+    "deformation",
+    "dynamic_phase_from_energy",
+    "elliptic",
+    "errors",
+    "examples",
+    "final_attitudes",
+    "fixed_points",
+    "geodesics",
+    "holonomy",
+    "holonomy_derivative",
+    "horizontal_gauge",
+    "horizontal_lift",
+    "in_gauge",
+    "inertia_tensor",
+    "integrator",
+    "is_flat",
+    "link_gauge",
+    "load_body",
+    "load_motion",
+    "mean_body_gauge",
+    "mechanical_connection",
+    "momentum_crossings",
+    "momentum_from_rate",
+    "momentum_returns",
+    "motion_page",
+    "optimal_control",
+    "parallel_transport",
+    "particles",
+    "path_summary",
+    "phases",
+    "plan_reorientation",
+    "plots",
+    "plotting",
+    "prescribed",
+    "principal_gauge",
+    "read_recorded_motion",
+    "read_shape_path",
+    "reconstruct",
+    "reconstruction",
+    "rigid",
+    "rigid_body",
+    "robot_names",
+    "running_phases",
+    "shape_space",
+    "so3",
+    "sphere",
+    "split",
+    "stokes_holonomy",
+    "stroboscopic_map",
+    "view",
+    "write_shape_path",
+]

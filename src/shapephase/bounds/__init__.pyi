@@ -1,0 +1,76 @@
+from ._energy_bounds import EnergyBounds, energy_bounds, momentum_argument, turning
+from .all_bounds import Bound, bounds
+from .arc_bounds import (
+    ArcLengthBounds,
+    AzimuthBounds,
+    ReturnTimeBounds,
+    arc_length_bounds,
+    azimuth_bounds,
+    azimuth_rate,
+    return_time_bounds,
+)
+from .energy import (
+    EnergyRate,
+    FrozenPolhode,
+    energy_along,
+    energy_rate,
+    frozen_polhode,
+    homoclinic_energy,
+    kinetic_energy_along,
+    momentum_energy,
+)
+from .gravity_gradient import (
+    GravityTorque,
+    KeplerOrbit,
+    eccentric_anomaly,
+    gravity_force,
+    gravity_gradient_torque,
+    gravity_torque_estimate,
+)
+from .phase_bounds import (
+    PhaseBounds,
+    dynamic_phase_bounds,
+    dynamic_phase_bounds_by_extremes,
+    loop_phase_bounds,
+    solid_angle_bounds,
+)
+from .regimes import CrownRegion, RegimeCertificate, crown_region, regime_certificate
+
+__all__ = [
+    "ArcLengthBounds",
+    "AzimuthBounds",
+    "Bound",
+    "CrownRegion",
+    "EnergyBounds",
+    "EnergyRate",
+    "FrozenPolhode",
+    "GravityTorque",
+    "KeplerOrbit",
+    "PhaseBounds",
+    "RegimeCertificate",
+    "ReturnTimeBounds",
+    "arc_length_bounds",
+    "azimuth_bounds",
+    "azimuth_rate",
+    "bounds",
+    "crown_region",
+    "dynamic_phase_bounds",
+    "dynamic_phase_bounds_by_extremes",
+    "eccentric_anomaly",
+    "energy_along",
+    "energy_bounds",
+    "energy_rate",
+    "frozen_polhode",
+    "gravity_force",
+    "gravity_gradient_torque",
+    "gravity_torque_estimate",
+    "homoclinic_energy",
+    "kinetic_energy_along",
+    "loop_phase_bounds",
+    "momentum_argument",
+    "momentum_energy",
+    "regime_certificate",
+    "return_time_bounds",
+    "solid_angle_bounds",
+    "turning",
+]

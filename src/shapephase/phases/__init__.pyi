@@ -1,0 +1,35 @@
+from .continuation import OrbitBranch, continued_orbits
+from .phases import (
+    ArcPhases,
+    PhaseSplit,
+    RunningPhases,
+    arc_phases,
+    dynamic_phase_from_energy,
+    parallel_transport,
+    running_phases,
+    split,
+)
+from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
+from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+
+__all__ = [
+    "ArcPhases",
+    "Crossings",
+    "FixedPoints",
+    "OrbitBranch",
+    "PhaseSplit",
+    "ReturnMap",
+    "Returns",
+    "RunningPhases",
+    "arc_phases",
+    "closed_orbits",
+    "continued_orbits",
+    "dynamic_phase_from_energy",
+    "fixed_points",
+    "momentum_crossings",
+    "momentum_returns",
+    "parallel_transport",
+    "running_phases",
+    "split",
+    "stroboscopic_map",
+]

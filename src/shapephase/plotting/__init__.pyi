@@ -1,0 +1,46 @@
+from . import plots
+from ._moving_scene import MovingNode, MovingScene, moving_scene
+from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
+from .momentum_plots import plot_fixed_points, plot_momentum_curve
+from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
+from .named_figures import Figure, figure_image, write_figure
+from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes, spread_energies
+from .regime_plots import plot_bounds, plot_crown
+from .report import write_report
+from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
+from .viewer import LiveView, motion_html, motion_page, view, viser_module
+
+__all__ = [
+    "Figure",
+    "LiveView",
+    "MovingNode",
+    "MovingScene",
+    "figure_image",
+    "motion_html",
+    "motion_page",
+    "moving_scene",
+    "plot_attitude",
+    "plot_bounds",
+    "plot_caustic",
+    "plot_conjugate_locus",
+    "plot_crown",
+    "plot_curvature",
+    "plot_ellipsoid_locus",
+    "plot_energy",
+    "plot_fixed_points",
+    "plot_heavy_top_stability",
+    "plot_herpolhode",
+    "plot_inertia",
+    "plot_internal_momentum",
+    "plot_momentum_curve",
+    "plot_phases",
+    "plot_polhodes",
+    "plot_shape_path",
+    "plot_shape_plane",
+    "plots",
+    "spread_energies",
+    "view",
+    "viser_module",
+    "write_figure",
+    "write_report",
+]

@@ -1,0 +1,80 @@
+from . import geodesics, lie
+from ._andoyer_pendulum import AndoyerPendulum, andoyer_pendulum
+from ._flow import ascending_times, flow
+from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, twist_defect
+from ._momentum_orbit import MomentumOrbit, momentum_orbit, separatrix_solid_angle
+from ._nutation import Nutation, nutation
+from .euler_angles import EulerChart, canonical_bracket, precession_rate
+from .euler_top import EulerTop
+from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, marched, semidirect_bracket
+from .lagrange_top import (
+    LagrangeTop,
+    SleepingTop,
+    StabilityChart,
+    characteristic_polynomial,
+    e_quadratic,
+    second_variation,
+    sleeping_matrix,
+    sleeping_spectrum,
+    sleeping_top,
+    spectrally_stable,
+    stability_chart,
+)
+from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, rigid_body_pendulum
+from .poinsot import Closure, Cones, Poinsot, cones
+from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
+from .stability import SteadyRotation, steady_rotation, steady_rotations
+
+__all__ = [
+    "AndoyerPendulum",
+    "Closure",
+    "Cones",
+    "Equilibrium",
+    "EulerChart",
+    "EulerTop",
+    "HalfTwist",
+    "HeavyTop",
+    "HeavyTopMotion",
+    "LagrangeTop",
+    "MomentumOrbit",
+    "Nutation",
+    "PendulumEquilibrium",
+    "PendulumMotion",
+    "Poinsot",
+    "RigidBodyPendulum",
+    "SleepingTop",
+    "StabilityChart",
+    "SteadyRotation",
+    "andoyer_pendulum",
+    "ascending_times",
+    "canonical_bracket",
+    "casimirs",
+    "characteristic_polynomial",
+    "cones",
+    "e_quadratic",
+    "equilibria",
+    "flow",
+    "geodesics",
+    "half_twist",
+    "half_twist_from_tilt",
+    "heteroclinics",
+    "inverse_difference",
+    "lie",
+    "marched",
+    "momentum_orbit",
+    "nutation",
+    "polhodes",
+    "precession_rate",
+    "rigid_body_pendulum",
+    "second_variation",
+    "semidirect_bracket",
+    "separatrix_solid_angle",
+    "sleeping_matrix",
+    "sleeping_spectrum",
+    "sleeping_top",
+    "spectrally_stable",
+    "stability_chart",
+    "steady_rotation",
+    "steady_rotations",
+    "twist_defect",
+]

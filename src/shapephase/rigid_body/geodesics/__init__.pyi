@@ -1,0 +1,81 @@
+from ._andoyer_variables import AndoyerVariables, TurningBody, andoyer_from_euler, andoyer_motion, andoyer_variables
+from ._conjugate_locus import (
+    ConjugateLocus,
+    ConjugatePoints,
+    conjugate_height_rate,
+    conjugate_locus,
+    conjugate_points,
+    conjugate_points_of_momentum,
+)
+from ._cut_locus import CutLocus, cut_locus, cut_time
+from ._ellipsoid import EllipsoidStretch, astroid, ellipsoid, ellipsoid_period, meridian_length, metric_coefficients
+from ._extremal import Extremal, Start, extremal, start_of, stretch_at, variational_jacobi_field
+from ._sadov_variables import SadovVariables, sadov_frequencies, sadov_variables
+from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
+from .distance import ShortestGeodesic, shortest_geodesic
+from .left_invariant import LeftInvariantMetric, left_invariant_metric
+from .metric_profile import Assumptions, TabulatedStretch, assumptions, surface_of_metric
+from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
+from .serret_andoyer_constants import (
+    GeodesicConstants,
+    constants_of,
+    constants_of_momentum,
+    moment_gaps,
+    refuse,
+    separatrix_constants,
+)
+from .serret_andoyer_geodesics import GeodesicFamily
+from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
+
+__all__ = [
+    "AndoyerVariables",
+    "Assumptions",
+    "AxisymmetricMetric",
+    "ConjugateLocus",
+    "ConjugatePoints",
+    "CutLocus",
+    "EllipsoidStretch",
+    "Extremal",
+    "GeodesicConstants",
+    "GeodesicFamily",
+    "LeftInvariantMetric",
+    "SadovVariables",
+    "SerretAndoyerMetric",
+    "ShortestGeodesic",
+    "Start",
+    "SurfaceOfRevolution",
+    "TabulatedStretch",
+    "TurningBody",
+    "andoyer_from_euler",
+    "andoyer_motion",
+    "andoyer_variables",
+    "assumptions",
+    "astroid",
+    "axisymmetric_metric",
+    "conjugate_height_rate",
+    "conjugate_locus",
+    "conjugate_points",
+    "conjugate_points_of_momentum",
+    "constants_of",
+    "constants_of_momentum",
+    "cut_locus",
+    "cut_time",
+    "ellipsoid",
+    "ellipsoid_period",
+    "extremal",
+    "left_invariant_metric",
+    "meridian_length",
+    "metric_coefficients",
+    "moment_gaps",
+    "refuse",
+    "sadov_frequencies",
+    "sadov_variables",
+    "separatrix_constants",
+    "serret_andoyer_metric",
+    "shortest_geodesic",
+    "start_of",
+    "stretch_at",
+    "surface_of_metric",
+    "surface_of_stretch",
+    "variational_jacobi_field",
+]
