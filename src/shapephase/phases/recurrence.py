@@ -23,6 +23,9 @@ _MOST_PIECES = 500_000
 _AT_ONCE = 2048
 _FAR, _TURNED = 1.0, 2.0
 _SAME_CURVE = 1e-8
+# [rad] Newton's method has brought two passages together: a further step leaves about the square of this, which is
+# below rounding even for passages at 1e-6 rad to each other.
+_MET = 1e-11
 _TANGENT = 1e-6
 
 
@@ -379,8 +382,12 @@ def _refined(curve: _Curve, pieces: _Pieces, pairs: Integers) -> tuple[Array, Ar
     times = _distinct(np.concatenate(first), np.concatenate(second), 1e-5 * float(np.median(pieces.duration)))
     for _ in range(6):
         times = _newton(*curve.at(times[0]), *curve.at(times[1]), times, 0.0, end)
-    gap = so3.angle_between(curve.at(times[0])[0], curve.at(times[1])[0])
-    return times[0][gap < 1e-11], times[1][gap < 1e-11]
+    (here, heading), (there, other) = curve.at(times[0]), curve.at(times[1])
+    met = so3.angle_between(here, there) < _MET
+    # A start that strayed from elsewhere may only just have come near, and would be taken for a pair already at
+    # rounding. Newton's method squares an error: after one more step all of them are at rounding.
+    times = (times[0][met], times[1][met])
+    return _newton(here[met], heading[met], there[met], other[met], times, 0.0, end)
 
 
 def _newton(
