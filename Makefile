@@ -11,6 +11,7 @@ lint:
 
 types:
 	$(BIN)/pyright --pythonpath $(BIN)/python
+	$(BIN)/mypy --strict --python-executable $(BIN)/python tests/support/typed_script.py
 
 imports:
 	$(BIN)/lint-imports
