@@ -77,7 +77,7 @@ def with_hull(masses, curves):
 HULL_PART = rigid_part(50.0, HULL, [0.1, 0.2, -0.1])
 
 
-def test_a7_moving_the_furniture_is_a_sum_over_particles():
+def test_moving_the_furniture_is_a_sum_over_particles_a7():
     """Cabrera example 2.2: L_o is not zero, and the common centre of mass moves in the frame."""
     one, two = walk(1), walk(2, mean=1.0)
     made = assembly(HULL_PART, [moving_mass(70.0, one), moving_mass(12.0, two)])
@@ -105,7 +105,7 @@ def rod(length, pace, root, axis, density):
     return density * length[:, None] * np.array([0.5, 0.5]), at, speed
 
 
-def test_a3_a_boom_is_the_rod_that_is_out_and_a_point_that_is_not():
+def test_a_boom_is_the_rod_that_is_out_and_a_point_that_is_not_a3():
     """I, L_o and energy about the moving common centre, with Gauss points along the rod, by hand."""
     path = extension(0.2, 3.0)
     made = assembly(HULL_PART, [boom(8.0, 4.0, ROOT, 5.0 * AXIS, path)])
@@ -359,7 +359,7 @@ def test_an_assembly_without_moving_parts_is_rigid():
     )
 
 
-def test_a4_an_assembly_is_physical_because_its_parts_are():
+def test_an_assembly_is_physical_because_its_parts_are_a4():
     """The second moments add; whatever the parts do the triangle inequality holds."""
     rng = np.random.default_rng(9)
     for seed in range(20):
@@ -380,7 +380,7 @@ def test_a4_an_assembly_is_physical_because_its_parts_are():
         rigid_part(1.0, HULL, on_unphysical="ignore")
 
 
-def test_a2_an_assembly_on_one_line_is_refused_with_the_time():
+def test_an_assembly_on_one_line_is_refused_with_the_time_a2():
     """A point, a boom along x, and a mass that crosses the line at t = 0.5."""
     path = sp.ShapePath.function(
         lambda t: (

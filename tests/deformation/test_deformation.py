@@ -260,7 +260,7 @@ def crossing(t):
     return points, speeds
 
 
-def test_a2_a_line_between_the_samples_is_found_when_the_motion_is_computed():
+def test_a_line_between_the_samples_is_found_when_the_motion_is_computed_a2():
     """No time at which the inertia is asked is the one; and near it nothing is refused."""
     deformation = sp.particles([1.0, 2.0, 1.0], crossing, 1.0)
     assert deformation.inertia(0.3722)[0, 0] > 0.0
@@ -314,7 +314,7 @@ def test_sampled_particles_that_return_move_smoothly_on():
     assert 12.0 < gaps[0] / gaps[1] < 20.0
 
 
-def test_a2_samples_on_one_line_are_refused_at_once():
+def test_samples_on_one_line_are_refused_at_once_a2():
     times = np.linspace(0.0, 1.0, 9)
     with pytest.raises(
         SingularInertiaError, match=r"t = 0\.372\d* s is not positive definite: all mass is on one line"
@@ -508,7 +508,7 @@ def unphysical_for_a_while(t):
     return np.stack([1 + 0 * t, 2 + 0 * t, third], axis=-1)[:, :, None] * np.eye(3)
 
 
-def test_a4_prescribed_tensors_are_checked_at_all_times_where_asked():
+def test_prescribed_tensors_are_checked_at_all_times_where_asked_a4():
     """Physical at both ends, not in between: the message has the worst time and by how much; to 1e-7 s here."""
     with pytest.raises(UnphysicalInertiaError, match=r"t = 0\.6137 s .*triangle inequality by 0\.99 %"):
         sp.prescribed(unphysical_for_a_while, None, 1.0, on_unphysical="error")
@@ -524,7 +524,7 @@ def test_a4_prescribed_tensors_are_checked_at_all_times_where_asked():
         sp.prescribed(swelling, None, 1.0, on_unphysical="alow")
 
 
-def test_a4_every_piece_between_breaks_is_searched():
+def test_every_piece_between_breaks_is_searched_a4():
     """One of 200 pieces is unphysical, for a fifth of its length."""
 
     def inertia(t):
@@ -535,7 +535,7 @@ def test_a4_every_piece_between_breaks_is_searched():
         sp.prescribed(inertia, None, 200.0, np.arange(1.0, 200.0), on_unphysical="error")
 
 
-def test_a4_what_the_search_missed_is_refused_when_it_is_evaluated():
+def test_what_the_search_missed_is_refused_when_it_is_evaluated_a4():
     def inertia(t):
         third = 2.9 + 0.2 * np.exp(-(((t - 0.51234) / 1e-5) ** 2))
         return np.stack([1 + 0 * t, 2 + 0 * t, third], axis=-1)[:, :, None] * np.eye(3)
@@ -545,7 +545,7 @@ def test_a4_what_the_search_missed_is_refused_when_it_is_evaluated():
         deformation.inertia(0.51234)
 
 
-def test_c_e13_cabreras_examples_as_printed_are_allowed_and_named():
+def test_cabreras_examples_as_printed_are_allowed_and_named_c_e13():
     """Examples 4.4 and 4.5 let one moment grow alone: past the sum of the others no body has them."""
 
     def antenna(t):
@@ -562,7 +562,7 @@ def test_c_e13_cabreras_examples_as_printed_are_allowed_and_named():
     assert -0.01 < capped.triangle_defect()[0] < 0.0
 
 
-def test_a4_flat_and_round_bodies_are_physical():
+def test_flat_and_round_bodies_are_physical_a4():
     """At the limit rounding decides nothing."""
     turns = Rotation.random(50, rng=np.random.default_rng(4)).as_matrix()
     for turn in turns:
