@@ -1,7 +1,7 @@
 """What a fresh interpreter pays: `python -m benchmarks.imports [SOURCE]`.
 
-Processor time of importing the library, of `shapephase --help`, and of loading the cat, reconstructing and splitting its
-righting, each in interpreters of their own that take turns; medians, and ratios to importing NumPy and Pinocchio alone.
+Processor time of importing the library, of `shapephase --help`, and of loading the cat, reconstructing and splitting
+its righting, each in interpreters of their own that take turns; medians, and ratios to importing NumPy and Pinocchio.
 SOURCE is the `src` folder of another checkout, to be compared in the same turns.
 """
 

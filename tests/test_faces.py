@@ -14,10 +14,8 @@ import pytest
 import shapephase as sp
 from support.places import ROOT
 
-ROOMS = sorted(
-    ".".join(stub.parent.relative_to(ROOT / "src").parts)
-    for stub in (ROOT / "src" / "shapephase").rglob("__init__.pyi")
-)
+SOURCE = ROOT / "src"
+ROOMS = sorted(".".join(stub.parent.relative_to(SOURCE).parts) for stub in SOURCE.glob("shapephase/**/__init__.pyi"))
 
 
 @pytest.mark.parametrize("room", ROOMS)
