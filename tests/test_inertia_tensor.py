@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import mpmath
 import numpy as np
 import pytest
@@ -11,7 +13,13 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from shapephase.errors import SingularInertiaError
-from shapephase.inertia_tensor import inverse_inertia, principal_axes, second_moment, triangle_defect
+from shapephase.inertia_tensor import (
+    ascending_moments,
+    inverse_inertia,
+    principal_axes,
+    second_moment,
+    triangle_defect,
+)
 
 laws = settings(derandomize=True, max_examples=60, deadline=None)
 
@@ -153,3 +161,18 @@ def test_principal_axes_of_a_batch(rng):
     assert moments.shape == (4, 5, 3)
     np.testing.assert_allclose(np.linalg.det(axes), 1.0, atol=1e-14, rtol=0)
     np.testing.assert_allclose(tensors @ axes, axes * moments[..., None, :], atol=1e-14, rtol=0)
+
+
+def test_ascending_moments_say_where_each_stood_and_with_what_parity(rng):
+    for order in itertools.permutations(range(3)):
+        moments = np.array([0.4, 1.1, 2.0])[list(order)]
+        ascending, where, parity = ascending_moments(moments)
+        assert np.array_equal(ascending, [0.4, 1.1, 2.0])
+        assert np.array_equal(moments[where], ascending)
+        assert parity == np.round(np.linalg.det(np.eye(3)[:, where]))
+    batch = rng.uniform(0.1, 2.0, (2, 5, 3))
+    ascending, where, parity = ascending_moments(batch)
+    assert np.array_equal(ascending, np.sort(batch, axis=-1))
+    assert np.array_equal(np.take_along_axis(batch, where, -1), ascending)
+    assert np.array_equal(parity, np.round(np.linalg.det(np.eye(3)[where])))
+    assert np.array_equal(ascending_moments(np.array([2.0, 1.0, 2.0]))[1], [1, 0, 2])

@@ -1,9 +1,19 @@
-"""Inertia tensors: validity, inverse, principal axes; batched over leading axes."""
+"""Inertia tensors: validity, inverse, principal axes; batched over leading axes.
+
+The order of principal moments inside the library is ascending everywhere, I1 <= I2 <= I3: axis 1 (index 0) has the
+smallest moment, axis 2 the intermediate one, axis 3 (index 2) the largest. Public functions take moments in any order
+and answer on the caller's axes; `ascending_moments` and `principal_axes` lead from these to the inner order.
+
+The literature differs, and docstrings that quote it say which symbol is which. Marsden and Ratiu have I1 >= I2 >= I3
+in section 15.8 (their I1, I2, I3 are the I3, I2, I1 of here) and I1 < I2 < I3 in section 15.11 (as here); Bonnard, Cots
+and Shcherbakova have I1 > I2 > I3, and A < B < C for the inverse moments. To read three axes backwards is an odd
+permutation, which a formula pays for by one change of sign.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from .arrays import Array, finite_array
 from .errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
@@ -119,3 +129,22 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     moments, axes = np.linalg.eigh(inertia)
     axes[..., :, 2] *= np.where(np.linalg.det(axes) < 0.0, -1.0, 1.0)[..., None]
     return moments, axes
+
+
+def ascending_moments(moments: Array) -> tuple[Array, NDArray[np.intp], Array]:
+    """Principal moments in ascending order, and where each of them stood.
+
+    Vectors v on the given axes are v[order] on the ordered ones. Those are right-handed only for an even permutation:
+    formulas that need a proper rotation multiply one of the axes by the parity.
+
+    Returns
+    -------
+    ascending : (..., 3) [kg m^2]
+    order : (..., 3) indices with ascending = moments[order]; equal moments keep their order
+    parity : (...) 1 for an even permutation, -1 for an odd one
+
+    Source: theory.md, table of conventions.
+    """
+    order = np.argsort(moments, axis=-1, kind="stable")
+    parity = np.where((order[..., 1] - order[..., 0]) % 3 == 1, 1.0, -1.0)
+    return np.take_along_axis(moments, order, -1), order, parity

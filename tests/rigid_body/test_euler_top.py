@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
@@ -332,11 +334,30 @@ def test_separatrix_solid_angle_is_the_area_of_the_lune():
         assert abs(separatrix_solid_angle(i, 0) + separatrix_solid_angle(i, 2) - 2.0 * np.pi) < 1e-14
         on_it = EulerTop.principal(i, [0.3, 0.1, 0.3 * tangent])
         assert abs(on_it.solid_angle - on_it.orbit.sense * separatrix_solid_angle(i, on_it.orbit.circled)) < 1e-6
-    for bad in ([3.0, 2.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 2.0], [[1.0, 2.0, 3.0]]):
-        with pytest.raises(ShapeError, match="ascending"):
+    for bad in ([1.0, 1.0, 1.0], [0.0, 1.0, 2.0], [[1.0, 2.0, 3.0]]):
+        with pytest.raises(ShapeError, match="not all equal"):
             separatrix_solid_angle(bad, 0)
-    with pytest.raises(ShapeError, match="largest"):
-        separatrix_solid_angle([1.0, 2.0, 3.0], 1)
+    for bad in (1, 3, -1):
+        with pytest.raises(ShapeError, match="largest"):
+            separatrix_solid_angle([1.0, 2.0, 3.0], bad)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_separatrix_solid_angle_takes_moments_in_any_order(order):
+    ascending = np.array([0.7, 1.3, 1.9])
+    for axis, rank in enumerate(order):
+        if rank != 1:
+            assert separatrix_solid_angle(ascending[list(order)], axis) == separatrix_solid_angle(ascending, rank)
+        else:
+            with pytest.raises(ShapeError, match="largest"):
+                separatrix_solid_angle(ascending[list(order)], axis)
+
+
+def test_separatrix_solid_angle_of_an_axisymmetric_body():
+    """There is no lune: nothing on the side of the equal moments, half the sphere about the axis of symmetry."""
+    for moments, axis in (([1.0, 1.0, 2.0], 2), ([2.0, 1.0, 2.0], 1)):
+        assert separatrix_solid_angle(moments, axis) == 2.0 * np.pi
+        assert all(separatrix_solid_angle(moments, other) == 0.0 for other in range(3) if other != axis)
 
 
 def test_h3_h4_m_e1_m_e2_m_e7_the_book_s_solution_with_its_letters():

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, common_shape, finite_array
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
+from ..inertia_tensor import ascending_moments
 from ._momentum_orbit import momentum_orbit
 
 
@@ -58,11 +59,13 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     SingularInertiaError
         If a moment is not positive.
 
-    Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1; theory.md L4.
+    Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1, whose I1 >= I2 >= I3 are our I3, I2, I1;
+    theory.md L4.
     """
     inertia, vector = _broadcast(_moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s"))
-    order = np.argsort(inertia, axis=-1, kind="stable")
-    inertia, vector = np.take_along_axis(inertia, order, -1), np.take_along_axis(vector, order, -1)
+    # Whether the ordered axes are right-handed makes no difference to times.
+    inertia, order, _ = ascending_moments(inertia)
+    vector = np.take_along_axis(vector, order, -1)
     rows = [_flip(i, x) for i, x in zip(inertia.reshape(-1, 3), vector.reshape(-1, 3))]
     table = np.array(rows, dtype=float).reshape(*inertia.shape[:-1], 5)
     return HalfTwist(*(table[..., k][()] for k in range(5)))
@@ -83,7 +86,7 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
     ShapeError, SingularInertiaError
         As `half_twist`.
     """
-    inertia = np.sort(_moments(moments), axis=-1)
+    inertia, _, _ = ascending_moments(_moments(moments))
     size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
     lean, towards = finite_array(tilt, "tilt", unit="rad"), finite_array(azimuth, "azimuth", unit="rad")
     common_shape(magnitude=size, tilt=lean, azimuth=towards)
@@ -118,7 +121,7 @@ def twist_defect(moments: ArrayLike) -> Array:
 
     Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
     """
-    inertia = np.sort(_moments(moments), axis=-1)
+    inertia, _, _ = ascending_moments(_moments(moments))
     low, middle, high = np.moveaxis(inertia, -1, 0)
     if np.any((low == middle) | (middle == high)):
         raise ShapeError("moments: two are equal; a tennis racket needs three different principal moments")

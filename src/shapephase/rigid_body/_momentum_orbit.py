@@ -9,7 +9,8 @@ with the complementary parameter m1 proportional to |D|. Everything near the sep
 found in rational arithmetic, once, so that moments and momentum given as doubles are answered to rounding on both sides
 of the separatrix and on it.
 
-Sources: Jacobi 1850; Marsden and Ratiu, section 15.8, with the misprints of theory.md (M-E1, M-E2, M-E7) mended.
+Sources: Jacobi 1850; Marsden and Ratiu, section 15.8, whose I1 >= I2 >= I3 are our I3, I2, I1, with the corrections
+M-E1, M-E2 and M-E7 of theory.md.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from numpy.typing import ArrayLike
 from .. import elliptic
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
+from ..inertia_tensor import ascending_moments
 
 _NEGLIGIBLE = 1e-140
 
@@ -155,18 +157,26 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
 
     Parameters
     ----------
-    moments : (3,) ascending, not all equal [kg m^2]
-    axis : 0 or 2, the axis of the smallest or of the largest moment
+    moments : (3,) in any order, above 0, not all equal [kg m^2]
+    axis : 0, 1 or 2, one of these axes, with the smallest or the largest moment
+
+    Raises
+    ------
+    ShapeError
+        If the moments are not such numbers, or the axis is the intermediate one.
 
     Source: theory.md section 7.
     """
     values = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if values.ndim != 1 or values[0] <= 0.0 or np.any(np.diff(values) < 0.0) or values[0] == values[2]:
-        raise ShapeError(f"moments: three ascending numbers above 0, not all equal, are needed, got {values}")
-    if axis not in (0, 2):
-        raise ShapeError(f"axis: 0 (smallest moment) or 2 (largest moment) is needed, got {axis!r}")
-    own = np.sqrt(abs(values[1] - values[axis]) / values[axis])
-    opposite = np.sqrt(abs(values[2 - axis] - values[1]) / values[2 - axis])
+    if values.ndim != 1 or values.min() <= 0.0 or values.min() == values.max():
+        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {values}")
+    (low, middle, high), _, _ = ascending_moments(values)
+    if axis not in (0, 1, 2) or values[axis] not in (low, high):
+        raise ShapeError(
+            f"axis: one of 0, 1, 2 with the smallest or the largest of the moments {values} is needed, got {axis!r}"
+        )
+    circled, other = (low, high) if values[axis] == low else (high, low)
+    own, opposite = np.sqrt(abs(middle - circled) / circled), np.sqrt(abs(other - middle) / other)
     return 4.0 * float(np.arctan2(own, opposite))
 
 

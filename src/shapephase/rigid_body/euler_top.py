@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from .. import elliptic, so3
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import inertia_argument, principal_axes
+from ..inertia_tensor import ascending_moments, inertia_argument, principal_axes
 from ._momentum_orbit import MomentumOrbit, momentum_orbit
 
 _TURNS = 1e12
@@ -308,10 +308,10 @@ def _principal(tensor: Array) -> tuple[Array, Array]:
     """Ascending moments and axes: those of a diagonal tensor as they are, else with moments equal to rounding equal."""
     diagonal = np.diagonal(tensor)
     if np.array_equal(tensor, np.diag(diagonal)):
-        order = np.argsort(diagonal, kind="stable")
+        moments, order, parity = ascending_moments(diagonal)
         axes = np.eye(3)[:, order]
-        axes[:, 2] *= np.round(np.linalg.det(axes))
-        return diagonal[order], axes
+        axes[:, 2] *= parity
+        return moments, axes
     moments, axes = principal_axes(tensor)
     close = np.diff(moments) < 4.0 * _EPS * moments[2]
     if close[0]:

@@ -30,7 +30,7 @@ from scipy.special import elliprf
 from .. import elliptic
 from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import moments_argument
+from ..inertia_tensor import ascending_moments, moments_argument
 
 _FAINT = 1e-140  # squares of smaller parts underflow
 
@@ -275,9 +275,9 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     values = moments_argument(moments)
     if values.min() == values.max():
         raise ShapeError(f"moments: all are {values[0]:.17g}; every body momentum is then at rest, and K is zero")
-    ascending = np.argsort(values, kind="stable")
     if axes is None:
-        order = ascending if values[ascending[1]] < values[ascending[2]] else ascending[::-1]
+        ascending, order, _ = ascending_moments(values)
+        order = order if ascending[1] < ascending[2] else order[::-1]
     else:
         order = np.asarray(axes)
         if order.shape != (3,) or sorted(order.tolist()) != [0, 1, 2]:

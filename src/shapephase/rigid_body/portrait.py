@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import moments_argument
+from ..inertia_tensor import ascending_moments, moments_argument
 
 
 @dataclass(frozen=True)
@@ -46,16 +46,18 @@ def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
 def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     """The four great half-circles from saddle to saddle, each along its motion: (4, count, 3) unit vectors.
 
+    For moments in any order, on the axes as they were given. In axes of ascending moments each lies in a
+    plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
+
     Raises
     ------
     ShapeError
         If two moments are equal: the middle axis is then on a circle of equilibria and there is no separatrix.
 
-    Source: theory.md M-E4 (Marsden and Ratiu 15.8.10, its signs corrected).
+    Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
     """
     inertia = moments_argument(moments)
-    order = np.argsort(inertia, kind="stable")
-    ascending = inertia[order]
+    ascending, order, parity = ascending_moments(inertia)
     if not np.all(np.diff(ascending) > 0.0):
         raise ShapeError(f"moments: three different ones are needed for a separatrix, got {inertia} kg m^2")
     angle = np.linspace(0.0, np.pi, count)
@@ -63,7 +65,7 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     most = np.sqrt(inverse_difference(ascending, 0, 1) / inverse_difference(ascending, 0, 2))
     curves = np.empty((4, count, 3))
     for row, (first, third) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
-        middle = -_parity(order) * first * third * np.cos(angle)
+        middle = -parity * first * third * np.cos(angle)
         curves[row][:, order] = np.stack([first * least * np.sin(angle), middle, third * most * np.sin(angle)], axis=-1)
     return curves
 
@@ -87,8 +89,7 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     """
     inertia = moments_argument(moments)
     levels = np.atleast_1d(finite_array(energies, "energies", unit="1/(kg m^2)"))
-    order = np.argsort(inertia, kind="stable")
-    ascending = inertia[order]
+    ascending, order, parity = ascending_moments(inertia)
     lowest, highest = 0.5 / ascending[2], 0.5 / ascending[0]
     if lowest == highest:
         raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
@@ -106,7 +107,7 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
         for branch, side in enumerate((1.0, -1.0)):
             along = curves[row, branch]
             along[:, order[outer]] = a * np.cos(phase)
-            along[:, order[1]] = _parity(order) * side * b * np.sin(phase)
+            along[:, order[1]] = parity * side * b * np.sin(phase)
             along[:, order[circled]] = side * c
     return curves
 
@@ -114,8 +115,3 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
 def inverse_difference(moments: Array, first: int, second: int) -> float:
     """1/I_first - 1/I_second, right in all digits for moments that nearly agree [1/(kg m^2)]."""
     return float((moments[second] - moments[first]) / (moments[first] * moments[second]))
-
-
-def _parity(order: NDArray[np.intp]) -> float:
-    """1 for an even permutation of the axes, -1 for an odd one."""
-    return float(np.round(np.linalg.det(np.eye(3)[order])))

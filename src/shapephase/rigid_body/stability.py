@@ -88,7 +88,8 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     UnphysicalInertiaError, SingularInertiaError
         If the tensor is not symmetric, or not positive definite.
 
-    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2; theory.md L1-L3, L5, M-E13.
+    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
+    order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
     """
     tensor = _tensor(inertia)
     vector = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -120,8 +121,9 @@ def steady_rotations(
 ) -> tuple[SteadyRotation, SteadyRotation, SteadyRotation]:
     """The steady rotations about the three principal axes, by ascending moment of inertia.
 
-    The opposite momenta are the other three equilibria, alike in everything. The book's "long" axis, of the inertia
-    ellipsoid, is that of the smallest moment: here axes go by their moments (theory.md M-E12).
+    The opposite momenta are the other three equilibria, alike in everything. The book's "longest axis" of theorem
+    15.9.1 is the axis of the largest moment (its I1, our I3), which is the shortest axis of the inertia ellipsoid and
+    of a homogeneous box: here axes go by their moments (theory.md M-E12).
 
     Parameters
     ----------
