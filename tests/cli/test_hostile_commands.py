@@ -21,7 +21,7 @@ CASES_OF_BODIES = cases()
 
 @pytest.fixture(scope="module")
 def worker():
-    # The process itself limits nothing: each command is measured, and limited in processor time.
+    # The process itself limits nothing: each command has a process of its own, whose memory is measured.
     process = Worker(4 * MOST_MEMORY)
     yield process
     process.stop()

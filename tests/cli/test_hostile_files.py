@@ -1,6 +1,7 @@
 """Hostile and odd files, thousands of damaged ones: a body that is right, or an error that says where.
 
-Every file is loaded in a process that may use 1 GiB and 5 s; what crashes it, hangs or eats memory is a failure.
+Every file is loaded in a process that may use 1 GiB and `MOST_LOADS` times the work of a reference load; what crashes
+it, hangs or eats memory is a failure.
 Hazards 1 and 4.
 """
 

@@ -16,6 +16,7 @@ import pytest
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.cli import progress
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting, satellite_sweep
 from shapephase.plotting.named_figures import FIGURES, figure_image, write_figure
@@ -92,7 +93,7 @@ def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum):
 
 def ran(*arguments, **options):
     command = [sys.executable, "-m", "shapephase", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, **options)
 
 
 def test_the_plot_command(tmp_path):
@@ -137,24 +138,26 @@ def on_a_terminal(source):
             break
         told += part
     os.close(reader)
-    process.wait(timeout=30)
+    process.wait(timeout=300)
     return told.decode()
 
 
 def test_progress_is_shown_after_a_second_on_a_terminal_only():
     source = """
 import time
-from shapephase.cli.progress import steps
-with steps(2) as work:
+from shapephase.cli import progress
+progress._PATIENCE = {1}
+with progress.steps(2) as work:
     work.begin("first things")
     time.sleep({0})
     work.begin("second things")
     time.sleep({0})
 """
-    assert "things" not in on_a_terminal(source.format(0.05))
-    shown = on_a_terminal(source.format(0.9))
+    assert progress._PATIENCE == 1.0
+    assert "things" not in on_a_terminal(source.format(0.05, 600.0))
+    shown = on_a_terminal(source.format(0.9, 0.3))
     assert "first things" in shown or "second things" in shown
-    piped = subprocess.run([sys.executable, "-c", source.format(0.7)], capture_output=True, text=True, timeout=60)
+    piped = subprocess.run([sys.executable, "-c", source.format(0.7, 0.1)], capture_output=True, text=True, timeout=300)
     assert piped.stdout == piped.stderr == ""
 
 
@@ -165,7 +168,7 @@ def test_an_interrupt_leaves_no_file_or_a_whole_one(tmp_path):
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         time.sleep(wait)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
         if process.returncode == 0 or out.exists():
             assert out.read_text(encoding="utf-8").endswith("</html>")
             out.unlink()

@@ -711,7 +711,7 @@ def test_no_figure_is_registered_anywhere():
         "plots.plot_momentum_curve(plots.column_axes(), motion).figure.draw_without_rendering()\n"
         "print('matplotlib.pyplot' in sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout.strip() == "False"
 
 

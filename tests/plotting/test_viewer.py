@@ -289,7 +289,7 @@ def test_viser_is_imported_only_when_something_is_shown():
         "import sys, shapephase.plotting.viewer; "
         "print([m for m in ('viser', 'trimesh', 'IPython') if m in sys.modules])"
     )
-    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300)
     assert told.stdout.strip() == "[]"
 
 
@@ -467,23 +467,28 @@ def test_a_page_of_a_body_with_36_joints_is_small(tmp_path):
 # ---- Live -----------------------------------------------------------------------------------------------------------
 
 
+def wait_until(condition):
+    """Return once it holds, or after enough looks to be sure that it never will."""
+    for _ in range(3000):
+        if condition():
+            return
+        time.sleep(0.02)
+
+
 def test_a_live_view_plays_scrubs_and_stops(righting, monkeypatch):
     opened = []
     monkeypatch.setattr(viewer.webbrowser, "open", opened.append)
-    with view(righting, speed=0.2, port=0) as live:
+    with view(righting, speed=0.05, port=0) as live:
         assert opened == [live.url]
-        with urllib.request.urlopen(live.url, timeout=10) as answer:
+        with urllib.request.urlopen(live.url, timeout=60) as answer:
             assert b"<!doctype html>" in answer.read(200).lower()
-        deadline = time.monotonic() + 10.0
-        while live._slider.value < 0.02 and time.monotonic() < deadline:
-            time.sleep(0.02)
+        wait_until(lambda: live._slider.value >= 0.02)
         assert 0.02 <= live._slider.value <= 0.5
         live._playing.value = False
         live._slider.value = 0.5
         body = next(handle for handle, *_ in live._drawn.moving if handle.name == "/body")
         target = righting.base_position(0.5)
-        while not np.allclose(body.position, target, atol=1e-9) and time.monotonic() < deadline:
-            time.sleep(0.02)
+        wait_until(lambda: np.allclose(body.position, target, atol=1e-9))
         np.testing.assert_allclose(body.position, target, atol=1e-9)
         turn = Rotation.from_quat(np.roll(body.wxyz, -1)).as_matrix()
         np.testing.assert_allclose(turn, righting.final_attitude, atol=1e-9)
@@ -494,10 +499,18 @@ def test_a_live_view_plays_scrubs_and_stops(righting, monkeypatch):
 
 def test_a_script_may_wait_for_the_end_of_a_view(righting):
     live = view(righting, frames=2, browser=False, port=0)
-    threading.Timer(0.3, live.stop).start()
-    start = time.monotonic()
+    events = []
+
+    def end():
+        events.append("stop")
+        live.stop()
+
+    timer = threading.Timer(0.3, end)
+    timer.start()
     live.wait()
-    assert 0.2 < time.monotonic() - start < 5.0
+    events.append("waited")
+    timer.join()
+    assert events == ["stop", "waited"]
 
 
 def test_in_a_notebook_the_recording_is_shown_in_the_cell(righting, monkeypatch):

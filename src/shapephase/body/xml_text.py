@@ -246,7 +246,8 @@ def numbers(node: Node, name: str, count: int, owner: str, text: str | None, mos
     wanted = "a finite number is needed" if count == 1 else f"{count} finite numbers are needed, with blanks between"
     if text is None:
         raise node.fault(owner, f"<{node.tag}> has no {name}; {wanted}")
-    words = text.split()
+    # One word too many shows that there are too many, however long the rest is.
+    words = text.split(maxsplit=count)
     values = [float(word) for word in words if _NUMBER.fullmatch(word)]
     if len(words) != count or len(values) != count or not all(map(math.isfinite, values)):
         raise node.fault(owner, f"<{node.tag}> {name}={quoted(text)!r}: {wanted}")
