@@ -18,11 +18,15 @@ from . import (
 )
 from .body.body import Body
 from .body.catalog import load_body, robot_names
-from .body.link_tree import IgnoredElementWarning, UnphysicalInertiaWarning
 from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
-from .errors import ShapePhaseError
-from .integrator.compilation import CompiledCodeWarning
+from .errors import (
+    CompiledCodeWarning,
+    IgnoredElementWarning,
+    ShapePhaseError,
+    TrajectoryWarning,
+    UnphysicalInertiaWarning,
+)
 from .integrator.compiled_steps import compile_steps
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
@@ -54,7 +58,6 @@ from .shape_space.connection import (
 )
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
-from .shape_space.files.recording import TrajectoryWarning
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
 from .shape_space.shape_path import ShapePath
 from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_summary

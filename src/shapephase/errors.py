@@ -1,4 +1,4 @@
-"""Every error of the library: what came, what was expected, the valid choices, and where.
+"""Every error and warning of the library: what came, what was expected, the valid choices, and where.
 
 `ShapePhaseError` is the root. A bad value is also a `ValueError`, a missing file also a `FileNotFoundError`,
 a failed computation also an `ArithmeticError`, so that a caller who knows only Python's own names catches them too.
@@ -132,6 +132,26 @@ class PlanNotFound(ShapePhaseError, ArithmeticError):
     def __init__(self, message: str, best: object = None) -> None:
         super().__init__(message)
         self.best = best
+
+
+class UnphysicalInertiaWarning(UserWarning):
+    """Links whose inertia is doubtful, accepted because the caller asked so or because it does no harm."""
+
+
+class IgnoredElementWarning(UserWarning):
+    """Something a file says that a free-floating body of joints does not take up, named."""
+
+
+class VisualWarning(UserWarning):
+    """Something of a body's looks is not shown as its file has it: a mesh, a faulty element, or a changed file."""
+
+
+class CompiledCodeWarning(UserWarning):
+    """Compiled steps were found but cannot be used; the interpreted ones give the same results."""
+
+
+class TrajectoryWarning(UserWarning):
+    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:

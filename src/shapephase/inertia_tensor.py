@@ -13,38 +13,10 @@ permutation, which a formula pays for by one change of sign.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from .arrays import Array, finite_array
-from .errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
-
-
-def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
-    """A user's tensors (N, 3, 3), made exactly symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
-    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
-    if skew > 1e-9 * np.abs(tensors).max(initial=0.0):
-        raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
-    symmetric = 0.5 * (tensors + np.swapaxes(tensors, -1, -2))
-    inverse_inertia(symmetric, times)
-    return symmetric
-
-
-def moments_argument(moments: ArrayLike) -> Array:
-    """Three positive principal moments, checked: (3,) [kg m^2].
-
-    Raises
-    ------
-    ShapeError
-        If they are not three finite numbers, or the least is not above 1e-12 of the largest.
-    """
-    values = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if values.shape != (3,):
-        raise ShapeError(f"moments: expected three principal moments (3,), got {values.shape}")
-    if not values.min() > 1e-12 * values.max():
-        raise ShapeError(
-            f"moments: three positive principal moments, the least above 1e-12 of the largest, are needed; got {values}"
-        )
-    return values.copy()
+from .arrays import Array
+from .errors import SingularInertiaError
 
 
 def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:

@@ -19,7 +19,8 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.body import appearance as visuals
 from shapephase.body import catalog
-from shapephase.body.appearance import VisualWarning, inertia_box
+from shapephase.body.appearance import inertia_box
+from shapephase.errors import VisualWarning
 from support.bodies import BODIES, joint, link, random_shapes, urdf
 
 BASE = link("base", 3.0, [0.3, 0.5, 0.6])

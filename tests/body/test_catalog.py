@@ -15,8 +15,8 @@ import pytest
 
 import shapephase as sp
 from shapephase.body import catalog
-from shapephase.body.link_tree import IgnoredElementWarning
 from shapephase.errors import (
+    IgnoredElementWarning,
     InputFileNotFoundError,
     MissingExtraError,
     ModelFileError,

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.bounds._enclosure import enclosure, interval_argument, restricted, series_bounds
+from shapephase.arguments import interval_argument
+from shapephase.bounds._enclosure import enclosure, restricted, series_bounds
 from support.independent import body_of, random_loop
 from support.random_deformations import KINDS, random_case
 

@@ -19,9 +19,8 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.body.appearance import VisualWarning
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
-from shapephase.errors import MissingExtraError, ShapeError, UnknownNameError
+from shapephase.errors import MissingExtraError, ShapeError, UnknownNameError, VisualWarning
 from shapephase.examples.scenarios import cat_righting
 from shapephase.plotting import scene_drawing, viewer
 from shapephase.plotting._moving_scene import moving_scene

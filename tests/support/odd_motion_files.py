@@ -11,8 +11,7 @@ import zipfile
 
 import numpy as np
 
-from shapephase.errors import InputFileNotFoundError, TrajectoryError, UnknownNameError
-from shapephase.shape_space.files.recording import TrajectoryWarning
+from shapephase.errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning, UnknownNameError
 from support.motion_writers import STATE, states, trajectory, write_bag
 
 HEADER = "time,left_shoulder_abduction,right_shoulder_abduction\n"

@@ -1,4 +1,4 @@
-from .appearance import Visual, VisualWarning, inertia_box, visuals
+from .appearance import Visual, inertia_box, visuals
 from .body import Body, MovingPart
 from .catalog import example_file, example_folder, example_names, load_body, load_from_input, robot_names, robots_folder
 
@@ -6,7 +6,6 @@ __all__ = [
     "Body",
     "MovingPart",
     "Visual",
-    "VisualWarning",
     "example_file",
     "example_folder",
     "example_names",

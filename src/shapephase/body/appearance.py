@@ -15,7 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..errors import InputFileNotFoundError, ModelFileError
+from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
 from .body import Body, MovingPart
 from .catalog import example_folder
@@ -37,10 +37,6 @@ _THINNEST = 0.01
 _WATER = 1000.0
 # MuJoCo's own viewer shows these groups of geoms; the others are for collisions.
 _SHOWN_GROUPS = (0.0, 1.0, 2.0)
-
-
-class VisualWarning(UserWarning):
-    """Something of a body's looks is not shown as its file has it: a mesh, a faulty element, or a changed file."""
 
 
 @dataclass(frozen=True, eq=False)

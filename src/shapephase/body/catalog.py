@@ -11,10 +11,17 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from ..errors import MissingExtraError, ModelFileError, ShapePhaseError, unknown_name
+from ..errors import (
+    IgnoredElementWarning,
+    MissingExtraError,
+    ModelFileError,
+    ShapePhaseError,
+    UnphysicalInertiaWarning,
+    unknown_name,
+)
 from .body import Body
 from .cross_check import check_against_file
-from .link_tree import IgnoredElementWarning, UnphysicalInertiaWarning, inertia_warnings, massless_warning
+from .link_tree import inertia_warnings, massless_warning
 from .mjcf import mjcf_tree
 from .model_tree import checked_model, model_of
 from .urdf import urdf_tree

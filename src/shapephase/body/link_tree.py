@@ -23,14 +23,6 @@ _TRIANGLE, _NEGATIVE, _ROUNDING = 1e-3, 1e-9, 1e-12
 _LEAST_RADIUS, _MOST_RADIUS, _HEAVY = 1e-4, 10.0, 1e5
 
 
-class UnphysicalInertiaWarning(UserWarning):
-    """Links whose inertia is doubtful, accepted because the caller asked so or because it does no harm."""
-
-
-class IgnoredElementWarning(UserWarning):
-    """Something a file says that a free-floating body of joints does not take up, named."""
-
-
 @dataclass(frozen=True)
 class Mimic:
     """A joint that follows another: angle = multiplier * (angle of `leader`) + offset."""

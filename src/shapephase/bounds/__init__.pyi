@@ -1,4 +1,4 @@
-from ._energy_bounds import EnergyBounds, energy_bounds, momentum_argument, turning
+from ._energy_bounds import EnergyBounds, energy_bounds, turning
 from .all_bounds import Bound, bounds
 from .arc_bounds import (
     ArcLengthBounds,
@@ -67,7 +67,6 @@ __all__ = [
     "homoclinic_energy",
     "kinetic_energy_along",
     "loop_phase_bounds",
-    "momentum_argument",
     "momentum_energy",
     "regime_certificate",
     "return_time_bounds",

@@ -13,9 +13,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..arguments import interval_argument
 from ..arrays import Array, Mask
 from ..deformation.deformation import Deformation
-from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.interpolant import Interpolant, chebyshev, unit_nodes, values_to_coefficients
 
@@ -147,19 +147,6 @@ class Enclosure:
         middle = np.abs((turn @ self.inverse @ turn.T)[:, 0, 1:])
         radius = (np.abs(turn) @ self.inverse_radius @ np.abs(turn.T))[:, 0, 1:]
         return along, across, np.linalg.norm(middle + radius, axis=1) + room
-
-
-def interval_argument(interval: tuple[float, float] | None, duration: float) -> tuple[float, float]:
-    """Start and end of a stretch of [0, duration]; None: all of it. Raises ShapeError for anything else."""
-    if interval is None:
-        return 0.0, duration
-    try:
-        start, end = (float(time) for time in interval)
-    except (TypeError, ValueError):
-        raise ShapeError(f"interval: two times, start and end [s], are needed, got {interval!r}") from None
-    if not 0.0 <= start < end <= duration * (1.0 + 1e-12):
-        raise ShapeError(f"interval: 0 <= start < end <= {duration:.9g} s is needed, got ({start:.9g}, {end:.9g})")
-    return start, min(end, duration)
 
 
 def enclosure(

@@ -19,10 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
-from ..arrays import Array, finite_array
+from ..arguments import body_momentum_argument
+from ..arrays import Array
 from ..deformation.deformation import Deformation
-from ..errors import ShapeError
 from ._enclosure import Enclosure, enclosure
 
 _EPS = float(np.finfo(float).eps)
@@ -69,19 +68,6 @@ class EnergyBounds:
         return 2.0 * self.lower / self.size / self.size, 2.0 * self.upper / self.size / self.size
 
 
-def momentum_argument(momentum: ArrayLike, attitude: ArrayLike | None) -> Array:
-    """One body angular momentum Pi(start) = R^T momentum: (3,)."""
-    spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    body = (
-        spatial if attitude is None else so3.apply(so3.transpose(so3.rotation_argument(attitude, "attitude")), spatial)
-    )
-    if body.ndim != 1:
-        raise ShapeError(
-            f"momentum and attitude: bounds are of one motion, got a batch of {body.shape[:-1]}; ask for each"
-        )
-    return body
-
-
 def energy_bounds(
     deformation: Deformation,
     momentum: ArrayLike,
@@ -108,7 +94,7 @@ def energy_bounds(
 
     Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
     """
-    body = momentum_argument(momentum, attitude)
+    body = body_momentum_argument(momentum, attitude)
     size = float(np.linalg.norm(body))
     known = enclosure(deformation, interval, momentum_size=size, resolution=resolution)
     if not size:

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import so3, sphere
+from ..arguments import interval_argument
 from ..arrays import Array
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
-from ._enclosure import interval_argument
 from ._energy_bounds import EnergyBounds
 from .arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds
 from .energy import energy_along, energy_rate

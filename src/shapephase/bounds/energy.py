@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
-from ..shape_space.shape_path import times_argument
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import positive_argument
 from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.shape_path import positive_argument
 
 # Of the mean anomaly [rad]: where 1e-6 rad of it are left, and where squares are no numbers any more.
 _FARTHEST_ELLIPSE, _FARTHEST_HYPERBOLA = 1e10, 1e150

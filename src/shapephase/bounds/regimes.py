@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import body_momentum_argument
 from ..arrays import Array, Mask, finite_array
 from ..deformation.deformation import Deformation
 from ._enclosure import Enclosure
-from ._energy_bounds import EnergyBounds, energy_bounds, momentum_argument
+from ._energy_bounds import EnergyBounds, energy_bounds
 
 _FRAMES = 9
 _CHUNK = 2_000_000
@@ -138,7 +139,7 @@ def regime_certificate(
 
     Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
     """
-    body = momentum_argument(momentum, attitude)
+    body = body_momentum_argument(momentum, attitude)
     bounds = energy_bounds(deformation, momentum, attitude, interval, resolution=resolution)
     known = bounds.enclosure
     low, high = bounds.quotients

@@ -25,14 +25,7 @@ from .descriptions import (
 )
 from .frames import frames_argument, integrated_frames, lift_frames, link_frames, mean_body_frames, named_frames
 from .gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, named_gauge, principal_gauge
-from .physical_validity import (
-    check_never_on_a_line,
-    check_not_on_a_line,
-    check_triangle,
-    least_over,
-    line_measure,
-    on_unphysical_argument,
-)
+from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle, least_over, line_measure
 from .principal_frame import principal_frames
 
 __all__ = [
@@ -72,7 +65,6 @@ __all__ = [
     "moving_mass",
     "named_frames",
     "named_gauge",
-    "on_unphysical_argument",
     "particles",
     "prescribed",
     "principal_frames",

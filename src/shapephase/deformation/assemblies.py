@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import on_unphysical_argument, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from ..inertia_tensor import second_moment
 from ..integrator.sampling import Sampler, sampler
-from ..shape_space.connection import CLOSED
-from ..shape_space.shape_path import ShapePath, positive_argument
+from ..shape_space.shape_path import CLOSED, ShapePath
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of
-from .physical_validity import check_never_on_a_line, check_triangle, least_over, on_unphysical_argument
+from .physical_validity import check_never_on_a_line, check_triangle, least_over
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +270,7 @@ def rigid_part(
     """
     weight = positive_argument(mass, "mass", "a mass in kg")
     tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
-    place = _vector(centre, "centre", "m")
+    place = vector_argument(centre, "centre", unit="m")
     if tensor.shape != (3, 3) or np.abs(tensor - tensor.T).max() > 1e-9 * np.abs(tensor).max():
         raise ShapeError(f"inertia: one symmetric (3, 3) tensor [kg m^2] is needed, got {tensor.tolist()}")
     tensor = 0.5 * (tensor + tensor.T)
@@ -320,7 +320,7 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
     """
     weight = positive_argument(mass, "mass", "a mass in kg")
     whole = positive_argument(full_length, "full_length", "a length in m")
-    axis = _vector(direction, "direction")
+    axis = vector_argument(direction, "direction")
     size = float(np.linalg.norm(axis))
     if size == 0.0:
         raise ShapeError("direction: a vector other than zero is needed, got [0, 0, 0]")
@@ -332,7 +332,7 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
                 f"the length of a boom must stay between 0 and {whole:.9g} m, at t = {when:.6g} s it is "
                 f"{sign * (least - offset):.9g} m"
             )
-    return Boom(weight, whole, _vector(root, "root", "m"), axis / size, route)
+    return Boom(weight, whole, vector_argument(root, "root", unit="m"), axis / size, route)
 
 
 def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | None = None) -> Deformation:
@@ -381,13 +381,6 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     closure = np.eye(3) if gap <= CLOSED else None
     names = f"a spacecraft with {len(parts)} parts" if len(parts) != 1 else "a spacecraft with one part"
     return Deformation(description, length, breaks, closure, gap, names, count)
-
-
-def _vector(value: ArrayLike, name: str, unit: str = "") -> Array:
-    vector = finite_array(value, name, (3,), unit=unit)
-    if vector.ndim != 1:
-        raise ShapeError(f"{name}: one vector (3,) is needed, got {vector.shape}")
-    return vector
 
 
 def _columns(path: ShapePath, count: int, whose: str) -> ShapePath:

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import breaks_argument, inertia_argument, on_unphysical_argument, positive_argument, times_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, SingularInertiaError
-from ..inertia_tensor import inertia_argument, triangle_defect
+from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import Sampler
-from ..shape_space.connection import CLOSED, path_gap
-from ..shape_space.shape_path import ShapePath, breaks_argument, positive_argument, times_argument
+from ..shape_space.body_path import path_gap
+from ..shape_space.shape_path import CLOSED, ShapePath
 from .descriptions import (
     ArticulatedDescription,
     Description,
@@ -25,7 +26,7 @@ from .descriptions import (
     RigidDescription,
     SampledDescription,
 )
-from .physical_validity import check_never_on_a_line, check_triangle, least_over, on_unphysical_argument
+from .physical_validity import check_never_on_a_line, check_triangle, least_over
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import GaugeError, ShapeError
-from ..inertia_tensor import inertia_argument, inverse_inertia, second_moment
+from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
 from ..integrator.sampling import Sampler, sampler
-from ..shape_space.connection import path_sampler
+from ..shape_space.body_path import path_sampler
 from ..shape_space.shape_path import ShapePath
 from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 

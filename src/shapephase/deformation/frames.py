@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.interpolant import chebyshev, inside, unit_nodes, values_to_coefficients
 from ..integrator.sampling import sampler
-from ..shape_space.shape_path import times_argument
 from .deformation import Deformation
 from .principal_frame import Frames, principal_frames
 

@@ -8,12 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from ..arrays import Array
-from ..body.link_tree import UnphysicalInertiaWarning
-from ..errors import SingularInertiaError, UnphysicalInertiaError, unknown_name
+from ..errors import SingularInertiaError, UnphysicalInertiaError, UnphysicalInertiaWarning
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import inside, unit_nodes
 
-ON_UNPHYSICAL = ("allow", "warn", "error")
 # A flat body stands exactly at the limit of the triangle inequality, and rounding puts it on either side.
 _ROUNDING = 1e-9
 # As `inverse_inertia` has it: of I's least eigenvalue to its largest.
@@ -111,13 +109,6 @@ def check_triangle(inertia: Array, times: Array | None, on_unphysical: str) -> N
     if on_unphysical == "error":
         raise UnphysicalInertiaError(message)
     warnings.warn(message, UnphysicalInertiaWarning, stacklevel=3)
-
-
-def on_unphysical_argument(value: str) -> str:
-    """One of "allow", "warn" and "error". Raises UnknownNameError."""
-    if value not in ON_UNPHYSICAL:
-        raise unknown_name("value of on_unphysical", value, ON_UNPHYSICAL)
-    return value
 
 
 def _refuse_line(when: float) -> None:

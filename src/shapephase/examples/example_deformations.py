@@ -17,12 +17,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import moments_argument
 from ..arrays import Array
 from ..body.catalog import load_body
 from ..deformation.assemblies import assembly, moving_mass, rigid_part
 from ..deformation.deformation import articulated, prescribed, rigid
 from ..errors import ShapeError, TrajectoryError, unknown_name
-from ..inertia_tensor import moments_argument
 from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
 from .closed_form_motions import (

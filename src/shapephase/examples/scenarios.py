@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arguments import positive_argument
 from ..arrays import Array
 from ..body.catalog import load_body
 from ..deformation.deformation import articulated
@@ -14,7 +15,7 @@ from ..deformation.gauge import horizontal_gauge
 from ..errors import TrajectoryError, unknown_name
 from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..shape_space.shape_path import ShapePath, positive_argument
+from ..shape_space.shape_path import ShapePath
 
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root_scalar
 
 from .. import so3
+from ..arguments import moments_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
-from ..inertia_tensor import moments_argument
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body._momentum_orbit import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop

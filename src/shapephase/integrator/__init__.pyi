@@ -1,11 +1,10 @@
-from .compilation import CompiledCodeWarning, code_folder, compile_functions, compiled_or_interpreted, same_numbers
+from .compilation import code_folder, compile_functions, compiled_or_interpreted, same_numbers
 from .compiled_steps import compile_steps
-from .integrate import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
+from .integrate import SteppedRotation, dop853_rotation, stepped_rotation
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
 from .sampling import LoopSampler, Sampler, sampler
 
 __all__ = [
-    "CompiledCodeWarning",
     "Interpolant",
     "LoopSampler",
     "Sampler",
@@ -20,7 +19,6 @@ __all__ = [
     "same_numbers",
     "sampler",
     "stepped_rotation",
-    "tolerance_argument",
     "unit_nodes",
     "values_to_coefficients",
 ]

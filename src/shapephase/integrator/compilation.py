@@ -20,17 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import CompilerError
+from ..errors import CompiledCodeWarning, CompilerError
 from ..files import write_whole
 
 # Contracting a product and a sum into one operation would round differently.
 _OPTIONS = ("-O2", "-ffp-contract=off", "-shared", "-fPIC")
 _PATIENCE = 120.0
 _TRIALS = 20
-
-
-class CompiledCodeWarning(UserWarning):
-    """Compiled steps were found but cannot be used; the interpreted ones give the same results."""
 
 
 def code_folder() -> Path:

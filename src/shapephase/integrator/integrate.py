@@ -15,8 +15,9 @@ from itertools import groupby
 import numpy as np
 
 from .. import so3, sphere
-from ..arrays import Array, Integers, finite_array
-from ..errors import AccuracyNotReached, ShapeError
+from ..arguments import LOOSEST_TOLERANCE
+from ..arrays import Array, Integers
+from ..errors import AccuracyNotReached
 from .error_propagator import amplification, exact_propagators, momentum_slope
 from .interpolant import Interpolant, chebyshev, inside
 from .rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
@@ -29,7 +30,6 @@ _EPS = np.finfo(float).eps
 _MOST_STEPS = 4_000_000
 _ROUNDS = 12
 _MANY_STEPS = 4000
-_TIGHTEST, _LOOSEST = 1e-13, 1e-4
 _BATCHED = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
     "propagator",
@@ -189,16 +189,6 @@ def _stacked(parts: list[Array]) -> Array:
     return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
 
-def tolerance_argument(tolerance: float) -> float:
-    """A user's tolerance of an attitude [rad]. Raises ShapeError outside 1e-13 to 1e-4."""
-    if type(tolerance) is float and _TIGHTEST <= tolerance <= _LOOSEST:
-        return tolerance
-    goal = finite_array(tolerance, "tolerance", unit="rad")
-    if goal.ndim or not _TIGHTEST <= goal <= _LOOSEST:
-        raise ShapeError(f"tolerance: a number from {_TIGHTEST:g} to {_LOOSEST:g} rad is needed, got {tolerance!r}")
-    return float(goal)
-
-
 def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> SteppedRotation:
     """Integrate the attitude equation to a tolerance, sampling the deformation as far as that needs.
 
@@ -292,7 +282,7 @@ def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> 
 
     What is but nearly right drifts off in the end.
     """
-    least = StepRequirements.of(interpolant, float(sizes.max()), _LOOSEST).least_steps()
+    least = StepRequirements.of(interpolant, float(sizes.max()), LOOSEST_TOLERANCE).least_steps()
     steps = np.ceil(np.maximum(least, 1.0)).astype(int)
     channels, directions = _stage_channels(interpolant, steps), _directions(momentum, sizes)
     amplified, last = np.empty(len(sizes)), np.empty((len(sizes), 3, 3))

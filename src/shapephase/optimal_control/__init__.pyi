@@ -9,7 +9,6 @@ from .extremals import (
     initial_state,
     integrated,
     natural_sizes,
-    vector_argument,
     wong_residual,
 )
 from .plan import Plan, Progress, Start
@@ -42,6 +41,5 @@ __all__ = [
     "shoot",
     "solved",
     "symbolic_body",
-    "vector_argument",
     "wong_residual",
 ]

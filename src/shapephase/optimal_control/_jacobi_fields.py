@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import positive_argument, tolerance_argument
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.casadi_calls import call_casadi
-from ..integrator.integrate import tolerance_argument
 from ..shape_space.connection import horizontal_lift, mechanical_connection
-from ..shape_space.shape_path import ShapePath, positive_argument
+from ..shape_space.shape_path import ShapePath
 from .extremals import Extremal, extremal, hamiltonian, initial_state, integrated, natural_sizes, wong_residual
 
 _STEPS = 40

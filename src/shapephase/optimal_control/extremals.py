@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from .. import so3
-from ..arrays import Array, check_reach, finite_array
+from ..arguments import positive_argument, times_argument, tolerance_argument, vector_argument
+from ..arrays import Array, check_reach
 from ..body.body import Body
-from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError, unknown_name
+from ..errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ..integrator.casadi_calls import call_casadi
-from ..integrator.integrate import tolerance_argument
 from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
-from ..shape_space.shape_path import ShapePath, positive_argument, times_argument
+from ..shape_space.shape_path import ShapePath
 from .symbolic import solved, symbolic_body
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -305,14 +305,6 @@ def integrated(
             "in which a motion of the joints has no kinetic energy; shorten the motion, or start otherwise"
         )
     return answer
-
-
-def vector_argument(value: ArrayLike, name: str, length: int) -> Array:
-    """One vector of the length. Raises ShapeError."""
-    vector = finite_array(value, name, (length,))
-    if vector.ndim != 1:
-        raise ShapeError(f"{name}: one vector ({length},) is needed, got {vector.shape}")
-    return vector
 
 
 def checked_metric(body: Body, equations: Hamiltonian, shapes: Array) -> Array:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, TrajectoryError, unknown_name
-from ..shape_space.shape_path import positive_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "time")
 # Where a joint has no limit, a plan may still take it so far from its start [rad or m].

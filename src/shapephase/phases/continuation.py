@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arrays import Array, finite_array
+from ..arguments import direction_argument, magnitudes_argument
+from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, TrajectoryError
-from .loop_map import MomentumLoop, closed_points, direction_argument, solved, tangent_basis
+from .loop_map import MomentumLoop, closed_points, solved, tangent_basis
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LARGEST_STEP, _SMALLEST_STEP = 0.1, 1e-6
@@ -71,7 +72,7 @@ def continued_orbits(
 
     Source: theory.md section 2.
     """
-    sizes = _sizes_argument(magnitudes)
+    sizes = magnitudes_argument(magnitudes)
     loop = MomentumLoop.of(deformation, tolerance)
     first = 0.0 if start is None else float(sizes[0])
     axis = _axis_at_rest(loop) if first == 0.0 else _UP
@@ -182,13 +183,3 @@ def _ending(passed: list[_Orbit], beyond: float) -> tuple[str, float | None]:
             ), fold
     trace = 2.0 - passed[-1].excess
     return f"the orbit was lost between {size:.9g} and {beyond:.9g} kg m^2/s, at trace {trace:.6g}", None
-
-
-def _sizes_argument(magnitudes: ArrayLike) -> Array:
-    sizes = finite_array(magnitudes, "magnitudes", (None,), unit="kg m^2/s")
-    steps = np.diff(sizes)
-    if sizes.ndim != 1 or not len(sizes) or sizes.min() < 0.0 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
-        raise ShapeError(
-            f"magnitudes: numbers of 0 or more kg m^2/s, all growing or all falling, are needed, got {magnitudes!r}"
-        )
-    return sizes

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arrays import Array, Integers, Mask, finite_array
+from ..arguments import tolerance_argument
+from ..arrays import Array, Integers, Mask
 from ..deformation.deformation import Deformation
-from ..errors import OpenPathError, ShapeError
-from ..integrator.integrate import SteppedRotation, stepped_rotation, tolerance_argument
+from ..errors import OpenPathError
+from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.sampling import Sampler
 
 _ROWS_AT_ONCE = 2048
@@ -150,22 +150,3 @@ def solved(slope: Array, right: Array, least: float) -> Array:
 def moved_along(points: Array, step: Array) -> Array:
     """Directions moved in their tangent planes: (N, 3), (N, 2) -> (N, 3)."""
     return so3.normalised(points + np.einsum("ni,nic->nc", step, tangent_basis(points)))
-
-
-def size_argument(magnitude: float, *, allow_zero: bool = False) -> float:
-    """A user's size of the momentum [kg m^2/s]. Raises ShapeError."""
-    size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
-    if size.ndim or size < 0.0 or (size == 0.0 and not allow_zero):
-        wanted = "0 or more" if allow_zero else "above 0"
-        raise ShapeError(f"magnitude: a number {wanted} kg m^2/s is needed, got {magnitude!r}")
-    return float(size)
-
-
-def direction_argument(value: ArrayLike, name: str) -> Array:
-    """A user's directions, made unit vectors: (..., 3) -> (..., 3). Raises ShapeError."""
-    directions = finite_array(value, name, (3,))
-    largest = np.max(np.abs(directions), axis=-1, keepdims=True)
-    if np.any(largest == 0.0):
-        where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
-        raise ShapeError(f"{name}: entry {list(where)} is zero and has no direction")
-    return so3.normalised(directions / largest)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3, sphere
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.shape_path import times_argument
 from ._momentum_curve import Gauge, horizontal_lift_of, momentum_curve
 
 

@@ -14,21 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import direction_argument, magnitude_argument
 from ..arrays import Array, Integers
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError
 from ..integrator.integrate import SteppedRotation
 from ..reconstruction.reconstruction import Motion, reconstruct
 from .fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
-from .loop_map import (
-    MomentumLoop,
-    closed_points,
-    direction_argument,
-    ends_of,
-    exact_slopes,
-    size_argument,
-    tangent_basis,
-)
+from .loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFSCHETZ = 2
@@ -124,7 +117,7 @@ def stroboscopic_map(
 
     Source: theory.md section 2.
     """
-    size = size_argument(magnitude, allow_zero=True)
+    size = magnitude_argument(magnitude, allow_zero=True)
     start = direction_argument(directions, "directions")
     flat = start.reshape(-1, 3)
     solution = MomentumLoop.of(deformation, tolerance).run(size, flat)
@@ -163,7 +156,7 @@ def fixed_points(
 
     Source: theory.md section 2, B9, D16.
     """
-    size = size_argument(magnitude)
+    size = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
         raise ShapeError(f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {most_directions!r}")
     loop = MomentumLoop.of(deformation, tolerance)

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import so3, sphere
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..phases._momentum_curve import Gauge, MomentumCurve, horizontal_lift_of, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
-from ..shape_space.shape_path import times_argument
 from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided
 from .polhode_plots import spread_energies
 from .sphere_area import enclosed_cells

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..errors import MissingExtraError, ShapeError
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.shape_path import ShapePath, times_argument
+from ..shape_space.shape_path import ShapePath
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..body.appearance import VisualWarning
-from ..errors import MissingExtraError, ShapeError
+from ..errors import MissingExtraError, ShapeError, VisualWarning
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
 from ._moving_scene import MovingScene, moving_scene

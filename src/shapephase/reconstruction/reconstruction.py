@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import SteppedRotation, dop853_rotation, stepped_rotation, tolerance_argument
+from ..integrator.integrate import SteppedRotation, dop853_rotation, stepped_rotation
 from ..integrator.interpolant import Interpolant
-from ..shape_space.shape_path import times_argument
 from .closed_form import rigid_rotation
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..shape_space.shape_path import times_argument
 from .reconstruction import Motion
 
 

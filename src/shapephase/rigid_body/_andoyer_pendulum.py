@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import moments_argument
 from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import moments_argument
 from .pendulum import rigid_body_pendulum
 
 _NAMES = {"libration": "oscillating", "rotation": "rotating"}

@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import inertia_argument
 from ..arrays import Array, Mask, finite_array
 from ..errors import ChartPoleError, ShapeError
-from ..inertia_tensor import inertia_argument, inverse_inertia
+from ..inertia_tensor import inverse_inertia
 
 _NEAREST = 1e-8
 _AT_POLE = 1e-15  # sine of half the angle to a pole; an attitude's rounding is as large

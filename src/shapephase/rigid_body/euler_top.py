@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3
+from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import ascending_moments, inertia_argument, principal_axes
+from ..inertia_tensor import ascending_moments, principal_axes
 from ._momentum_orbit import MomentumOrbit, momentum_orbit
 
 _TURNS = 1e12

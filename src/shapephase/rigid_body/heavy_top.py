@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 
 from .. import so3
+from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
-from ..inertia_tensor import inertia_argument, inverse_inertia
+from ..inertia_tensor import inverse_inertia
 
 _FLOOR = 3e-14
 """The local tolerance below which rounding decides."""

@@ -28,9 +28,10 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprf
 
 from .. import elliptic
+from ..arguments import moments_argument
 from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import ascending_moments, moments_argument
+from ..inertia_tensor import ascending_moments
 
 _FAINT = 1e-140  # squares of smaller parts underflow
 

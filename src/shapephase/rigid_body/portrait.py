@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import moments_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import ascending_moments, moments_argument
+from ..inertia_tensor import ascending_moments
 
 
 @dataclass(frozen=True)

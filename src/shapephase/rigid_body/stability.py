@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..inertia_tensor import inertia_argument, principal_axes
+from ..inertia_tensor import principal_axes
 
 _ROUNDING = 16.0 * np.finfo(float).eps
 """Moments of a turned tensor closer than this, relative to its trace, cannot be told from equal ones."""

@@ -1,19 +1,16 @@
 from . import files
 from .connection import (
     HorizontalLift,
-    check_closed,
     connection_slopes,
     curvature,
     holonomy,
     holonomy_derivative,
     horizontal_lift,
     mechanical_connection,
-    path_gap,
-    path_sampler,
 )
 from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .many_paths import FinalAttitudes, final_attitudes
-from .shape_path import ShapePath, breaks_argument, positive_argument, times_argument
+from .shape_path import ShapePath
 from .summaries import BodySummary, JointCard, PathSummary, body_summary, path_summary
 
 __all__ = [
@@ -24,8 +21,6 @@ __all__ = [
     "PathSummary",
     "ShapePath",
     "body_summary",
-    "breaks_argument",
-    "check_closed",
     "connection_slopes",
     "curvature",
     "curvature_on_plane",
@@ -36,10 +31,6 @@ __all__ = [
     "horizontal_lift",
     "is_flat",
     "mechanical_connection",
-    "path_gap",
-    "path_sampler",
     "path_summary",
-    "positive_argument",
     "stokes_holonomy",
-    "times_argument",
 ]

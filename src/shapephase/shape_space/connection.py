@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import SteppedRotation, stepped_rotation, tolerance_argument
-from ..integrator.sampling import Sampler, sampler
-from .shape_path import ShapePath, times_argument
+from ..integrator.integrate import SteppedRotation, stepped_rotation
+from .body_path import check_closed, path_sampler
+from .shape_path import CLOSED, ShapePath
 
-CLOSED = 1e-9
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PIECES = (2, 4, 8, 16, 32, 64)
 
@@ -174,17 +174,6 @@ def _lift_of_loop(body: Body, route: ShapePath, tolerance: float) -> SteppedRota
     return _lift(body, route, tolerance)
 
 
-def check_closed(body: Body, path: ShapePath) -> None:
-    """Raise `OpenPathError` where the path is no loop; continuous joints may end whole turns from their start."""
-    gap = path_gap(body, path)
-    worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
-    if len(gap) and abs(gap[worst]) > CLOSED:
-        raise OpenPathError(
-            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from "
-            "its start; close the path, or take the end of its horizontal_lift"
-        )
-
-
 def holonomy_derivative(
     body: Body, path: ShapePath, variation: Callable[[Array], ArrayLike], tolerance: float = 1e-9
 ) -> tuple[Array, Array]:
@@ -276,29 +265,4 @@ def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, t
     raise AccuracyNotReached(
         f"the derivative of the holonomy still changes by {change:.3g} rad where {goal:.3g} was asked; declare the "
         "times where the variation jumps as breaks of the path, or loosen the tolerance"
-    )
-
-
-def path_gap(body: Body, path: ShapePath) -> Array:
-    """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,)."""
-    gap = path.gap
-    return np.where(body.continuous, so3.wrap(gap), gap)
-
-
-def path_sampler(body: Body, path: ShapePath) -> Sampler:
-    """A sampler of the body along a path whose columns are in the body's order."""
-
-    def evaluate(times: Array) -> tuple[Array, Array]:
-        return body.sample(*path.curve(times))
-
-    def probe(times: Array) -> Array:
-        return np.concatenate(path.curve(times), axis=1)
-
-    return sampler(
-        evaluate,
-        path.breaks,
-        oscillations=path.oscillations,
-        loops=path.loops,
-        smooth_loop=path.smooth_loop,
-        probe=probe,
     )

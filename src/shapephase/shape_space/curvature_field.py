@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import stepped_rotation, tolerance_argument
+from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import sampler
-from .connection import CLOSED, check_closed, connection_slopes
-from .shape_path import ShapePath
+from .body_path import check_closed
+from .connection import connection_slopes
+from .shape_path import CLOSED, ShapePath
 
 _EPS = float(np.finfo(float).eps)
 _SHAPES, _SEED = 16, 15

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, ShapePhaseError
-from ..integrator.integrate import stepped_rotation, tolerance_argument
-from .connection import path_sampler
+from ..integrator.integrate import stepped_rotation
+from .body_path import path_sampler
 from .shape_path import ShapePath
 
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import breaks_argument, positive_argument, times_argument
 from ..arrays import Array, check_finite, check_reach, finite_array
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from .curves import (
@@ -24,6 +25,8 @@ from .curves import (
     returned_pair,
 )
 
+CLOSED = 1e-9
+"""[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
 _WHOLE_TURN = 2.0 * np.pi
 
 
@@ -289,26 +292,6 @@ class ShapePath:
         return shapes.reshape(wanted), rates.reshape(wanted)
 
 
-def times_argument(t: ArrayLike, duration: float) -> Array:
-    """A user's times, checked to lie in [0, duration] (to rounding): (...) -> (...) [s]. Raises TrajectoryError."""
-    times = finite_array(t, "t", unit="s")
-    slack = 1e-9 * duration
-    if times.size and (times.min() < -slack or times.max() > duration + slack):
-        outside = times.min() if times.min() < -slack else times.max()
-        raise TrajectoryError(f"time {outside:.9g} s lies outside the motion's [0, {duration:.9g}] s")
-    return np.clip(times, 0.0, duration)
-
-
-def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
-    """A user's interior breaks with the two ends added: (M,) -> (M + 2,) ascending [s]. Raises TrajectoryError."""
-    inner = finite_array(breaks, "breaks", (None,), unit="s")
-    if inner.ndim != 1:
-        raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
-    if np.any((inner < 0.0) | (inner > duration)):
-        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {inner}")
-    return np.unique(np.concatenate([[0.0], inner, [duration]]))
-
-
 def _piecewise(times: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
     n_shape = coefficients.shape[2]
     curve = PiecewisePolynomial(times, coefficients)
@@ -339,15 +322,7 @@ def _samples(times: ArrayLike, shapes: ArrayLike) -> tuple[Array, Array]:
 
 
 def _closes(a: Array, b: Array) -> bool:
-    return bool(np.all(np.abs(a - b) <= 1e-9 * np.maximum(1.0, np.abs(a))))
-
-
-def positive_argument(value: float, name: str = "duration", unit: str = "a time in s") -> float:
-    """A user's number, checked to be finite and above 0. Raises TrajectoryError, ShapeError."""
-    number = finite_array(value, name)
-    if number.ndim or number <= 0.0:
-        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value!r}")
-    return float(number)
+    return bool(np.all(np.abs(a - b) <= CLOSED * np.maximum(1.0, np.abs(a))))
 
 
 def _names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[str, ...] | None:

@@ -9,8 +9,8 @@ import numpy as np
 from ..arrays import Array
 from ..body.body import Body
 from ..inertia_tensor import principal_axes, triangle_defect
-from .connection import CLOSED, path_gap
-from .shape_path import ShapePath
+from .body_path import path_gap
+from .shape_path import CLOSED, ShapePath
 
 _SAMPLES = 401
 

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as drawn
 
 import shapephase as sp
-from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, UnknownNameError
+from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
 from shapephase.shape_space.files.read import read_recorded_motion, read_shape_path, write_shape_path
-from shapephase.shape_space.files.recording import TrajectoryWarning
 from support.motion_writers import (
     NANO,
     Sample,

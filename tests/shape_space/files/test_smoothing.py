@@ -8,8 +8,7 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.optimize import brentq
 
 import shapephase as sp
-from shapephase.errors import TrajectoryError
-from shapephase.shape_space.files.recording import TrajectoryWarning
+from shapephase.errors import TrajectoryError, TrajectoryWarning
 from shapephase.shape_space.files.smoothing import smoothed_path
 
 NAMES = ("hip", "knee")

@@ -26,9 +26,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
+from ...arguments import inertia_argument
 from ...arrays import Array, Mask, finite_array
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError
-from ...inertia_tensor import inertia_argument, inverse_inertia
+from ...inertia_tensor import inverse_inertia
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
 _NEAREST = 1e-8

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
+from ...arguments import inertia_argument, moments_argument
 from ...arrays import Array, finite_array, real_array
 from ...errors import ShapeError
-from ...inertia_tensor import inertia_argument, moments_argument, principal_axes
+from ...inertia_tensor import principal_axes
 from ._momentum_flow import attitude_flow, exponential_derivative
 from .conjugate_search import conjugate_times
 

@@ -23,9 +23,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import elliptic
+from ...arguments import moments_argument
 from ...arrays import Array, common_shape, finite_array
 from ...errors import ShapeError
-from ...inertia_tensor import moments_argument
 from .serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants
 from .serret_andoyer_geodesics import GeodesicFamily
 

@@ -21,9 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
+from ...arguments import inertia_argument, moments_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ...inertia_tensor import inertia_argument, moments_argument, principal_axes
+from ...inertia_tensor import principal_axes
 
 _ZERO = 1e-14
 _CANCELLED = 16.0 * np.finfo(float).eps

@@ -16,11 +16,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from .._flow import ascending_times, flow
 from .lie_algebra import complex_or_real, su2
-from .lie_poisson import angular_velocity, inverse_inertia_argument, kinetic_energy
+from .lie_poisson import angular_velocity, kinetic_energy
 
 Spinor = NDArray[np.complex128]
 

@@ -12,9 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from .._flow import ascending_times, flow
-from .lie_poisson import Gradient, angular_velocity, gradient_at, inverse_inertia_argument
+from .lie_poisson import Gradient, angular_velocity, gradient_at
 
 
 def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, alpha: ArrayLike) -> Array:

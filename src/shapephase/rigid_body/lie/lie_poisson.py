@@ -14,9 +14,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ...inertia_tensor import inverse_inertia
 from .._flow import ascending_times, flow
 from .lie_algebra import LieAlgebra, so3
 
@@ -211,21 +211,6 @@ def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     return (inverse_inertia_argument(inertia) @ pi[..., None])[..., 0]
-
-
-def inverse_inertia_argument(inertia: ArrayLike) -> Array:
-    """The inverse of a user's inertia tensor: (..., 3, 3) -> (..., 3, 3).
-
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If it is not symmetric to 1e-9 of its size, or not positive definite.
-    """
-    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
-    skew = np.abs(tensor - np.swapaxes(tensor, -1, -2)).max(initial=0.0)
-    if skew > 1e-9 * np.abs(tensor).max(initial=0.0):
-        raise ShapeError(f"inertia: not symmetric, off by {skew:.3g} kg m^2")
-    return inverse_inertia(0.5 * (tensor + np.swapaxes(tensor, -1, -2)))
 
 
 def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:

@@ -1,7 +1,6 @@
 from .read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .recording import (
     Recording,
-    TrajectoryWarning,
     check_size,
     check_text,
     digest,
@@ -16,7 +15,6 @@ from .smoothing import smoothed_path
 __all__ = [
     "RecordedMotion",
     "Recording",
-    "TrajectoryWarning",
     "check_size",
     "check_text",
     "digest",

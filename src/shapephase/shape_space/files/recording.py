@@ -12,14 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ...arrays import Array
-from ...errors import InputFileNotFoundError, TrajectoryError
+from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 
 MOST_BYTES = 256 * 2**20
 _WILD_STEPS = 100.0
-
-
-class TrajectoryWarning(UserWarning):
-    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns."""
 
 
 @dataclass(frozen=True, eq=False)

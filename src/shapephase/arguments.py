@@ -1,0 +1,177 @@
+"""Checks of what a user passes in: each takes an argument as it came and returns it ready for use, or raises."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import so3
+from .arrays import Array, finite_array
+from .errors import ShapeError, TrajectoryError, UnphysicalInertiaError, unknown_name
+from .inertia_tensor import inverse_inertia
+
+TIGHTEST_TOLERANCE = 1e-13
+"""[rad]; a few hundred roundings, below which no attitude of many steps can be promised."""
+LOOSEST_TOLERANCE = 1e-4
+"""[rad]; the error estimates are first order and hold for small errors only."""
+ON_UNPHYSICAL = ("allow", "warn", "error")
+
+# How far outside [0, T] a time may lie, relative to T: rounding of a user's own arithmetic.
+_TIME_SLACK = 1e-9
+# Entries of a tensor that mirror each other may differ by this much, relative to the largest: printed digits.
+_ASYMMETRY = 1e-9
+# The least ratio of two principal moments: below it the inverse has no correct digits left.
+_LEAST_MOMENT_RATIO = 1e-12
+
+
+def times_argument(t: ArrayLike, duration: float) -> Array:
+    """A user's times, checked to lie in [0, duration] (to rounding): (...) -> (...) [s]. Raises TrajectoryError."""
+    times = finite_array(t, "t", unit="s")
+    slack = _TIME_SLACK * duration
+    if times.size and (times.min() < -slack or times.max() > duration + slack):
+        outside = times.min() if times.min() < -slack else times.max()
+        raise TrajectoryError(f"time {outside:.9g} s lies outside the motion's [0, {duration:.9g}] s")
+    return np.clip(times, 0.0, duration)
+
+
+def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
+    """A user's interior breaks with the two ends added: (M,) -> (M + 2,) ascending [s]. Raises TrajectoryError."""
+    inner = finite_array(breaks, "breaks", (None,), unit="s")
+    if inner.ndim != 1:
+        raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
+    if np.any((inner < 0.0) | (inner > duration)):
+        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {inner}")
+    return np.unique(np.concatenate([[0.0], inner, [duration]]))
+
+
+def positive_argument(value: float, name: str = "duration", unit: str = "a time in s") -> float:
+    """A user's number, checked to be finite and above 0. Raises TrajectoryError, ShapeError."""
+    number = finite_array(value, name)
+    if number.ndim or number <= 0.0:
+        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value!r}")
+    return float(number)
+
+
+def tolerance_argument(tolerance: float) -> float:
+    """A user's tolerance of an attitude [rad]. Raises ShapeError outside 1e-13 to 1e-4."""
+    if type(tolerance) is float and TIGHTEST_TOLERANCE <= tolerance <= LOOSEST_TOLERANCE:
+        return tolerance
+    goal = finite_array(tolerance, "tolerance", unit="rad")
+    if goal.ndim or not TIGHTEST_TOLERANCE <= goal <= LOOSEST_TOLERANCE:
+        raise ShapeError(
+            f"tolerance: a number from {TIGHTEST_TOLERANCE:g} to {LOOSEST_TOLERANCE:g} rad is needed, got {tolerance!r}"
+        )
+    return float(goal)
+
+
+def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
+    """A user's tensors (N, 3, 3), made exactly symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
+    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
+    if skew > _ASYMMETRY * np.abs(tensors).max(initial=0.0):
+        raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
+    symmetric = 0.5 * (tensors + np.swapaxes(tensors, -1, -2))
+    inverse_inertia(symmetric, times)
+    return symmetric
+
+
+def moments_argument(moments: ArrayLike) -> Array:
+    """Three positive principal moments, checked: (3,) [kg m^2].
+
+    Raises
+    ------
+    ShapeError
+        If they are not three finite numbers, or the least is not above 1e-12 of the largest.
+    """
+    values = finite_array(moments, "moments", (3,), unit="kg m^2")
+    if values.shape != (3,):
+        raise ShapeError(f"moments: expected three principal moments (3,), got {values.shape}")
+    if not values.min() > _LEAST_MOMENT_RATIO * values.max():
+        raise ShapeError(
+            f"moments: three positive principal moments, the least above 1e-12 of the largest, are needed; got {values}"
+        )
+    return values.copy()
+
+
+def inverse_inertia_argument(inertia: ArrayLike) -> Array:
+    """The inverse of a user's inertia tensor: (..., 3, 3) -> (..., 3, 3).
+
+    Raises
+    ------
+    ShapeError, SingularInertiaError
+        If it is not symmetric to 1e-9 of its size, or not positive definite.
+    """
+    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
+    skew = np.abs(tensor - np.swapaxes(tensor, -1, -2)).max(initial=0.0)
+    if skew > _ASYMMETRY * np.abs(tensor).max(initial=0.0):
+        raise ShapeError(f"inertia: not symmetric, off by {skew:.3g} kg m^2")
+    return inverse_inertia(0.5 * (tensor + np.swapaxes(tensor, -1, -2)))
+
+
+def on_unphysical_argument(value: str) -> str:
+    """One of "allow", "warn" and "error". Raises UnknownNameError."""
+    if value not in ON_UNPHYSICAL:
+        raise unknown_name("value of on_unphysical", value, ON_UNPHYSICAL)
+    return value
+
+
+def magnitude_argument(magnitude: float, *, allow_zero: bool = False) -> float:
+    """A user's magnitude of the momentum [kg m^2/s]. Raises ShapeError."""
+    number = finite_array(magnitude, "magnitude", unit="kg m^2/s")
+    if number.ndim or number < 0.0 or (number == 0.0 and not allow_zero):
+        allowed = "0 or more" if allow_zero else "above 0"
+        raise ShapeError(f"magnitude: a number {allowed} kg m^2/s is needed, got {magnitude!r}")
+    return float(number)
+
+
+def magnitudes_argument(magnitudes: ArrayLike) -> Array:
+    """A user's magnitudes of the momentum, all growing or all falling: (N,) [kg m^2/s]. Raises ShapeError."""
+    values = finite_array(magnitudes, "magnitudes", (None,), unit="kg m^2/s")
+    steps = np.diff(values)
+    if values.ndim != 1 or not len(values) or values.min() < 0.0 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
+        raise ShapeError(
+            f"magnitudes: numbers of 0 or more kg m^2/s, all growing or all falling, are needed, got {magnitudes!r}"
+        )
+    return values
+
+
+def direction_argument(value: ArrayLike, name: str) -> Array:
+    """A user's directions, made unit vectors: (..., 3) -> (..., 3). Raises ShapeError."""
+    directions = finite_array(value, name, (3,))
+    largest = np.max(np.abs(directions), axis=-1, keepdims=True)
+    if np.any(largest == 0.0):
+        where = tuple(int(i) for i in np.argwhere(largest[..., 0] == 0.0)[0])
+        raise ShapeError(f"{name}: entry {list(where)} is zero and has no direction")
+    return so3.normalised(directions / largest)
+
+
+def vector_argument(value: ArrayLike, name: str, length: int = 3, unit: str = "") -> Array:
+    """One vector of this length. Raises ShapeError."""
+    vector = finite_array(value, name, (length,), unit=unit)
+    if vector.ndim != 1:
+        raise ShapeError(f"{name}: one vector ({length},) is needed, got {vector.shape}")
+    return vector
+
+
+def body_momentum_argument(momentum: ArrayLike, attitude: ArrayLike | None) -> Array:
+    """One body angular momentum at the start, Pi = R^T momentum: (3,) [kg m^2/s]. Raises ShapeError for a batch."""
+    body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    if attitude is not None:
+        body = so3.apply(so3.transpose(so3.rotation_argument(attitude, "attitude")), body)
+    if body.ndim != 1:
+        raise ShapeError(
+            f"momentum and attitude: bounds are of one motion, got a batch of {body.shape[:-1]}; compute them for each"
+        )
+    return body
+
+
+def interval_argument(interval: tuple[float, float] | None, duration: float) -> tuple[float, float]:
+    """Start and end of a stretch of [0, duration]; None: all of it. Raises ShapeError for anything else."""
+    if interval is None:
+        return 0.0, duration
+    try:
+        start, end = (float(time) for time in interval)
+    except (TypeError, ValueError):
+        raise ShapeError(f"interval: two times, start and end [s], are needed, got {interval!r}") from None
+    if not 0.0 <= start < end <= duration * (1.0 + 1e-12):
+        raise ShapeError(f"interval: 0 <= start < end <= {duration:.9g} s is needed, got ({start:.9g}, {end:.9g})")
+    return start, min(end, duration)
