@@ -1,7 +1,7 @@
 """Times and costs of plans from default arguments, and one method against the other: `python -m benchmarks.planning`.
 
-The turns of the issue with their aims. A time is the processor's, of
-the first plan for a body: its symbolic functions are included.
+Turns of three bodies, each with the time that it should take at most. A time is the processor's, of the first plan
+for a body: its symbolic functions are included.
 """
 
 from __future__ import annotations

@@ -73,6 +73,71 @@ def test_bodies_say_where_their_numbers_come_from(name):
     assert text.count("<visual>") >= text.count("<mass ")
 
 
+_CODE = r"(?:[CBM]-E\d+|[A-U]\d+[a-z]?)"
+
+
+def _defined_in_the_theory() -> set[str]:
+    text = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    return set(re.findall(rf"^- \*\*({_CODE})\*\*", text, re.MULTILINE)) | set(
+        re.findall(r"^### ([A-U])\. ", text, re.MULTILINE)
+    )
+
+
+def _sections(name: str) -> set[str]:
+    return set(re.findall(r"^## (\d+)\. ", (ROOT / "docs" / name).read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def _cited(name: str) -> list[tuple[str, list[str], list[str]]]:
+    """Where a page of docs/ is cited, with which sections and codes; line breaks do not end a citation."""
+    found = []
+    for folder in ("src", "tests", "benchmarks", "notebooks"):
+        for file in sorted((ROOT / folder).rglob("*")):
+            if file.suffix not in (".py", ".pyi", ".ipynb") or file == Path(__file__):
+                continue
+            text = re.sub(r"\s*\n[\s#]*", " ", file.read_text(encoding="utf-8"))
+            for match in re.finditer(
+                rf"{name}((?:[ ,;:(-]|and|to|its|errata|sections?|\d+\b|{_CODE}\b|[A-U]\b)*)", text
+            ):
+                citation = match[1]
+                codes = re.findall(rf"(?<![\w-])({_CODE}|[A-U])(?![\w])", citation)
+                sections = re.findall(r"sections? ((?:\d+(?: and |, )?)+)", citation)
+                place = f"{file.relative_to(ROOT)}: {name}{citation}"
+                found.append((place, [number for one in sections for number in re.findall(r"\d+", one)], codes))
+    return found
+
+
+@pytest.mark.parametrize("name", ["theory.md", "numerics.md"])
+def test_what_is_cited_from_the_docs_stands_there(name):
+    defined, sections, cited = _defined_in_the_theory(), _sections(name), _cited(name)
+    assert len(cited) > {"theory.md": 150, "numerics.md": 8}[name]
+    for place, numbers, codes in cited:
+        assert set(numbers) <= sections, place
+        assert not codes or (name == "theory.md" and set(codes) <= defined), place
+        assert numbers or codes, f"{place}: which part of it?"
+
+
+def test_codes_at_the_end_of_test_names_stand_in_the_theory():
+    defined = {code.lower().replace("-", "_") for code in _defined_in_the_theory()}
+    for file in sorted((ROOT / "tests").rglob("test_*.py")):
+        for name in re.findall(r"def (test_\w+)\(", file.read_text(encoding="utf-8")):
+            if ends := re.search(r"_((?:[cbm]_e|[a-z])\d+[a-z]?)$", name):
+                assert ends[1] in defined, f"{file.relative_to(ROOT)}: {name}"
+
+
+def test_nothing_refers_to_a_note_outside_the_repository():
+    inside = {"theory.md", "numerics.md", "architecture.md", "readme.md", "contributing.md", "changelog.md"}
+    talk = re.compile(r"\bissues? \d|\bthe issue\b|Must show|\bhazards? \d|\bchecklist\b")
+    page = re.compile(r"(?<![\w-])[\w-]+\.md\b")
+    files = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "Makefile", "pyproject.toml")]
+    for folder in ("src", "tests", "benchmarks", "notebooks", "docs"):
+        files += [file for file in (ROOT / folder).rglob("*") if file.suffix in (".py", ".pyi", ".ipynb", ".md")]
+    for file in files:
+        if file != Path(__file__):
+            text = file.read_text(encoding="utf-8")
+            assert not (found := talk.search(text)), f"{file.relative_to(ROOT)}: {found[0]}"
+            assert {name.lower() for name in page.findall(text)} <= inside, file.relative_to(ROOT)
+
+
 def test_the_benchmark_s_opponent_still_stands_on_the_body():
     code = (
         "from benchmarks.cases import cases; from benchmarks.contestants import FloatingModel; "

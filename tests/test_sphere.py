@@ -298,7 +298,7 @@ def test_there_are_a_hundred_curves_of_every_kind():
 
 @pytest.mark.parametrize("number", range(100))
 def test_solid_angle_by_formula_transport_and_polygon(number):
-    """Must show 4 of the issue on running phases: three ways, and a fourth, agree on random curves."""
+    """Three ways, and a fourth, agree on random curves."""
     kind, curve = CURVES[number]
     t = np.linspace(0.0, TURN, 4096, endpoint=False)
     u, v = curve(t)

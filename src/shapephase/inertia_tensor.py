@@ -115,7 +115,7 @@ def ascending_moments(moments: Array) -> tuple[Array, NDArray[np.intp], Array]:
     order : (..., 3) indices with ascending = moments[order]; equal moments keep their order
     parity : (...) 1 for an even permutation, -1 for an odd one
 
-    Source: theory.md, table of conventions.
+    Source: theory.md section 1 (table of conventions).
     """
     order = np.argsort(moments, axis=-1, kind="stable")
     parity = np.where((order[..., 1] - order[..., 0]) % 3 == 1, 1.0, -1.0)

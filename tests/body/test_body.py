@@ -702,7 +702,7 @@ def test_a_pinocchio_model_with_a_free_flyer(rng):
 
 
 def test_a_body_keeps_its_own_model():
-    """Changing the model afterwards changes no body (hazards: adding a joint would corrupt the heap)."""
+    """Changing the model afterwards changes no body (a joint added to a model in use corrupts Pinocchio's heap)."""
     model = pin.buildModelFromUrdf(str(file_of("diver")), pin.JointModelFreeFlyer())
     body = sp.load_body(model)
     before = body.locked_inertia(body.shape())

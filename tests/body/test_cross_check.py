@@ -1,4 +1,4 @@
-"""Mass, inertia and momentum from the file's numbers alone, and bodies that differ from their file (hazards 4 B)."""
+"""Mass, inertia and momentum from the file's numbers alone, and bodies that differ from their file."""
 
 from __future__ import annotations
 

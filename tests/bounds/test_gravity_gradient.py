@@ -205,8 +205,9 @@ DIRECTION = np.array([0.48, -0.6, 0.64])
 
 @pytest.mark.parametrize(("symmetric", "order"), [(False, 1), (True, 2)])
 def test_a16_the_exact_torque_tends_to_the_gravity_gradient(symmetric, order):
-    """Must show: relative remainder in proportion to size/r over three decades; to its square for a body that is its
-    own mirror image in its centre, where the third moments vanish."""
+    """The relative remainder is in proportion to size/r over three decades; to its square for a body that is its own
+    mirror image in its centre, where the third moments vanish.
+    """
     masses, points = (np.tile(MASSES, 2), np.concatenate([POINTS, -POINTS])) if symmetric else (MASSES, POINTS)
     ratios = []
     for distance in (1e2, 1e3, 1e4, 1e5):

@@ -2,7 +2,6 @@
 
 Every file is loaded in a process that may use 1 GiB and `MOST_LOADS` times the work of a reference load; what crashes
 it, hangs or eats memory is a failure.
-Hazards 1 and 4.
 """
 
 from __future__ import annotations

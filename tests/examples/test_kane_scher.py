@@ -1,4 +1,4 @@
-"""The falling cat of Kane and Scher (1969), from the paper's kinematics alone (issue 2, Must show 2).
+"""The falling cat of Kane and Scher (1969), from the paper's kinematics alone.
 
 Two equal axisymmetric halves, axial to transverse inertia 0.25, both centres of mass at the waist. In the front half's
 axes: a is its forward axis x, K lies in the x-z plane at the angle alpha from a, the rear half's axis (a when straight)

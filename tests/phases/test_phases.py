@@ -1,4 +1,4 @@
-"""The split of a rotation: holonomy, dynamic and Montgomery phase (issue 2, Must show 4; checklist U5, U9, B, D).
+"""The split of a rotation: holonomy, dynamic and Montgomery phase (theory.md U5, U9, B, D).
 
 The truth comes from `pinocchio_motion`: one integration of the attitude, the lift, the dynamic phase and a tangent
 vector carried parallel along the momentum curve, whose turn is the solid angle.
@@ -63,7 +63,7 @@ def read_off(rotation: np.ndarray, axis: np.ndarray) -> float:
     return float(vector @ axis)
 
 
-# ---- Must show 4: momentum and shape close together ---------------------------------------------------------------
+# ---- Momentum and shape close together ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["example:human", "cat"])
@@ -212,7 +212,7 @@ def test_rigid_phase_over_one_period(moments, size, a, period, phase, tolerance,
 
 
 def test_signed_area_of_the_rigid_body():
-    """The loop goes clockwise about the axis of the least moment; the smaller region is counted (theory.md 6)."""
+    """Clockwise about the axis of the least moment; the smaller region is counted (theory.md section 6)."""
     body = 1.7 * np.array([np.sqrt(1.0 - 1.7 / 2.6), 0.0, np.sqrt(1.7 / 2.6)])
     motion = sp.reconstruct(sp.rigid(np.diag([3.0, 2.0, 1.0]), 8.305738787261774), body, tolerance=1e-11)
     split = sp.split(motion, "base")

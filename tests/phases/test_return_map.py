@@ -158,7 +158,7 @@ def test_a_map_needs_a_loop_directions_and_a_size():
         stroboscopic_map(deformation_of("cat"), -0.1, UP)
 
 
-# ---- Fixed points: Must show ---------------------------------------------------------------------------------------
+# ---- Fixed points --------------------------------------------------------------------------------------------------
 
 
 def check_fixed_points(name: str, seed: int, share: float) -> FixedPoints:

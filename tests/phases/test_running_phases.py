@@ -164,7 +164,7 @@ def frames_of(motion, gauge, times):
     return turning(times)[0] if gauge == "given" else sp.horizontal_gauge(motion.deformation).frame(times)
 
 
-# ---- Must show 4: open arcs ----------------------------------------------------------------------------------------
+# ---- Open arcs -----------------------------------------------------------------------------------------------------
 
 
 QUICK = ("cat", "satellite")
@@ -371,7 +371,7 @@ def test_arcs_outside_the_motion():
         arc_phases(some_motion("cat"), [0.0, 2.1])
 
 
-# ---- Must show 6: a continuous phase -------------------------------------------------------------------------------
+# ---- A continuous phase --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Laws of mechanics over random bodies of the catalog and random paths (issue 2, Must show 5; checklist B8, C2, C8)."""
+"""Laws of mechanics over random bodies of the catalog and random paths (theory.md B8, C2, C8)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""The reconstruction against other people's engines: Pinocchio's ccrba in solve_ivp, and MuJoCo (issue 2, Must show 3).
+"""The reconstruction against other people's engines: Pinocchio's ccrba in solve_ivp, and MuJoCo.
 
-Checklist U10 (full-dynamics cross-check), U3 and U9 (about the centre of mass, whatever the base), U7, A7.
+The full dynamics as a check (theory.md U10), about the centre of mass whatever the base (theory.md U3, U9), for joint
+trajectories from anywhere (theory.md U7, A7).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The derivative of the holonomy by the path (issue 3, Must show 6; checklist B6): the curvature, carried along a loop.
+"""The derivative of the holonomy by the path (theory.md B6): the curvature, carried along a loop.
 
 The truth is differences of `holonomy` at 1e-13, and what the geometry says of variations that change nothing.
 """

@@ -1,4 +1,4 @@
-"""Many paths of one body in one call, and stretches on which nothing moves (issue 3)."""
+"""Many paths of one body in one call, and stretches on which nothing moves."""
 
 from __future__ import annotations
 

@@ -606,7 +606,7 @@ def test_joints_that_do_not_match_are_named(load_urdf):
 
 
 def test_joints_do_not_go_beyond_a_million():
-    """There an angle has lost six digits (hazards 4 C)."""
+    """Beyond 1e6 rad, where an angle has lost six digits."""
     far = 1.1e6
     for make in (
         lambda: sp.ShapePath.fourier([far], [[0.0]], [[0.0]], 1.0),

@@ -9,8 +9,8 @@ with the complementary parameter m1 proportional to |D|. Everything near the sep
 found in rational arithmetic, once, so that moments and momentum given as doubles are answered to rounding on both sides
 of the separatrix and on it.
 
-Sources: Jacobi 1850; Marsden and Ratiu, section 15.8, whose I1 >= I2 >= I3 are our I3, I2, I1, with the corrections
-M-E1, M-E2 and M-E7 of theory.md.
+Sources: Jacobi 1850; Marsden and Ratiu, section 15.8, whose I1 >= I2 >= I3 are our I3, I2, I1, corrected
+according to theory.md M-E1, M-E2, M-E7.
 """
 
 from __future__ import annotations

@@ -386,7 +386,7 @@ def test_b_e7_b_e8_the_printed_theta():
 
 @pytest.mark.parametrize("p", [1.3, 1.1, 0.8, 0.3])
 def test_b_e11_the_rotating_case(p):
-    """Y by the substitution of theory.md, on both sides of p = sqrt(I_3), and the differential equation of eta."""
+    """Y by the substitution of theory.md B-E11, on both sides of p = sqrt(I_3), and the equation of eta'."""
     exact = Exact(MOMENTS, p)
     y1, y2 = exact.roots(exact.p)
     factor = (exact.p * (exact.b - exact.a)) ** 2
