@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,15 @@ def test_the_readme_s_python_runs_and_prints_what_it_says(tmp_path, monkeypatch,
     assert capsys.readouterr().out == output
     assert (tmp_path / "fall.npz").exists()
     assert len((tmp_path / "fall.csv").read_text().splitlines()) == 202
+
+
+def test_the_readme_s_names_exist():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    (table,) = re.findall(r"^\| question \| names \|\n(.*?)\n\n", text, re.MULTILINE | re.DOTALL)
+    names = [name for row in table.splitlines()[1:] for name in re.findall(r"`([\w.]+)`", row.split("|")[2])]
+    assert len(names) > 30
+    for name in names:
+        attrgetter(name.removeprefix("sp."))(sp)
 
 
 def test_the_readme_begins_with_the_two_commands():
