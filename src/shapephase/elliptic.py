@@ -173,15 +173,15 @@ def _arguments(**values: ArrayLike) -> tuple[Array, ...]:
     return tuple(arrays.values())
 
 
-def _refuse(bad: Mask, values: Array, name: str, wanted: str) -> None:
+def _refuse(bad: Mask, values: Array, name: str, requirement: str) -> None:
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise ShapeError(f"{name}: entry {list(where)} is {values[where]:.17g}; {wanted}")
+        raise ShapeError(f"{name}: entry {list(where)} is {values[where]:.17g}; {requirement}")
 
 
 def _refuse_infinite(phi: Array, m1: Array) -> None:
-    wanted = "with m1 = 0 the integral is infinite from |phi| = pi/2 on; keep phi inside, or m1 above 0"
-    _refuse((m1 == 0.0) & (np.abs(phi) >= 0.5 * np.pi), np.broadcast_arrays(phi, m1)[0], "phi", wanted)
+    requirement = "with m1 = 0 the integral is infinite from |phi| = pi/2 on; keep phi inside, or m1 above 0"
+    _refuse((m1 == 0.0) & (np.abs(phi) >= 0.5 * np.pi), np.broadcast_arrays(phi, m1)[0], "phi", requirement)
 
 
 def _regular(m1: Array) -> Array:

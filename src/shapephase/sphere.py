@@ -20,8 +20,13 @@ from .errors import AccuracyNotReached
 Curve = Callable[[Array], tuple[Array, Array]]
 """Times (N,) -> directions (..., N, 3) and a second vector along with them (..., N, 3)."""
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-_THREE, _ = np.polynomial.legendre.leggauss(3)
+# Eight Gauss nodes for each piece of a curve: exact to degree 15, right to rounding where the piece bends little.
+_GAUSS = np.polynomial.legendre.leggauss(8)
+_NODES = _GAUSS[0]
+_WEIGHTS = _GAUSS[1]
+# The sixth-order Magnus formula of `transport` takes the curve at three Gauss nodes.
+_MAGNUS_NODES = np.polynomial.legendre.leggauss(3)[0]
+# Pieces are halved until two results agree; a curve that has not settled after this many is refused.
 _HALVINGS = 12
 
 
@@ -112,7 +117,7 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     last = None
     for _ in range(_HALVINGS):
         steps = np.diff(edges)
-        nodes = edges[:-1, None] + 0.5 * steps[:, None] * (_THREE + 1.0)
+        nodes = edges[:-1, None] + 0.5 * steps[:, None] * (_MAGNUS_NODES + 1.0)
         direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
         early, middle, late = np.moveaxis(np.cross(direction, rate) * steps[:, None, None], -2, 0)
         slope, bend = np.sqrt(15.0) / 3.0 * (late - early), 10.0 / 3.0 * (late - 2.0 * middle + early)

@@ -1,0 +1,138 @@
+"""One vocabulary, that of the field: names that were given up do not come back, and constants stand alone."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1] / "src" / "shapephase"
+# Folders that still have such names.
+NOT_YET = {
+    "body",
+    "bounds",
+    "cli",
+    "deformation",
+    "examples",
+    "integrator",
+    "optimal_control",
+    "phases",
+    "plotting",
+    "rigid_body",
+    "shape_space",
+}
+
+# The name given up, and what says the same in the words of the field.
+GIVEN_UP = {
+    "march": "step_loop, integrate_steps",
+    "March": "StepRecord",
+    "marched": "integrate_steps",
+    "growth": "error_propagator",
+    "exact_growth": "exact_propagators",
+    "Needs": "StepRequirements",
+    "step_plan": "step_control",
+    "caution": "safety_factor",
+    "Source": "Description",
+    "Original": "UngaugedDescription",
+    "sources": "descriptions",
+    "ModelCard": "BodySummary",
+    "model_card": "body_summary",
+    "PathCard": "PathSummary",
+    "path_card": "path_summary",
+    "JointCard": "JointSummary",
+    "cards": "summaries",
+    "beyond": "joints_beyond_limits",
+    "resting": "still_joints",
+    "asked": "evaluate",
+    "wanted": "expected_shape",
+    "told": "report",
+    "heard": "iteration_callback",
+    "tale": "message",
+    "called": "call_casadi",
+    "for_rows": "map_rows",
+    "in_machine_code": "compiled_or_interpreted",
+    "Judgement": "SpectralEstimate",
+    "judged": "estimate_spectrum",
+    "Tail": "estimate_tail",
+    "calm": "at_noise_floor",
+    "Followed": "BestIterate",
+    "Watch": "IterationCallback",
+    "Watched": "IterationCallback",
+    "Solved": "NlpSolution",
+    "solved": "solve_linear",
+    "miss": "goal_error",
+    "pace": "rate_limit",
+    "ties": "coupling",
+    "still": "fixed_joints",
+    "RigidInOwnTime": "TimeReparametrisedRigid",
+    "wild": "near_pole",
+    "tame": "regular",
+    "size": "magnitude, or the name of what is counted",
+}
+# Where such a word is the field's own: a moment of inertia that grows.
+RIGHT_THERE = {("examples", "growth")}
+
+
+def named(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    """Functions, classes, parameters, fields and attributes that a module defines, with their lines."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                yield node.name, node.lineno
+            case ast.ClassDef():
+                yield node.name, node.lineno
+                for part in node.body:
+                    if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name):
+                        yield part.target.id, part.lineno
+            case ast.arg():
+                yield node.arg, node.lineno
+            case ast.Attribute(value=ast.Name(id="self"), ctx=ast.Store()):
+                yield node.attr, node.lineno
+
+
+def room(file: Path) -> str:
+    return file.relative_to(ROOT).parts[0]
+
+
+def packed(tree: ast.Module) -> Iterator[tuple[str, int]]:
+    """Constants that share an assignment at the top of a module, with their lines."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            names = [part.id for target in node.targets for part in ast.walk(target) if isinstance(part, ast.Name)]
+            several = len(node.targets) > 1 or isinstance(node.targets[0], ast.Tuple | ast.List)
+            if several and any(re.fullmatch(r"_*[A-Z][A-Z0-9_]*", name) for name in names):
+                yield ", ".join(names), node.lineno
+
+
+def modules() -> Iterator[tuple[str, str, ast.Module]]:
+    """Of each module its room, its path and its content."""
+    for file in sorted(file for file in ROOT.rglob("*") if file.suffix in (".py", ".pyi")):
+        place = file.relative_to(ROOT)
+        if place.parts[0] not in NOT_YET:
+            yield place.parts[0], str(place), ast.parse(file.read_text(encoding="utf-8"))
+
+
+def test_no_name_that_was_given_up_is_defined():
+    found = [
+        f"{place}:{line}: {name} (say {GIVEN_UP[name.strip('_')]})"
+        for room, place, tree in modules()
+        for name, line in [*named(tree), (Path(place).stem, 0)]
+        if name.strip("_") in GIVEN_UP and (room, name.strip("_")) not in RIGHT_THERE
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_every_constant_has_a_line_of_its_own():
+    """No A, B = 1, 2 at the top of a module: each constant has a unit and a reason to be stated."""
+    found = [f"{place}:{line}: {names}" for _, place, tree in modules() for names, line in packed(tree)]
+    assert not found, "\n".join(found)
+
+
+def test_the_search_finds_what_it_is_for():
+    tree = ast.parse("class Tail:\n    miss: float\n    def f(self, size, *, told=1):\n        self._calm = size\n")
+    assert {name.strip("_") for name, _ in named(tree)} == {"Tail", "miss", "f", "self", "size", "told", "calm"}
+    assert [names for names, _ in packed(ast.parse("_A, _B = 1, 2\nx, y = f()\nC = 3\nD, _ = f()\n"))] == [
+        "_A, _B",
+        "D, _",
+    ]
