@@ -13,7 +13,8 @@ import shapephase as sp
 from shapephase.cli.main import main
 from shapephase.errors import CompilerError
 from shapephase.examples.scenarios import MOTIONS
-from shapephase.integrator import compilation, step_loop
+from shapephase.integrator import _step_loop as step_loop
+from shapephase.integrator import compilation
 from shapephase.integrator.compiled_steps import forget_functions
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler on this machine")
@@ -98,7 +99,7 @@ def test_without_a_compiler_that_works_it_is_said(folder, monkeypatch, compiler,
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
-    assert "no place" not in said
+    assert "no folder" not in said
     assert not folder.exists() or list(folder.iterdir()) == []
 
 
@@ -119,7 +120,7 @@ def test_a_place_that_cannot_be_looked_at_is_no_obstacle(monkeypatch):
 
 def test_without_a_home_nothing_is_kept(monkeypatch):
     def nowhere():
-        raise RuntimeError("nobody is at home")
+        raise RuntimeError("no home directory")
 
     monkeypatch.setenv("XDG_CACHE_HOME", "relative/is/ignored")
     monkeypatch.setattr(compilation.Path, "home", nowhere)

@@ -1,7 +1,7 @@
 """From I(t) and L_o(t) to rotations: sampling, interpolation, stepping, and how wrong the result may be.
 
 A deformation is sampled as Chebyshev series (`sampling`), which are stepped by an eighth-order formula
-(`integrate`); the linearised equation says how errors grow. Knows nothing of bodies, shapes or phases.
+(`integrate`); the linearised equation shows how errors grow. Knows nothing of bodies, shapes or phases.
 """
 
 from lazy_loader import attach_stub

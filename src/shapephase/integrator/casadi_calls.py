@@ -13,24 +13,25 @@ from ..arrays import Array
 from .compilation import compiled_or_interpreted
 
 Formula = Callable[[list[Any]], list[Any]]
+# Functions of one thread; a buffer holds a few kilobytes, and a computation uses a few dozen.
 _MOST_BUFFERS = 128
 
 
 class _Buffers(threading.local):
-    """Of each thread its own: what it last called, with the memory that is worked on."""
+    """The functions that a thread has called, each with the memory it works on; every thread has its own."""
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[Any, Any, Any, list[int]]] = {}
 
-    def of(self, function: Any) -> tuple[Any, Any, list[int]]:
-        """The buffer of a function, what evaluates it, and the sizes of its results."""
+    def for_function(self, function: Any) -> tuple[Any, Any, list[int]]:
+        """The buffer of a function, the call that evaluates it, and the lengths of its results."""
         known = self._known.get(id(function))
         if known is None:
             if len(self._known) >= _MOST_BUFFERS:
                 self._known.clear()
-            # Held on to, so that no other function comes to have its identity.
-            sizes = [function.numel_out(place) for place in range(function.n_out())]
-            known = self._known[id(function)] = function, *function.buffer(), sizes
+            # The function is kept alive, so that no other one gets its id.
+            lengths = [function.numel_out(place) for place in range(function.n_out())]
+            known = self._known[id(function)] = function, *function.buffer(), lengths
         return known[1:]
 
 
@@ -38,12 +39,12 @@ _buffers = _Buffers()
 
 
 def call_casadi(function: Any, rows: int, *arguments: Array) -> list[Array]:
-    """A CasADi function on arrays, on memory that nobody else sees, so that threads can call it at the same time.
+    """Evaluate a CasADi function on arrays, in memory of this thread, so that threads can call it at the same time.
 
     Arguments hold numbers in the order of the function's inputs (column-major); each result is (rows, entries / rows).
     """
-    buffer, evaluate, sizes = _buffers.of(function)
-    results = [np.empty((rows, size // rows)) for size in sizes]
+    buffer, evaluate, lengths = _buffers.for_function(function)
+    results = [np.empty((rows, length // rows)) for length in lengths]
     kept = [np.ascontiguousarray(argument) for argument in arguments]
     for place, argument in enumerate(kept):
         buffer.set_arg(place, argument.data)

@@ -1,7 +1,7 @@
-"""The innermost loops in machine code, for those who have a C compiler and ask for it once.
+"""The innermost loops in machine code, where a C compiler is at hand.
 
-CasADi interprets its functions. What it writes of them in C does the same operations in the same order, so the results
-are the same to the last bit, and take a fifth of the time.
+CasADi interprets its functions. The C code it generates does the same operations in the same order, so the results
+are the same to the last bit, in a fifth of the time.
 """
 
 from __future__ import annotations
@@ -25,14 +25,17 @@ from ..files import write_whole
 
 # Contracting a product and a sum into one operation would round differently.
 _OPTIONS = ("-O2", "-ffp-contract=off", "-shared", "-fPIC")
-_PATIENCE = 120.0
+# [s] for one call of the compiler; it takes a few seconds on a slow machine.
+_COMPILER_TIMEOUT = 120.0
+# Random arguments for which a compiled function must agree with the interpreted one: operations in another order, or
+# another function in the place of one, show in nearly every trial.
 _TRIALS = 20
 
 
 def code_folder() -> Path:
     """Where compiled functions are kept: $XDG_CACHE_HOME/shapephase, or ~/.cache/shapephase.
 
-    Raises RuntimeError where nobody is at home.
+    Raises RuntimeError if the home directory cannot be determined.
     """
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     # A relative path is to be ignored: XDG Base Directory Specification.
@@ -43,7 +46,7 @@ def code_folder() -> Path:
 def compiled_or_interpreted(function: Any) -> Any:
     """The compiled twin of a CasADi function if there is one in `code_folder`, else the function itself.
 
-    Looked for once.
+    The folder is searched once for each function.
     """
     import casadi
 
@@ -51,7 +54,7 @@ def compiled_or_interpreted(function: Any) -> Any:
         if not code_folder().is_dir():
             return function
         library = _library(function.name(), _source(function))
-        # In a folder that others may write to, their code is not ours to run.
+        # Code written by another user is not run, even if the folder lets everyone write.
         if not library.is_file() or library.stat().st_uid not in (0, os.getuid()):
             return function
     except (OSError, RuntimeError):
@@ -84,73 +87,77 @@ def compile_functions(functions: list[Any]) -> list[Path]:
     try:
         folder = code_folder()
     except RuntimeError as error:
-        raise CompilerError(f"no place to keep what is compiled ({error}); name one in $XDG_CACHE_HOME") from error
+        raise CompilerError(
+            f"there is no folder for compiled functions ({error}); name one in $XDG_CACHE_HOME"
+        ) from error
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder) as workshop:
             for function in functions:
                 _compile(function, compiler, Path(workshop))
-            _try_all(compiler, workshop)
-            return [_kept(function, Path(workshop)) for function in functions]
+            _check_all(compiler, workshop)
+            return [_installed(function, Path(workshop)) for function in functions]
     except OSError as error:
-        raise CompilerError(f"{folder}: cannot be written to ({error}); $XDG_CACHE_HOME names another place") from error
+        raise CompilerError(
+            f"{folder}: cannot be written to ({error}); $XDG_CACHE_HOME names another folder"
+        ) from error
 
 
 def _compile(function: Any, compiler: list[str], workshop: Path) -> None:
-    """One function compiled, and kept as it is beside that."""
+    """Compile one function, and save the interpreted one beside it."""
     source, made = workshop / f"{function.name()}.c", workshop / f"{function.name()}.so"
     source.write_text(_source(function))
     function.save(str(workshop / f"{function.name()}.casadi"))
-    done = _ran([*compiler, *_OPTIONS, str(source), "-o", str(made), "-lm"], compiler)
+    done = _run([*compiler, *_OPTIONS, str(source), "-o", str(made), "-lm"], compiler)
     if done.returncode:
-        raise CompilerError(f"the compiler {compiler[0]} failed: {done.stderr.strip()[-500:] or 'it says nothing'}")
+        raise CompilerError(f"the compiler {compiler[0]} failed: {done.stderr.strip()[-500:] or 'it printed nothing'}")
 
 
-def _try_all(compiler: list[str], workshop: str) -> None:
-    """In a process of its own: code for "fast" mathematics changes how all of its process computes, once loaded."""
+def _check_all(compiler: list[str], workshop: str) -> None:
+    """Compare in a separate process: code for "fast" mathematics changes the arithmetic of a process that loads it."""
     trial = (
         "import sys; from shapephase.integrator.compilation import same_numbers; "
         "sys.exit(not same_numbers(sys.argv[1]))"
     )
-    done = _ran([sys.executable, "-c", trial, workshop], compiler)
+    done = _run([sys.executable, "-c", trial, workshop], compiler)
     if done.returncode:
         said = f" ({done.stderr.strip().splitlines()[-1][-300:]})" if done.stderr.strip() else ""
         words = " ".join(compiler)
-        raise CompilerError(f"what {words!r} makes of the steps gives other numbers{said}; name another in $CC")
+        raise CompilerError(f"the steps compiled by {words!r} give other numbers{said}; name another compiler in $CC")
 
 
 def same_numbers(workshop: str) -> bool:
-    """Whether all compiled functions in a folder do the same as the interpreted ones beside them, bit by bit."""
+    """Whether all compiled functions in a folder give the same as the interpreted ones beside them, bit by bit."""
     import casadi
 
     rng = np.random.default_rng(0)
-    for kept in sorted(Path(workshop).glob("*.casadi")):
-        function = casadi.Function.load(str(kept))
+    for saved in sorted(Path(workshop).glob("*.casadi")):
+        function = casadi.Function.load(str(saved))
         trials = [
             [rng.uniform(-1.0, 1.0, function.size_in(place)) for place in range(function.n_in())]
             for _ in range(_TRIALS)
         ]
-        wanted = [function.call(given) for given in trials]
-        twin = casadi.external(function.name(), str(kept.with_suffix(".so")))
-        for given, numbers in zip(trials, wanted, strict=True):
-            pairs = zip(numbers, twin.call(given), strict=True)
+        expected = [function.call(given) for given in trials]
+        compiled = casadi.external(function.name(), str(saved.with_suffix(".so")))
+        for given, numbers in zip(trials, expected, strict=True):
+            pairs = zip(numbers, compiled.call(given), strict=True)
             if not all(np.array_equal(np.array(a), np.array(b), equal_nan=True) for a, b in pairs):
                 return False
     smallest = np.array([5e-324])
     return bool((smallest * 1.0)[0] > 0.0)
 
 
-def _ran(command: list[str], compiler: list[str]) -> subprocess.CompletedProcess[str]:
+def _run(command: list[str], compiler: list[str]) -> subprocess.CompletedProcess[str]:
     try:
-        return subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, check=False)
+        return subprocess.run(command, capture_output=True, text=True, timeout=_COMPILER_TIMEOUT, check=False)
     except subprocess.TimeoutExpired:
         raise CompilerError(
-            f"compiling with {compiler[0]} took more than {_PATIENCE:g} s; $CC names another compiler"
+            f"compiling with {compiler[0]} took more than {_COMPILER_TIMEOUT:g} s; $CC names another compiler"
         ) from None
 
 
-def _kept(function: Any, workshop: Path) -> Path:
-    """What was compiled, in its place."""
+def _installed(function: Any, workshop: Path) -> Path:
+    """Move a compiled function to its place."""
     library = _library(function.name(), _source(function))
     write_whole(library, lambda stream: stream.write((workshop / f"{function.name()}.so").read_bytes()))
     return library
@@ -166,6 +173,6 @@ def _source(function: Any) -> str:
 
 
 def _library(name: str, source: str) -> Path:
-    """Where the compiled source belongs: another source, machine or system has another name."""
+    """The file of compiled source; its name depends on source, machine and system."""
     kind = f"{platform.system()} {platform.machine()} {' '.join(_OPTIONS)}\n"
     return code_folder() / f"{name}-{hashlib.sha256((kind + source).encode()).hexdigest()[:24]}.so"

@@ -1,16 +1,16 @@
-"""From sampled I^-1 and I^-1 L_o to rotations: the one integrator everybody uses.
+"""From sampled I^-1 and I^-1 L_o to rotations: the one integrator of the library.
 
 The deformation is sampled first (`sampling`), without regard to the rotation; then the attitude equation is
 stepped on the interpolant, as finely as the rotation needs. An embedded formula estimates each step's error, and the
-linearised equation, carried along, says how errors grow.
+linearised equation, integrated along with it, shows how errors grow.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,19 +18,36 @@ from .. import so3, sphere
 from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from .error_propagator import amplification, exact_propagators, momentum_slope
-from .interpolant import Interpolant, chebyshev, inside
-from .rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
+from ._error_propagator import amplification, exact_propagators, momentum_slope
+from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
+from ._step_control import StepRequirements, carried_over, finer
+from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest
+from .interpolant import Interpolant, chebyshev
 from .sampling import Sampler
-from .spectral_error import Evaluate
-from .step_control import StepRequirements, carried_over, finer
-from .step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest
 
 _EPS = np.finfo(float).eps
+# Steps of one motion: some ten seconds, and a gigabyte of results.
 _MOST_STEPS = 4_000_000
-_ROUNDS = 12
+# Rounds of refinement; most motions need one, and after twelve the error is at its floor.
+_MOST_ROUNDS = 12
+# Steps of one motion from which on propagators are not integrated along: the derivative of coarser steps costs less.
 _MANY_STEPS = 4000
-_BATCHED = (
+# Of the tolerance, for sampling at first: errors grow by a factor not yet known, and samples are cheaper than a second
+# round.
+_SAMPLING_SHARE = 0.05
+# The same without momentum, where errors do not grow.
+_SAMPLING_SHARE_AT_REST = 0.3
+# Of the tolerance, for the first plan of many momenta at once.
+_MARGIN_OF_MANY = 0.1
+# [rad] for a single step: it is far below rounding, and a stricter plan would only waste steps.
+_LEAST_STEP_TOLERANCE = 1e-18
+# Of the tolerance: Chebyshev degrees that the plan neglects.
+_INSIGNIFICANT_SHARE = 1e-3
+# [rad] sum of local errors up to which the propagators of the steps are trusted.
+_INFORMATIVE_ERROR = 1e-2
+# Of the tolerance: with more rounding than this no refinement reaches it.
+_MOST_ROUNDING = 0.9
+_BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
     "propagator",
 )  # fmt: skip
@@ -92,10 +109,10 @@ class SteppedRotation:
 
     @cached_property
     def rounding_error(self) -> Array:
-        """What rounding alone contributes: (B,) [rad]."""
+        """Error due to rounding alone: (B,) [rad]."""
         chords = self.quaternions[:, 1:] - self.quaternions[:, :-1]
         turned_by = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords)).sum(axis=1)
-        # The rate of turning itself is known to a few units of rounding only, which is felt as the body turns on.
+        # The rate of turning itself is known only to a few units of rounding; the error grows as the body turns on.
         committed = 8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + turned_by
         return _EPS * (self.amplification * committed + 4.0 * turned_by)
 
@@ -161,8 +178,8 @@ class SteppedRotation:
             step, _ = rest_step(stages[:, 6:])
             return _stacked(product(before, step)), np.zeros((*nothing.shape, 3)), nothing, nothing
         start = list(np.moveaxis(self.directions[:, index], -1, 0))
-        size = np.linalg.norm(self.momentum, axis=-1)[:, None]
-        end, turn, dynamic, _ = momentum_step(start, size, stages)
+        magnitude = np.linalg.norm(self.momentum, axis=-1)[:, None]
+        end, turn, dynamic, _ = momentum_step(start, magnitude, stages)
         half = 0.5 * turn
         there = turned(before, start, end, (np.sin(half), np.cos(half)))
         return _stacked(there), _stacked(end), turn, dynamic
@@ -202,70 +219,138 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     AccuracyNotReached
         If the estimate stays above the tolerance.
     """
-    sizes = np.sqrt((momentum * momentum).sum(axis=-1))
-    size = float(sizes.max(initial=0.0))
-    # Errors grow with momentum, nobody knows yet how much; samples are cheaper than a second attempt.
-    sampling_target = (0.05 if size > 0.0 else 0.3) * tolerance
-    steps: Integers | None = None
-    # Among many there are some that need more steps than most; a second attempt takes them all along.
-    ease = 1.0 if len(momentum) <= FEW else 0.1
-    known: tuple[Array, Array] | None = None
-    edges = np.empty(0)
-    rounds = 0
-    while True:
-        rounds += 1
-        sampler.refine(size, sampling_target)
-        interpolant = sampler.interpolant()
-        needs = StepRequirements.of(interpolant, size, tolerance)
-        # For each of many the derivative would take too long: steps so short that it is not needed.
-        short = needs.far and len(momentum) > FEW
-        least = needs.least_steps(short=short)
-        planned = needs.first_plan(ease * tolerance) if steps is None else carried_over(interpolant, edges, steps)
-        many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
-        if size > 0.0 and known is None and (many or (needs.far and not short)):
-            known = _growth_of_long(interpolant, momentum, sizes)
-            # So many steps, each in need of that much more accuracy.
-            share = 0.01 * planned.sum() * interpolant.loops * max(1.0, float(np.nan_to_num(known[0]).max()))
-            planned = needs.first_plan(max(tolerance / share, 1e-18))
-        steps = np.ceil(np.maximum(planned, least)).astype(int)
-        march = _run(interpolant, momentum, sizes, steps, with_growth=known is None)
-        local = needs.caution(steps) * march.errors
+    return _Integration(sampler, momentum, tolerance).solution()
+
+
+class _Growth(NamedTuple):
+    """How errors grow along the motions of a batch."""
+
+    amplification: Array  # (B,) from one time to a later one
+    propagator: Array  # (B, 3, 3) from the start to the end
+
+
+class _Attempt(NamedTuple):
+    """One round of steps with its error estimates."""
+
+    rotation: SteppedRotation
+    local_errors: Array  # (B, K) of each step [rad]
+
+    @property
+    def is_informative(self) -> bool:
+        """Whether it shows how errors grow; steps that are still far too long do not."""
+        small = self.local_errors.sum(axis=1).max() < _INFORMATIVE_ERROR
+        return bool(small and np.isfinite(self.rotation.amplification).all())
+
+    def panel_errors(self) -> Array:
+        """The sums of the local errors on each panel, the worst of all loops and momenta: (P,) [rad]."""
+        steps, loops = self.rotation.steps, self.rotation.interpolant.loops
+        by_loop = self.local_errors.reshape(len(self.local_errors), loops, -1).sum(axis=1)
+        return np.add.reduceat(by_loop, np.cumsum(steps) - steps, axis=1).max(axis=0)
+
+
+class _Integration:
+    """The attitude equation solved in rounds: sample, plan the steps, take them, estimate the error, refine."""
+
+    def __init__(self, sampler: Sampler, momentum: Array, tolerance: float) -> None:
+        self._sampler, self._momentum, self._tolerance = sampler, momentum, tolerance
+        self._magnitudes = np.sqrt((momentum * momentum).sum(axis=-1))
+        self._largest = float(self._magnitudes.max(initial=0.0))
+        share = _SAMPLING_SHARE if self._largest > 0.0 else _SAMPLING_SHARE_AT_REST
+        self._sampling_target = share * tolerance
+        # What earlier rounds found out: how errors grow where only the derivative shows it, and a finer plan.
+        self._growth: _Growth | None = None
+        self._refined: tuple[Array, Integers] | None = None  # panel ends [s], steps on each panel
+
+    def solution(self) -> SteppedRotation:
+        """The first attempt whose error estimate is within the tolerance for every momentum."""
+        number = 0
+        while True:
+            self._sampler.refine(self._largest, self._sampling_target)
+            attempt = self._attempt(self._sampler.interpolant())
+            if (attempt.rotation.error_estimate <= self._tolerance).all():
+                return _for_whole_batch(attempt.rotation, self._momentum)
+            steps = self._refine(attempt, number)
+            number += 1
+            if number == _MOST_ROUNDS or steps > _MOST_STEPS or self._is_hopeless(attempt):
+                raise _not_reached(self._tolerance, attempt.rotation)
+
+    def _attempt(self, interpolant: Interpolant) -> _Attempt:
+        """Steps as planned, and the error estimates of the result."""
+        requirements = StepRequirements.from_interpolant(interpolant, self._largest, self._tolerance)
+        steps = self._plan(interpolant, requirements)
+        record = self._take_steps(interpolant, steps)
+        local = requirements.safety_factor(steps) * record.errors
         total = local.sum(axis=1)
         if not np.isfinite(total).all():
+            # Steps so long that they overflowed: as wrong as an attitude can be.
             local = np.where(np.isfinite(local), local, np.pi)
             total = local.sum(axis=1)
-        growth, last = known or (amplification(march.growth), _last(march))
-        bound = SteppedRotation(
-            interpolant,
-            momentum,
-            steps,
-            march.quaternions,
-            march.directions,
-            march.turns,
-            march.dynamics,
-            growth * sampler.error(size),
-            # What the plan took for too small to be resolved counts too.
-            growth * total + 1e-3 * tolerance,
-            growth,
-            last,
+        growth = self._growth or _Growth(amplification(record.propagators), _end_propagator(record))
+        rotation = SteppedRotation(
+            interpolant=interpolant,
+            momentum=self._momentum,
+            steps=steps,
+            quaternions=record.quaternions,
+            directions=record.directions,
+            turns=record.turns,
+            dynamics=record.dynamics,
+            sampling_error=growth.amplification * self._sampler.error(self._largest),
+            # Degrees that the plan took for insignificant count too.
+            stepping_error=growth.amplification * total + _INSIGNIFICANT_SHARE * self._tolerance,
+            amplification=growth.amplification,
+            propagator=growth.propagator,
         )
-        if (bound.error_estimate <= tolerance).all():
-            return _for_all(bound, momentum)
-        # Steps that are still far too long tell nothing about how errors grow.
-        telling = total.max() < 1e-2 and bool(np.isfinite(growth).all())
-        worst = float(growth.max()) if telling else 1.0
+        return _Attempt(rotation, local)
+
+    def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> Integers:
+        """Steps on each panel: (P,). Finds the growth of errors first where the steps themselves will not show it."""
+        # The derivative for each of many momenta would take too long; with steps this short it is not needed.
+        short = requirements.far and len(self._momentum) > FEW
+        least = requirements.least_steps(short=short)
+        if self._refined is None:
+            # Among many momenta some need more steps than most, and a second round would repeat them all.
+            margin = 1.0 if len(self._momentum) <= FEW else _MARGIN_OF_MANY
+            planned = requirements.first_plan(margin * self._tolerance)
+        else:
+            planned = carried_over(interpolant, *self._refined)
+        many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
+        if self._largest > 0.0 and self._growth is None and (many or (requirements.far and not short)):
+            self._growth = _growth_by_derivative(interpolant, self._momentum, self._magnitudes)
+            # The errors of so many steps add up and are amplified: each must be that much smaller.
+            worst = float(np.nan_to_num(self._growth.amplification).max())
+            share = 0.01 * planned.sum() * interpolant.loops * max(1.0, worst)
+            planned = requirements.first_plan(max(self._tolerance / share, _LEAST_STEP_TOLERANCE))
+        return np.ceil(np.maximum(planned, least)).astype(int)
+
+    def _take_steps(self, interpolant: Interpolant, steps: Integers) -> StepRecord:
+        """All steps of all loops and momenta."""
+        channels = _stage_channels(interpolant, steps)
+        if not self._magnitudes.any():
+            return integrate_steps_at_rest(channels, interpolant.loops)
+        directions = _directions(self._momentum, self._magnitudes)
+        with_propagators = self._growth is None
+        return integrate_steps(
+            channels, directions, self._magnitudes, interpolant.loops, with_propagators=with_propagators
+        )
+
+    def _refine(self, attempt: _Attempt, number: int) -> int:
+        """Finer steps and samples for the next round, after round `number` from 0; the steps of all its loops."""
+        rotation = attempt.rotation
+        worst = float(rotation.amplification.max()) if attempt.is_informative else 1.0
+        left = max(self._tolerance - float(rotation.rounding_error.max()), 0.1 * self._tolerance)
         # Less in every round: where one of the errors is at its floor, the others must make room for it.
-        left = max(tolerance - float(bound.rounding_error.max()), 0.1 * tolerance)
-        room = 0.6 * 0.8 ** (rounds - 1) * left / worst
-        by_loop = local.reshape(len(local), interpolant.loops, -1).sum(axis=1)
-        sums = np.add.reduceat(by_loop, np.cumsum(steps) - steps, axis=1).max(axis=0)
-        if sums.sum() > room:
-            steps = finer(steps, sums, room)
-        sampling_target = min(sampling_target, 0.5 * room)
-        edges = interpolant.edges[: len(steps) + 1]
-        too_many = rounds == _ROUNDS or steps.sum() * interpolant.loops > _MOST_STEPS
-        if too_many or (telling and np.any(bound.rounding_error > 0.9 * tolerance)):
-            raise _not_reached(tolerance, bound)
+        budget = 0.6 * 0.8**number * left / worst
+        steps, errors = rotation.steps, attempt.panel_errors()
+        if errors.sum() > budget:
+            steps = finer(steps, errors, budget)
+        self._refined = rotation.interpolant.edges[: len(steps) + 1], steps
+        self._sampling_target = min(self._sampling_target, 0.5 * budget)
+        return int(steps.sum()) * rotation.interpolant.loops
+
+    def _is_hopeless(self, attempt: _Attempt) -> bool:
+        """Whether rounding alone takes up the tolerance."""
+        rounding = attempt.rotation.rounding_error
+        return attempt.is_informative and bool(np.any(rounding > _MOST_ROUNDING * self._tolerance))
 
 
 def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
@@ -277,54 +362,46 @@ def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
     )
 
 
-def _growth_of_long(interpolant: Interpolant, momentum: Array, sizes: Array) -> tuple[Array, Array]:
-    """Amplification (B,) and propagator (B, 3, 3) of many steps, by the derivative of coarse ones.
+def _growth_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> _Growth:
+    """How errors grow along a long motion, by the derivative of coarse steps.
 
-    What is but nearly right drifts off in the end.
+    Propagators that are only nearly right would drift off over many turns; the steps' own derivative does not.
     """
-    least = StepRequirements.of(interpolant, float(sizes.max()), LOOSEST_TOLERANCE).least_steps()
+    largest = float(magnitudes.max())
+    least = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE).least_steps()
     steps = np.ceil(np.maximum(least, 1.0)).astype(int)
-    channels, directions = _stage_channels(interpolant, steps), _directions(momentum, sizes)
-    amplified, last = np.empty(len(sizes)), np.empty((len(sizes), 3, 3))
+    channels, directions = _stage_channels(interpolant, steps), _directions(momentum, magnitudes)
+    growth = _Growth(np.empty(len(magnitudes)), np.empty((len(magnitudes), 3, 3)))
     with np.errstate(all="ignore"):
-        for row in range(len(sizes)):
+        for row in range(len(magnitudes)):
             part = slice(row, row + 1)
-            growth = exact_propagators(channels, directions[part], sizes[part], interpolant.loops)
-            amplified[part], last[part] = amplification(growth), growth[:, -1]
-    return amplified, last
+            propagators = exact_propagators(channels, directions[part], magnitudes[part], interpolant.loops)
+            growth.amplification[part] = amplification(propagators)
+            growth.propagator[part] = propagators[:, -1]
+    return growth
 
 
-def _last(march: StepRecord) -> Array:
-    """How a small turn of the start reaches the end."""
-    if march.growth.shape[1]:
-        return march.growth[:, -1]
-    return so3.transpose(so3.matrix_from_quat(march.quaternions[:, -1]))
+def _end_propagator(record: StepRecord) -> Array:
+    """How a small turn of the start reaches the end: (B, 3, 3)."""
+    if record.propagators.shape[1]:
+        return record.propagators[:, -1]
+    return so3.transpose(so3.matrix_from_quat(record.quaternions[:, -1]))
 
 
-def _run(
-    interpolant: Interpolant, momentum: Array, sizes: Array, steps: Integers, *, with_growth: bool = True
-) -> StepRecord:
-    """All steps."""
-    channels = _stage_channels(interpolant, steps)
-    if not sizes.any():
-        return integrate_steps_at_rest(channels, interpolant.loops)
-    return integrate_steps(channels, _directions(momentum, sizes), sizes, interpolant.loops, with_growth=with_growth)
-
-
-def _directions(momentum: Array, sizes: Array) -> Array:
-    """Pi/|Pi|; of a motion without momentum among others with it any direction shows the rotation."""
-    moving = sizes > 0.0
+def _directions(momentum: Array, magnitudes: Array) -> Array:
+    """Pi/|Pi|; for a motion without momentum in a batch with it any direction shows the rotation."""
+    moving = magnitudes > 0.0
     if moving.all():
-        return momentum / sizes[:, None]
-    return np.where(moving[:, None], momentum, [0.0, 0.0, 1.0]) / np.where(moving, sizes, 1.0)[:, None]
+        return momentum / magnitudes[:, None]
+    return np.where(moving[:, None], momentum, [0.0, 0.0, 1.0]) / np.where(moving, magnitudes, 1.0)[:, None]
 
 
-def _for_all(solution: SteppedRotation, momentum: Array) -> SteppedRotation:
-    """The one solution of zero momentum shared by the whole batch."""
+def _for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotation:
+    """The solution with one row for each momentum; without momentum all share the only one."""
     count = len(momentum)
     if len(solution.quaternions) == count:
         return solution
-    shared = {name: getattr(solution, name) for name in _BATCHED}
+    shared = {name: getattr(solution, name) for name in _BATCHED_FIELDS}
     return replace(solution, **{name: np.broadcast_to(v, (count, *v.shape[1:])) for name, v in shared.items()})
 
 
@@ -353,49 +430,3 @@ def _stage_matrix(degree_count: int, count: int) -> Array:
     _, _, c = tableau()
     x = 2.0 * (np.arange(count)[:, None] + c) / count - 1.0
     return chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(STAGES * count, degree_count) / count
-
-
-def dop853_rotation(
-    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float
-) -> tuple[Callable[[Array], Array], int]:
-    """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks: the independent check.
-
-    Every stage evaluates the deformation itself; nothing of this module's interpolation or stepping is used.
-
-    Returns
-    -------
-    dense : times (N,) -> quaternions (N, 4)
-    evaluations : of I and L_o
-    """
-    from scipy.integrate import solve_ivp
-
-    inner = inside(breaks[:-1], breaks[1:])
-
-    def slope(t: float, q: Array, left: float, right: float) -> Array:
-        inertia, internal = evaluate(np.array([min(max(t, left), right)]))
-        unit = so3.normalised(q)
-        omega = np.linalg.solve(inertia[0], so3.matrix_from_quat(unit).T @ momentum - internal[0])
-        vector, scalar = q[:3], q[3]
-        return 0.5 * np.append(scalar * omega + np.cross(vector, omega), -vector @ omega)
-
-    quaternion, pieces, evaluations = np.array([0.0, 0.0, 0.0, 1.0]), [], 0
-    for a, b, left, right in zip(breaks[:-1], breaks[1:], *inner, strict=True):
-        run = solve_ivp(
-            slope, (a, b), quaternion, "DOP853", dense_output=True, rtol=max(tolerance, 3e-14), atol=1e-2 * tolerance,
-            args=(left, right),
-        )  # fmt: skip
-        if not run.success:
-            raise AccuracyNotReached(f"DOP853 stopped at t = {run.t[-1]:.9g} s: {run.message}")
-        pieces.append(run.sol)
-        evaluations += run.nfev
-        quaternion = so3.normalised(run.y[:, -1])
-
-    def dense(t: Array) -> Array:
-        piece = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, len(pieces) - 1)
-        values = np.empty((len(t), 4))
-        for number in np.unique(piece):
-            rows = piece == number
-            values[rows] = pieces[number](t[rows]).T
-        return so3.normalised(values)
-
-    return dense, evaluations

@@ -21,7 +21,7 @@ class Interpolant:
     edges : (loops P + 1,) panel ends [s]
     coefficients : (P, n, 9), padded with zeros to one degree; channels xx yy zz yz xz xy of I^-1, then I^-1 L_o;
         the P panels of the first loop serve every loop
-    loops : how often the panels are gone through
+    loops : how often the panels are repeated
     evaluations : how many times the deformation was evaluated
     """
 

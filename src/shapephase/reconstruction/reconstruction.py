@@ -18,7 +18,8 @@ from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import SteppedRotation, dop853_rotation, stepped_rotation
+from ..integrator.dop853 import dop853_rotation
+from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.interpolant import Interpolant
 from .closed_form import rigid_rotation
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table

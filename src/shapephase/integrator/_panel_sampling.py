@@ -10,16 +10,21 @@ import numpy as np
 
 from ..arrays import Array, Integers, Mask
 from ..errors import AccuracyNotReached
+from ._spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_norms
 from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
-from .spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_sizes
 
-# Degrees to begin with, by tolerance, on many panels and on a few.
+# Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
 _FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
-_HALF_DEGREE, _LAST_DEGREE = 10, 80
+# Of both halves of a bisected panel: enough to see how fast the spectrum decays.
+_HALF_DEGREE = 10
+# The highest of a panel; bisecting needs fewer samples than a higher degree.
+_HIGHEST_DEGREE = 80
+# Panels before bisecting ends, besides 40 for every break: a motion that needs more is rough, not merely long.
 _MOST_PANELS = 4000
+# Of a panel, relative to the interval: narrower ones would consist of rounding.
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
-_BETWEEN = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
+_TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +35,8 @@ class _Group:
     left: Array
     right: Array
     values: Array  # (G, degree + 1, 9) at the ascending Chebyshev points
-    gaps: Array  # (G, 2) errors seen between the nodes; NaN: not looked for
-    judgement: SpectralEstimate
+    gaps: Array  # (G, 2) errors seen between the nodes; NaN: not checked
+    estimate: SpectralEstimate
 
     @property
     def width(self) -> Array:
@@ -43,23 +48,18 @@ class _Group:
 
 def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
     rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
-    judgement = estimate_spectrum(spectral_sizes(values_to_coefficients(degree) @ values), rounding)
+    estimate = estimate_spectrum(spectral_norms(values_to_coefficients(degree) @ values), rounding)
     if gaps is None:
-        return _Group(degree, left, right, values, np.full((len(left), 2), np.nan), judgement)
+        gaps = np.full((len(left), 2), np.nan)
     seen = ~np.isnan(gaps[:, 0])
-    return _Group(
-        degree,
-        left,
-        right,
-        values,
-        gaps,
-        judgement.raised(2.0 * np.nan_to_num(gaps), seen) if seen.any() else judgement,
-    )
+    if seen.any():
+        estimate = estimate.raised_to(2.0 * np.nan_to_num(gaps), seen)
+    return _Group(degree=degree, left=left, right=right, values=values, gaps=gaps, estimate=estimate)
 
 
 @dataclass(frozen=True, eq=False)
-class _Wanted:
-    """Panels to be sampled at a degree; `known` are the values of a lower degree that divides it."""
+class _PanelsToSample:
+    """Panels to be sampled at a degree; `known` are the values at a lower degree that divides it."""
 
     degree: int
     left: Array
@@ -106,46 +106,48 @@ class PanelSampler:
 
     def __init__(
         self,
-        asked: Channels,
+        channels: Channels,
         breaks: Array,
         loops: int,
         oscillations: float | None,
         probe: Callable[[Array], Array] | None,
     ) -> None:
-        self._asked, self._probe, self._loops = asked, probe, loops
-        self._known = oscillations is not None
+        self._channels, self._probe, self._loops = channels, probe, loops
+        self._is_bandlimited = oscillations is not None
         self._span = float(breaks[-1] - breaks[0])
-        self._most = _MOST_PANELS + 40 * len(breaks)
+        self._most_panels = _MOST_PANELS + 40 * len(breaks)
         pieces = 4 if oscillations is None else max(1, int(np.ceil(oscillations / 2.0)))
         ends = [np.linspace(left, right, pieces + 1) for left, right in pairwise(breaks)]
         self._left, self._right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
-        self._still = oscillations == 0.0
+        self._at_rest = oscillations == 0.0
         self._groups: dict[int, _Group] = {}
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
         if not self._groups:
             of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
-            still = self._standing()
-            parts = ((0, still), (of_many if len(self._left) > 4 else of_few, ~still))
-            self._add([_Wanted(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()])
+            at_rest = self._panels_at_rest()
+            parts = ((0, at_rest), (of_many if len(self._left) > 4 else of_few, ~at_rest))
+            self._add(
+                [_PanelsToSample(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()]
+            )
         while True:
-            errors = {d: g.judgement.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
+            errors = {d: g.estimate.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
             total = self._loops * sum(float(e.sum()) for e in errors.values())
             if total <= tolerance:
-                if self._known or not self._look_between():
+                if self._is_bandlimited or not self._check_between_nodes():
                     return
                 continue
             share = tolerance / (self._span * self._loops)
-            rough = {d: (errors[d] > share * g.width) & ~g.judgement.at_rounding for d, g in self._groups.items()}
+            rough = {d: (errors[d] > share * g.width) & ~g.estimate.at_rounding for d, g in self._groups.items()}
             if not any(rows.any() for rows in rough.values()):
                 return
-            self._sharpen(rough, errors, tolerance, total)
+            self._refine_panels(rough, errors, tolerance, total)
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
         return self._loops * sum(
-            float(g.judgement.error(momentum, g.width, 2.0 * d).sum()) for d, g in self._groups.items()
+            float(g.estimate.error(momentum, g.width, 2.0 * d).sum()) for d, g in self._groups.items()
         )
 
     def interpolant(self) -> Interpolant:
@@ -163,67 +165,67 @@ class PanelSampler:
         if self._loops > 1:
             starts = edges[-1] * np.arange(self._loops)
             edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
-        return Interpolant(edges, coefficients[order], self._loops, self._asked.count)
+        return Interpolant(edges, coefficients[order], self._loops, self._channels.count)
 
-    def _sharpen(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
+    def _refine_panels(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
-        wanted: list[_Wanted] = []
-        crowded = self._panel_count > self._most
+        to_sample: list[_PanelsToSample] = []
+        too_many = self._panel_count > self._most_panels
         for degree, rows in rough.items():
             if not rows.any():
                 continue
             g = self._groups.pop(degree)
             share = tolerance / (self._span * self._loops) * g.width
             with np.errstate(divide="ignore", invalid="ignore"):
-                missing = np.log(np.maximum(errors[degree] / share, 1.0)) / g.judgement.decay
-            # A panel without a decay that is still small enough was found wanting between its nodes.
+                missing = np.log(np.maximum(errors[degree] / share, 1.0)) / g.estimate.decay
+            # Without any missing degrees, the error was seen between the nodes: the degree is doubled.
             factor = np.clip(np.ceil(np.nan_to_num(missing, nan=0.0, posinf=9.9 * degree) / degree + 0.9), 2, 4)
-            factor[(missing > 3.1 * degree) | (factor * degree > _LAST_DEGREE)] = 0
+            factor[(missing > 3.1 * degree) | (factor * degree > _HIGHEST_DEGREE)] = 0
             halves = rows & (factor == 0)
-            if (g.width[halves] < _LEAST_WIDTH * self._span).any() or (crowded and halves.any()):
+            if (g.width[halves] < _LEAST_WIDTH * self._span).any() or (too_many and halves.any()):
                 where = float(g.left[halves][np.argmin(g.width[halves])])
                 raise AccuracyNotReached(
-                    f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left where "
-                    f"{tolerance:.3g} was asked; declare the times of its jumps as breaks, smooth the data, or loosen "
-                    "the tolerance"
+                    f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
+                    f"{tolerance:.3g} was requested; declare the times of its jumps as breaks, smooth the data, or "
+                    "loosen the tolerance"
                 )
             if not rows.all():
                 self._groups[degree] = g.kept(~rows)
             for times in (2, 3, 4):
                 grows = rows & (factor == times)
                 if grows.any():
-                    wanted.append(_Wanted(times * degree, g.left[grows], g.right[grows], g.values[grows]))
+                    to_sample.append(_PanelsToSample(times * degree, g.left[grows], g.right[grows], g.values[grows]))
             if halves.any():
                 left, right = g.left[halves], g.right[halves]
                 middle = 0.5 * (left + right)
                 ends = np.concatenate([left, middle]), np.concatenate([middle, right])
-                wanted.append(_Wanted(_HALF_DEGREE, *ends, None))
-        self._add(wanted)
+                to_sample.append(_PanelsToSample(_HALF_DEGREE, *ends, None))
+        self._add(to_sample)
 
-    def _standing(self) -> Mask:
-        """Panels on which nothing moves: one sample each will do."""
-        standing = np.full(len(self._left), self._still)
-        if self._still or self._probe is None:
-            return standing
-        for fractions in (_BETWEEN[31:32], _BETWEEN):
-            rows = np.flatnonzero(~standing) if len(fractions) == 1 else np.flatnonzero(standing)
+    def _panels_at_rest(self) -> Mask:
+        """Panels on which nothing moves: one sample each is enough."""
+        at_rest = np.full(len(self._left), self._at_rest)
+        if self._at_rest or self._probe is None:
+            return at_rest
+        for fractions in (_TEST_FRACTIONS[31:32], _TEST_FRACTIONS):
+            rows = np.flatnonzero(~at_rest) if len(fractions) == 1 else np.flatnonzero(at_rest)
             times = self._left[rows, None] + (self._right - self._left)[rows, None] * fractions
             seen = self._probe(times.ravel()).reshape(len(rows), len(fractions), -1)
-            standing[rows] = ~seen[:, :, seen.shape[-1] // 2 :].any(axis=(1, 2))
-            if not standing.any():
+            at_rest[rows] = ~seen[:, :, seen.shape[-1] // 2 :].any(axis=(1, 2))
+            if not at_rest.any():
                 break
-        return standing
+        return at_rest
 
     @property
     def _panel_count(self) -> int:
         return sum(len(g.left) for g in self._groups.values())
 
-    def _add(self, wanted: list[_Wanted]) -> None:
+    def _add(self, to_sample: list[_PanelsToSample]) -> None:
         """Sample new panels, and those whose degree is raised; one call for all points."""
-        times = [panels.new_points() for panels in wanted]
-        values = self._asked(np.concatenate([t.ravel() for t in times]))
+        times = [panels.new_points() for panels in to_sample]
+        values = self._channels(np.concatenate([t.ravel() for t in times]))
         start = 0
-        for panels, points in zip(wanted, times, strict=True):
+        for panels, points in zip(to_sample, times, strict=True):
             whole = panels.with_values(values[start : start + points.size].reshape(*points.shape, 9))
             start += points.size
             left, right, gaps = panels.left, panels.right, None
@@ -232,11 +234,11 @@ class PanelSampler:
                 gaps = np.concatenate([g.gaps, np.full((len(left), 2), np.nan)])
                 left, right = np.concatenate([g.left, left]), np.concatenate([g.right, right])
                 whole = np.concatenate([g.values, whole])
-            gaps = None if self._known else gaps
+            gaps = None if self._is_bandlimited else gaps
             self._groups[panels.degree] = _group(panels.degree, left, right, whole, gaps)
 
-    def _look_between(self) -> bool:
-        """Look at new panels of a black box between their nodes; errors seen there count. False: nothing was new."""
+    def _check_between_nodes(self) -> bool:
+        """Compare new panels of a black box with samples between their nodes. False: no panel was new."""
         found = False
         for degree, g in list(self._groups.items()):
             rows = np.flatnonzero(np.isnan(g.gaps[:, 0]))
@@ -246,24 +248,24 @@ class PanelSampler:
             points = self._suspicious_points(g, rows)
             there = chebyshev(2.0 * points - 1.0, degree + 1) @ values_to_coefficients(degree)
             between = g.left[rows, None] + g.width[rows, None] * points
-            truth = self._asked(between.ravel()).reshape(*points.shape, 9)
+            truth = self._channels(between.ravel()).reshape(*points.shape, 9)
             gaps = g.gaps.copy()
-            gaps[rows] = spectral_sizes(there @ g.values[rows] - truth).max(axis=1)
+            gaps[rows] = spectral_norms(there @ g.values[rows] - truth).max(axis=1)
             self._groups[degree] = _group(degree, g.left, g.right, g.values, gaps)
         return found
 
     def _suspicious_points(self, g: _Group, rows: Integers) -> Array:
-        """Where in its panels (in [0, 1]) the probe is farthest from its own interpolant: (R, k)."""
+        """Where in the panels (in [0, 1]) the probe is farthest from its own interpolant: (R, k)."""
         if self._probe is None:
-            return np.broadcast_to(_BETWEEN[::16], (len(rows), 4))
-        there = chebyshev(2.0 * _BETWEEN - 1.0, g.degree + 1) @ values_to_coefficients(g.degree)
+            return np.broadcast_to(_TEST_FRACTIONS[::16], (len(rows), 4))
+        there = chebyshev(2.0 * _TEST_FRACTIONS - 1.0, g.degree + 1) @ values_to_coefficients(g.degree)
         nodes = _nodes_in(*inside(g.left[rows], g.right[rows]), g.degree)
-        between = g.left[rows, None] + g.width[rows, None] * _BETWEEN
+        between = g.left[rows, None] + g.width[rows, None] * _TEST_FRACTIONS
         seen, truth = (self._probe(t.ravel()).reshape(*t.shape, -1) for t in (nodes, between))
         gap = np.abs(there @ seen - truth)
         half = gap.shape[-1] // 2
         worst = [np.argmax(part.max(axis=-1), axis=1) for part in (gap[..., :half], gap[..., half:])]
-        return _BETWEEN[np.stack(worst, axis=-1)]
+        return _TEST_FRACTIONS[np.stack(worst, axis=-1)]
 
 
 def _nodes_in(left: Array, right: Array, degree: int) -> Array:

@@ -17,6 +17,7 @@ from ..arrays import Array
 
 Scalars = Any  # numbers, arrays or symbols, one for each component
 STAGES = 12
+# Keeps the ratio of two estimates defined where both are zero; its square root is far below any turn [rad^2].
 _TINY = 1e-200
 
 
@@ -36,13 +37,13 @@ def _differences() -> tuple[Array, Array]:
     return DOP853.E5[:STAGES], DOP853.E3[:STAGES]
 
 
-def momentum_step(direction: Scalars, size: Any, channels: Scalars) -> tuple[list[Any], Any, Any, list[Any]]:
+def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tuple[list[Any], Any, Any, list[Any]]:
     """A step with momentum.
 
     Parameters
     ----------
     direction : three components of the unit vector Pi/|Pi| at the start of the step; numbers, arrays or symbols
-    size : of the momentum [kg m^2/s]
+    magnitude : of the momentum [kg m^2/s]
     channels : for each of the 12 stage times the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
         entries
 
@@ -60,7 +61,7 @@ def momentum_step(direction: Scalars, size: Any, channels: Scalars) -> tuple[lis
     dynamics: list[list[Any]] = []
     for stage in range(STAGES):
         p = _combination(direction, a[stage, :stage], slopes)
-        omega = turn_rate([size * component for component in p], channels[stage])
+        omega = turn_rate([magnitude * component for component in p], channels[stage])
         slopes.append(_cross(p, omega))
         if b[stage] == 0.0 and fifth[stage] == 0.0 and third[stage] == 0.0:
             turns.append([0.0])
@@ -161,7 +162,7 @@ def turn_rate(momentum: Scalars, channels: Scalars) -> list[Any]:
 def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
     """The matrix M of delta' = M delta for an error delta of the attitude, S exp(hat(delta)).
 
-    M = I^-1 hat(Pi) - hat(omega), scaled as the channels are (numerics.md section 1).
+    M = I^-1 hat(Pi) - hat(omega), scaled as the channels are.
     """
     p, q, r = momentum
     xx, yy, zz, yz, xz, xy, *_ = channels
@@ -174,7 +175,7 @@ def variation(momentum: Scalars, channels: Scalars) -> list[list[Any]]:
 
 
 def unit(vector: Scalars) -> list[Any]:
-    """A vector made one of length one."""
+    """A vector scaled to length one."""
     scale = 1.0 / _dot(vector, vector) ** 0.5
     return [component * scale for component in vector]
 

@@ -8,42 +8,46 @@ from math import ceil, inf, log, pi
 import numpy as np
 
 from ..arrays import Array, Integers
+from ._spectral_error import EPS, Channels, estimate_tail, fourier_norms, unaveraged_share
 from .interpolant import Interpolant, unit_nodes, values_to_coefficients
-from .spectral_error import EPS, Channels, Tail, averaged, fourier_sizes
 
-_LAST_EVEN = 768
-# Samples to begin with for every four harmonics, by tolerance: what most bodies need, since a second helping costs as
-# much as thirty samples more.
-_HARMONICS = 4
+# Samples of a loop, beyond which panels need fewer.
+_MOST_SAMPLES = 768
+# Tolerance [rad] from which on, and the samples to begin with for every `_HARMONICS` harmonics: what most bodies need,
+# since a second round costs as much as thirty samples more.
 _FIRST_COUNTS = ((1e-8, 64), (1e-11, 96), (0.0, 128))
-_EVEN_A_PANEL, _PANEL_DEGREE = 16, 32
+_HARMONICS = 4
+# Samples of the loop on each panel of the interpolant.
+_SAMPLES_A_PANEL = 16
+# Of the interpolant's panels: a Fourier series resolved by 16 samples is a Chebyshev series of this degree to rounding.
+_PANEL_DEGREE = 32
 
 
 class EvenSampler:
     """Samples a smooth loop at even times; each new count is two, three or four times the last."""
 
-    def __init__(self, asked: Channels, period: float, loops: int, oscillations: float) -> None:
-        self._asked, self._period, self._loops, self._oscillations = asked, period, loops, oscillations
+    def __init__(self, channels: Channels, period: float, loops: int, oscillations: float) -> None:
+        self._channels, self._period, self._loops, self._oscillations = channels, period, loops, oscillations
         self._values = np.empty((0, 9))
 
     def refine(self, momentum: float, tolerance: float) -> bool:
         """As `Sampler.refine`; False where that would take too many samples."""
         if not len(self._values):
             count = self._first_count(tolerance)
-            self._judge(self._asked(self._times(np.arange(count), count)))
+            self._take(self._channels(self._times(np.arange(count), count)))
         while (error := self.error(momentum)) > tolerance and not self._at_rounding:
             count = len(self._values)
             missing = log(error / tolerance) / self._decay if self._decay > 0.0 else inf
             # Twice, three or four times as many samples, whichever is enough for this decay.
             factor = 2 if missing <= 0.55 * count else 3 if missing <= 1.1 * count else 4
-            if factor * count > _LAST_EVEN:
+            if factor * count > _MOST_SAMPLES:
                 return self._decay == inf
             index = np.arange(factor * count)
             fresh = index[index % factor != 0]
             values = np.empty((factor * count, 9))
             values[::factor] = self._values
-            values[fresh] = self._asked(self._times(fresh, factor * count))
-            self._judge(values)
+            values[fresh] = self._channels(self._times(fresh, factor * count))
+            self._take(values)
         return True
 
     def _first_count(self, tolerance: float) -> int:
@@ -55,29 +59,29 @@ class EvenSampler:
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
         inverse, drift = self._tails
-        turn = self._period * (momentum * inverse.top + drift.top)
-        share = averaged(inverse.converging and drift.converging, pi * len(self._values), turn)
+        turn = self._period * (momentum * inverse.largest + drift.largest)
+        share = unaveraged_share(inverse.converging and drift.converging, pi * len(self._values), turn)
         return self._loops * 0.5 * self._period * (momentum * inverse.error + drift.error) * share
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
         count = len(self._values)
-        panels = max(1, count // _EVEN_A_PANEL)
+        panels = max(1, count // _SAMPLES_A_PANEL)
         degree = _PANEL_DEGREE if count > 1 else 0
-        # Panels differ only in where their samples begin: twice round, each finds its own in one piece.
-        twice = np.concatenate([self._values, self._values])
-        row, number = twice.strides
-        begun = np.ndarray((panels, count, 9), buffer=twice, strides=(count // panels * row, row, number))
+        # Panels differ only in where their samples begin: in two copies of the loop each finds its own contiguous.
+        two_loops = np.concatenate([self._values, self._values])
+        row, number = two_loops.strides
+        from_each = np.ndarray((panels, count, 9), buffer=two_loops, strides=(count // panels * row, row, number))
         edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
         edges[-1] = self._period * self._loops
-        return Interpolant(edges, _even_to_panel(count, panels, degree) @ begun, self._loops, self._asked.count)
+        return Interpolant(edges, _even_to_panel(count, panels, degree) @ from_each, self._loops, self._channels.count)
 
     def _times(self, index: Integers, count: int) -> Array:
         return (self._period / count) * index.astype(np.float64)
 
-    def _judge(self, values: Array) -> None:
+    def _take(self, values: Array) -> None:
         self._values = values
-        self._tails = [Tail.of(sizes, 2.0 * pi * EPS) for sizes in fourier_sizes(values)]
+        self._tails = [estimate_tail(norms, 2.0 * pi * EPS) for norms in fourier_norms(values)]
 
     @property
     def _decay(self) -> float:

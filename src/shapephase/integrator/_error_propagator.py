@@ -1,4 +1,4 @@
-"""How small changes of the start grow along a motion: the derivative of the steps themselves."""
+"""Error propagators: how small changes of the start grow along a motion, by the derivative of the steps."""
 
 from __future__ import annotations
 
@@ -9,65 +9,66 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ._rotation_step import STAGES, attitude_step
+from ._step_loop import BLOCK, adjugate_of, matrix_product, momentum_step_function
 from .casadi_calls import call_casadi, map_rows
 from .compilation import compiled_or_interpreted
-from .rotation_step import STAGES, attitude_step
-from .step_loop import BLOCK, adjugate_of, matrix_product, momentum_step_function
 
+# Times between which the growth of errors is compared: 28 pairs.
 CHECKPOINTS = 8
 
 
-def amplification(growth: Array) -> Array:
-    """Largest growth of an error from one time to a later one, from the growth matrices: (B, K + 1, 3, 3) -> (B,).
+def amplification(propagators: Array) -> Array:
+    """Largest growth of an error from one time to a later one, from error propagators: (B, K + 1, 3, 3) -> (B,).
 
     Between eight times. A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
     values as s, 1, 1/s, the sum of their squares gives the largest.
     """
-    count = growth.shape[1]
+    count = propagators.shape[1]
     if count == 0:
         return np.ones(1)
-    chosen = growth[:, np.arange(CHECKPOINTS) * (count - 1) // (CHECKPOINTS - 1)].reshape(len(growth), -1)
-    largest = map_rows(largest_growth, 9 * CHECKPOINTS, chosen)[:, 0]
-    # Where steps were so long that they overflowed, nothing is known.
+    chosen = propagators[:, np.arange(CHECKPOINTS) * (count - 1) // (CHECKPOINTS - 1)].reshape(len(propagators), -1)
+    largest = map_rows(largest_amplification, 9 * CHECKPOINTS, chosen)[:, 0]
+    # Where steps were so long that they overflowed, the growth is unknown.
     return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
 
 
-def largest_growth(entries: Any) -> list[Any]:
-    """From the growth matrices at the checkpoints, row by row."""
+def largest_amplification(entries: Any) -> list[Any]:
+    """From the nine entries of the propagator at each checkpoint, row by row."""
     import casadi
 
     matrices = [[entries[9 * k + 3 * i : 9 * k + 3 * i + 3] for i in range(3)] for k in range(CHECKPOINTS)]
-    rest: Any = 1.0
+    largest: Any = 1.0
     for later in range(1, CHECKPOINTS):
         for earlier in range(later):
             between = matrix_product(matrices[later], adjugate_of(matrices[earlier])) if earlier else matrices[later]
             squares = sum(entry * entry for row in between for entry in row)
-            rest = casadi.fmax(rest, 0.5 * (squares - 1.0))
-    return [(rest + (rest * rest - 1.0) ** 0.5) ** 0.5]
+            largest = casadi.fmax(largest, 0.5 * (squares - 1.0))
+    return [(largest + (largest * largest - 1.0) ** 0.5) ** 0.5]
 
 
-def exact_propagators(channels: Array, directions: Array, sizes: Array, loops: int) -> Array:
-    """Growth matrices at the step ends: (B, K + 1, 3, 3). Parameters as `march.integrate_steps`.
+def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loops: int) -> Array:
+    """Error propagators at the step ends: (B, K + 1, 3, 3). Parameters as `integrate_steps`.
 
     A turn delta of the start is carried over as S^T delta, and changes the momentum's direction by p x delta.
     """
-    growth = np.empty((len(sizes), loops * len(channels) + 1, 3, 3))
-    growth[:, 0] = np.eye(3)
-    for row, (direction, size) in enumerate(zip(directions, sizes, strict=True)):
+    propagators = np.empty((len(magnitudes), loops * len(channels) + 1, 3, 3))
+    propagators[:, 0] = np.eye(3)
+    for row, (direction, magnitude) in enumerate(zip(directions, magnitudes, strict=True)):
         first = so3.perpendicular(direction)
         basis = np.stack([first, np.cross(direction, first)])
         seeds = np.zeros((2, 8))
         seeds[:, :3] = np.cross(direction, basis)
-        for place, quaternions, slopes in _derivatives(channels, direction, float(size), loops, seeds):
+        for place, quaternions, slopes in _derivatives(channels, direction, float(magnitude), loops, seeds):
             rotation = so3.transpose(so3.matrix_from_quat(quaternions))
-            growth[row, place] = rotation + so3.transpose(slopes) @ basis
-    return growth
+            propagators[row, place] = rotation + so3.transpose(slopes) @ basis
+    return propagators
 
 
 def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
     """The turn of the end, body axes, by a change of Pi at the start: (B, 3, 3) for Pi (B, 3), zero or not.
 
-    Here the steps are taken on the quaternion itself: with hardly any momentum its direction tells nothing any more.
+    Here the steps are taken on the quaternion itself: the direction of a momentum near zero is lost in rounding.
     """
     count = len(channels)
     result = np.empty((len(momenta), 3, 3))
@@ -82,13 +83,13 @@ def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
     return result
 
 
-def _derivatives(channels: Array, direction: Array, size: float, loops: int, seeds: Array) -> Any:
-    """Block by block: where it stands, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after its steps.
+def _derivatives(channels: Array, direction: Array, magnitude: float, loops: int, seeds: Array) -> Any:
+    """Block by block: its rows, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after its steps.
 
-    `seeds` (s, 8) are changes of direction, quaternion and size at the start.
+    `seeds` (s, 8) are changes of direction, quaternion and magnitude at the start.
     """
     count, columns = len(channels), len(seeds)
-    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0, size], seeds.ravel()])
+    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0, magnitude], seeds.ravel()])
     done = 0
     for _ in range(loops):
         for first in range(0, count, BLOCK):

@@ -1,0 +1,199 @@
+"""The channels of a deformation, and error estimates from the tails of their spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import expm1, inf, isfinite, log
+from operator import mul
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arrays import Array, Mask
+from ..errors import ShapeError
+from ..inertia_tensor import inverse_inertia
+from .casadi_calls import map_rows
+
+Evaluate = Callable[[Array], tuple[Array, Array]]
+
+EPS = float(np.finfo(float).eps)
+# Rounding of a coefficient, relative to the largest: samples are right to some ten units, and their sums to thirty.
+_ROUNDING = 30.0 * EPS
+# Keeps quotients and logarithms of coefficients defined where these are zero.
+_TINY = 1e-300
+# Chebyshev degrees still missing beyond the tail of at most this part of the spectrum's middle count as convergence.
+_CONVERGED_TAIL = 1e-2
+# Of the floor: what a spectrum's estimate is at least, since tails can be small by chance.
+_LEAST_OF_FLOOR = 0.02
+# [rad] phase of the missing terms, beyond the body's turn, over which they do not average out.
+_UNAVERAGED_PHASE = 8.0
+_VOIGT = np.array([0, 4, 8, 5, 2, 1])
+# Off-diagonal channels stand for two entries of I^-1.
+_SQUARES = np.array([[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T
+_SQUARES_OF_PAIRS = np.repeat(_SQUARES, 2, axis=0)
+
+
+class Channels:
+    """The deformation as channels, with a count of its evaluations."""
+
+    def __init__(self, evaluate: Evaluate) -> None:
+        self._evaluate = evaluate
+        self.count = 0
+
+    def __call__(self, times: Array) -> Array:
+        """I^-1 (xx yy zz yz xz xy) and I^-1 L_o: (N,) -> (N, 9)."""
+        inertia, momentum = self._evaluate(times)
+        self.count += len(times)
+        flat = np.empty((len(times), 12))
+        flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
+        channels = map_rows(inverse_channels, 12, flat)
+        if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
+            inverse = inverse_inertia(inertia, times)
+            channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
+            channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
+        if not isfinite(channels[:, :9].sum()):
+            row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
+            raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
+        return channels[:, :9]
+
+
+def inverse_channels(entries: list[Any]) -> list[Any]:
+    """I^-1, I^-1 L_o and a number above zero where the tensor is far from singular, from the nine of I and L_o.
+
+    Far from singular: the condition number is at most some hundred, and so are the digits that the adjugate loses.
+    """
+    import casadi
+
+    a, f, e, _, b, d, _, _, c, x, y, z = entries
+    adjugate = [b * c - d * d, a * c - e * e, a * b - f * f, e * f - a * d, f * d - b * e, d * e - c * f]
+    determinant = a * adjugate[0] + f * adjugate[5] + e * adjugate[4]
+    trace = a + b + c
+    safe = casadi.fmin(determinant - 1e-3 * trace * trace * trace, casadi.fmin(adjugate[2], a))
+    xx, yy, zz, yz, xz, xy = inverse = [entry / determinant for entry in adjugate]
+    return [*inverse, xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z, safe]
+
+
+class TailEstimate(NamedTuple):
+    """Error estimate from one spectrum, in plain numbers: for a few entries they are faster than arrays."""
+
+    error: float
+    decay: float  # per degree
+    converging: bool
+    at_rounding: bool
+    largest: float
+
+
+def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
+    """As `estimate_spectrum`, for one series with the norms of its coefficients at degrees 0, 1, 2 ..."""
+    degree = len(norms) - 1
+    largest = max(norms)
+    if degree == 0:
+        return TailEstimate(error=0.0, decay=inf, converging=True, at_rounding=True, largest=largest)
+    # The largest of a window: single coefficients are small by chance, or by the symmetry of a motion.
+    tail, middle = max(norms[-max(2, degree // 10) :]), max(norms[degree // 2 - 1 : degree // 2 + 2])
+    floor = _ROUNDING * largest + 4.0 * time_rounding * sum(map(mul, norms, range(degree + 1)))
+    decay = log(middle / tail) * 2.0 / degree if middle > tail > 0.0 else 0.0
+    beyond_tail = 2.0 * tail / expm1(decay) if decay > 0.0 else inf
+    at_noise_floor = tail <= floor
+    return TailEstimate(
+        error=max(min(beyond_tail, (2.0 if at_noise_floor else degree) * tail), _LEAST_OF_FLOOR * floor),
+        decay=inf if at_noise_floor else decay,
+        converging=at_noise_floor or tail < _CONVERGED_TAIL * middle,
+        # More samples of a loop cost little, and only they show what is truly rounding.
+        at_rounding=tail <= 0.05 * floor,
+        largest=largest,
+    )
+
+
+def unaveraged_share(converging: bool, phase: float, turn: float) -> float:
+    """The share of an interpolation error that does not average out.
+
+    The missing terms of the series run through `phase` or more [rad] while the body turns by `turn`. Only a quarter of
+    the averaging is relied on; the error of a kink does not average out at all.
+    """
+    return min(1.0, _UNAVERAGED_PHASE / max(phase - turn, _UNAVERAGED_PHASE)) if converging else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SpectralEstimate:
+    """Error estimates from the spectra of some panels: (G,) each."""
+
+    inverse: Array  # error estimate of I^-1
+    drift: Array  # error estimate of I^-1 L_o
+    decay: Array  # of the spectrum, per degree; the slower one
+    converging: Mask
+    at_rounding: Mask
+    inverse_norm: Array
+    drift_norm: Array
+    floor: Array  # (G, 2) the part of rounding alone
+
+    def error(self, momentum: float, width: Array, phase: float) -> Array:
+        """Attitude error caused by the interpolation error: (G,) [rad]; it averages out as in `unaveraged_share`."""
+        rate = momentum * self.inverse + self.drift
+        turn = width * (momentum * self.inverse_norm + self.drift_norm)
+        share = np.minimum(1.0, _UNAVERAGED_PHASE / np.maximum(phase - turn, _UNAVERAGED_PHASE))
+        return 0.5 * width * rate * np.where(self.converging, share, 1.0)
+
+    def raised_to(self, gaps: Array, seen: Mask) -> SpectralEstimate:
+        """The same with errors at least as large as gaps that were seen (G, 2), which do not average out."""
+        return replace(
+            self,
+            inverse=np.maximum(self.inverse, gaps[:, 0]),
+            drift=np.maximum(self.drift, gaps[:, 1]),
+            converging=self.converging & ~seen,
+            at_rounding=self.at_rounding & np.all(gaps <= 4.0 * self.floor, axis=1),
+        )
+
+
+def estimate_spectrum(norms: Array, time_rounding: Array | float) -> SpectralEstimate:
+    """Error estimates from the tails of spectra; norms (G, degree + 1, 2) of I^-1 and of I^-1 L_o.
+
+    `time_rounding` is the rounding of the sample times in units of half a panel (or of a radian): it limits the
+    accuracy of samples of a fast motion.
+    """
+    degree = norms.shape[1] - 1
+    if degree == 0:
+        zero = np.zeros(len(norms))
+        certain = zero == 0.0
+        return SpectralEstimate(
+            inverse=zero,
+            drift=zero,
+            decay=zero + np.inf,
+            converging=certain,
+            at_rounding=certain,
+            inverse_norm=norms[:, 0, 0],
+            drift_norm=norms[:, 0, 1],
+            floor=norms[:, 0] * EPS,
+        )
+    centre, last_tenth = degree // 2, degree + 1 - max(2, degree // 10)
+    parts = np.maximum.reduceat(norms, (0, centre - 1, centre + 2, last_tenth), axis=1)
+    largest, middle, tail = parts.max(axis=1), parts[:, 1], parts[:, 3]
+    floor = _ROUNDING * largest + (4.0 * np.reshape(time_rounding, (-1, 1))) * (np.arange(degree + 1) @ norms)
+    decay = np.log(np.maximum(middle, _TINY) / np.maximum(tail, _TINY)) * (2.0 / degree)
+    # The rest of a geometric series with this decay beyond its last term; twice, for aliasing.
+    beyond_tail = 2.0 * tail / np.expm1(np.maximum(decay, _TINY))
+    at_noise_floor = tail <= floor
+    # A tail at the noise floor shows no decay any more; the terms beyond it are smaller than it.
+    error = np.maximum(np.minimum(beyond_tail, np.where(at_noise_floor, 2.0, degree) * tail), _LEAST_OF_FLOOR * floor)
+    return SpectralEstimate(
+        inverse=error[:, 0],
+        drift=error[:, 1],
+        decay=np.where(at_noise_floor, np.inf, np.maximum(decay, 0.0)).min(axis=1),
+        converging=(at_noise_floor | (tail < _CONVERGED_TAIL * middle)).all(axis=1),
+        at_rounding=at_noise_floor.all(axis=1),
+        inverse_norm=largest[:, 0],
+        drift_norm=largest[:, 1],
+        floor=floor,
+    )
+
+
+def spectral_norms(coefficients: Array) -> Array:
+    """Frobenius norm of I^-1 and norm of I^-1 L_o in spectra: (..., 9) -> (..., 2)."""
+    return np.sqrt((coefficients * coefficients) @ _SQUARES)
+
+
+def fourier_norms(values: Array) -> list[list[float]]:
+    """The same of the Fourier series through even samples: (N, 9) -> two lists of N // 2 + 1."""
+    pairs = np.fft.rfft(values, axis=0).view(np.float64)
+    return (np.sqrt((pairs * pairs) @ _SQUARES_OF_PAIRS) * (2.0 / len(values))).T.tolist()

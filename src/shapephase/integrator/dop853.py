@@ -1,0 +1,64 @@
+"""The attitude equation integrated by SciPy, as an independent check of `integrate`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..errors import AccuracyNotReached
+from ._spectral_error import Evaluate
+from .interpolant import inside
+
+# SciPy refuses a smaller relative tolerance.
+_LEAST_RELATIVE_TOLERANCE = 3e-14
+
+
+def dop853_rotation(
+    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float
+) -> tuple[Callable[[Array], Array], int]:
+    """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks.
+
+    Every stage evaluates the deformation itself; the library's interpolation and stepping are not used.
+
+    Returns
+    -------
+    dense : times (N,) -> quaternions (N, 4)
+    evaluations : of I and L_o
+    """
+    from scipy.integrate import solve_ivp
+
+    inner = inside(breaks[:-1], breaks[1:])
+
+    rtol = max(tolerance, _LEAST_RELATIVE_TOLERANCE)
+
+    def slope(t: float, q: Array, left: float, right: float) -> Array:
+        inertia, internal = evaluate(np.array([min(max(t, left), right)]))
+        unit = so3.normalised(q)
+        omega = np.linalg.solve(inertia[0], so3.matrix_from_quat(unit).T @ momentum - internal[0])
+        vector, scalar = q[:3], q[3]
+        return 0.5 * np.append(scalar * omega + np.cross(vector, omega), -vector @ omega)
+
+    quaternion, pieces, evaluations = np.array([0.0, 0.0, 0.0, 1.0]), [], 0
+    for a, b, left, right in zip(breaks[:-1], breaks[1:], *inner, strict=True):
+        run = solve_ivp(
+            slope, (a, b), quaternion, "DOP853", dense_output=True, rtol=rtol, atol=1e-2 * tolerance,
+            args=(left, right),
+        )  # fmt: skip
+        if not run.success:
+            raise AccuracyNotReached(f"DOP853 stopped at t = {run.t[-1]:.9g} s: {run.message}")
+        pieces.append(run.sol)
+        evaluations += run.nfev
+        quaternion = so3.normalised(run.y[:, -1])
+
+    def dense(t: Array) -> Array:
+        piece = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, len(pieces) - 1)
+        values = np.empty((len(t), 4))
+        for number in np.unique(piece):
+            rows = piece == number
+            values[rows] = pieces[number](t[rows]).T
+        return so3.normalised(values)
+
+    return dense, evaluations
