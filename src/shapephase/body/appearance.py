@@ -17,12 +17,12 @@ import numpy as np
 from ..arrays import Array, Integers
 from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
+from ._mjcf import Placed, contents_of, settings_of, with_defaults
+from ._mjcf_geometry import placed_geom
+from ._urdf import rpy_matrix
+from ._xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
 from .body import Body, MovingPart
 from .catalog import example_folder
-from .mjcf import Placed, contents_of, settings_of, with_defaults
-from .mjcf_geometry import placed_geom
-from .urdf import rpy_matrix
-from .xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
 
 Colour = tuple[float, float, float, float]
 

@@ -19,9 +19,9 @@ from .. import so3
 from ..arrays import Array, check_reach, finite_array
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
-from ._joint_chain import joint_chain
-from .joint_map import JointMap
-from .link_tree import Mimic
+from ._joint_map import JointMap
+from ._link_tree import Mimic
+from .joint_chain import joint_chain
 
 _BASE = 6  # velocities of the free-flyer in Pinocchio's order
 

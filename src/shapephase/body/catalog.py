@@ -19,13 +19,13 @@ from ..errors import (
     UnphysicalInertiaWarning,
     unknown_name,
 )
+from ._cross_check import check_against_file
+from ._link_tree import inertia_warnings, massless_warning
+from ._mjcf import mjcf_tree
+from ._model_tree import checked_model, model_of
+from ._urdf import urdf_tree
+from ._xml_text import quoted, read_file, xml_tree
 from .body import Body
-from .cross_check import check_against_file
-from .link_tree import inertia_warnings, massless_warning
-from .mjcf import mjcf_tree
-from .model_tree import checked_model, model_of
-from .urdf import urdf_tree
-from .xml_text import quoted, read_file, xml_tree
 
 _EXAMPLE = "example:"
 # The largest body takes 300 MiB.

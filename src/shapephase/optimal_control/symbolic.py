@@ -10,8 +10,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..arrays import Array
-from ..body._joint_chain import JointChain
 from ..body.body import Body
+from ..body.joint_chain import JointChain
 from ..errors import unknown_name
 
 QUANTITIES = ("inertia", "momentum_matrix", "connection", "centre_of_mass", "shape_metric")

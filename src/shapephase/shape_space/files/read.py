@@ -17,11 +17,11 @@ from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
 from ..shape_path import ShapePath
-from .joint_columns import matched
-from .motion_arrays import read_arrays
-from .motion_tables import read_delimited, read_opensim
-from .recording import Recording, digest
-from .ros_motion_files import read_bag, read_ros_yaml
+from ._joint_columns import matched
+from ._motion_arrays import read_arrays
+from ._motion_tables import read_delimited, read_opensim
+from ._recording import Recording, digest
+from ._ros_motion_files import read_bag, read_ros_yaml
 from .smoothing import smoothed_path
 
 _WRITTEN = (".csv", ".npz", ".tsv")

@@ -11,7 +11,7 @@ from ...arrays import Array
 from ...errors import TrajectoryError
 from ..curves import PiecewisePolynomial
 from ..shape_path import ShapePath
-from .recording import warn
+from ._recording import warn
 
 _FEWEST = 5
 # The gap of a loop is the difference of two samples: this many of its standard deviations.

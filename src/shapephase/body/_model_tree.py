@@ -12,7 +12,7 @@ import pinocchio as pin
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from .link_tree import Link, LinkTree, Mimic, inertia_warnings
+from ._link_tree import Link, LinkTree, Mimic, inertia_warnings
 
 _ROOT = "shapephase_free_flyer"
 

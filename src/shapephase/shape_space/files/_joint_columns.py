@@ -11,7 +11,7 @@ from ... import so3
 from ...arrays import FARTHEST, Array
 from ...body.body import Body
 from ...errors import TrajectoryError, unknown_name
-from .recording import Recording, warn
+from ._recording import Recording, warn
 
 _DEGREES = "_deg"
 _LONGEST_NAME, _MOST_SHOWN = 256, 200

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from .link_tree import Mimic
-from .model_tree import mimic_map, moving_joints
+from ._link_tree import Mimic
+from ._model_tree import mimic_map, moving_joints
 
 _BASE = 6  # velocities of the free-flyer in Pinocchio's order
 

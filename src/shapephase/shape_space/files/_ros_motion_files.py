@@ -12,8 +12,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
-from .recording import Recording, check_size, check_text, file_bytes, number, times_from_zero
-from .strict_yaml import Word, yaml_documents
+from ._recording import Recording, check_size, check_text, file_bytes, number, times_from_zero
+from ._strict_yaml import Word, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
-from .link_tree import LEAST_MASS, MOST_MASS
-from .xml_text import Node, number, numbers, quoted, vector
+from ._link_tree import LEAST_MASS, MOST_MASS
+from ._xml_text import Node, number, numbers, quoted, vector
 
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, TrajectoryError
-from .recording import MOST_BYTES, Recording, file_bytes, times_from_zero
+from ._recording import MOST_BYTES, Recording, file_bytes, times_from_zero
 
 _FREE_JOINT = 7
 _SCALAR_FIRST = [1, 2, 3, 0]

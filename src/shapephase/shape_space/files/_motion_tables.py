@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import TrajectoryError
-from .recording import Recording, check_text, file_bytes, number, plain_numbers, times_from_zero
+from ._recording import Recording, check_text, file_bytes, number, plain_numbers, times_from_zero
 
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons"}
 _END = "endheader"

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import ModelFileError
+from ._link_tree import LinkTree
 from .body import Body
-from .link_tree import LinkTree
 
 _TOLERANCE = 1e-12
 _SEED = 20060518
