@@ -202,8 +202,11 @@ def test_a4_the_second_moment_is_positive_where_the_triangle_inequality_holds():
     tensors = frames @ (moments[:, :, None] * np.eye(3)) @ np.swapaxes(frames, 1, 2)
     least = np.linalg.eigvalsh(second_moment(tensors))[:, 0]
     lack = moments[:, 2] - moments[:, 1] - moments[:, 0]
-    np.testing.assert_allclose(least, -0.5 * lack, rtol=0, atol=1e-14)
-    np.testing.assert_allclose(triangle_defect(tensors) * moments[:, 2], lack, rtol=0, atol=1e-14)
+    # Two products of 3 x 3 matrices, the trace and the eigenvalue routine each commit some units of rounding of the
+    # largest entries, which add up to less than the trace; sixteen of them are allowed.
+    rounding = 16.0 * np.finfo(float).eps * moments.sum(axis=1)
+    assert np.all(np.abs(least + 0.5 * lack) <= rounding)
+    assert np.all(np.abs(triangle_defect(tensors) * moments[:, 2] - lack) <= rounding)
     assert 50 < np.sum(lack > 0) < 450
     for seed in range(5):
         cloud = Cloud(seed)

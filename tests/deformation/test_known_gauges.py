@@ -412,9 +412,11 @@ def test_the_mean_frame_of_particles_is_the_best_fit(reference):
         frame = there.frame(t)
         best = Rotation.align_vectors(still, now, weights=MASSES)[0]
         np.testing.assert_allclose(frame, best.as_matrix(), atol=1e-12, rtol=0)
-        np.testing.assert_allclose(
-            np.einsum("m,mi->i", MASSES, np.cross(still, now @ frame.T)), 0.0, atol=1e-14, rtol=0
-        )
+        # A polar factor is right for a correlation within some units of rounding of the given one, and that is how far
+        # the product may be from symmetric; 64 units allow for the decomposition, the quaternion and the sum here.
+        correlation = MASSES @ (np.linalg.norm(still, axis=1) * np.linalg.norm(now, axis=1))
+        lack = np.einsum("m,mi->i", MASSES, np.cross(still, now @ frame.T))
+        np.testing.assert_allclose(lack, 0.0, atol=64.0 * np.finfo(float).eps * correlation, rtol=0)
         turned.append(apart(frame, np.eye(3)))
     assert max(turned) > 0.5
     np.testing.assert_allclose(there.frame(reference), np.eye(3), atol=1e-14, rtol=0)
@@ -538,11 +540,19 @@ def test_the_mean_frame_of_a_body_already_seen_from_elsewhere(case):
 
 
 def test_a_rigid_body_is_its_own_mean():
-    """Also when described from a turning frame: the mean frame undoes the turn."""
+    """Also when described from a turning frame: the mean frame undoes the turn.
+
+    The frame is a polar factor of a correlation whose condition, its norm over the sum of its two least singular values
+    (the least moment), is near one: rounding units come out as they went in. Some eight of them without a turn, where
+    the decomposition is that of a symmetric matrix; with it three products of rotations more, and a general matrix.
+    """
+    eps = np.finfo(float).eps
     rigid = sp.rigid([[2.0, 0.1, 0.0], [0.1, 2.5, 0.2], [0.0, 0.2, 3.0]], LENGTH)
-    np.testing.assert_allclose(mean_body_gauge(rigid).frame(T), np.stack([np.eye(3)] * len(T)), atol=1e-15, rtol=0)
+    here = mean_body_gauge(rigid).frame(T)
+    np.testing.assert_allclose(here, np.stack([np.eye(3)] * len(T)), atol=8.0 * eps, rtol=0)
     there = mean_body_gauge(sp.in_gauge(rigid, swaying))
-    np.testing.assert_allclose(there.frame(T), np.stack([swaying(np.zeros(1))[0][0]] * len(T)), atol=1e-14, rtol=0)
+    start = swaying(np.zeros(1))[0][0]
+    np.testing.assert_allclose(there.frame(T), np.stack([start] * len(T)), atol=64.0 * eps, rtol=0)
     np.testing.assert_allclose(there.internal_momentum(T), 0.0, atol=1e-13, rtol=0)
 
 
