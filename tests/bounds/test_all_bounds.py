@@ -9,17 +9,17 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import shapephase as sp
+from shapephase.bounds._arc_bounds import arc_length_bounds, azimuth_bounds, azimuth_rate, return_time_bounds
 from shapephase.bounds._energy_bounds import energy_bounds
-from shapephase.bounds.all_bounds import Bound, bounds
-from shapephase.bounds.arc_bounds import arc_length_bounds, azimuth_bounds, azimuth_rate, return_time_bounds
-from shapephase.bounds.energy import energy_along, homoclinic_energy
-from shapephase.bounds.phase_bounds import (
+from shapephase.bounds._phase_bounds import (
     PhaseBounds,
     dynamic_phase_bounds,
     dynamic_phase_bounds_by_extremes,
     loop_phase_bounds,
     solid_angle_bounds,
 )
+from shapephase.bounds.all_bounds import Bound, bounds
+from shapephase.bounds.energy import energy_along, homoclinic_energy
 from shapephase.bounds.regimes import crown_region, regime_certificate
 from support.random_deformations import KINDS, random_case
 
@@ -72,18 +72,18 @@ def check_sense(certificate, deformation, motion, interval):
     assert np.all(difference > 0.0) if certificate.regime == "about axis 1" else np.all(difference < 0.0)
 
 
-def test_e9_bounds_hold_in_random_deformations():
+def test_bounds_hold_in_random_deformations_e9():
     certain = [check_case(seed) for seed in range(QUICK)]
     assert 0.1 < np.mean(certain) < 0.9
 
 
 @pytest.mark.full
-def test_e9_bounds_hold_in_two_thousand_random_deformations():
+def test_bounds_hold_in_two_thousand_random_deformations_e9():
     certain = [check_case(seed) for seed in range(QUICK, QUICK + FULL)]
     assert 0.1 < np.mean(certain) < 0.9
 
 
-def test_e9_every_kind_of_bound_is_given():
+def test_every_kind_of_bound_is_given_e9():
     """The enumeration has each of them, those about an axis where one is certain and Pi has gone round."""
     seed = KINDS.index("circling") + len(KINDS)
     names = {bound.name for bound in bounds(sp.reconstruct(*random_case(seed)[1:]))}
@@ -93,7 +93,7 @@ def test_e9_every_kind_of_bound_is_given():
         assert name in names
 
 
-def test_e9_energy_bounds_are_sharp_where_the_energy_is_known():
+def test_energy_bounds_are_sharp_where_the_energy_is_known_e9():
     """Homothety: E = E_0/a(t)^2 whatever Pi does, and both bounds find that to the resolution."""
     base = np.array([1.0, 1.5, 2.2])
     deformation = sp.prescribed(lambda t: ((1.0 + 0.3 * np.sin(t)) ** 2)[:, None, None] * np.diag(base), None, 3.0)
@@ -105,7 +105,7 @@ def test_e9_energy_bounds_are_sharp_where_the_energy_is_known():
     assert np.all(found.upper - found.lower <= 0.03 * exact)
 
 
-def test_e9_energy_bounds_reach_what_some_motion_does():
+def test_energy_bounds_reach_what_some_motion_does_e9():
     """No bound of the rate at the start can be sharper than the most over all directions with that energy."""
     deformation = moments_in_time(lambda t: (1.0 + 0.1 * t, 1.5 - 0.2 * t, 2.0 + 0.3 * t), 1.0)
     momentum = np.array([0.5, 0.6, 0.7])
@@ -125,7 +125,7 @@ def test_e9_energy_bounds_reach_what_some_motion_does():
     assert found.rate_lower[0] <= min(ends) + 1e-12
 
 
-def test_e3_energy_rate_by_internal_momentum_is_reached():
+def test_energy_rate_by_internal_momentum_is_reached_e3():
     """An axisymmetric body whose w is along u x I^-1 u: dE/dt = (Pi x I^-1 Pi).w, all that the bound allows."""
     moments, drift = np.array([1.0, 2.0, 2.0]), np.array([0.0, 0.0, -0.3])
     deformation = sp.prescribed(
@@ -140,7 +140,7 @@ def test_e3_energy_rate_by_internal_momentum_is_reached():
     assert found.rate_lower[0] == pytest.approx(-exact, rel=1e-4)
 
 
-def test_e11_regime_crossing_under_the_triangle_cap():
+def test_regime_crossing_under_the_triangle_cap_e11():
     """I = (1, 1.05, I_3), I_3 from 1.06 to 2.05 in 0.2 s: E from 0.48189 to 0.33610 through 0.47619."""
 
     def moments(t):
@@ -167,7 +167,7 @@ def test_e11_regime_crossing_under_the_triangle_cap():
     assert last.axis == pytest.approx([0.0, 0.0, 1.0], abs=1e-12)
 
 
-def test_e9_antenna_along_the_largest_axis_keeps_its_regime():
+def test_antenna_along_the_largest_axis_keeps_its_regime_e9():
     """F4 with growing I_3: the energy falls, and from the initial momentum alone the regime is certain for ever."""
     deformation = moments_in_time(lambda t: (1.0, 1.5, 2.0 + 0.4 * t / 20.0), 20.0)
     certificate = regime_certificate(deformation, [0.3, 0.2, 0.9])
@@ -181,7 +181,7 @@ def test_e9_antenna_along_the_largest_axis_keeps_its_regime():
     assert np.all(np.diff(energy_along(motion, np.linspace(0.0, 20.0, 400))) <= 0.0)
 
 
-def test_e9_antenna_along_the_smallest_axis_has_no_certificate():
+def test_antenna_along_the_smallest_axis_has_no_certificate_e9():
     """F3: growing I_1 passes I_2; a motion about axis 1 leaves it, which no certificate denies."""
     deformation = moments_in_time(lambda t: (1.0 + 0.9 * t / 40.0, 1.5, 2.0), 40.0)
     momentum = np.array([0.8, 0.1, 0.6])
@@ -192,7 +192,7 @@ def test_e9_antenna_along_the_smallest_axis_has_no_certificate():
 
 
 @pytest.mark.parametrize("scale", [1e-30, 1e30])
-def test_e9_certificate_knows_no_units(scale):
+def test_certificate_scales_with_the_units_e9(scale):
     deformation = sp.prescribed(lambda t: scale * (1.0 + 0.02 * t)[:, None, None] * np.diag([1.0, 1.5, 2.0]), None, 1.0)
     certificate = regime_certificate(deformation, np.array([0.3, 0.2, 0.9]) * scale)
     plain = moments_in_time(lambda t: tuple((1.0 + 0.02 * t) * m for m in (1.0, 1.5, 2.0)), 1.0)
@@ -201,7 +201,7 @@ def test_e9_certificate_knows_no_units(scale):
     assert certificate.margin / scale == pytest.approx(expected.margin, rel=1e-6)
 
 
-def test_e9_certificate_turns_with_the_frame(rng):
+def test_certificate_turns_with_the_frame_e9(rng):
     """The same body in turned axes, with an attitude to match: the same margin, the axis turned."""
     frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     frame *= np.sign(np.linalg.det(frame))
@@ -218,12 +218,12 @@ def test_e9_certificate_turns_with_the_frame(rng):
     assert second.margin == pytest.approx(first.margin, rel=1e-3)
 
 
-def test_e9_without_momentum_nothing_is_certain():
+def test_without_momentum_nothing_is_certain_e9():
     deformation = moments_in_time(lambda t: (1.0, 1.5, 2.0 + t), 1.0)
     certificate = regime_certificate(deformation, np.zeros(3))
     assert certificate.regime == "may cross"
     assert "no angular momentum" in certificate.why
-    assert dynamic_phase_bounds(certificate.bounds) == PhaseBounds(0.0, 0.0)
+    assert dynamic_phase_bounds(certificate.bounds) == PhaseBounds(lower=0.0, upper=0.0)
     assert return_time_bounds(certificate).by_azimuth == 0.0
     with pytest.raises(sp.ShapePhaseError, match="momentum"):
         bounds(sp.reconstruct(deformation, np.zeros(3)))
@@ -233,18 +233,18 @@ def test_e9_without_momentum_nothing_is_certain():
     ("momentum", "attitude"),
     [(np.ones((2, 3)), None), (np.ones(3), np.stack([np.eye(3)] * 2)), ([1.0, np.nan, 0.0], None), ([1.0, 2.0], None)],
 )
-def test_e9_only_one_motion_at_a_time(momentum, attitude):
+def test_only_one_motion_at_a_time_e9(momentum, attitude):
     with pytest.raises(sp.ShapePhaseError):
         energy_bounds(sp.rigid(np.eye(3), 1.0), momentum, attitude)
 
 
-def test_e9_batches_of_motions_are_refused():
+def test_batches_of_motions_are_refused_e9():
     with pytest.raises(sp.ShapePhaseError, match="batch"):
         bounds(sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), np.ones((2, 3))))
 
 
 @pytest.mark.parametrize("factor", [1.05, 0.95])
-def test_c_e5_thresholds_need_their_half(factor):
+def test_thresholds_need_their_half_c_e5(factor):
     """A rigid body with E = 1.05 l^2/(2 I_2) keeps Pi_1 > 0, with 0.95 it does not; printed l^2/I_2 says otherwise."""
     inverse = 1.0 / np.array([1.0, 1.6, 2.2])
     goal = factor * 0.5 * inverse[1]
@@ -266,7 +266,7 @@ def quadrature(function, duration):
     return quad(function, 0.0, duration, epsabs=1e-12, epsrel=1e-11, limit=200)[0]
 
 
-def test_e6_arc_length_bounds_against_quadrature():
+def test_arc_length_bounds_against_quadrature_e6():
     """General, without internal momentum and ordered: the integrals themselves, to the resolution, and from above."""
     _, deformation, momentum = random_case(KINDS.index("turned frame, internal momentum"))
     size = np.linalg.norm(momentum)
@@ -287,7 +287,7 @@ def test_e6_arc_length_bounds_against_quadrature():
     assert found.by_drift == pytest.approx(found.general, rel=1e-12)
 
 
-def test_e6_arc_length_by_energy_is_reached():
+def test_arc_length_by_energy_is_reached_e6():
     """An axisymmetric rigid body circles with |u x I^-1 u| at the bound: there it is sharp."""
     top = sp.rigid(np.diag([1.0, 2.0, 2.0]), 3.0)
     momentum = np.array([0.6, 0.8, 0.0])
@@ -299,7 +299,7 @@ def test_e6_arc_length_by_energy_is_reached():
     assert sphere.by_energy < 1e-6 < sphere.general
 
 
-def test_e7_norm_of_the_inverse_is_the_least_moment(rng):
+def test_norm_of_the_inverse_is_the_least_moment_e7(rng):
     """|I^-1 v| <= |v|/I_1, reached along the axis of the smallest moment."""
     _, deformation, _ = random_case(KINDS.index("turned frame"))
     found = energy_bounds(deformation, [0.0, 0.0, 1.0]).enclosure
@@ -313,7 +313,7 @@ def test_e7_norm_of_the_inverse_is_the_least_moment(rng):
     assert top == pytest.approx(np.linalg.norm(inverse, ord=2, axis=(1, 2)), rel=2e-2)
 
 
-def test_e8_crown_region(rng):
+def test_crown_region_e8(rng):
     """The region of a rigid body is its polhode, on the start's side alone; a deforming body's holds its motion."""
     rigid = sp.rigid(np.diag([1.0, 1.5, 2.0]), 30.0)
     momentum = np.array([0.3, 0.2, 0.9])
@@ -359,14 +359,14 @@ def azimuth_by_differences(moments, start, axis):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_e10_azimuth_rate(axis, rng):
+def test_azimuth_rate_e10(axis, rng):
     for _ in range(5):
         moments, start = np.sort(rng.uniform(1.0, 2.0, 3)), rng.normal(size=3)
         momentum, rate = azimuth_by_differences(moments, start, axis)
         assert azimuth_rate(moments, momentum, axis) == pytest.approx(rate, abs=1e-8)
 
 
-def test_c_e4_azimuth_rate_needs_the_momentum():
+def test_azimuth_rate_needs_the_momentum_c_e4():
     """Printed (14) lacks l: true over printed is l exactly."""
     moments, start = np.array([1.0, 1.5, 2.0]), 2.7 * np.array([0.6, 0.48, 0.64])
     momentum, rate = azimuth_by_differences(moments, start, 0)
@@ -381,7 +381,7 @@ def test_c_e4_azimuth_rate_needs_the_momentum():
 
 
 @pytest.mark.parametrize(("start", "regime", "sense"), [((0.9, 0.4, 0.1), 1, -1.0), ((0.1, 0.4, 0.9), 3, 1.0)])
-def test_e10_azimuth_is_monotone(start, regime, sense):
+def test_azimuth_is_monotone_e10(start, regime, sense):
     """Clockwise about axis 1, counterclockwise about axis 3, in all certified motions with fixed axes."""
 
     def moments(t):
@@ -403,7 +403,7 @@ def test_e10_azimuth_is_monotone(start, regime, sense):
     assert np.all(rates >= found.slow[cell] - 1e-4)
 
 
-def test_e10_azimuth_arguments_are_checked():
+def test_azimuth_arguments_are_checked_e10():
     for moments, momentum, axis in (
         ([1.0, 2.0, 3.0], [1.0, 0.0, 0.0], 0),
         ([1.0, 2.0, 3.0], [1.0, 1.0, 0.0], 3),
@@ -417,7 +417,7 @@ def test_e10_azimuth_arguments_are_checked():
             function(crossing)
 
 
-def test_c_e10_return_time_with_the_other_extreme_is_false():
+def test_return_time_with_the_other_extreme_is_false_c_e10():
     """Remark 4.1 read with 1/max I_1 claims more time than Pi takes; with 1/min I_1 it holds, the sharper one also.
 
     I_1 goes from small to large after the turn: then the largest I_1 says nothing of the turn.
@@ -446,7 +446,7 @@ def test_c_e10_return_time_with_the_other_extreme_is_false():
     assert found.by_latitude <= found.by_inertia <= found.by_azimuth <= turn <= found.latest
 
 
-def test_e12_return_time_of_a_rigid_body():
+def test_return_time_of_a_rigid_body_e12():
     """The period of Euler's top is above every bound, and near the sharpest for a nearly axisymmetric one."""
     momentum = np.array([0.9, 0.3, 0.3])
     for moments, tight in (((1.0, 1.5, 2.0), 0.6), ((1.0, 1.999, 2.0), 0.99)):
@@ -460,7 +460,7 @@ def test_e12_return_time_of_a_rigid_body():
         assert found.by_azimuth > tight * period
 
 
-def test_e12_about_the_largest_axis_and_no_return_within():
+def test_return_time_about_the_largest_axis_and_no_return_within_e12():
     """The analogue about axis 3 has the least moment in it, not the largest; a short interval sees no return."""
     momentum = np.array([0.1, 0.1, 0.99])
     body = sp.rigid(np.diag([1.0, 1.1, 2.0]), 40.0)
@@ -490,7 +490,7 @@ def closing_motion(regime):
 
 
 @pytest.mark.parametrize("regime", [1, 3])
-def test_e13_two_sided_bounds_of_the_phase(regime):
+def test_two_sided_bounds_of_the_phase_e13(regime):
     """(15) with the signed area, by extremes and by energy in time; the loop's own bounds from before the motion."""
     deformation, start = closing_motion(regime)
     motion = sp.reconstruct(deformation, start)
@@ -514,7 +514,7 @@ def test_e13_two_sided_bounds_of_the_phase(regime):
 
 
 @pytest.mark.parametrize("regime", [1, 3])
-def test_c_e6_signs_of_the_area(regime):
+def test_signs_of_the_area_c_e6(regime):
     """The phase read off the attitude is theta_D - Lambda with the signed area; the printed + sign fails about axis 3.
 
     Both curves go round less than half of the sphere, for which + is printed: right about axis 1, which Pi goes round
@@ -544,7 +544,7 @@ def test_c_e6_signs_of_the_area(regime):
     assert (printed < 0.05) == (regime == 1)
 
 
-def test_e14_bounds_say_something_modulo_a_turn():
+def test_phase_bounds_are_informative_below_a_full_turn_e14():
     """Width 2 (E_max - E_min) dt/l against 2 pi: short intervals are informative, long ones are not."""
     deformation = moments_in_time(lambda t: (1.0 + 0.2 * np.sin(t), 1.5 + 0.2 * np.cos(t), 2.0 + 0.1 * t / 40.0), 40.0)
     momentum = np.array([0.5, 0.6, 0.7])
@@ -558,7 +558,7 @@ def test_e14_bounds_say_something_modulo_a_turn():
         assert bool(width < 2.0 * np.pi) is informative
 
 
-def test_c_e12_scale_of_slow_deformations():
+def test_scale_of_slow_deformations_c_e12():
     """E_initial - E_min is l^2 |d(1/I_3)/dt| dt/2 at most: small against E where the rate is against E/(l^2 dt).
 
     The printed scale I^2 E/dt has other units: doubling the unit of mass changes whether a deformation counts as slow,
@@ -582,7 +582,7 @@ def test_c_e12_scale_of_slow_deformations():
     assert ratio < 0.05
 
 
-def test_bound_compares_as_it_says():
+def test_slack_and_tightness_of_a_bound():
     above, below = Bound("x", True, 2.0, 1.5), Bound("y", False, 1.0, 1.5)
     assert above.slack == below.slack == 0.5
     assert above.tightness == 0.75

@@ -143,7 +143,7 @@ def turning(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a1_positions_count_from_the_centre_of_mass(seed):
+def test_positions_count_from_the_centre_of_mass_a1(seed):
     """Sum of m r = 0 for particles, and for an extended body: the integral of r dm of a boom and a hull."""
     cloud = Cloud(seed)
     at, speed = cloud.deformation.description.centred(TIMES)
@@ -157,7 +157,7 @@ def test_a1_positions_count_from_the_centre_of_mass(seed):
     np.testing.assert_allclose(about, np.zeros((5, 3)), rtol=0, atol=1e-13)
 
 
-def test_a2_the_action_is_free_where_the_second_moment_has_rank_two():
+def test_the_action_is_free_where_the_second_moment_has_rank_two_a2():
     """On a line some turn moves nothing and the body is refused; on a plane none does and it is taken."""
     rng = np.random.default_rng(3)
     for rank in (1, 2, 3):
@@ -181,7 +181,7 @@ def test_a2_the_action_is_free_where_the_second_moment_has_rank_two():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a3_the_locked_inertia_is_a_sum_of_products(seed):
+def test_the_locked_inertia_is_a_sum_of_products_a3(seed):
     """v.I w = sum m (v x r).(w x r), and I(R d) = R I R^T."""
     cloud = Cloud(seed)
     deformation = cloud.deformation
@@ -194,7 +194,7 @@ def test_a3_the_locked_inertia_is_a_sum_of_products(seed):
     np.testing.assert_allclose(turned.inertia(TIMES), turn @ deformation.inertia(TIMES) @ turn.T, rtol=0, atol=1e-13)
 
 
-def test_a4_the_second_moment_is_positive_where_the_triangle_inequality_holds():
+def test_the_second_moment_is_positive_where_the_triangle_inequality_holds_a4():
     """J = tr(I)/2 - I: its eigenvalues are half of one moment's lack against the other two."""
     rng = np.random.default_rng(6)
     frames = Rotation.random(500, rng=rng).as_matrix()
@@ -217,7 +217,7 @@ def test_a4_the_second_moment_is_positive_where_the_triangle_inequality_holds():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a5_equation_3_angular_momentum_of_a_turned_body(seed):
+def test_equation_3_angular_momentum_of_a_turned_body_a5(seed):
     """L(d/dt (R d)) = R I omega + R L_o for any turn R(t): sums over the particles in space."""
     cloud = Cloud(seed)
     turn, omega = turning(seed)(TIMES)
@@ -233,7 +233,7 @@ def test_a5_equation_3_angular_momentum_of_a_turned_body(seed):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a6_equation_4_kinetic_energy_of_a_turned_body(seed):
+def test_equation_4_kinetic_energy_of_a_turned_body_a6(seed):
     """T(d/dt (R d)) = omega.I omega/2 + L_o.omega + T_0, T = sum m v^2/2 over the particles in space."""
     cloud = Cloud(seed)
     body = cloud.deformation
@@ -249,8 +249,12 @@ def test_a6_equation_4_kinetic_energy_of_a_turned_body(seed):
     np.testing.assert_allclose(body.kinetic_energy(TIMES), still, rtol=1e-13)
 
 
-def test_c_e1_kinetic_energy_as_printed_lacks_the_half():
-    """With T = sum m v^2 equation (4) is off by T - T_0, all of T where the shape rests; with the half it holds."""
+def test_kinetic_energy_as_printed_lacks_the_half_c_e1():
+    """With T = sum m v^2, printed before equation (4), (4) is off by all of T if the shape rests.
+
+    T = omega.I omega/2 is then the energy of a rigid body, computed from its principal moments. If the shape moves, (4)
+    is off by T - T_0; with the half it holds.
+    """
     cloud = Cloud(1)
     body = cloud.deformation
     turn, omega = turning(1)(TIMES)
@@ -262,10 +266,20 @@ def test_c_e1_kinetic_energy_as_printed_lacks_the_half():
     defect = printed - (turned + of_shape)
     np.testing.assert_allclose(defect, 0.5 * (printed - of_shape), rtol=1e-11)
     assert np.abs(defect).min() > 0.1
+    points = at[0]
+    rigid = sp.particles(
+        cloud.masses, lambda t: (np.broadcast_to(points, (len(t), 5, 3)), np.zeros((len(t), 5, 3))), 2.0
+    )
+    rotating = np.cross(omega[:, None], points) @ np.swapaxes(turn, 1, 2)
+    printed = np.einsum("m,nmi,nmi->n", cloud.masses, rotating, rotating)
+    by_equation_4 = 0.5 * np.sum(omega * times_vector(rigid.inertia(TIMES), omega), axis=-1)
+    moments, axes = np.linalg.eigh(sum(m * (p @ p * np.eye(3) - np.outer(p, p)) for m, p in zip(cloud.masses, points)))
+    energy = 0.5 * (omega @ axes) ** 2 @ moments
+    np.testing.assert_allclose(printed - by_equation_4, energy, rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a7_internal_momentum_is_a_sum_over_the_masses(seed):
+def test_internal_momentum_is_a_sum_over_the_masses_a7(seed):
     """L_o = sum m r x r' with the frame at rest, r' by differences of the positions alone."""
     cloud = Cloud(seed)
     at, _ = cloud.centred(TIMES)
@@ -274,7 +288,7 @@ def test_a7_internal_momentum_is_a_sum_over_the_masses(seed):
     np.testing.assert_allclose(cloud.deformation.internal_momentum(TIMES), want, rtol=0, atol=1e-9)
 
 
-def test_a8_positions_in_space_are_turn_and_shift():
+def test_positions_in_space_are_turn_and_shift_a8():
     """r = R r_o + T: the centre of mass goes straight, the momentum about it stays, in the frame of the spacecraft."""
     hull = np.array([[0.9, 0.1, 0.0], [-0.5, 0.8, 0.2], [-0.4, -0.9, 0.4], [0.1, 0.2, -0.8]])
     weights = np.array([1.0, 1.5, 2.0, 0.5])
@@ -340,7 +354,7 @@ def driven(strong):
     return momentum_of(masses, r, v), 0.5 * np.einsum("m,nmi,nmi->n", masses, v, v), pace, masses, r, v, run.t
 
 
-def test_a9_strong_action_and_reaction_keep_the_momentum_and_not_the_energy():
+def test_strong_action_and_reaction_keep_the_momentum_and_not_the_energy_a9():
     """Section 2.2, remarks 2.3 and 2.5; a force that is only equal and opposite keeps the linear momentum alone."""
     momentum, energy, pace, *_ = driven(strong=True)
     np.testing.assert_allclose(momentum, np.broadcast_to(momentum[0], momentum.shape), rtol=0, atol=1e-10)
@@ -351,7 +365,7 @@ def test_a9_strong_action_and_reaction_keep_the_momentum_and_not_the_energy():
     assert np.abs(momentum - momentum[0]).max() > 0.1 * np.abs(momentum).max()
 
 
-def test_a9_masses_driven_by_their_own_forces_are_a_self_deforming_body():
+def test_masses_driven_by_their_own_forces_are_a_self_deforming_body_a9():
     """Their motion seen from some turning frame is a deformation; the library turns it back into that in space."""
     momentum, energy, _, masses, r, v, times = driven(strong=True)
     frame = turning(7)
@@ -368,7 +382,7 @@ def test_a9_masses_driven_by_their_own_forces_are_a_self_deforming_body():
     assert apart(motion.attitude(times), turn) < 1e-4
 
 
-def test_a10_a_rigid_body_is_a_shape_that_stays():
+def test_a_rigid_body_is_a_shape_that_stays_a10():
     """Examples 2.6 and 2.7: a constant curve and one inside the fibre move alike, and obey Euler's equations."""
     cloud = Cloud(8)
     points = cloud.centred(0.3)[0][0]
@@ -398,7 +412,7 @@ def test_a10_a_rigid_body_is_a_shape_that_stays():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a11_principal_axes_are_axes_of_steady_rotation(seed):
+def test_principal_axes_are_axes_of_steady_rotation_a11(seed):
     """I e = I_k e with a proper frame; a rigid body that turns about one of them goes on doing so."""
     tensor = Cloud(seed).deformation.inertia(0.7)
     moments, axes = principal_axes(tensor)
@@ -413,7 +427,7 @@ def test_a11_principal_axes_are_axes_of_steady_rotation(seed):
 # ---- Motion ---------------------------------------------------------------------------------------------------------
 
 
-def test_c1_equation_5_the_second_order_equation(motion):
+def test_equation_5_the_second_order_equation_c1(motion):
     """I omega' = I omega x omega + L_o x omega - I' omega - L_o', omega by differences of R(t)."""
     body = motion.deformation
     omega = rate_of_attitude(motion, TIMES)
@@ -425,7 +439,7 @@ def test_c1_equation_5_the_second_order_equation(motion):
     np.testing.assert_allclose(left, right, rtol=0, atol=1e-8 * max(1.0, np.abs(spin).max()) * 3)
 
 
-def test_c2_equation_7_body_momentum_and_its_length(motion):
+def test_equation_7_body_momentum_and_its_length_c2(motion):
     body = motion.deformation
     spin = times_vector(body.inertia(TIMES), rate_of_attitude(motion, TIMES)) + body.internal_momentum(TIMES)
     size = np.linalg.norm(motion.momentum)
@@ -433,7 +447,7 @@ def test_c2_equation_7_body_momentum_and_its_length(motion):
     np.testing.assert_allclose(np.linalg.norm(motion.body_momentum(TIMES), axis=-1), np.full(5, size), rtol=1e-13)
 
 
-def test_c3_equation_8_the_rate_from_the_momentum(motion):
+def test_equation_8_the_rate_from_the_momentum_c3(motion):
     body = motion.deformation
     rest = motion.body_momentum(TIMES) - body.internal_momentum(TIMES)
     want = np.linalg.solve(body.inertia(TIMES), rest[..., None])[..., 0]
@@ -441,7 +455,7 @@ def test_c3_equation_8_the_rate_from_the_momentum(motion):
     np.testing.assert_allclose(motion.angular_velocity(TIMES), want, rtol=0, atol=1e-12 * np.abs(want).max())
 
 
-def test_c4_equation_9_the_momentum_goes_on_its_sphere(motion):
+def test_equation_9_the_momentum_goes_on_its_sphere_c4(motion):
     body = motion.deformation
     pi = motion.body_momentum(TIMES)
     rate = np.linalg.solve(body.inertia(TIMES), (pi - body.internal_momentum(TIMES))[..., None])[..., 0]
@@ -463,7 +477,7 @@ def raw_slope(motion):
     return rates
 
 
-def test_c5_equation_10_reconstruction(motion):
+def test_equation_10_reconstruction_c5(motion):
     """R' = R hat(I^-1 (Pi - L_o)), by differences of R."""
     rates = raw_slope(motion)
     slope = derivative(motion.attitude, TIMES)
@@ -482,7 +496,7 @@ def product_of_turns(motion, count, right):
     return total
 
 
-def test_c_e2_the_ordered_exponential_is_ordered_to_the_right_and_ends_at_t():
+def test_the_ordered_exponential_is_ordered_to_the_right_and_ends_at_t_c_e2():
     """Since R' = R hat(omega), later factors stand on the right; to the left, as T usually means, it fails.
 
     The printed upper limit is t_2 for every t: then R would not depend on t.
@@ -497,7 +511,7 @@ def test_c_e2_the_ordered_exponential_is_ordered_to_the_right_and_ends_at_t():
     assert apart(half, whole) > 0.1
 
 
-def test_c6_the_vector_field_on_the_level_set_of_the_momentum(motion):
+def test_the_vector_field_on_the_level_set_of_the_momentum_c6(motion):
     """Proposition 3.2: X is tangent to R Pi = L at every (R, Pi, t), and its integral curve is (R(t), Pi(t))."""
     rates = raw_slope(motion)
     rng = np.random.default_rng(1)
@@ -521,7 +535,7 @@ def test_c6_the_vector_field_on_the_level_set_of_the_momentum(motion):
     )
 
 
-def test_c7_the_initial_momentum(motion):
+def test_the_initial_momentum_c7(motion):
     """Pi(t_1) = R(t_1)^-1 L; the momentum of a body that starts with a given rate is R (I omega + L_o)."""
     np.testing.assert_allclose(
         motion.body_momentum(0.0), np.linalg.solve(motion.initial_attitude, motion.momentum), rtol=1e-12
@@ -532,7 +546,7 @@ def test_c7_the_initial_momentum(motion):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_c8_the_momentum_in_space_is_kept(seed):
+def test_the_momentum_in_space_is_kept_c8(seed):
     """Sum of m r x r' over the particles in space, their velocities by differences of positions."""
     cloud, motion = Cloud(seed), solved(f"particles {seed}")
 
@@ -544,7 +558,7 @@ def test_c8_the_momentum_in_space_is_kept(seed):
     assert motion.equation_residual < 1e-9
 
 
-def test_c9_the_rate_is_known_from_the_momentum_and_the_energy_is_not_kept(motion):
+def test_the_rate_is_known_from_the_momentum_and_the_energy_is_not_kept_c9(motion):
     """Remarks 2.8 and 2.9: d/dt E = (Pi x I^-1 Pi).I^-1 L_o + Pi.(I^-1)' Pi/2 with E = Pi.I^-1 Pi/2."""
     body = motion.deformation
     assert np.linalg.eigvalsh(body.inertia(TIMES)).min() > 0
@@ -562,7 +576,7 @@ def test_c9_the_rate_is_known_from_the_momentum_and_the_energy_is_not_kept(motio
     assert np.ptp(energy(np.linspace(0, DURATION, 50))) > 1e-3 * energy(TIMES).max()
 
 
-def test_c10_the_hamiltonian_that_depends_on_time(motion):
+def test_the_hamiltonian_that_depends_on_time_c10(motion):
     """Remark 3.3: H = Pi.I^-1 Pi/2 - Pi.I^-1 L_o; Pi' = Pi x grad H, and along the motion dH/dt is that of the
     explicit time."""
     body = motion.deformation
@@ -593,7 +607,7 @@ def test_equation_12_the_dynamic_phase(motion):
     assert motion.dynamic_phase(0.0) == 0.0
 
 
-def test_c_e3_the_turn_is_about_the_unit_vector():
+def test_the_turn_is_about_the_unit_vector_c_e3():
     """exp(theta L/|L|) with the vector's length; with L itself, or the norm of its hat matrix, the turn is another."""
     top = EulerTop.principal([1.0, 2.0, 3.0], [0.9, 0.3, 1.4])
     hat, phase, end = so3.hat(top.momentum), top.montgomery_phase, top.attitude(top.period)
@@ -602,7 +616,7 @@ def test_c_e3_the_turn_is_about_the_unit_vector():
     assert np.abs(expm(phase * hat / np.linalg.norm(hat)) - end).max() > 0.1
 
 
-def test_c_e15_the_whole_turn_does_not_depend_on_the_description_and_the_phase_does(rng):
+def test_the_whole_turn_does_not_depend_on_the_description_and_the_phase_does_c_e15(rng):
     body = sp.load_body("satellite")
     original = sp.articulated(body, random_loop(body, rng, duration=3.0))
     motion = sp.reconstruct(original, [0.5, 0.3, 1.0], tolerance=1e-11)

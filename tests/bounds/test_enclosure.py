@@ -26,7 +26,7 @@ def channels_of(deformation, times):
     return inverse, np.einsum("nij,nj->ni", inverse, internal)
 
 
-def test_e9_series_bounds_hold_exactly(rng):
+def test_series_bounds_hold_exactly_e9(rng):
     """Against rational arithmetic: |T_k| <= 1 on [-1, 1], whatever the rounding of the sum."""
     for _ in range(50):
         series = rng.normal(size=(7, 1)) * 10.0 ** rng.uniform(-8, 2, (7, 1))
@@ -39,7 +39,7 @@ def test_e9_series_bounds_hold_exactly(rng):
             assert Fraction(float(low[0])) <= value <= Fraction(float(high[0]))
 
 
-def test_e9_series_bounds_are_reached():
+def test_series_bounds_are_reached_e9():
     """c_0 plus the sum of the others is the value at 1 where all are positive."""
     low, high = series_bounds(np.array([[1.0], [0.25], [0.125]]))
     assert high[0] == pytest.approx(1.375, abs=1e-13)
@@ -47,7 +47,7 @@ def test_e9_series_bounds_are_reached():
 
 
 @pytest.mark.parametrize("count", [1, 2, 9, 33, 81])
-def test_e9_restriction_is_the_same_polynomial(count, rng):
+def test_restriction_is_the_same_polynomial_e9(count, rng):
     series = rng.normal(size=(count, 2)) / np.arange(1, count + 1)[:, None] ** 2
     left, right = -0.37, 0.81
     x = np.linspace(-1.0, 1.0, 101)
@@ -58,7 +58,7 @@ def test_e9_restriction_is_the_same_polynomial(count, rng):
 
 @pytest.mark.parametrize("interval", INTERVALS)
 @pytest.mark.parametrize("seed", range(len(KINDS)))
-def test_e9_channels_lie_in_their_bounds(seed, interval):
+def test_channels_lie_in_their_bounds_e9(seed, interval):
     """At thousands of times the inverse, its rate, the drift, the moments and |L_o| are within what is claimed."""
     _, deformation, _ = random_case(seed)
     length = deformation.duration
@@ -69,7 +69,7 @@ def test_e9_channels_lie_in_their_bounds(seed, interval):
     seen = known.frame.T @ inverse @ known.frame
     assert np.all(np.abs(seen - known.inverse[cell]) <= known.inverse_radius[cell])
     assert np.all(np.linalg.norm(drift @ known.frame - known.drift[cell], axis=1) <= known.drift_radius[cell])
-    assert np.all(np.linalg.norm(drift, axis=1) <= known.drift_size[cell])
+    assert np.all(np.linalg.norm(drift, axis=1) <= known.drift_magnitude[cell])
     rate = -inverse @ deformation.inertia_rate(times) @ inverse
     room = known.inverse_rate_radius[cell] + 1e-8 * np.abs(rate).max()
     assert np.all(np.abs(known.frame.T @ rate @ known.frame - known.inverse_rate[cell]) <= room)
@@ -77,13 +77,13 @@ def test_e9_channels_lie_in_their_bounds(seed, interval):
     least, greatest = known.principal_moments
     assert np.all((least[cell] <= moments) & (moments <= greatest[cell]))
     internal = np.linalg.norm(deformation.internal_momentum(times), axis=1)
-    assert np.all(internal <= known.internal_momentum_size[cell])
+    assert np.all(internal <= known.internal_momentum_magnitude[cell])
     # Tight: a cell is as wide as the resolution, and no bound is far from what is reached.
     assert np.all(greatest - least <= 0.06 * greatest)
-    assert known.internal_momentum_size.max() <= 1.25 * internal.max() + 1e-12
+    assert known.internal_momentum_magnitude.max() <= 1.25 * internal.max() + 1e-12
 
 
-def test_e9_bounds_converge_with_the_resolution():
+def test_bounds_converge_with_the_resolution_e9():
     _, deformation, _ = random_case(0)
     times = np.linspace(0.0, deformation.duration, 20001)
     top = np.linalg.eigvalsh(deformation.inertia(times))[:, 2].max()
@@ -95,7 +95,7 @@ def test_e9_bounds_converge_with_the_resolution():
     assert gaps[2] < 4e-4 * top
 
 
-def test_e9_bounds_see_what_samples_miss():
+def test_bounds_see_what_samples_miss_e9():
     """A maximum between all the samples of the panel is in the bound: it is a bound of the series."""
 
     def inertia(t):
@@ -108,17 +108,17 @@ def test_e9_bounds_see_what_samples_miss():
     assert known.principal_moments[0][:, 0].min() == pytest.approx(1.0 / 1.4, rel=1e-2)
 
 
-def test_e9_rigid_body_is_known_to_rounding():
+def test_rigid_body_is_known_to_rounding_e9():
     known = enclosure(sp.rigid(np.diag([1.0, 2.0, 3.0]), 5.0))
     least, greatest = known.principal_moments
     assert least[0] == pytest.approx([1.0, 2.0, 3.0], abs=1e-12)
     assert greatest[0] == pytest.approx([1.0, 2.0, 3.0], abs=1e-12)
     assert np.all((least <= [1.0, 2.0, 3.0]) & (greatest >= [1.0, 2.0, 3.0]))
     assert len(known.widths) == 1
-    assert known.internal_momentum_size[0] == 0.0
+    assert known.internal_momentum_magnitude[0] == 0.0
 
 
-def test_e9_quadratic_form_and_view_along_an_axis(rng):
+def test_quadratic_form_and_view_along_an_axis_e9(rng):
     """u.I^-1 u within its bounds; along, across and coupling of I^-1 about any axis, with either sign."""
     _, deformation, _ = random_case(KINDS.index("turning axes"))
     known = enclosure(deformation)
@@ -141,7 +141,7 @@ def test_e9_quadratic_form_and_view_along_an_axis(rng):
             assert np.all(side <= coupling)
 
 
-def test_e9_loops_of_a_repeated_path():
+def test_loops_of_a_repeated_path_e9():
     """The second loop's cells are those of the first."""
     loop = random_loop(3, body_of("cat_two_halves").n_shape)
     once = sp.articulated(body_of("cat_two_halves"), loop.path)
@@ -156,7 +156,7 @@ def test_e9_loops_of_a_repeated_path():
     assert np.all(moments >= second.principal_moments[0][cell])
 
 
-def test_e9_breaks_are_ends_of_cells():
+def test_breaks_are_ends_of_cells_e9():
     """A jump of the rate at a break is on the edge of two cells, and both sides' rates are right."""
 
     def inertia(t):

@@ -59,7 +59,7 @@ def inner_times(motion, count=25):
     return np.linspace(0.1, 0.9, count) * motion.duration
 
 
-def test_e1_energy_is_the_quadratic_form(rng):
+def test_energy_is_the_quadratic_form_e1(rng):
     moments, momentum = np.array([1.0, 2.0, 4.0]), np.array([1.0, 2.0, 4.0])
     assert momentum_energy(np.diag(moments), momentum) == 3.5
     frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -67,7 +67,7 @@ def test_e1_energy_is_the_quadratic_form(rng):
     assert momentum_energy(np.stack([np.eye(3)] * 4), np.ones(3)).shape == (4,)
 
 
-def test_e1_energy_of_a_rigid_motion_is_kept(rng):
+def test_energy_of_a_rigid_motion_is_kept_e1(rng):
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 9.0), rng.normal(size=(5, 3)), tolerance=1e-11)
     energy = energy_along(motion, np.linspace(0.0, 9.0, 50))
     assert energy.shape == (5, 50)
@@ -76,7 +76,7 @@ def test_e1_energy_of_a_rigid_motion_is_kept(rng):
     assert energy_along(sp.reconstruct(motion.deformation, motion.momentum[0]), 4.5) == pytest.approx(energy[0, 0])
 
 
-def test_e2_identity_with_the_kinetic_energy(swarm):
+def test_energy_identity_with_the_kinetic_energy_e2(swarm):
     """E_t = T - T_0 + L_o.I^-1 L_o/2 with the energies summed over particles."""
     times = inner_times(swarm)
     inverse, internal, _ = pieces(swarm, times)
@@ -85,27 +85,50 @@ def test_e2_identity_with_the_kinetic_energy(swarm):
     assert energy_along(swarm, times) == pytest.approx(whole - shape_only + rest, rel=1e-10)
 
 
-def test_e2_kinetic_energy_is_that_of_the_particles(swarm):
+def test_kinetic_energy_is_that_of_the_particles_e2(swarm):
     times = inner_times(swarm)
     assert kinetic_energy_along(swarm, times) == pytest.approx(particle_energies(swarm, times)[0], rel=1e-10)
 
 
-def test_e2_kinetic_energy_needs_the_masses():
+def test_kinetic_energy_needs_the_masses_e2():
     _, deformation, momentum = random_case(DIAGONAL)
     with pytest.raises(sp.ShapePhaseError, match="only the inertia is known"):
         kinetic_energy_along(sp.reconstruct(deformation, momentum), 0.1)
 
 
-def test_c_e1_kinetic_energy_lacks_its_half_in_print(swarm):
-    """The sum of m |v|^2 as printed is off by the whole T: the corrected one satisfies (4) and E2."""
-    times = inner_times(swarm)
-    whole, _ = particle_energies(swarm, times)
-    printed = 2.0 * whole
-    assert printed - kinetic_energy_along(swarm, times) == pytest.approx(whole, rel=1e-10)
+def test_printed_kinetic_energy_is_off_by_the_whole_of_it_c_e1(swarm):
+    """T is printed as the sum of m |v|^2 over the particles in space: what equation (4) gives falls short by all of T.
+
+    The velocities in space are differences of positions; T is the right side of (4), with the inertia, the internal
+    momentum and T_0 as sums over the particles.
+    """
+    times, description = inner_times(swarm), swarm.deformation.description
+    share = description.masses / description.masses.sum()
+
+    def centred(t):
+        points, speeds = (np.asarray(part) for part in description.positions(t))
+        return points - (share @ points)[:, None], speeds - (share @ speeds)[:, None]
+
+    def in_space(t):
+        return centred(t)[0] @ np.swapaxes(swarm.attitude(t), -1, -2)
+
+    velocities = differentiated(in_space, times, 2e-3 * swarm.duration)
+    printed = np.einsum("m,nmi,nmi->n", description.masses, velocities, velocities)
+    points, speeds = centred(times)
+    omega = swarm.angular_velocity(times)
+    turning = np.cross(omega[:, None], points)
+    by_equation_4 = (
+        0.5 * np.einsum("m,nmi,nmi->n", description.masses, turning, turning)
+        + np.einsum("ni,m,nmi->n", omega, description.masses, np.cross(points, speeds))
+        + 0.5 * np.einsum("m,nmi,nmi->n", description.masses, speeds, speeds)
+    )
+    assert printed - by_equation_4 == pytest.approx(by_equation_4, rel=1e-9)
+    assert printed - kinetic_energy_along(swarm, times) == pytest.approx(by_equation_4, rel=1e-9)
+    assert by_equation_4.min() > 0.0
 
 
 @pytest.mark.parametrize("seed", range(len(KINDS)))
-def test_e3_rate_is_the_derivative(seed):
+def test_energy_rate_is_the_derivative_of_the_energy_e3(seed):
     """Along a motion, for every kind of deformation, with and without internal momentum."""
     _, deformation, momentum = random_case(seed)
     motion = sp.reconstruct(deformation, momentum, tolerance=1e-11)
@@ -118,7 +141,7 @@ def test_e3_rate_is_the_derivative(seed):
         assert rate.by_inertia == pytest.approx(expected, abs=1e-7 * (np.abs(expected).max() + 1e-3))
 
 
-def test_c_e9_internal_momentum_and_not_that_of_the_shape_itself(swarm):
+def test_internal_momentum_and_not_that_of_the_shape_itself_c_e9(swarm):
     """Printed L(d_0) is the sum of m d_0 x d_0 = 0: then neither the rate nor k(t) is right; with L(d_0') both are."""
     times = inner_times(swarm)
     inverse, internal, _ = pieces(swarm, times)
@@ -134,7 +157,7 @@ def test_c_e9_internal_momentum_and_not_that_of_the_shape_itself(swarm):
     assert np.abs(whole - shape_only - energy_along(swarm, times)).max() > 0.5 * rest.max() > 1e-4 * whole.max()
 
 
-def test_c_e8_rate_of_the_inverse_and_not_of_its_product(swarm):
+def test_rate_of_the_inverse_and_not_of_its_product_c_e8(swarm):
     """Pi.(d/dt)[I^-1 Pi]/2 is the rate only without internal momentum."""
 
     def printed(motion, times):
@@ -164,7 +187,7 @@ def growing(duration=2.0):
     )
 
 
-def test_c_e7_rate_of_case_three_needs_its_half():
+def test_rate_of_case_three_needs_its_half_c_e7():
     """dE/dt = Pi_3^2 (1/I_3)'/2; the printed one is twice as much."""
     motion = sp.reconstruct(growing(), [0.6, 0.1, 0.8], tolerance=1e-11)
     times = inner_times(motion)
@@ -187,7 +210,7 @@ def test_c_e7_rate_of_case_three_needs_its_half():
         ((2.0, 2.0, 2.0), (0.3, 0.4, 1.0), "spherical"),
     ],
 )
-def test_e4_frozen_polhode_is_the_orbit_of_the_frozen_body(moments, momentum, regime):
+def test_frozen_polhode_is_the_orbit_of_the_frozen_body_e4(moments, momentum, regime):
     """On both the sphere and the ellipsoid, through the start, closed, and along Euler's equations."""
     pi, inverse = np.array(momentum), 1.0 / np.array(moments)
     curve = frozen_polhode(sp.rigid(np.diag(moments), 1.0), 0.5, pi)
@@ -204,7 +227,7 @@ def test_e4_frozen_polhode_is_the_orbit_of_the_frozen_body(moments, momentum, re
         assert gaps.max() < 0.6 * np.linalg.norm(np.diff(curve.points, axis=0), axis=1).max() + 1e-9
 
 
-def test_e4_frozen_polhode_of_a_moment_of_the_deformation():
+def test_frozen_polhode_of_a_moment_of_the_deformation_e4():
     """In any axes and at any time, and the true solution starts along it where there is no internal momentum."""
     _, deformation, momentum = random_case(KINDS.index("turned frame"))
     motion = sp.reconstruct(deformation, momentum)
@@ -218,7 +241,7 @@ def test_e4_frozen_polhode_of_a_moment_of_the_deformation():
     assert abs(along @ rate) / np.linalg.norm(along) / np.linalg.norm(rate) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_e4_frozen_polhode_on_the_separatrix():
+def test_frozen_polhode_on_the_separatrix_e4():
     """Half a great circle from one direction of the intermediate axis to the other, through the start."""
     pi = np.array([np.sqrt(1 / 3), 0.0, 1.0])
     curve = frozen_polhode(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), 0.0, pi, count=401)
@@ -229,13 +252,13 @@ def test_e4_frozen_polhode_on_the_separatrix():
     assert energies == pytest.approx(np.full(401, curve.homoclinic_energy), rel=1e-13)
 
 
-def test_e4_count_is_checked():
+def test_frozen_polhode_checks_its_count_e4():
     for count in (1, 2.5, True):
         with pytest.raises(sp.ShapePhaseError, match="count"):
             frozen_polhode(sp.rigid(np.eye(3), 1.0), 0.0, [1.0, 0.0, 0.0], count=count)
 
 
-def test_e5_homoclinic_energy_is_that_of_the_intermediate_axis():
+def test_homoclinic_energy_is_that_of_the_intermediate_axis_e5():
     deformation = growing()
     times = np.linspace(0.0, 2.0, 7)
     inverse = np.linalg.inv(deformation.inertia(times))
@@ -244,7 +267,7 @@ def test_e5_homoclinic_energy_is_that_of_the_intermediate_axis():
     assert homoclinic_energy(deformation, 0.0, 1.7) == pytest.approx(0.5 * 1.7**2 / 1.4, rel=1e-13)
 
 
-def test_e15_principal_axes_are_equilibria():
+def test_principal_axes_are_equilibria_e15():
     """Without internal momentum and with axes that stay, Pi along one stays there, whatever the moments do."""
     _, deformation, _ = random_case(DIAGONAL)
     for axis in np.eye(3):
@@ -253,7 +276,7 @@ def test_e15_principal_axes_are_equilibria():
         assert momenta == pytest.approx(np.broadcast_to(1.3 * axis, momenta.shape), abs=1e-12)
 
 
-def test_e15_principal_axes_are_none_with_internal_momentum():
+def test_principal_axes_are_no_equilibria_with_internal_momentum_e15():
     _, deformation, _ = random_case(KINDS.index("diagonal, internal momentum"))
     motion = sp.reconstruct(deformation, [0.0, 0.0, 1.3])
     assert np.linalg.norm(motion.body_momentum(motion.duration) - [0.0, 0.0, 1.3]) > 1e-3

@@ -68,7 +68,7 @@ ORBITS = [
 
 
 @pytest.mark.parametrize(("position", "velocity"), ORBITS)
-def test_a16_the_orbit_is_the_solution_of_newtons_equation(position, velocity):
+def test_the_orbit_is_the_solution_of_newtons_equation_a16(position, velocity):
     """Both ways in time, against DOP853 on r'' = -gm r/|r|^3; ellipses and hyperbolas."""
     centre = np.array([1e6, -2e6, 3e6])
     orbit = KeplerOrbit.from_state(np.add(position, centre), velocity, EARTH, centre)
@@ -146,7 +146,7 @@ def test_times_whose_digits_are_lost_are_refused():
         gravity_gradient_torque(np.eye(3), [1e-200, 0.0, 0.0], 1.0)
 
 
-def test_orbits_that_are_none_are_refused():
+def test_impossible_orbits_are_refused():
     for make, said in (
         (lambda: KeplerOrbit.from_state([7e6, 0, 0], [100.0, 0, 0], EARTH), "straight"),
         (lambda: KeplerOrbit.from_state([7e6, 0, 0], [0, 0, 0], EARTH), "straight"),
@@ -204,7 +204,7 @@ DIRECTION = np.array([0.48, -0.6, 0.64])
 
 
 @pytest.mark.parametrize(("symmetric", "order"), [(False, 1), (True, 2)])
-def test_a16_the_exact_torque_tends_to_the_gravity_gradient(symmetric, order):
+def test_the_exact_torque_tends_to_the_gravity_gradient_a16(symmetric, order):
     """The relative remainder is in proportion to size/r over three decades; to its square for a body that is its own
     mirror image in its centre, where the third moments vanish.
     """
@@ -225,7 +225,7 @@ def test_a16_the_exact_torque_tends_to_the_gravity_gradient(symmetric, order):
     assert abs(ratios[2] / ratios[-1] - 1) < 0.001
 
 
-def test_a16_the_torque_law_is_batched_and_follows_the_axes():
+def test_the_torque_law_is_batched_and_follows_the_axes_a16():
     rng = np.random.default_rng(5)
     turn = Rotation.random(6, rng=rng).as_matrix()
     positions = rng.normal(size=(6, 3)) * 1e3
@@ -238,7 +238,7 @@ def test_a16_the_torque_law_is_batched_and_follows_the_axes():
     )
 
 
-def test_c_e14_the_force_has_the_cube_of_the_distance():
+def test_the_force_has_the_cube_of_the_distance_c_e14():
     """Remark 4.7 prints (r_CM - P)^3, which has no meaning for a vector; the slope of gm m/|r| decides."""
     position = np.array([3.0, -2.0, 5.0])
     with mpmath.workdps(30):
@@ -255,7 +255,7 @@ def test_c_e14_the_force_has_the_cube_of_the_distance():
     np.testing.assert_allclose(gravity_force(2.0, 3 * position, 7.0), want / 9, rtol=1e-14)
 
 
-def test_a16_equal_accelerations_make_no_torque():
+def test_equal_accelerations_make_no_torque_a16():
     """Remark 4.7: with F_i = m_i g(r_CM) the torque about the centre vanishes whatever the shape."""
     forces = np.array([gravity_force(m, [1e3, 2e3, -5e2], EARTH) for m in MASSES])
     torque = np.sum(np.cross(CENTRED, forces), axis=0)
@@ -320,7 +320,7 @@ def newtonian(shape, orbit, momentum, duration, times):
 
 @pytest.mark.parametrize("shape", [still, breathing])
 @pytest.mark.parametrize("momentum", [(0.4, -0.3, 0.9), (0.02, 0.01, -0.03)])
-def test_a16_the_estimate_is_what_the_full_simulation_shows(shape, momentum):
+def test_the_estimate_is_what_the_full_simulation_shows_a16(shape, momentum):
     """The orbit decouples to (size/r)^2, the attitude leaves the free motion by the estimate, to its first order."""
     duration = 30.0
     orbit = KeplerOrbit.from_elements(2e4, 0.2, 0.5, 0.3, 0.2, 0.1, 1e9)
@@ -345,7 +345,7 @@ def test_a16_the_estimate_is_what_the_full_simulation_shows(shape, momentum):
     assert found.largest_torque == pytest.approx(want, rel=1e-3)
 
 
-def test_a16_the_estimate_against_the_linear_equation_integrated_otherwise(monkeypatch):
+def test_the_estimate_against_the_linear_equation_integrated_otherwise_a16(monkeypatch):
     """dmu' = torque, eps' = R I^-1 R^T (dmu + mu x eps), with DOP853 and dense attitudes: to the estimate's 1e-5."""
     orbit = KeplerOrbit.from_state([0.0, 3e3, 1e3], [400.0, 0.0, 100.0], 1e9, centre=[1e3, 0.0, 0.0])
     mu = np.array([0.4, -0.3, 0.9])
@@ -370,7 +370,7 @@ def test_a16_the_estimate_against_the_linear_equation_integrated_otherwise(monke
         assert gravity_torque_estimate(other, orbit).attitude_error == pytest.approx(found.attitude_error, rel=1e-4)
 
 
-def test_a16_is_the_body_free_enough():
+def test_is_the_body_free_enough_a16():
     """A satellite on a low orbit is not to 1e-9 in a minute, and is to a degree; far away it is."""
     motion = sp.reconstruct(sp.rigid(np.diag([10.0, 14.0, 20.0]), 60.0), [1.0, 2.0, 3.0])
     low = KeplerOrbit.from_elements(7e6, 0.001, 0.9, 0.3, 0.2, 0.1, EARTH)

@@ -108,7 +108,7 @@ HOMOTHETIES = {
 
 
 @pytest.mark.parametrize("name", HOMOTHETIES)
-def test_f1_a_growing_body_moves_as_the_rigid_one_in_its_own_time(name):
+def test_a_growing_body_moves_as_the_rigid_one_in_its_own_time_f1(name):
     example = homothety(**HOMOTHETIES[name])
     motion = motion_of(example, 5e-12)
     assert_known(example, motion)
@@ -118,7 +118,7 @@ def test_f1_a_growing_body_moves_as_the_rigid_one_in_its_own_time(name):
 
 
 @pytest.mark.parametrize("name", HOMOTHETIES)
-def test_f1_the_raw_equations_say_the_same(name):
+def test_the_raw_equations_say_the_same_f1(name):
     example = homothety(**HOMOTHETIES[name])
     times = np.linspace(0.0, example.deformation.duration, 21)
     scale = HOMOTHETIES[name].get("scale") or pulsation()
@@ -128,7 +128,7 @@ def test_f1_the_raw_equations_say_the_same(name):
     assert np.abs(example.known.body_momentum(times) - momentum).max() < 3e-11
 
 
-def test_f1_the_phase_is_the_rigid_one_and_the_area_its_own():
+def test_the_phase_is_the_rigid_one_and_the_area_its_own_f1():
     """The dynamic phase is 2 f(Pi) T_RB/l, the solid angle the rigid body's: both halves, not the sum alone."""
     example = homothety()
     split = sp.split(motion_of(example), "base")
@@ -138,7 +138,7 @@ def test_f1_the_phase_is_the_rigid_one_and_the_area_its_own():
 
 
 @pytest.mark.parametrize("scale", [pulsation(), pulsation(-0.8, 1.3), expansion(), expansion(2.0)])
-def test_f1_the_clock_is_the_integral_of_the_inverse_square(scale):
+def test_the_clock_is_the_integral_of_the_inverse_square_f1(scale):
     for end in (0.3, 2.9, 7.0):
         exact = sum(
             quad(lambda t: float(scale.factor(t)) ** -2, *piece, epsabs=1e-14)[0]
@@ -147,7 +147,7 @@ def test_f1_the_clock_is_the_integral_of_the_inverse_square(scale):
         assert float(scale.clock(np.array(end))) == pytest.approx(exact, rel=1e-13)
 
 
-def test_f1_the_clock_by_quadrature():
+def test_the_clock_by_quadrature_f1():
     known = pulsation(0.7, 1.1)
     example = homothety(Scale(known.factor), duration=6.0)
     times = np.linspace(0.0, 6.0, 12).reshape(3, 4)
@@ -157,7 +157,7 @@ def test_f1_the_clock_by_quadrature():
         homothety(Scale(lambda t: 2.0 + np.sign(np.sin(1e4 * t)) * np.cos(t)), duration=3.0).known.attitude([2.0])
 
 
-def test_f1_a_body_that_expands_for_ever_turns_by_a_finite_angle():
+def test_a_body_that_expands_for_ever_turns_by_a_finite_angle_f1():
     example = homothety(expansion(0.5), duration=1e5)
     last = example.rigid.attitude(2.0)
     assert so3.angle(example.known.attitude(1e5).T @ last) < 2.0 * 3.2 / (0.5 * 1e5 * 0.5)
@@ -172,7 +172,7 @@ AXIAL = {"as printed": axial_as_printed, "stretch": axial_stretch}
 
 @pytest.mark.parametrize("name", AXIAL)
 @pytest.mark.parametrize("momentum", [(3.0, 0.8, 0.6), (-2.0, 1.5, 0.9)])
-def test_f2_the_closed_form_is_the_motion(name, momentum):
+def test_the_closed_form_is_the_motion_f2(name, momentum):
     example = AXIAL[name](momentum=momentum)
     motion = motion_of(example, 3e-12)
     assert_known(example, motion)
@@ -183,7 +183,7 @@ def test_f2_the_closed_form_is_the_motion(name, momentum):
 
 
 @pytest.mark.parametrize("name", AXIAL)
-def test_f2_pi_goes_by_the_rigid_body_in_its_own_time_and_the_phase_does_not(name):
+def test_pi_goes_by_the_rigid_body_in_its_own_time_and_the_phase_does_not_f2(name):
     """Example 4.4: Pi = Pi_RB(sigma), sigma the integral of 1/I_1 − 1/I_2 over its value at the start."""
     example = AXIAL[name]()
     motion = motion_of(example)
@@ -201,7 +201,7 @@ def test_f2_pi_goes_by_the_rigid_body_in_its_own_time_and_the_phase_does_not(nam
     assert abs(so3.wrap(example.phase - example.rigid.montgomery_phase)) > 0.3
 
 
-def test_f2_the_phase_as_printed_is_the_rate_times_another_time():
+def test_the_phase_as_printed_is_the_rate_times_another_time_f2():
     """l T/I_2 with the time of its own loop, l T_RB/I_2 for the rigid body."""
     example = axial_as_printed()
     size = np.linalg.norm(example.momentum)
@@ -210,7 +210,7 @@ def test_f2_the_phase_as_printed_is_the_rate_times_another_time():
     assert example.deformation.duration < 0.95 * example.rigid.period
 
 
-def test_f2b_a_cylinder_is_what_its_moments_say():
+def test_a_cylinder_is_what_its_moments_say_f2b():
     example = axial_stretch(3.0, 0.4, 1.2, speed=0.25, duration=4.0)
     for t in (0.0, 1.7, 4.0):
         length = 1.2 + 0.25 * t
@@ -221,7 +221,7 @@ def test_f2b_a_cylinder_is_what_its_moments_say():
     assert example.deformation.triangle_defect()[0] < 0.0
 
 
-def test_c_e13_a_true_stretch_goes_round_at_the_corrected_rate():
+def test_a_true_stretch_goes_round_at_the_corrected_rate_c_e13():
     """Example 4.4 speaks of a stretch along the axis: I_1 stays. Pi goes round at Pi_1 (1/I(t) − 1/I_1)."""
     example = axial_stretch()
     motion = motion_of(example)
@@ -249,7 +249,7 @@ def test_c_e13_a_true_stretch_goes_round_at_the_corrected_rate():
     ],
     ids=["F2 beyond 2 I_2", "F3 beyond I_2 + I_3", "F4 beyond I_1 + I_2"],
 )
-def test_c_e13_as_printed_the_triangle_inequality_fails(make, limit, fine):
+def test_as_printed_the_triangle_inequality_fails_c_e13(make, limit, fine):
     assert make(fine).deformation.triangle_defect()[0] < 0.0
     assert make(limit).deformation.triangle_defect()[0] == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(UnphysicalInertiaError):
@@ -260,7 +260,7 @@ def test_c_e13_as_printed_the_triangle_inequality_fails(make, limit, fine):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_c_e13_what_is_shipped_is_a_body(name):
+def test_what_is_shipped_is_a_body_c_e13(name):
     assert named_example(name).deformation.triangle_defect()[0] < 1e-12
 
 
@@ -270,7 +270,7 @@ def test_c_e13_what_is_shipped_is_a_body(name):
 @pytest.mark.parametrize(
     "example", [printed_antenna(1), printed_antenna(3), regime_crossing()], ids=["F3", "F4", "E11"]
 )
-def test_f3_f4_the_energy_falls_by_half_the_printed_rate(example):
+def test_the_energy_falls_by_half_the_printed_rate_f3_f4(example):
     """C-E7: dE/dt = Pi_k² d(1/I_k)/dt / 2, in 4.1.1 printed without the half; and the energy falls to the coast."""
     motion = motion_of(example)
     end = example.deformation.breaks[1]
@@ -287,7 +287,7 @@ def test_f3_f4_the_energy_falls_by_half_the_printed_rate(example):
 
 
 @pytest.mark.parametrize("name", ["antenna_along_1", "antenna_along_3", "regime_crossing", "dipole_antenna"])
-def test_f3_f4_the_raw_equations_say_the_same(name):
+def test_the_raw_equations_say_the_same_f3_f4(name):
     example = named_example(name)
     motion = motion_of(example)
     times = np.linspace(0.0, motion.duration, 31)
@@ -299,7 +299,7 @@ def test_f3_f4_the_raw_equations_say_the_same(name):
     assert np.abs(motion.body_momentum(times) - momentum).max() < 3e-12
 
 
-def test_f3_passes_from_axis_1_to_axis_3_with_the_order_kept():
+def test_printed_antenna_passes_from_axis_1_to_axis_3_with_the_order_kept_f3():
     example = printed_antenna(1)
     motion = motion_of(example)
     times = np.linspace(0.0, motion.duration, 1001)
@@ -319,7 +319,7 @@ def test_f3_passes_from_axis_1_to_axis_3_with_the_order_kept():
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_f4_stays_about_axis_3(seed):
+def test_printed_antenna_stays_about_axis_3_f4(seed):
     """I_3 grows, I_1 and I_2 stay: energy falls, its limit l²/(2 I_2) stays."""
     rng = np.random.default_rng(seed)
     one, two, three = np.sort(rng.uniform(1.0, 2.0, 3))
@@ -336,7 +336,7 @@ def test_f4_stays_about_axis_3(seed):
     assert np.all(motion.body_momentum(times)[:, 2] * top.momentum[2] > 0.0)
 
 
-def test_e11_case_3_crosses_under_the_triangle_cap():
+def test_case_3_crosses_under_the_triangle_cap_e11():
     example = regime_crossing()
     motion = motion_of(example)
     values = energy(example, motion, np.array([0.0, 0.2, motion.duration]))
@@ -359,7 +359,7 @@ def test_e11_case_3_crosses_under_the_triangle_cap():
 
 
 @pytest.mark.parametrize("axis", [1, 2, 3])
-def test_f4b_the_antenna_is_that_of_particles(axis):
+def test_the_antenna_is_that_of_particles_f4b(axis):
     """The hub as six masses, and two tips: the same inertia, no internal momentum, the same motion."""
     example = dipole_antenna(axis, coast=1.0)
     hub = np.array([1.0, 1.5, 2.0])
@@ -386,7 +386,7 @@ def test_f4b_the_antenna_is_that_of_particles(axis):
     assert so3.angle(motion_of(example).final_attitude.T @ whole.final_attitude) < 3e-12
 
 
-def test_f4b_along_the_largest_moment_the_order_does_not_last():
+def test_along_the_largest_moment_the_order_does_not_last_f4b():
     """Against the paper's conclusion of example 4.5; along the smallest it does."""
     example = dipole_antenna(3)
     motion = motion_of(example)
@@ -398,7 +398,7 @@ def test_f4b_along_the_largest_moment_the_order_does_not_last():
     assert np.all(np.diff(moments_of(dipole_antenna(1), times), axis=1) > 0.0)
 
 
-def test_f4b_the_boom_of_the_satellite_does_what_the_physical_antenna_does():
+def test_the_boom_of_the_satellite_does_what_the_physical_antenna_does_f4b():
     """A real boom along x: I_xx stays, the others grow alike, the energy falls, and the order does not last."""
     body = sp.load_body("satellite")
     deformation = sp.articulated(body, antenna_deployment(60.0))
@@ -446,7 +446,7 @@ def phase_difference(rate, law, moments, momentum):
 
 
 @pytest.mark.parametrize("law", ["even", "periodic"])
-def test_f5_the_phase_tends_to_the_rigid_one_over_three_decades(law):
+def test_the_phase_tends_to_the_rigid_one_over_three_decades_f5(law):
     """First order in the rate in general, second where the rate starts from zero."""
     rates = 10.0 ** np.arange(-2.0, -5.5, -0.5)
     gaps = np.abs([phase_difference(rate, law, *ORBITS["default"])[0] for rate in rates])
@@ -458,7 +458,7 @@ def test_f5_the_phase_tends_to_the_rigid_one_over_three_decades(law):
 
 
 @pytest.mark.parametrize("name", ORBITS)
-def test_f5_the_first_order_is_the_derived_one(name):
+def test_the_first_order_is_the_derived_one_f5(name):
     """Extrapolated from two rates, against perturbation in Andoyer's variables."""
     slope = slow_phase_slope(*ORBITS[name])
     rate = 2e-5
@@ -466,14 +466,14 @@ def test_f5_the_first_order_is_the_derived_one(name):
     assert 2.0 * measured[1] - measured[0] == pytest.approx(slope, rel=1e-6)
 
 
-def test_f5_the_loop_closes_along_the_meridian():
+def test_the_loop_closes_along_the_meridian_f5():
     _, loop = phase_difference(1e-3, "even", *ORBITS["wide"])
     assert 1e-4 < loop.momentum_gap[0] < 1e-1
     _, slower = phase_difference(1e-4, "even", *ORBITS["wide"])
     assert loop.momentum_gap[0] / slower.momentum_gap[0] == pytest.approx(10.0, rel=0.1)
 
 
-def test_f5_half_a_loop_to_either_side_of_a_symmetric_point_leaves_second_order():
+def test_half_a_loop_to_either_side_of_a_symmetric_point_leaves_second_order_f5():
     """The rigid body of the middle of the loop: first orders cancel, so the order is that of the reference."""
     moments, size = np.array([1.0, 1.5, 2.0]), 3.0
     start = size * np.array([0.0, np.sin(0.4), np.cos(0.4)])
@@ -501,7 +501,7 @@ def test_f5_half_a_loop_to_either_side_of_a_symmetric_point_leaves_second_order(
 
 
 @pytest.mark.parametrize(("law", "order"), [("deployment", 3.0), ("even", 1.0)])
-def test_f5_after_a_deployment_the_body_has_the_area_it_had(law, order):
+def test_after_a_deployment_the_body_has_the_area_it_had_f5(law, order):
     """From rest to rest by the quintic to third order, evenly to first.
 
     What the two ends do adds up or cancels, by when they come: the worst of eight starts on half the orbit and of
@@ -538,7 +538,7 @@ def even_growth(duration):
 
 
 @pytest.mark.parametrize("law", ["deployment", "even"])
-def test_f5_the_whole_precession_is_that_of_constant_area_to_first_order(law):
+def test_the_whole_precession_is_that_of_constant_area_to_first_order_f5(law):
     """Second order a loop: the angle of axis 3 about the momentum grows as 1/rate, its difference falls as the rate."""
     spatial = 3.0 * np.array([0.0, np.sin(0.4), np.cos(0.4)])
     seconds = np.array([20.0, 40.0, 80.0, 160.0]) if law == "even" else np.array([80.0, 160.0])
@@ -563,7 +563,7 @@ def test_f5_the_whole_precession_is_that_of_constant_area_to_first_order(law):
     assert -np.polyfit(np.log(seconds), np.log(gaps), 1)[0] == pytest.approx(1.0, abs=0.08)
 
 
-def test_f5_the_precession_of_constant_area_goes_over_breaks_and_is_rigid_without_growth():
+def test_the_precession_of_constant_area_goes_over_breaks_and_is_rigid_without_growth_f5():
     top = EulerTop.principal([1.0, 1.5, 2.0], [0.3, 0.4, 0.9])
     still = sp.rigid(np.diag([1.0, 1.5, 2.0]), 9.0)
     assert adiabatic_precession(still, top.momentum, 7.0) == pytest.approx(7.0 * top.precession_frequency, rel=1e-12)
@@ -574,7 +574,7 @@ def test_f5_the_precession_of_constant_area_goes_over_breaks_and_is_rigid_withou
 
 
 @pytest.mark.parametrize("area", [1e-6, 0.3, 2.5])
-def test_f5_the_orbit_of_an_area_has_it(area):
+def test_the_orbit_of_an_area_has_it_f5(area):
     top = orbit_of_area([1.0, 1.5, 2.4], 1.7, area)
     assert top.solid_angle == pytest.approx(area, abs=1e-12)
     assert top.magnitude == pytest.approx(1.7, rel=1e-14)
@@ -585,7 +585,7 @@ def test_f5_the_orbit_of_an_area_has_it(area):
 
 @pytest.mark.parametrize("momentum", [30.0, 0.0, -12.0])
 @pytest.mark.parametrize("duration", [5.0, 20.0])
-def test_f6_a_walk_round_turns_the_spacecraft_by_the_reduced_mass(momentum, duration):
+def test_a_walk_round_turns_the_spacecraft_by_the_reduced_mass_f6(momentum, duration):
     example = furniture(duration, momentum=(0.0, 0.0, momentum))
     motion = motion_of(example)
     assert_known(example, motion, 1e-12)
@@ -598,7 +598,7 @@ def test_f6_a_walk_round_turns_the_spacecraft_by_the_reduced_mass(momentum, dura
     assert abs(so3.wrap(holonomy + 2.0 * np.pi * reduced * 4.0 / largest)) < 1e-11
 
 
-def test_f6_the_assembly_is_that_of_particles_and_of_the_reduced_mass():
+def test_the_assembly_is_that_of_particles_and_of_the_reduced_mass_f6():
     example = furniture(height=0.5, momentum=(10.0, -20.0, 30.0))
     assert example.known is None
     assert furniture(height=0.5).known is None
@@ -635,7 +635,7 @@ def test_f6_the_assembly_is_that_of_particles_and_of_the_reduced_mass():
 
 
 @pytest.mark.parametrize("example", [cat(), cat(halves=True)], ids=["realistic", "Kane and Scher"])
-def test_f7_the_cat_rights_itself(example):
+def test_the_cat_rights_itself_f7(example):
     motion = motion_of(example)
     assert np.all(example.momentum == 0.0)
     assert so3.angle(motion.final_attitude) == pytest.approx(example.turn, abs=1e-9)
@@ -643,7 +643,7 @@ def test_f7_the_cat_rights_itself(example):
 
 
 @pytest.mark.parametrize("legs", [False, True])
-def test_f8_the_astronaut_pitches(legs):
+def test_the_astronaut_pitches_f8(legs):
     example = astronaut(legs)
     end = motion_of(example).final_attitude
     assert so3.angle(end) == pytest.approx(example.turn, abs=1e-8)
@@ -651,7 +651,7 @@ def test_f8_the_astronaut_pitches(legs):
 
 
 @pytest.mark.parametrize("momentum", [(0.6, 0.5, 1.2), (1.2, 0.1, -0.4)])
-def test_f9_the_rigid_body_is_the_euler_top(momentum):
+def test_the_rigid_body_is_the_euler_top_f9(momentum):
     example = rigid_body(momentum=momentum)
     motion = sp.reconstruct(example.deformation, example.momentum, tolerance=1e-12, method="collocation")
     assert_known(example, motion, 1e-11)
@@ -719,7 +719,7 @@ def test_what_cannot_be_is_refused(call, error, words):
 
 
 @pytest.mark.parametrize("name", ["default", "nearer the separatrix", "fast"])
-def test_f4_the_certificate_is_given_before_the_motion_and_kept(name):
+def test_the_certificate_is_given_before_the_motion_and_kept_f4(name):
     """Must hold for the printed antenna along axis 3: the order prevails, the energy falls."""
     options = {
         "default": {},
@@ -742,6 +742,6 @@ def test_f4_the_certificate_is_given_before_the_motion_and_kept(name):
 
 
 @pytest.mark.parametrize("name", ["antenna_1", "regime_crossing"])
-def test_f3_no_certificate_where_the_momentum_changes_its_axis(name):
+def test_no_certificate_where_the_momentum_changes_its_axis_f3(name):
     example = printed_antenna(1) if name == "antenna_1" else regime_crossing()
     assert regime_certificate(example.deformation, example.momentum).regime == "may cross"

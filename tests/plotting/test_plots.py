@@ -420,7 +420,7 @@ def test_inertia_and_internal_momentum(motions):
 
 
 @pytest.mark.parametrize("name", ["cat", "astronaut"])
-def test_e5_energy_lies_between_the_bands_whose_edges_are_the_thresholds(motions, name):
+def test_energy_lies_between_the_bands_whose_edges_are_the_thresholds_e5(motions, name):
     motion = motions[name]
     ax = plots.plot_energy(flat_axes(2.6), motion)
     energy = by_label(ax, "E")

@@ -51,7 +51,7 @@ def labels(ax):
     return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
-def test_g8_curves_lie_on_the_sphere_and_on_their_energy():
+def test_curves_lie_on_the_sphere_and_on_their_energy_g8():
     levels = [0.15, 0.2, 0.3, 0.45]
     ax = plot_polhodes(solid_axes(), MOMENTS, energies=levels)
     for colour, expected in ((ROUND_LARGEST, levels[:2]), (ROUND_SMALLEST, levels[2:])):
@@ -66,7 +66,7 @@ def test_g8_curves_lie_on_the_sphere_and_on_their_energy():
     assert labels(ax) == ["round largest moment", "round smallest moment", "separatrix", "saddle", "centre"]
 
 
-def test_g8_the_usual_energies_go_round_each_stable_axis():
+def test_the_usual_energies_go_round_each_stable_axis_g8():
     ax = plot_polhodes(solid_axes(), MOMENTS)
     for colour, low, high in ((ROUND_LARGEST, 0.125, 0.25), (ROUND_SMALLEST, 0.25, 0.5)):
         found = {round(float(energy(c[0], MOMENTS)), 12) for c in curves(ax, colour)}
@@ -79,7 +79,7 @@ def test_g8_the_usual_energies_go_round_each_stable_axis():
 
 
 @pytest.mark.parametrize("view", [(24.0, 32.0), (90.0, 0.0), (-15.0, 200.0)])
-def test_g8_the_far_side_is_dimmed(view):
+def test_the_far_side_is_dimmed_g8(view):
     ax = solid_axes()
     ax.view_init(*view)
     plot_polhodes(ax, MOMENTS)
@@ -98,7 +98,7 @@ def test_g8_the_far_side_is_dimmed(view):
     ("view", "right", "up"),
     [((0.0, 90.0), [-1, 0, 0], [0, 0, 1]), ((90.0, 0.0), [0, 1, 0], [-1, 0, 0]), ((-90.0, 0.0), [0, 1, 0], [1, 0, 0])],
 )
-def test_g8_flat_axes_show_the_same_points_in_parallel_projection(view, right, up):
+def test_flat_axes_show_the_same_points_in_parallel_projection_g8(view, right, up):
     solid = solid_axes()
     solid.view_init(*view)
     plot_polhodes(solid, MOMENTS)
@@ -108,7 +108,7 @@ def test_g8_flat_axes_show_the_same_points_in_parallel_projection(view, right, u
         assert other == pytest.approx(one @ np.transpose([right, up]), abs=1e-14)
 
 
-def test_g8_pieces_of_a_curve_join_at_the_limb():
+def test_pieces_of_a_curve_join_at_the_limb_g8():
     ax = plot_polhodes(solid_axes(), MOMENTS, energies=[0.24])
     pieces = curves(ax, ROUND_LARGEST)
     assert len(pieces) > 2
@@ -118,7 +118,7 @@ def test_g8_pieces_of_a_curve_join_at_the_limb():
 
 
 @pytest.mark.parametrize("name", TOPS)
-def test_g8_the_polhode_of_a_top_is_drawn_whole(name):
+def test_the_polhode_of_a_top_is_drawn_whole_g8(name):
     top = TOPS[name]
     ax = plot_polhodes(solid_axes(), top)
     own = np.concatenate(curves(ax, OWN))
@@ -132,7 +132,7 @@ def test_g8_the_polhode_of_a_top_is_drawn_whole(name):
     assert OWN in {line.get_color() for line in plot_polhodes(flat_axes(), top).lines}
 
 
-def test_g8_degenerate_bodies():
+def test_degenerate_bodies_g8():
     ax = plot_polhodes(solid_axes(), (1.0, 2.0, 1.0))
     assert labels(ax) == ["round largest moment", "circle of equilibria", "centre"]
     assert len({round(float(energy(c[0], (1.0, 2.0, 1.0))), 12) for c in curves(ax, ROUND_LARGEST)}) == 4
@@ -155,7 +155,7 @@ def test_g8_degenerate_bodies():
 
 
 @pytest.mark.parametrize("name", TOPS)
-def test_i5_the_herpolhode_is_drawn_between_its_circles(name):
+def test_the_herpolhode_is_drawn_between_its_circles_i5(name):
     top = TOPS[name]
     inner, outer = Poinsot(top).annulus
     ax = plot_herpolhode(flat_axes(), top, 6.0)
@@ -181,7 +181,7 @@ def test_i5_the_herpolhode_is_drawn_between_its_circles(name):
 
 
 @pytest.mark.parametrize("momentum", [(0.0, 0.0, 2.0), (0.0, 2.0, 0.0)])
-def test_i5_a_steady_rotation_is_drawn_as_a_point(momentum):
+def test_a_steady_rotation_is_drawn_as_a_point_i5(momentum):
     ax = plot_herpolhode(flat_axes(), EulerTop.principal((1.0, 2.0, 3.0), momentum))
     assert curves(ax) == []
     assert markers(ax, "*") == pytest.approx(np.zeros((1, 2)), abs=0.0)

@@ -1,7 +1,8 @@
-"""What is certain before a body moves: bounds of energy, arc length, return time and phase after Cabrera.
+"""What is certain before a motion is computed: bounds of energy, arc length, return time and phase after Cabrera.
 
-`regime_certificate` names the axis that the momentum circles; `bounds` collects the rest; `gravity_gradient` says
-whether a body in orbit is free enough.
+`regime_certificate` names the principal axis that the momentum circles, `crown_region` the part of the momentum sphere
+that it can reach, `bounds` lists every bound of a motion with the value it bounds. `gravity_torque_estimate` says
+whether a body in orbit turns as a free one.
 """
 
 from lazy_loader import attach_stub

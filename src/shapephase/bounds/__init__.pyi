@@ -1,6 +1,4 @@
-from ._energy_bounds import EnergyBounds, energy_bounds, turning
-from .all_bounds import Bound, bounds
-from .arc_bounds import (
+from ._arc_bounds import (
     ArcLengthBounds,
     AzimuthBounds,
     ReturnTimeBounds,
@@ -9,6 +7,15 @@ from .arc_bounds import (
     azimuth_rate,
     return_time_bounds,
 )
+from ._energy_bounds import EnergyBounds, energy_bounds
+from ._phase_bounds import (
+    PhaseBounds,
+    dynamic_phase_bounds,
+    dynamic_phase_bounds_by_extremes,
+    loop_phase_bounds,
+    solid_angle_bounds,
+)
+from .all_bounds import Bound, bounds
 from .energy import (
     EnergyRate,
     FrozenPolhode,
@@ -27,14 +34,7 @@ from .gravity_gradient import (
     gravity_gradient_torque,
     gravity_torque_estimate,
 )
-from .phase_bounds import (
-    PhaseBounds,
-    dynamic_phase_bounds,
-    dynamic_phase_bounds_by_extremes,
-    loop_phase_bounds,
-    solid_angle_bounds,
-)
-from .regimes import CrownRegion, RegimeCertificate, crown_region, regime_certificate
+from .regimes import CrownRegion, Regime, RegimeCertificate, crown_region, regime_certificate
 
 __all__ = [
     "ArcLengthBounds",
@@ -47,6 +47,7 @@ __all__ = [
     "GravityTorque",
     "KeplerOrbit",
     "PhaseBounds",
+    "Regime",
     "RegimeCertificate",
     "ReturnTimeBounds",
     "arc_length_bounds",
@@ -71,5 +72,4 @@ __all__ = [
     "regime_certificate",
     "return_time_bounds",
     "solid_angle_bounds",
-    "turning",
 ]

@@ -2,8 +2,8 @@
 
 On every cell of an interval the nine channels (I^-1 and I^-1 L_o) and their rates lie within `radius` of `middle`: the
 Chebyshev series of the sampled deformation is restricted to the cell, where |T_k| <= 1, and rounding and the estimated
-error of sampling are added. That estimate is the one link of the chain that is no proof: a deformation is known by
-evaluating it, and what happens between all the times at which it was asked nobody can tell.
+error of sampling are added. That estimate is the one link of the chain that is not a proof: a deformation is known
+only at the times where it is evaluated, and nothing rules out a feature that lies between them.
 """
 
 from __future__ import annotations
@@ -19,36 +19,51 @@ from ..deformation.deformation import Deformation
 from ..inertia_tensor import inverse_inertia
 from ..integrator.interpolant import Interpolant, chebyshev, unit_nodes, values_to_coefficients
 
+# Relative rounding of one operation. The factors before it below count the operations of each formula, generously.
 _EPS = float(np.finfo(float).eps)
+# Channel of each entry of the symmetric matrix I^-1: xx, yy, zz, yz, xz, xy.
 _FULL = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
+# Row and column of each of those six channels.
 _CHANNEL = ([0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1])
-# Two entries of I^-1 stand behind an off-diagonal channel.
+# Entries of I^-1 that each channel stands for: two where it is off the diagonal.
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-_MOST_CELLS, _HALVINGS = 4096, 24
-_VETTED = np.array([0.0381, 0.2361, 0.6180, 0.8541])
-_SAFETY = 4.0
-_STEADY = 0.05
+# Cells; limits the loop over them in `energy_bounds`. The bounds of coarser cells are looser, but they hold.
+_MAX_CELLS = 4096
+# Of a panel: 2^-24 of it is far below any time scale that its series has.
+_MAX_HALVINGS = 24
+# Parts of a panel at which the interpolant is compared with the deformation: none is near a Chebyshev node, and they
+# are not symmetric, so that an error which is odd or even about the middle is seen.
+_TEST_POINTS = np.array([0.0381, 0.2361, 0.6180, 0.8541])
+# Over the largest error seen at those points, which may all miss the peaks of an error that oscillates like T_n; it
+# is unlikely that all four see less than a quarter of it.
+_SAFETY_FACTOR = 4.0
+# Of the steepest rate of I^-1 in the interval: cells where its rate varies by less are fine enough, because their
+# contribution to the drift of the energy bounds is small beside that of the steepest cell.
+_RATE_RESOLUTION = 0.05
+# Of the magnitude of I^-1: what its rate can change it by over a cell without being worth another halving.
 _NEGLIGIBLE = 1e-9
+# For products of positive bounds, whose rounding is a few eps: thousands of times more, and still not visible.
+ROUND_UP = 1.0 + 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """What I^-1, w = I^-1 L_o and their rates can be on each of the K cells of an interval.
+    """Ranges of I^-1, w = I^-1 L_o and their rates on each of the K cells of an interval.
 
-    Everything is given in the axes of `frame`, in which I^-1 is as nearly diagonal as can be: there the entries' radii
-    are small. With D the diagonal matrix of the sums of their rows, middle - D and middle + D bound a symmetric matrix
-    as quadratic forms.
+    Everything is given in the axes of `frame`, in which I^-1 is as nearly diagonal as possible, so that the radii of
+    its entries are small. With D the diagonal matrix of the row sums of the radii, middle - D and middle + D bound a
+    symmetric matrix as quadratic forms.
 
     Attributes
     ----------
     edges : (K + 1,) ends of the cells [s]
     frame : (3, 3) whose columns are the axes, body axes
-    start, start_radius : (3, 3) and a number in the spectral norm, I^-1 at the very start [1/(kg m^2)]
-    inverse, inverse_radius : (K, 3, 3) of I^-1, entry by entry [1/(kg m^2)]
+    start, start_radius : (3, 3) I^-1 at the start of the interval, and its radius in the spectral norm [1/(kg m^2)]
+    inverse, inverse_radius : (K, 3, 3) middle and radius of I^-1, entry by entry [1/(kg m^2)]
     inverse_rate, inverse_rate_radius : (K, 3, 3) of its rate [1/(kg m^2 s)]
-    drift, drift_radius : (K, 3), (K,) of w, in the Euclidean norm [rad/s]
+    drift, drift_radius : (K, 3), (K,) of w, the radius in the Euclidean norm [rad/s]
     drift_rate, drift_rate_radius : (K, 3), (K,) of its rate [rad/s^2]
-    sampling_error : (2,) the estimate contained in the radii of I^-1 and w
+    sampling_error : (2,) the estimated error of sampling I^-1 and w, which the radii contain
     """
 
     edges: Array
@@ -67,7 +82,7 @@ class Enclosure:
 
     @property
     def widths(self) -> Array:
-        """Of the cells: (K,) [s]."""
+        """Lengths of the cells: (K,) [s]."""
         return np.diff(self.edges)
 
     @property
@@ -77,14 +92,14 @@ class Enclosure:
 
     @property
     def inverse_rate_range(self) -> tuple[Array, Array]:
-        """The same of its rate."""
+        """Symmetric matrices below and above the rate of I^-1: (K, 3, 3), (K, 3, 3)."""
         return _range(self.inverse_rate, self.inverse_rate_radius)
 
     @property
     def eigenvalues(self) -> tuple[Array, Array]:
         """Bounds from below and above of the eigenvalues of I^-1, ascending: (K, 3), (K, 3) [1/(kg m^2)].
 
-        By Weyl's monotonicity; none is below zero.
+        By Weyl's monotonicity; lower bounds are cut at zero, because I^-1 is positive definite.
         """
         low, high = (np.linalg.eigvalsh(matrix) for matrix in self.inverse_range)
         room = 8.0 * _EPS * np.abs(high).max(axis=1, keepdims=True)
@@ -92,51 +107,51 @@ class Enclosure:
 
     @property
     def principal_moments(self) -> tuple[Array, Array]:
-        """Bounds of the principal moments, ascending: (K, 3), (K, 3) [kg m^2]; infinite where there is none above."""
+        """Bounds of the principal moments, ascending: (K, 3), (K, 3) [kg m^2]; infinite where none is known above."""
         low, high = self.eigenvalues
         with np.errstate(divide="ignore"):
             return np.nextafter(1.0 / high[:, ::-1], 0.0), np.nextafter(1.0 / low[:, ::-1], np.inf)
 
     @property
-    def drift_size(self) -> Array:
+    def drift_magnitude(self) -> Array:
         """The largest |I^-1 L_o| on each cell: (K,) [rad/s]."""
         return np.linalg.norm(self.drift, axis=1) * (1.0 + 4.0 * _EPS) + self.drift_radius
 
     @property
-    def internal_momentum_size(self) -> Array:
+    def internal_momentum_magnitude(self) -> Array:
         """A bound of |L_o| on each cell: (K,) [kg m^2/s]; infinite where the cell does not bound the inertia.
 
         L_o = I w; I lies within |M|^2 r/(1 - |M| r) of M, the inverse of the middle, r the radius of I^-1.
         """
-        radius = self.inverse_radius.sum(axis=2).max(axis=1) * (1.0 + 1e-12)
-        norm = 1.0 / np.linalg.eigvalsh(self.inverse)[:, 0] * (1.0 + 1e-12)
+        radius = self.inverse_radius.sum(axis=2).max(axis=1) * ROUND_UP
+        norm = 1.0 / np.linalg.eigvalsh(self.inverse)[:, 0] * ROUND_UP
         left = 1.0 - norm * radius
         with np.errstate(divide="ignore", invalid="ignore"):
             spread = np.where(left > 0.0, norm**2 * radius / left, np.inf)
-            reach = np.where(self.drift_size > 0.0, spread * self.drift_size, 0.0)
+            reach = np.where(self.drift_magnitude > 0.0, spread * self.drift_magnitude, 0.0)
         centre = np.linalg.norm(np.linalg.solve(self.inverse, self.drift[:, :, None])[:, :, 0], axis=1)
-        return (centre + norm * self.drift_radius) * (1.0 + 1e-12) + reach
+        return (centre + norm * self.drift_radius) * ROUND_UP + reach
 
     def quadratic(self, direction: Array) -> tuple[Array, Array]:
         """Bounds of u . I^-1 u for unit vectors in body axes: (..., 3) -> (..., K), (..., K) [1/(kg m^2)]."""
-        seen = direction @ self.frame
-        low, high = (np.einsum("...i,kij,...j->...k", seen, matrix, seen) for matrix in self.inverse_range)
+        u = direction @ self.frame
+        low, high = (np.einsum("...i,kij,...j->...k", u, matrix, u) for matrix in self.inverse_range)
         room = 16.0 * _EPS * np.abs(high)
         return low - room, high + room
 
     def about(self, axis: Array, sign: float) -> tuple[Array, Array, Array]:
-        """Bounds of sign I^-1 as seen from a unit vector (3,) in body axes.
+        """Bounds of the blocks of sign I^-1 along and across a unit vector (3,) in body axes.
 
         Returns
         -------
         along : (K, 2) bounds of its quadratic form along the axis
-        across : (K, 2) bounds of its quadratic form in the plane across
-        coupling : (K,) a bound of its component across at the axis
+        across : (K, 2) bounds of its quadratic form in the plane across the axis
+        coupling : (K,) a bound of the block that couples the axis with that plane
         """
-        seen = axis @ self.frame
-        first = np.cross(seen, np.eye(3)[np.argmin(np.abs(seen))])
+        along_axis = axis @ self.frame
+        first = np.cross(along_axis, np.eye(3)[np.argmin(np.abs(along_axis))])
         first /= np.linalg.norm(first)
-        turn = np.stack([seen, first, np.cross(seen, first)])
+        turn = np.stack([along_axis, first, np.cross(along_axis, first)])
         low, high = (turn @ matrix @ turn.T for matrix in self.inverse_range)
         low, high = (low, high) if sign > 0.0 else (-high, -low)
         room = 32.0 * _EPS * np.abs(high).max(axis=(1, 2))
@@ -153,7 +168,7 @@ def enclosure(
     deformation: Deformation,
     interval: tuple[float, float] | None = None,
     *,
-    momentum_size: float = 1.0,
+    magnitude: float = 1.0,
     tolerance: float = 1e-10,
     resolution: float = 5e-3,
 ) -> Enclosure:
@@ -162,10 +177,10 @@ def enclosure(
     Parameters
     ----------
     interval : (start, end) [s]; None: [0, duration]
-    momentum_size : of the momenta for which the deformation is sampled to `tolerance` [kg m^2/s]
+    magnitude : of the momenta for which the deformation is sampled to `tolerance` [kg m^2/s]
     tolerance : as for `reconstruct` [rad]
-    resolution : cells are halved until I^-1 varies by less than this part of its size on each, w by that of its own
-        or of the rate of rotation, and the rate of I^-1 by a twentieth of the largest
+    resolution : cells are halved until, on each, I^-1 varies by less than this fraction of its norm, w by that
+        fraction of its own norm or of the rate of rotation, and the rate of I^-1 by a twentieth of the steepest
 
     Raises
     ------
@@ -176,37 +191,32 @@ def enclosure(
     """
     start, end = interval_argument(interval, deformation.duration)
     sampler = deformation.sampler()
-    sampler.refine(momentum_size or 1.0, tolerance)
+    sampler.refine(magnitude or 1.0, tolerance)
     sampled = sampler.interpolant()
     error = _sampling_error(deformation, sampled)
     edges, coefficients = _within(sampled, start, end)
     frame, coefficients = _in_best_frame(edges, coefficients)
-    parts = _divided(edges, coefficients, resolution, momentum_size)
-    left = np.concatenate([left for left, _, _ in parts])
-    order = np.argsort(left)
-    right = np.concatenate([right for _, right, _ in parts])[order]
-    series = np.concatenate([rows for _, _, rows in parts])[order]
-    width = right - left[order]
+    edges, series = _cells(edges, coefficients, resolution, magnitude)
     middle, radius = _ball(series)
     at_start = ((-1.0) ** np.arange(series.shape[1])) @ series[:1]
     start_radius = _matrix_radius(_rounding(series[:1]))[0] + error[0]
-    rate_middle, rate_radius = _ball(_rates(series, width))
-    # Markov's inequality for what a polynomial of this degree cannot follow.
+    rate_middle, rate_radius = _ball(_rates(series, np.diff(edges)))
+    # Markov's inequality: how steep a polynomial of this degree can be that is as large as the sampling error.
     steepness = 2.0 * series.shape[1] ** 2 / _panel_width(sampled)
     return Enclosure(
-        np.append(left[order], right[-1]),
-        frame,
-        _matrix(at_start)[0],
-        float(start_radius),
-        _matrix(middle),
-        _matrix(radius) + error[0],
-        _matrix(rate_middle),
-        _matrix(rate_radius) + error[0] * steepness,
-        middle[:, 6:],
-        np.linalg.norm(radius[:, 6:], axis=1) + error[1],
-        rate_middle[:, 6:],
-        np.linalg.norm(rate_radius[:, 6:], axis=1) + error[1] * steepness,
-        error,
+        edges=edges,
+        frame=frame,
+        start=_matrix(at_start)[0],
+        start_radius=float(start_radius),
+        inverse=_matrix(middle),
+        inverse_radius=_matrix(radius) + error[0],
+        inverse_rate=_matrix(rate_middle),
+        inverse_rate_radius=_matrix(rate_radius) + error[0] * steepness,
+        drift=middle[:, 6:],
+        drift_radius=np.linalg.norm(radius[:, 6:], axis=1) + error[1],
+        drift_rate=rate_middle[:, 6:],
+        drift_rate_radius=np.linalg.norm(rate_radius[:, 6:], axis=1) + error[1] * steepness,
+        sampling_error=error,
     )
 
 
@@ -225,12 +235,12 @@ def restricted(coefficients: Array, left: float, right: float) -> Array:
 
 
 def _ball(series: Array) -> tuple[Array, Array]:
-    """The constant term, and the sum of all others with what rounding may have done."""
+    """The constant term, and the sum of the magnitudes of all others with a bound of rounding."""
     return series[..., 0, :], np.abs(series[..., 1:, :]).sum(axis=-2) + _rounding(series)
 
 
 def _rounding(series: Array) -> Array:
-    """What rounding may have done to a series' values: those of T_k are good to k^2 eps."""
+    """A bound of the rounding errors in the values of a series: T_k is evaluated to k^2 eps."""
     degrees = np.arange(series.shape[-2], dtype=np.float64)
     return 4.0 * _EPS * np.einsum("k,...kc->...c", degrees**2 + 16.0, np.abs(series))
 
@@ -241,16 +251,17 @@ def _range(middle: Array, radius: Array) -> tuple[Array, Array]:
 
 
 def _in_best_frame(edges: Array, coefficients: Array) -> tuple[Array, Array]:
-    """Axes in which the panels are nearly diagonal, and the series in them.
+    """Axes in which I^-1 is nearly diagonal on all panels, and the series in them.
 
-    Those of the panel, or of the mean, whose eigenvalues are farthest apart: the common ones where there are any.
+    They are the eigenvectors of the panel, or of the mean, whose eigenvalues are farthest apart; if the principal
+    axes stay fixed, these are the principal axes.
     """
     matrices = _matrix(
         np.concatenate([coefficients[:, 0], [np.diff(edges) @ coefficients[:, 0] / np.diff(edges).sum()]])
     )
     values, axes = np.linalg.eigh(matrices)
     frame = axes[np.argmax(np.diff(values, axis=1).min(axis=1))]
-    # Axes of the body that are principal axes already are not to be rounded.
+    # Where the body's axes are the principal axes, the frame is exactly the identity or a permutation.
     frame = np.where(np.abs(frame) < 4.0 * _EPS, 0.0, frame)
     turned = frame.T @ coefficients[:, :, :6][..., _FULL] @ frame
     series = np.empty_like(coefficients)
@@ -269,10 +280,10 @@ def _matrix_radius(radius: Array) -> Array:
 
 
 def _sampling_error(deformation: Deformation, sampled: Interpolant) -> Array:
-    """Four times the largest error of the interpolant seen at times that are no nodes: (2,) of I^-1 and w."""
+    """An estimate of the largest error of the interpolant, from times that are not nodes: (2,) of I^-1 and w."""
     panels = len(sampled.coefficients)
     left, right = sampled.edges[:panels], sampled.edges[1 : panels + 1]
-    times = (left[:, None] + (right - left)[:, None] * _VETTED).ravel()
+    times = (left[:, None] + (right - left)[:, None] * _TEST_POINTS).ravel()
     inverse, drift = sampled.inverse_and_drift(times)
     inertia, internal = deformation.description.sample(times)
     truth = inverse_inertia(inertia, times)
@@ -280,7 +291,7 @@ def _sampling_error(deformation: Deformation, sampled: Interpolant) -> Array:
         np.linalg.norm(inverse - truth, axis=(1, 2)).max(),
         np.linalg.norm(drift - (truth @ internal[:, :, None])[:, :, 0], axis=1).max(),
     )
-    return _SAFETY * np.array(gaps)
+    return _SAFETY_FACTOR * np.array(gaps)
 
 
 def _panel_width(sampled: Interpolant) -> float:
@@ -288,7 +299,7 @@ def _panel_width(sampled: Interpolant) -> float:
 
 
 def _within(sampled: Interpolant, start: float, end: float) -> tuple[Array, Array]:
-    """The panels between two times, the outer ones cut: edges (P + 1,), coefficients (P, n, 9)."""
+    """The panels between two times, the first and the last cut to them: edges (P + 1,), coefficients (P, n, 9)."""
     edges, count = sampled.edges, len(sampled.coefficients)
     first = int(np.searchsorted(edges, start, side="right")) - 1
     last = min(int(np.searchsorted(edges, end, side="left")), len(edges) - 1)
@@ -302,22 +313,32 @@ def _within(sampled: Interpolant, start: float, end: float) -> tuple[Array, Arra
     return ends, coefficients
 
 
+def _cells(edges: Array, coefficients: Array, resolution: float, magnitude: float) -> tuple[Array, Array]:
+    """Cells on which the series hardly vary: edges (K + 1,) in order of time, coefficients (K, n, 9)."""
+    parts = _divided(edges, coefficients, resolution, magnitude)
+    left = np.concatenate([left for left, _, _ in parts])
+    order = np.argsort(left)
+    right = np.concatenate([right for _, right, _ in parts])[order]
+    series = np.concatenate([rows for _, _, rows in parts])[order]
+    return np.append(left[order], right[-1]), series
+
+
 def _divided(
-    edges: Array, coefficients: Array, resolution: float, momentum_size: float
+    edges: Array, coefficients: Array, resolution: float, magnitude: float
 ) -> list[tuple[Array, Array, Array]]:
-    """Cells on which the series hardly vary: ends and coefficients, in parts of any order."""
+    """Panels halved until the series hardly vary on each: left ends, right ends, coefficients, in any order."""
     left, right, series = edges[:-1], edges[1:], coefficients
     count = series.shape[1]
     halves = _restriction(count, -1.0, 0.0), _restriction(count, 0.0, 1.0)
     done: list[tuple[Array, Array, Array]] = []
     finished = 0
-    inverse, drift = _sizes(np.abs(series).sum(axis=1)).max(axis=0)
-    scale = np.array([inverse, max(drift, momentum_size * inverse)])
-    steepest = _sizes(np.abs(_rates(series, right - left)).sum(axis=1))[:, 0].max()
-    for _ in range(_HALVINGS):
+    inverse, drift = _norms(np.abs(series).sum(axis=1)).max(axis=0)
+    scale = np.array([inverse, max(drift, magnitude * inverse)])
+    steepest = _norms(np.abs(_rates(series, right - left)).sum(axis=1))[:, 0].max()
+    for _ in range(_MAX_HALVINGS):
         fine = _fine(series, right - left, scale, steepest, resolution)
         finished += int(fine.sum())
-        if finished + 2 * int((~fine).sum()) > _MOST_CELLS:
+        if finished + 2 * int((~fine).sum()) > _MAX_CELLS:
             break
         done.append((left[fine], right[fine], series[fine]))
         left, right, series = left[~fine], right[~fine], series[~fine]
@@ -331,14 +352,14 @@ def _divided(
 
 def _fine(series: Array, width: Array, scale: Array, steepest: float, resolution: float) -> Mask:
     """Which cells are small enough: (K,)."""
-    radius = _sizes(_ball(series)[1])
-    rates = _sizes(_ball(_rates(series, width))[1])[:, 0]
-    calm = (rates <= _STEADY * steepest) | (rates * width <= _NEGLIGIBLE * scale[0])
-    return np.all(radius <= resolution * scale, axis=1) & calm
+    radius = _norms(_ball(series)[1])
+    rates = _norms(_ball(_rates(series, width))[1])[:, 0]
+    rate_resolved = (rates <= _RATE_RESOLUTION * steepest) | (rates * width <= _NEGLIGIBLE * scale[0])
+    return np.all(radius <= resolution * scale, axis=1) & rate_resolved
 
 
-def _sizes(channels: Array) -> Array:
-    """(K, 9) -> (K, 2) of I^-1 and w."""
+def _norms(channels: Array) -> Array:
+    """Norms of I^-1 (Frobenius) and of w (Euclidean): (K, 9) -> (K, 2)."""
     return np.stack([_matrix_radius(channels), np.linalg.norm(channels[:, 6:], axis=1)], axis=-1)
 
 
@@ -349,6 +370,7 @@ def _rates(series: Array, width: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _restriction(count: int, left: float, right: float) -> Array:
+    """Coefficients on [left, right], stretched to [-1, 1], from those on [-1, 1], as many: (count, count)."""
     nodes = 0.5 * (left + right) + 0.5 * (right - left) * unit_nodes(count - 1)
     return values_to_coefficients(count - 1) @ chebyshev(np.clip(nodes, -1.0, 1.0), count)
 

@@ -4,12 +4,12 @@ With u = Pi/l and e = u.I^-1 u = 2 E/l^2, equation (9) gives
 
     de/dt = u.(I^-1)' u + 2 (u x I^-1 u).w,    w = I^-1 L_o,
 
-which depends on the unknown u. On a cell of time u is only known to satisfy e in [e-, e+]; so for every number c
+which depends on the unknown u. On a cell of time all that is known of u is that e is in [e-, e+]; so for every number c
 
     u.(I^-1)' u  <=  greatest eigenvalue of ((I^-1)' + c I^-1)  -  c e-  (c >= 0)  or  - c e+  (c < 0),
 
 and |u x I^-1 u|^2 <= (a - e)(e - b), a and b the extreme eigenvalues of I^-1. By Brickman's theorem the best c gives
-the largest rate there is; the two bounds of e are followed from cell to cell.
+exactly the largest possible rate; the two bounds of e are propagated from cell to cell.
 """
 
 from __future__ import annotations
@@ -22,9 +22,16 @@ from numpy.typing import ArrayLike
 from ..arguments import body_momentum_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
-from ._enclosure import Enclosure, enclosure
+from ._enclosure import ROUND_UP, Enclosure, enclosure
 
+# Relative rounding of one operation. The factors before it below count the operations of each formula, generously.
 _EPS = float(np.finfo(float).eps)
+# Of the largest eigenvalue of I^-1: two closer ones than this give no slope c, which would be a quotient of two small
+# differences. Any c gives a true bound, so nothing is lost but sharpness.
+_DISTINCT = 1e-3
+# The energy bounds on a cell and the bounds of its rate depend on each other; each pass starts from a true bound and
+# sharpens it, and after three the change is of third order in the cell's length.
+_PASSES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +40,15 @@ class EnergyBounds:
 
     Attributes
     ----------
-    enclosure : what is known of the deformation
-    size : l, the momentum's size [kg m^2/s]
-    initial : E at the start of the interval, as far as rounding and sampling go its bounds: (2,) [J]
+    enclosure : bounds of the deformation
+    magnitude : l, the momentum's norm [kg m^2/s]
+    initial : (2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]
     lower, upper : (K,) of E on each cell [J]
     rate_lower, rate_upper : (K,) of dE/dt [W]
     """
 
     enclosure: Enclosure
-    size: float
+    magnitude: float
     initial: Array
     lower: Array
     upper: Array
@@ -50,22 +57,25 @@ class EnergyBounds:
 
     @property
     def least(self) -> float:
-        """[J] over the whole interval."""
+        """The lower bound of E over the whole interval [J]."""
         return float(self.lower.min())
 
     @property
     def greatest(self) -> float:
-        """[J] over the whole interval."""
+        """The upper bound of E over the whole interval [J]."""
         return float(self.upper.max())
 
     @property
     def quotients(self) -> tuple[Array, Array]:
         """Bounds of e = 2 E/l^2 on the cells: (K,), (K,) [1/(kg m^2)]; those of the eigenvalues without momentum."""
-        if not self.size:
+        if not self.magnitude:
             low, high = self.enclosure.eigenvalues
             return low[:, 0], high[:, 2]
-        # The ratio l^2/2 may under- or overflow no earlier than E itself.
-        return 2.0 * self.lower / self.size / self.size, 2.0 * self.upper / self.size / self.size
+        # Divided twice, because l^2 may underflow or overflow where the quotient does not.
+        return (
+            2.0 * self.lower / self.magnitude / self.magnitude,
+            2.0 * self.upper / self.magnitude / self.magnitude,
+        )
 
 
 def energy_bounds(
@@ -88,52 +98,60 @@ def energy_bounds(
     Raises
     ------
     ShapeError
-        For arguments of the wrong shape, an attitude that is no rotation, or times outside of the deformation.
+        For arguments of the wrong shape, an attitude that is not a rotation, or times outside the deformation.
     AccuracyNotReached
         If the deformation is too rough between its breaks to be sampled.
 
     Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
     """
     body = body_momentum_argument(momentum, attitude)
-    size = float(np.linalg.norm(body))
-    known = enclosure(deformation, interval, momentum_size=size, resolution=resolution)
-    if not size:
+    magnitude = float(np.linalg.norm(body))
+    known = enclosure(deformation, interval, magnitude=magnitude, resolution=resolution)
+    if not magnitude:
         zero = np.zeros(len(known.widths))
-        return EnergyBounds(known, size, np.zeros(2), zero, zero, zero, zero)
-    direction = body / size @ known.frame
+        return EnergyBounds(
+            enclosure=known,
+            magnitude=0.0,
+            initial=np.zeros(2),
+            lower=zero,
+            upper=zero,
+            rate_lower=zero,
+            rate_upper=zero,
+        )
+    direction = body / magnitude @ known.frame
     e = float(direction @ known.start @ direction)
-    room = known.start_radius * (1.0 + 1e-12) + 32.0 * _EPS * abs(e)
-    lower, upper, slow, fast = _followed(known, e - room, e + room)
-    half = 0.5 * size * size
-    grow = 8.0 * _EPS * half * np.abs(upper)
+    room = known.start_radius * ROUND_UP + 32.0 * _EPS * abs(e)
+    lower, upper, slow, fast = _propagated(known, e - room, e + room)
+    half = 0.5 * magnitude * magnitude
+    rounding = 8.0 * _EPS * half * np.abs(upper)
     return EnergyBounds(
-        known,
-        size,
-        half * np.array([e - room, e + room]),
-        half * lower - grow,
-        half * upper + grow,
-        half * slow,
-        half * fast,
+        enclosure=known,
+        magnitude=magnitude,
+        initial=half * np.array([e - room, e + room]),
+        lower=half * lower - rounding,
+        upper=half * upper + rounding,
+        rate_lower=half * slow,
+        rate_upper=half * fast,
     )
 
 
-def _followed(known: Enclosure, low: float, high: float) -> tuple[Array, Array, Array, Array]:
+def _propagated(known: Enclosure, low: float, high: float) -> tuple[Array, Array, Array, Array]:
     """Bounds of e and of its rate on every cell, from those at the start."""
     least, greatest = (part[:, i].tolist() for part, i in zip(known.eigenvalues, (0, 2), strict=True))
     slowest, fastest = known.inverse_rate_range
     rising = _lines(known, fastest)
     falling = _lines(known, -slowest)
-    drift = known.drift_size.tolist()
+    drift = known.drift_magnitude.tolist()
     rows = []
     for cell, width in enumerate(known.widths.tolist()):
         bottom, top = least[cell], greatest[cell]
-        # Where u could be anything; then twice with what that leaves.
+        # At first with any direction u, then with those that the bounds found so far leave.
         inner = bottom, top
         slow, fast = 0.0, 0.0
-        for _ in range(3):
-            turn = _turn(drift[cell], bottom, top, *inner)
-            fast = _least(rising[cell], *inner) + turn
-            slow = -_least(falling[cell], *inner) - turn
+        for _ in range(_PASSES):
+            by_drift = _rate_by_drift(drift[cell], bottom, top, *inner)
+            fast = _lowest(rising[cell], *inner) + by_drift
+            slow = -_lowest(falling[cell], *inner) - by_drift
             inner = (
                 max(bottom, low + min(0.0, slow * width)),
                 min(top, high + max(0.0, fast * width)),
@@ -146,15 +164,15 @@ def _followed(known: Enclosure, low: float, high: float) -> tuple[Array, Array, 
 
 
 def _lines(known: Enclosure, rate: Array) -> list[list[tuple[float, float]]]:
-    """Slopes c and greatest eigenvalues of rate + c I^-1, for the c at which two of its eigenvalues change places.
+    """Slopes c and greatest eigenvalues of rate + c I^-1, for the c at which two of its eigenvalues cross.
 
-    Every c is right; these are the best where I^-1 and its rate have common axes.
+    Every c gives a true bound; these are the best ones where I^-1 and its rate have common axes.
     """
     lower, upper = known.inverse_range
     values, axes = np.linalg.eigh(known.inverse)
     along = np.einsum("kji,kjl,kli->ki", axes, rate, axes)
     rise, run = along - np.roll(along, 1, axis=1), values - np.roll(values, 1, axis=1)
-    apart = np.abs(run) > 1e-3 * values[:, 2:]
+    apart = np.abs(run) > _DISTINCT * values[:, 2:]
     slopes = np.concatenate([np.zeros((len(rate), 1)), np.where(apart, -rise / np.where(apart, run, 1.0), 0.0)], axis=1)
     cut = slopes[..., None, None]
     tops = np.linalg.eigvalsh(rate[:, None] + np.where(cut >= 0.0, cut * upper[:, None], cut * lower[:, None]))
@@ -162,19 +180,20 @@ def _lines(known: Enclosure, rate: Array) -> list[list[tuple[float, float]]]:
     return np.stack([slopes, tops[..., 2] + room], axis=-1).tolist()
 
 
-def _least(lines: list[tuple[float, float]], low: float, high: float) -> float:
+def _lowest(lines: list[tuple[float, float]], low: float, high: float) -> float:
+    """The lowest of the upper bounds of u.(I^-1)' u that the lines give for e in [low, high]."""
     return min(top - slope * (low if slope >= 0.0 else high) for slope, top in lines)
 
 
-def _turn(drift: float, bottom: float, top: float, low: float, high: float) -> float:
-    """The most that 2 |u x I^-1 u| |w| can be."""
+def _rate_by_drift(drift: float, bottom: float, top: float, low: float, high: float) -> float:
+    """The largest value of 2 |u x I^-1 u| |w|."""
     if not drift:
         return 0.0
-    return 2.0 * drift * turning(bottom, top, low, high)
+    return 2.0 * drift * cross_product_bound(bottom, top, low, high)
 
 
-def turning(bottom: float, top: float, low: float, high: float) -> float:
-    """The most that |u x A u| can be for eigenvalues of A in [bottom, top] and u.Au in [low, high].
+def cross_product_bound(bottom: float, top: float, low: float, high: float) -> float:
+    """The largest value of |u x A u| for eigenvalues of A in [bottom, top] and u.Au in [low, high].
 
     Its square is u.A^2 u - (u.A u)^2, a variance, and at most (top - u.Au)(u.Au - bottom).
     """

@@ -1,12 +1,13 @@
-"""Every bound of a motion beside what it bounds: one enumeration for tests, tables and figures.
+"""Every bound of a motion with the value that it bounds, in one list for tests, tables and figures.
 
-The bounds come from the deformation and the initial momentum alone (`energy_bounds`, `regimes`, `arc_bounds`,
-`phase_bounds`); the values are measured on the motion.
+The bounds come from the deformation and the initial momentum alone (`energy_bounds`, `regimes`, `_arc_bounds`,
+`_phase_bounds`); the values are computed from the motion.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import SupportsFloat
 
 import numpy as np
 
@@ -15,25 +16,27 @@ from ..arguments import interval_argument
 from ..arrays import Array
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
+from ._arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds
 from ._energy_bounds import EnergyBounds
-from .arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds
-from .energy import energy_along, energy_rate
-from .phase_bounds import dynamic_phase_bounds, dynamic_phase_bounds_by_extremes
+from ._phase_bounds import dynamic_phase_bounds, dynamic_phase_bounds_by_extremes
+from .energy import energy_along, energy_rate, homoclinic_energy
 from .regimes import CrownRegion, RegimeCertificate, regime_certificate
 
-_SAMPLES = 4
+# Parts of each integrator step, each with a Gauss rule: the integrals are then good to rounding, and the extremes seen
+# at their nodes to a small part of what the bounds leave open.
+_PARTS_OF_STEP = 4
 
 
 @dataclass(frozen=True)
 class Bound:
-    """A number that a value cannot pass.
+    """A bound of a quantity of a motion, and the quantity itself.
 
     Attributes
     ----------
     name : what is bounded, and by what
-    is_upper : whether the value is at most the bound; else at least
+    is_upper : whether the value is at most the bound; else it is at least the bound
     limit : the bound
-    value : measured on the motion
+    value : of the motion
     """
 
     name: str
@@ -43,12 +46,12 @@ class Bound:
 
     @property
     def slack(self) -> float:
-        """How far the value keeps from the bound; below zero if the bound is false."""
+        """Distance of the value from the bound, on the right side; below zero if the bound is false."""
         return self.limit - self.value if self.is_upper else self.value - self.limit
 
     @property
     def tightness(self) -> float:
-        """The smaller of bound and value over the larger: 1 is sharp; 0 where signs differ or one is zero."""
+        """The smaller magnitude of bound and value over the larger: 1 is sharp; 0 where signs differ or one is zero."""
         small, large = sorted((abs(self.limit), abs(self.value)))
         if self.limit == self.value:
             return 1.0
@@ -60,7 +63,7 @@ def bounds(
 ) -> tuple[Bound, ...]:
     """All bounds of one motion over an interval, each with its value.
 
-    Those that need a certain axis, or a turn about it, are listed where there is one.
+    Bounds that need a certain axis, or a full turn about it, are listed only where there is one.
 
     Parameters
     ----------
@@ -71,7 +74,7 @@ def bounds(
     Raises
     ------
     ShapeError
-        If the motion is a batch, or has no momentum: then nothing moves that could be bounded.
+        If the motion is a batch, or has no momentum, so that there is nothing to bound.
 
     Source: theory.md E3, E6 to E14.
     """
@@ -81,7 +84,7 @@ def bounds(
     certificate = regime_certificate(
         motion.deformation, motion.momentum, motion.attitude(start), (start, end), resolution=resolution
     )
-    if not certificate.bounds.size:
+    if not certificate.bounds.magnitude:
         raise ShapeError("bounds are of a motion with angular momentum; this one has none")
     track = _track(motion, start, end)
     return (
@@ -95,7 +98,7 @@ def bounds(
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """Ascending nodes of a quadrature (N,) and the directions of Pi there; both ends are among them, without weight."""
+    """Ascending nodes of a quadrature (N,), its weights and the directions of Pi there; both ends have weight zero."""
 
     times: Array
     weights: Array
@@ -105,35 +108,35 @@ class _Track:
 def _track(motion: Motion, start: float, end: float) -> _Track:
     steps = motion.solution.times
     edges = np.concatenate([[start], steps[(steps > start) & (steps < end)], [end]])
-    edges = np.append((edges[:-1, None] + np.diff(edges)[:, None] * np.arange(_SAMPLES) / _SAMPLES).ravel(), end)
+    parts = np.arange(_PARTS_OF_STEP) / _PARTS_OF_STEP
+    edges = np.append((edges[:-1, None] + np.diff(edges)[:, None] * parts).ravel(), end)
     nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
     times = np.concatenate([[start], nodes.ravel(), [end]])
     momenta = motion.body_momentum(times)
     directions = momenta / np.linalg.norm(momenta, axis=1, keepdims=True)
-    return _Track(times, np.concatenate([[0.0], weights.ravel(), [0.0]]), directions)
+    return _Track(times=times, weights=np.concatenate([[0.0], weights.ravel(), [0.0]]), directions=directions)
 
 
 def _moments(known: EnergyBounds, motion: Motion, track: _Track) -> list[Bound]:
     least, greatest = known.enclosure.principal_moments
-    seen = np.linalg.eigvalsh(motion.deformation.inertia(track.times))
+    moments = np.linalg.eigvalsh(motion.deformation.inertia(track.times)).T
     return [
-        *(Bound(f"moment {k + 1}, most", True, float(greatest[:, k].max()), float(seen[:, k].max())) for k in range(3)),
-        *(Bound(f"moment {k + 1}, least", False, float(least[:, k].min()), float(seen[:, k].min())) for k in range(3)),
+        *(_at_most(f"moment {k + 1}, most", greatest[:, k].max(), moments[k].max()) for k in range(3)),
+        *(_at_least(f"moment {k + 1}, least", least[:, k].min(), moments[k].min()) for k in range(3)),
     ]
 
 
 def _energies(certificate: RegimeCertificate, motion: Motion, track: _Track) -> list[Bound]:
     known = certificate.bounds
     energy, rate = energy_along(motion, track.times), energy_rate(motion, track.times).total
-    size = known.size
-    inverse_middle = 0.5 * size * size / np.linalg.eigvalsh(motion.deformation.inertia(track.times))[:, 1]
+    homoclinic = homoclinic_energy(motion.deformation, track.times, known.magnitude)
     return [
-        Bound("energy, most", True, known.greatest, float(energy.max())),
-        Bound("energy, least", False, known.least, float(energy.min())),
-        Bound("energy rate, most", True, float(known.rate_upper.max()), float(rate.max())),
-        Bound("energy rate, least", False, float(known.rate_lower.min()), float(rate.min())),
-        Bound("homoclinic energy, most", True, certificate.threshold[1], float(inverse_middle.max())),
-        Bound("homoclinic energy, least", False, certificate.threshold[0], float(inverse_middle.min())),
+        _at_most("energy, most", known.greatest, energy.max()),
+        _at_least("energy, least", known.least, energy.min()),
+        _at_most("energy rate, most", known.rate_upper.max(), rate.max()),
+        _at_least("energy rate, least", known.rate_lower.min(), rate.min()),
+        _at_most("homoclinic energy, most", certificate.threshold[1], homoclinic.max()),
+        _at_least("homoclinic energy, least", certificate.threshold[0], homoclinic.min()),
     ]
 
 
@@ -142,12 +145,12 @@ def _arcs(known: EnergyBounds, motion: Motion, track: _Track) -> list[Bound]:
     speed = np.linalg.norm(np.cross(momenta, motion.angular_velocity(track.times)), axis=1)
     length = float(speed @ track.weights)
     most = arc_length_bounds(known)
-    farthest = float(so3.angle_between(track.directions[0], track.directions).max()) * known.size
+    farthest = float(so3.angle_between(track.directions[0], track.directions).max()) * known.magnitude
     return [
-        Bound("arc length, general", True, most.general, length),
-        Bound("arc length, by drift", True, most.by_drift, length),
-        Bound("arc length, by energy", True, most.by_energy, length),
-        Bound("distance from the start, by energy", True, most.by_energy, farthest),
+        _at_most("arc length, general", most.general, length),
+        _at_most("arc length, by drift", most.by_drift, length),
+        _at_most("arc length, by energy", most.by_energy, length),
+        _at_most("distance from the start, by energy", most.by_energy, farthest),
     ]
 
 
@@ -160,32 +163,32 @@ def _phases(certificate: RegimeCertificate, motion: Motion, track: _Track) -> li
         ("by extremes", dynamic_phase_bounds_by_extremes(known)),
         ("by energy", dynamic_phase_bounds(known)),
     ):
-        rows.append(Bound(f"dynamic phase, most, {name}", True, found.upper, value))
-        rows.append(Bound(f"dynamic phase, least, {name}", False, found.lower, value))
+        rows.append(_at_most(f"dynamic phase, most, {name}", found.upper, value))
+        rows.append(_at_least(f"dynamic phase, least, {name}", found.lower, value))
     return rows
 
 
 def _about_axis(certificate: RegimeCertificate, track: _Track) -> list[Bound]:
-    """What holds about a certain axis."""
+    """Bounds that need a certain axis."""
     least, greatest = CrownRegion(certificate).cosines
     cosine = track.directions @ certificate.axis
     rows = [
-        Bound("cosine to the axis, least", False, least, float(cosine.min())),
-        Bound("cosine to the axis, most", True, greatest, float(cosine.max())),
+        _at_least("cosine to the axis, least", least, cosine.min()),
+        _at_most("cosine to the axis, most", greatest, cosine.max()),
     ]
     azimuth = azimuth_bounds(certificate)
     if not azimuth.monotone:
         return rows
     widths = certificate.bounds.enclosure.widths
     turned = azimuth.sense * _azimuth(track.directions, certificate.axis)
-    rows.append(Bound("azimuth, most", True, float(widths @ azimuth.fast), float(turned[-1])))
-    rows.append(Bound("azimuth, least", False, float(widths @ azimuth.slow), float(turned[-1])))
+    rows.append(_at_most("azimuth, most", widths @ azimuth.fast, turned[-1]))
+    rows.append(_at_least("azimuth, least", widths @ azimuth.slow, turned[-1]))
     if turned[-1] < 2.0 * np.pi:
         return rows
     times = return_time_bounds(certificate)
     back = float(np.interp(2.0 * np.pi, turned, track.times) - track.times[0])
     rows.extend(
-        Bound(f"return time, {name}", False, limit, back)
+        _at_least(f"return time, {name}", limit, back)
         for name, limit in (
             ("by latitude", times.by_latitude),
             ("by inertia", times.by_inertia),
@@ -193,12 +196,20 @@ def _about_axis(certificate: RegimeCertificate, track: _Track) -> list[Bound]:
         )
     )
     if np.isfinite(times.latest):
-        rows.append(Bound("return time, latest", True, times.latest, back))
+        rows.append(_at_most("return time, latest", times.latest, back))
     return rows
 
 
+def _at_most(name: str, limit: SupportsFloat, value: SupportsFloat) -> Bound:
+    return Bound(name=name, is_upper=True, limit=float(limit), value=float(value))
+
+
+def _at_least(name: str, limit: SupportsFloat, value: SupportsFloat) -> Bound:
+    return Bound(name=name, is_upper=False, limit=float(limit), value=float(value))
+
+
 def _azimuth(directions: Array, axis: Array) -> Array:
-    """The angle that directions have gone round an axis, from zero and without jumps: (N, 3) -> (N,)."""
+    """The azimuth of directions about an axis, from zero at the first and without jumps: (N, 3) -> (N,)."""
     first = directions[0] - (directions[0] @ axis) * axis
     first /= np.linalg.norm(first)
     angle = np.unwrap(np.arctan2(directions @ np.cross(axis, first), directions @ first))

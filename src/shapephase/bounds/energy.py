@@ -4,8 +4,8 @@ E_t is not the kinetic energy T where the shape moves: with T_0 that of the shap
 
     T = omega.I omega/2 + L_o.omega + T_0,    E_t = T - T_0 + L_o.I^-1 L_o/2.
 
-Sources: Cabrera 2006, equation (4) with the missing half (theory.md C-E1) and section 4.1 with L_o for what is
-misprinted there (C-E9); theory.md E1 to E5.
+Sources: Cabrera 2006, equation (4) with the missing half (theory.md C-E1) and section 4.1 with L_o in place of the
+misprint there (C-E9); theory.md E1 to E5.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from ..rigid_body.euler_top import EulerTop
 
 @dataclass(frozen=True, eq=False)
 class EnergyRate:
-    """Why E_t changes; fields are batch + t.shape [W].
+    """The two parts of dE_t/dt; fields are batch + t.shape [W].
 
     Attributes
     ----------
-    by_inertia : Pi.(I^-1)' Pi/2, all there is without internal momentum
+    by_inertia : Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum
     by_internal_momentum : (Pi x I^-1 Pi).I^-1 L_o
     """
 
@@ -46,15 +46,15 @@ class EnergyRate:
 
 @dataclass(frozen=True, eq=False)
 class FrozenPolhode:
-    """Where a rigid body with the inertia of one moment would take Pi from where it is.
+    """The polhode of Pi if the body stayed rigid from one time on.
 
     Attributes
     ----------
-    points : (N, 3) of the curve from the start round to it [kg m^2/s]; on the separatrix it is not closed, but the
-        half circle through the start between the two directions of the intermediate axis
+    points : (N, 3) of the curve from Pi once round and back to it [kg m^2/s]; on the separatrix it is not closed, but
+        the half circle through Pi between the two directions of the intermediate axis
     energy : E_t on it [J]
     homoclinic_energy : E_t of the separatrix [J]
-    period : after which that body's momentum is back [s]; infinite on the separatrix and where it stands still
+    period : of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium
     regime : as `EulerTop.regime`
     """
 
@@ -84,21 +84,24 @@ def energy_along(motion: Motion, t: ArrayLike) -> Array:
 def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
     """dE_t/dt of a motion, in its two parts: times (...) -> batch + (...) [W].
 
-    Source: Cabrera 2006, section 4.1, where L_o stands for what is printed L(d_0) (theory.md C-E9); E3.
+    Source: Cabrera 2006, section 4.1, with L_o where L(d_0) is printed (theory.md C-E9); E3.
     """
     times, inverse, drift, pi = _along(motion, t)
     inverse_rate = -inverse @ motion.deformation.description.inertia_rate(times.ravel()) @ inverse
     shape = (*motion.batch, *times.shape)
     by_inertia = 0.5 * np.sum(pi * so3.apply(inverse_rate, pi), axis=-1)
     by_drift = np.sum(np.cross(pi, so3.apply(inverse, pi)) * drift, axis=-1)
-    return EnergyRate(by_inertia.reshape(shape)[()], by_drift.reshape(shape)[()])
+    return EnergyRate(
+        by_inertia=by_inertia.reshape(shape)[()],
+        by_internal_momentum=by_drift.reshape(shape)[()],
+    )
 
 
 def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
     """T = omega.I omega/2 + L_o.omega + T_0 about the centre of mass: times (...) -> batch + (...) [J].
 
     Raises GaugeError if the deformation is known by its inertia only.
-    Source: Cabrera 2006, equation (4), with the half it lacks (theory.md C-E1); A6.
+    Source: Cabrera 2006, equation (4), with the missing half (theory.md C-E1); A6.
     """
     times = times_argument(t, motion.duration)
     flat = times.ravel()
@@ -109,28 +112,28 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
     return (turning + shape_only).reshape((*motion.batch, *times.shape))[()]
 
 
-def homoclinic_energy(deformation: Deformation, t: ArrayLike, size: float) -> Array:
+def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) -> Array:
     """l^2/(2 I_2(t)), the energy on the separatrix of the body frozen at each time: times (...) -> (...) [J].
 
     Parameters
     ----------
-    size : l, the momentum's size [kg m^2/s]
+    magnitude : l, the momentum's norm [kg m^2/s]
 
-    Source: Cabrera 2006, section 4.1.1, with the half it lacks (theory.md C-E5); E5.
+    Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
     """
-    length = float(finite_array(size, "size"))
+    norm = float(finite_array(magnitude, "magnitude"))
     times = times_argument(t, deformation.duration)
     middle = np.linalg.eigvalsh(deformation.inertia(times))[..., 1]
-    return np.asarray(0.5 * length * length / middle, dtype=np.float64)[()]
+    return np.asarray(0.5 * norm * norm / middle, dtype=np.float64)[()]
 
 
 def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, count: int = 200) -> FrozenPolhode:
-    """The level set of E_t through a point: the polhode of the rigid body that the deforming one is at time t.
+    """The level set of E_t through Pi: its polhode if the body stayed rigid with the inertia of time t.
 
     Parameters
     ----------
     momentum : (3,) Pi(t), base axes [kg m^2/s]
-    count : how many points
+    count : number of points, 2 or more
 
     Source: Cabrera 2006, section 4.1; theory.md E4.
     """
@@ -141,9 +144,9 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     orbit = top.orbit
     directions = np.broadcast_to(orbit.direction, (count, 3))
     if orbit.rate:
-        # By the angle about the axis circled and not by time, which has no end on the separatrix.
-        seen = orbit.start / orbit.size / np.where(orbit.amplitudes == 0.0, 1.0, orbit.amplitudes)
-        half, begin = orbit.regime == "separatrix", float(np.arctan2(seen[1], seen[orbit.other]))
+        # Parametrised by the angle about the axis that is circled, because the time is infinite on the separatrix.
+        scaled = orbit.start / orbit.size / np.where(orbit.amplitudes == 0.0, 1.0, orbit.amplitudes)
+        half, begin = orbit.regime == "separatrix", float(np.arctan2(scaled[1], scaled[orbit.other]))
         am = np.linspace(-0.5 * np.pi, 0.5 * np.pi, count) if half else begin + np.linspace(0.0, 2.0 * np.pi, count)
         sine, cosine = np.sin(am), np.cos(am)
         directions = np.empty((count, 3))
@@ -160,7 +163,7 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
 
 
 def _along(motion: Motion, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
-    """Times, I^-1 (N, 3, 3), w (N, 3) and Pi (B, N, 3)."""
+    """Times, and at them flattened I^-1 (N, 3, 3), w (N, 3) and Pi (B, N, 3)."""
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     inertia, internal = motion.deformation.description.sample(flat)

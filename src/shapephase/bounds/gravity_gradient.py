@@ -1,4 +1,4 @@
-"""A small body in gravity: its centre of mass on a Kepler orbit, and the torque that a free body neglects."""
+"""A small body in gravity: its centre of mass on a Kepler orbit, and the torque that the free motion neglects."""
 
 from __future__ import annotations
 
@@ -14,9 +14,34 @@ from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 
-# Of the mean anomaly [rad]: where 1e-6 rad of it are left, and where squares are no numbers any more.
-_FARTHEST_ELLIPSE, _FARTHEST_HYPERBOLA = 1e10, 1e150
-_HALVINGS, _AGREEMENT, _MOST_STEPS, _CHUNK = 10, 1e-4, 400_000, 10_000
+# Mean anomaly of an ellipse [rad]: beyond, its rounding alone is more than 1e-6 rad.
+_MAX_ANOMALY_ELLIPSE = 1e10
+# Mean anomaly of a hyperbola [rad]: beyond, squares overflow.
+_MAX_ANOMALY_HYPERBOLA = 1e150
+# Distance of the eccentricity from 1 that is refused as a parabola: 1 - e has then four digits left.
+_PARABOLA = 1e-12
+# Sine of the angle between position and velocity: below, the normal of the orbit is rounding noise.
+_RADIAL = 1e-12
+# Distance [m] from the attracting body: above, gm over its cube is finite for every gm below 1e128 m^3/s^2.
+_MIN_DISTANCE = 1e-60
+# Relative step of Newton's method for Kepler's equation: the error after it is about its square.
+_NEWTON_STEP = 1e-9
+# Newton's method converges in fewer steps for every anomaly and eccentricity; the limit only ends a hang.
+_MAX_NEWTON_STEPS = 60
+# Anomaly [rad] below which x - sin(x) is summed as a series, because the difference would cancel digits.
+_SERIES_LIMIT = 1.0
+# Terms of that series: the next is below a thousandth of the rounding of the first.
+_SERIES_TERMS = 9
+# Of the integrator's steps: each halving makes the fourth-order estimate sixteen times as accurate.
+_MAX_HALVINGS = 10
+# Relative change from one halving to the next at which the estimate is good enough for an order of magnitude.
+_AGREEMENT = 1e-4
+# Steps of the estimate; limits its time, at some microseconds for each step.
+_MAX_STEPS = 400_000
+# Steps whose matrices are made at once: some 30 MB.
+_CHUNK = 10_000
+# Of the duration: closer times are one edge twice, apart by rounding.
+_SAME_TIME = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +53,7 @@ class KeplerOrbit:
     Attributes
     ----------
     gm : gravity of the other body, G M [m^3/s^2]
-    pericentre : least distance [m]
+    pericentre : least distance from the other body [m]
     eccentricity : below 1 an ellipse, above 1 a hyperbola
     axes : (3, 3) inertial axes; columns to the pericentre, across it along the motion, and the orbit's normal
     mean_anomaly : at t = 0 [rad]; of a hyperbola e sinh(H) - H
@@ -51,27 +76,31 @@ class KeplerOrbit:
         Raises
         ------
         ShapeError
-            For a fall straight to the centre, or a parabola (eccentricity 1 to 1e-12).
+            For a velocity along the position, or a parabola (eccentricity 1 to within 1e-12).
         """
         pull = positive_argument(gm, "gm", "a number in m^3/s^2")
         middle = _vector(centre, "centre", "m")
-        arm, speed = _vector(position, "position", "m") - middle, _vector(velocity, "velocity", "m/s")
-        distance, pace = float(np.linalg.norm(arm)), float(np.linalg.norm(speed))
-        swept = np.cross(arm, speed)
-        size = float(np.linalg.norm(swept))
-        if size <= 1e-12 * distance * pace or size == 0.0:
-            raise ShapeError(f"a velocity {speed} along the way from the centre {arm} leads straight into it")
-        normal = swept / size
+        arm, rate = _vector(position, "position", "m") - middle, _vector(velocity, "velocity", "m/s")
+        distance, speed = float(np.linalg.norm(arm)), float(np.linalg.norm(rate))
+        specific_momentum = np.cross(arm, rate)
+        magnitude = float(np.linalg.norm(specific_momentum))
+        if magnitude <= _RADIAL * distance * speed or magnitude == 0.0:
+            raise ShapeError(f"a velocity {rate} along the position {arm} from the centre leads straight into it")
+        normal = specific_momentum / magnitude
         # e cos and e sin of the true anomaly: the eccentricity vector in the frame of the position.
-        out = arm / distance
-        along, aside = size**2 / (pull * distance) - 1.0, size * float(arm @ speed) / (pull * distance)
+        radial = arm / distance
+        along, aside = magnitude**2 / (pull * distance) - 1.0, magnitude * float(arm @ rate) / (pull * distance)
         eccentricity, anomaly = float(np.hypot(along, aside)), float(np.arctan2(aside, along))
-        first = so3.apply(so3.exp(-anomaly * normal), out)
-        axes = np.stack([first, so3.apply(so3.hat(normal), first), normal], axis=-1)
-        pericentre = size**2 / (pull * (1.0 + eccentricity))
         _refuse_parabola(1.0 - eccentricity)
-        mean = _mean_anomaly(anomaly, eccentricity)
-        return KeplerOrbit(pull, pericentre, eccentricity, axes, mean, middle)
+        first = so3.apply(so3.exp(-anomaly * normal), radial)
+        return KeplerOrbit(
+            gm=pull,
+            pericentre=magnitude**2 / (pull * (1.0 + eccentricity)),
+            eccentricity=eccentricity,
+            axes=np.stack([first, so3.apply(so3.hat(normal), first), normal], axis=-1),
+            mean_anomaly=_mean_anomaly(anomaly, eccentricity),
+            centre=middle,
+        )
 
     @staticmethod
     def from_elements(
@@ -88,7 +117,7 @@ class KeplerOrbit:
 
         Parameters
         ----------
-        semi_major_axis : [m], below zero for a hyperbola
+        semi_major_axis : [m], negative for a hyperbola
         eccentricity : 0 or more
         inclination, node, argument : turns about z by the node, x by the inclination, z by the argument of the
             pericentre [rad]
@@ -97,7 +126,7 @@ class KeplerOrbit:
         Raises
         ------
         ShapeError
-            If axis and eccentricity do not belong together, or the orbit is a parabola.
+            If axis and eccentricity contradict each other, or the orbit is a parabola.
         """
         numbers = finite_array(
             [semi_major_axis, eccentricity, inclination, node, argument, mean_anomaly], "elements", (6,)
@@ -106,17 +135,23 @@ class KeplerOrbit:
         _refuse_parabola(1.0 - e)
         if e < 0.0 or axis * (1.0 - e) <= 0.0:
             raise ShapeError(
-                "an ellipse has an eccentricity from 0 to 1 and an axis above 0, a hyperbola more than 1 and below 0; "
-                f"got eccentricity {e} and semi-major axis {axis} m"
+                "an ellipse has an eccentricity from 0 to 1 and a semi-major axis above 0, a hyperbola an eccentricity "
+                f"above 1 and a semi-major axis below 0; got eccentricity {e} and semi-major axis {axis} m"
             )
         x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
         axes = so3.exp(turn * z) @ so3.exp(tilt * x) @ so3.exp(argument_angle * z)
-        pull = positive_argument(gm, "gm", "a number in m^3/s^2")
-        return KeplerOrbit(pull, axis * (1.0 - e), e, axes, mean, _vector(centre, "centre", "m"))
+        return KeplerOrbit(
+            gm=positive_argument(gm, "gm", "a number in m^3/s^2"),
+            pericentre=axis * (1.0 - e),
+            eccentricity=e,
+            axes=axes,
+            mean_anomaly=mean,
+            centre=_vector(centre, "centre", "m"),
+        )
 
     @property
     def semi_major_axis(self) -> float:
-        """[m]; below zero for a hyperbola."""
+        """Half the major axis [m]; negative for a hyperbola."""
         return self.pericentre / (1.0 - self.eccentricity)
 
     @property
@@ -126,17 +161,17 @@ class KeplerOrbit:
 
     @property
     def period(self) -> float:
-        """[s]; infinite for a hyperbola."""
+        """Time of one revolution [s]; infinite for a hyperbola."""
         return 2.0 * np.pi / self.mean_motion if self.eccentricity < 1.0 else np.inf
 
     def position(self, t: ArrayLike) -> Array:
-        """Where the centre of mass is: times (...), of any sign -> (..., 3) [m]."""
+        """Position of the centre of mass: times (...), of any sign -> (..., 3) [m]."""
         times = finite_array(t, "t", unit="s")
         x, y, _, _ = self._in_plane(times)
         return self.centre + x[..., None] * self.axes[:, 0] + y[..., None] * self.axes[:, 1]
 
     def velocity(self, t: ArrayLike) -> Array:
-        """How fast it moves: times (...) -> (..., 3) [m/s]."""
+        """Velocity of the centre of mass: times (...) -> (..., 3) [m/s]."""
         times = finite_array(t, "t", unit="s")
         _, _, x, y = self._in_plane(times)
         return x[..., None] * self.axes[:, 0] + y[..., None] * self.axes[:, 1]
@@ -145,8 +180,11 @@ class KeplerOrbit:
         """Position and velocity along the pericentre and across it."""
         e, gap, axis = self.eccentricity, 1.0 - self.eccentricity, abs(self.semi_major_axis)
         mean = self.mean_anomaly + self.mean_motion * times
-        if np.abs(mean).max(initial=0.0) > (_FARTHEST_ELLIPSE if e < 1.0 else _FARTHEST_HYPERBOLA):
-            raise AccuracyNotReached(f"at times up to {np.abs(times).max():.3g} s the digits of the anomaly are lost")
+        if np.abs(mean).max(initial=0.0) > (_MAX_ANOMALY_ELLIPSE if e < 1.0 else _MAX_ANOMALY_HYPERBOLA):
+            raise AccuracyNotReached(
+                f"at times up to {np.abs(times).max():.3g} s the digits of the anomaly are lost; start the orbit "
+                "nearer to them"
+            )
         anomaly = eccentric_anomaly(mean, e)
         side = np.sqrt(abs(gap) * (1.0 + e))
         if e < 1.0:
@@ -155,20 +193,20 @@ class KeplerOrbit:
         else:
             cosine, sine, half = np.cosh(anomaly), np.sinh(anomaly), 2.0 * np.sinh(0.5 * anomaly) ** 2
             away, x = -gap + e * half, -gap - half
-        pace = axis * self.mean_motion / away
-        return axis * x, axis * side * sine, -pace * sine, pace * side * cosine
+        rate = axis * self.mean_motion / away
+        return axis * x, axis * side * sine, -rate * sine, rate * side * cosine
 
 
 @dataclass(frozen=True)
 class GravityTorque:
-    """What the torque of gravity, neglected for a free body, does to a motion, to first order.
+    """The effect of the gravity-gradient torque, neglected for a free body, on a motion, to first order.
 
     Attributes
     ----------
     largest_torque : [N m]
     impulse : the largest change of the angular momentum [kg m^2/s]
-    attitude_error : the largest turn away from the free motion [rad]
-    tolerance : the turn that is allowed [rad]
+    attitude_error : the largest rotation away from the free motion [rad]
+    tolerance : the rotation that is allowed [rad]
     """
 
     largest_torque: float
@@ -178,7 +216,7 @@ class GravityTorque:
 
     @property
     def is_free(self) -> bool:
-        """Whether the free motion is the true one within the tolerance."""
+        """Whether the free motion agrees with the true one within the tolerance."""
         return self.attitude_error <= self.tolerance
 
 
@@ -187,7 +225,7 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
 
     Parameters
     ----------
-    mean_anomaly : (...) [rad]; E comes on the same turn
+    mean_anomaly : (...) [rad]; E is in the same revolution
     eccentricity : 0 or more, not 1
 
     Raises
@@ -195,7 +233,7 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     ShapeError
         For a negative eccentricity, or 1.
 
-    Newton's method, from above, where both sides are convex: no start fails.
+    Newton's method from above the root, where the function is convex, so that it always converges.
     """
     mean = finite_array(mean_anomaly, "mean_anomaly", unit="rad")
     e = float(finite_array(eccentricity, "eccentricity"))
@@ -209,13 +247,12 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
         by_line, by_cube = rest / gap, np.cbrt((np.pi**2 if e < 1.0 else 6.0) * rest / (e or 1e-300))
     first = np.minimum(by_line, rest + e) if e < 1.0 else np.arcsinh(by_line)
     anomaly = np.minimum(first, by_cube)
-    for _ in range(60):
+    for _ in range(_MAX_NEWTON_STEPS):
         excess = _excess(anomaly, e < 1.0)
         slope = gap + e * (2.0 * np.sin(0.5 * anomaly) ** 2 if e < 1.0 else 2.0 * np.sinh(0.5 * anomaly) ** 2)
         step = (gap * anomaly + e * excess - rest) / slope
         anomaly = anomaly - step
-        # The next error is about the square of this step.
-        if np.all(np.abs(step) <= 1e-9 * anomaly):
+        if np.all(np.abs(step) <= _NEWTON_STEP * anomaly):
             break
     return np.where(mean < turns, -anomaly, anomaly) + turns
 
@@ -223,8 +260,8 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
 def gravity_gradient_torque(inertia: ArrayLike, position: ArrayLike, gm: float) -> Array:
     """Torque of a distant attracting body on a small one, about its centre of mass: 3 gm/r^3 n x I n.
 
-    The first term of the torque of Newton's forces; the next is smaller by size/r, or by (size/r)^2 where the body
-    is its own mirror image in its centre of mass.
+    The first term of the torque of Newton's forces; with d the extent of the body, the next is smaller by d/r, or by
+    (d/r)^2 for a body that is symmetric under inversion in its centre of mass.
 
     Parameters
     ----------
@@ -247,9 +284,10 @@ def gravity_gradient_torque(inertia: ArrayLike, position: ArrayLike, gm: float) 
 def gravity_force(mass: float, position: ArrayLike, gm: float) -> Array:
     """Force on a body as small as a point, -gm m r/|r|^3: (..., 3) [m] from the attracting body -> (..., 3) [N].
 
-    The same acceleration for all its particles, so that there is no torque and the orbit does not know the attitude.
+    All its particles have the same acceleration, so that there is no torque and the orbit is independent of the
+    attitude.
 
-    Source: Cabrera 2006, remark 4.7, whose denominators are the cubes of the distance; theory.md A16, C-E14.
+    Source: Cabrera 2006, remark 4.7, with the cube of the distance in the denominators; theory.md A16, C-E14.
     """
     arm = finite_array(position, "position", (3,), unit="m")
     distance = _distance(arm)
@@ -258,24 +296,24 @@ def gravity_force(mass: float, position: ArrayLike, gm: float) -> Array:
 
 
 def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float | None = None) -> GravityTorque:
-    """Is the body free enough? What the gravity gradient along an orbit would have done to a motion.
+    """Is the body free enough? How far the gravity gradient along an orbit would turn it away from its free motion.
 
     The torque 3 gm/r^3 n x I n, at the attitudes of the free motion, changes the momentum by dmu, and the attitude
-    becomes exp(eps) R with eps' = R I^-1 R^T (dmu + mu x eps): its growth along the motion included, to first order.
-    What torque the turned attitude makes in its turn is left out: trust it while `attitude_error` is well below 1.
+    becomes exp(eps) R with eps' = R I^-1 R^T (dmu + mu x eps): to first order, with the growth of eps along the
+    motion. The change of the torque with the attitude is left out: trust it while `attitude_error` is well below 1.
 
     Parameters
     ----------
-    motion : of one body, not a batch; inertial axes are those of the orbit, t = 0 is the same
+    motion : of one body, not a batch; with the inertial axes and the t = 0 of the orbit
     orbit : of its centre of mass
-    tolerance : allowed turn [rad]; None: that of the motion
+    tolerance : allowed rotation [rad]; None: that of the motion
 
     Raises
     ------
     ShapeError
         For a batch of motions.
     AccuracyNotReached
-        If the steps of the estimate would be too many.
+        If the estimate would take too many steps.
 
     Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
     """
@@ -283,27 +321,28 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
         raise ShapeError(f"one motion is needed, this is a batch of {motion.batch}; reconstruct one of them")
     allowed = motion.tolerance if tolerance is None else positive_argument(tolerance, "tolerance", "an angle in rad")
     edges = np.unique(np.concatenate([motion.solution.times, motion.deformation.breaks]))
-    edges = edges[np.concatenate([[True], np.diff(edges) > 1e-12 * motion.duration])]
+    edges = edges[np.concatenate([[True], np.diff(edges) > _SAME_TIME * motion.duration])]
     edges[-1] = motion.duration
     before = None
-    for _ in range(_HALVINGS):
-        if len(edges) > _MOST_STEPS:
+    for _ in range(_MAX_HALVINGS):
+        if len(edges) > _MAX_STEPS:
             break
-        now = _drift(motion, orbit, edges)
+        now = _largest_effects(motion, orbit, edges)
         if before is not None and np.all(np.abs(now - before) <= _AGREEMENT * now):
-            return GravityTorque(float(now[0]), float(now[1]), float(now[2]), allowed)
+            torque, impulse, error = now.tolist()
+            return GravityTorque(largest_torque=torque, impulse=impulse, attitude_error=error, tolerance=allowed)
         before = now
         edges = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
     raise AccuracyNotReached(
-        "the torque of gravity changes too fast to be estimated; take a shorter part of the motion"
+        "the torque of gravity changes too fast to be estimated; choose a shorter part of the motion"
     )
 
 
-def _drift(motion: Motion, orbit: KeplerOrbit, edges: Array) -> Array:
-    """Largest torque, change of momentum and turn, by Runge-Kutta steps of order four between edges."""
+def _largest_effects(motion: Motion, orbit: KeplerOrbit, edges: Array) -> Array:
+    """Largest torque, change of momentum and rotation: (3,), by fourth-order Runge-Kutta steps between edges."""
     state, largest = np.zeros((6, 1)), np.zeros(3)
     for start in range(0, len(edges) - 1, _CHUNK):
-        steps, torque = _steps(motion, orbit, edges[start : start + _CHUNK + 1])
+        steps, torque = _step_matrices(motion, orbit, edges[start : start + _CHUNK + 1])
         largest[0] = max(largest[0], torque)
         states = np.empty((len(steps), 6, 1))
         for i, step in enumerate(steps):
@@ -313,15 +352,15 @@ def _drift(motion: Motion, orbit: KeplerOrbit, edges: Array) -> Array:
     return largest
 
 
-def _steps(motion: Motion, orbit: KeplerOrbit, edges: Array) -> tuple[Array, float]:
-    """What each step makes of the state (dmu, eps), (N, 6, 7): a matrix, and what is added; the largest torque."""
+def _step_matrices(motion: Motion, orbit: KeplerOrbit, edges: Array) -> tuple[Array, float]:
+    """Each step as an affine map of the state (dmu, eps): (N, 6, 7), the constant last; and the largest torque."""
     times = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
     attitude = motion.attitude(times)
-    turned = so3.transpose(attitude)
+    to_body = so3.transpose(attitude)
     inertia = motion.deformation.description.sample(times)[0]
     position = orbit.position(times) - orbit.centre
-    torque = so3.apply(attitude, gravity_gradient_torque(inertia, so3.apply(turned, position), orbit.gm))
-    inverse = attitude @ inverse_inertia(inertia, times) @ turned
+    torque = so3.apply(attitude, gravity_gradient_torque(inertia, so3.apply(to_body, position), orbit.gm))
+    inverse = attitude @ inverse_inertia(inertia, times) @ to_body
     # Rates of the state, with a seventh entry that stays 1.
     rates = np.zeros((len(times), 7, 7))
     rates[:, 3:6, :3], rates[:, 3:6, 3:6] = inverse, inverse @ so3.hat(motion.momentum)
@@ -338,34 +377,35 @@ def _steps(motion: Motion, orbit: KeplerOrbit, edges: Array) -> tuple[Array, flo
 
 
 def _excess(x: Array, is_ellipse: bool) -> Array:
-    """x - sin(x), or sinh(x) - x, without the loss of digits near zero."""
+    """x - sin(x), or sinh(x) - x, without loss of digits near zero."""
     square = x * x
     sign = -1.0 if is_ellipse else 1.0
-    series, term = np.zeros_like(x), np.where(np.abs(x) < 1.0, x, 0.0)
-    for k in range(1, 10):
+    near_zero = np.abs(x) < _SERIES_LIMIT
+    series, term = np.zeros_like(x), np.where(near_zero, x, 0.0)
+    for k in range(1, _SERIES_TERMS + 1):
         term = term * square / ((2 * k) * (2 * k + 1))
         series = series + sign ** (k - 1) * term
     with np.errstate(over="ignore"):
         direct = x - np.sin(x) if is_ellipse else np.sinh(x) - x
-    return np.where(np.abs(x) < 1.0, series, direct)
+    return np.where(near_zero, series, direct)
 
 
 def _mean_anomaly(true_anomaly: float, e: float) -> float:
-    """From the true anomaly, by the tangent of its half."""
+    """The mean anomaly of a true anomaly, by the tangent of its half."""
     half = np.tan(0.5 * true_anomaly) * np.sqrt(abs(1.0 - e) / (1.0 + e))
     anomaly = np.asarray(2.0 * np.arctan(half) if e < 1.0 else 2.0 * np.arctanh(half))
     return float(abs(1.0 - e) * anomaly + e * _excess(anomaly, e < 1.0))
 
 
 def _refuse_parabola(gap: float) -> None:
-    if abs(gap) < 1e-12:
-        raise ShapeError("eccentricity 1 is a parabola, between ellipse and hyperbola; change the velocity a little")
+    if abs(gap) < _PARABOLA:
+        raise ShapeError("an orbit of eccentricity 1, a parabola, is not supported; change the velocity a little")
 
 
 def _distance(arm: Array) -> Array:
     distance = np.linalg.norm(arm, axis=-1, keepdims=True)
-    if np.any(distance < 1e-60):
-        raise ShapeError("position: the centre of mass is in the attracting body's centre, where nothing is finite")
+    if np.any(distance < _MIN_DISTANCE):
+        raise ShapeError("position: the centre of mass is at the attracting body's centre, where gravity is infinite")
     return distance
 
 

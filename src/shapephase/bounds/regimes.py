@@ -1,14 +1,15 @@
 """Which principal axis a free body's momentum circles: a certificate given before the motion is computed.
 
 Pi can only get from one side of a plane through the body's centre to the other by crossing it, and there its energy is
-at most l^2/2 times the greatest eigenvalue of I^-1 in that plane. So as long as E_t stays above that, Pi keeps to its
-side; and likewise below the least. For principal axes that stay where they are, this is the comparison of E_t with the
-homoclinic energy l^2/(2 I_2(t)), at each time and not only of extremes; it holds for any deformation.
+at most l^2/2 times the greatest eigenvalue of I^-1 in that plane. So as long as E_t stays above that, Pi stays on its
+side; and likewise below the least. For fixed principal axes this compares E_t with the homoclinic energy
+l^2/(2 I_2(t)), at each time and not only their extremes; but it holds for any deformation.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,33 +20,49 @@ from ..deformation.deformation import Deformation
 from ._enclosure import Enclosure
 from ._energy_bounds import EnergyBounds, energy_bounds
 
-_FRAMES = 9
+# Times, the ends among them, whose principal axes are tried. Any axis gives a true certificate; between so few times
+# the axes of a deformation in one regime hardly move, and each costs six eigenvalues a cell.
+_CANDIDATE_TIMES = 9
+# Cosine between axes of which only one is tried: they are 4.5e-5 rad apart.
+_SAME_AXIS = 1.0 - 1e-9
+# Directions times cells that are compared at once: some 100 MB of arrays.
 _CHUNK = 2_000_000
-_STEADY = 1e-6
+# Relative change of the energy over the interval that the explanation calls none.
+_NO_CHANGE = 1e-6
+# Relative, of the bounds of a squared cosine: their rounding is below 100 eps.
+_COSINE_ROUND_UP = 1.0 + 1e-13
+# Absolute, of a squared cosine: rounding where it is zero.
+_COSINE_ROUNDING = 1e-15
 
-ABOUT_SMALLEST, ABOUT_LARGEST, MAY_CROSS = "about axis 1", "about axis 3", "may cross"
+
+class Regime(StrEnum):
+    """Which principal axis the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest."""
+
+    ABOUT_SMALLEST = "about axis 1"
+    ABOUT_LARGEST = "about axis 3"
+    MAY_CROSS = "may cross"
 
 
 @dataclass(frozen=True, eq=False)
 class RegimeCertificate:
-    """Which axis Pi circles over an interval, as far as that is certain without the motion.
+    """Which axis Pi circles over an interval, as far as that is certain before the motion is computed.
 
     Attributes
     ----------
     regime : "about axis 1" (of the smallest moment), "about axis 3" (of the largest), or "may cross"
-    axis : (3,) unit vector, body axes: Pi . axis > 0 throughout; for "may cross" the one that came nearest to it
-    margin : the least distance of E_t from the most (least) it can be on the plane across the axis; below zero where
-        it is not certain [J]
+    axis : (3,) unit vector, body axes: Pi . axis > 0 throughout; for "may cross" the one nearest to being certain
+    margin : the least distance of E_t above the greatest energy (below the least energy) possible on the plane across
+        the axis; negative where the regime is not certain [J]
     energy : (2,) bounds of E_t over the interval [J]
     threshold : (2,) bounds of the homoclinic energy l^2/(2 I_2(t)) over the interval [J]
     interval : (start, end) [s]
     start : (3,) Pi/l at the start of the interval, zero without momentum
     bounds : of the energy, cell by cell
     plane : (K,) on each cell the energy that Pi would need to cross the plane [J]
-    why : in words
+    why : the reason in words
     """
 
-    regime: str
+    regime: Regime
     axis: Array
     margin: float
     energy: tuple[float, float]
@@ -59,7 +76,7 @@ class RegimeCertificate:
     @property
     def certain(self) -> bool:
         """Whether Pi stays on one side of the plane across the axis."""
-        return self.regime != MAY_CROSS
+        return self.regime != Regime.MAY_CROSS
 
     @property
     def cosines(self) -> tuple[Array, Array]:
@@ -68,22 +85,24 @@ class RegimeCertificate:
         if not self.certain:
             ones = np.ones(len(known.widths))
             return -ones, ones
-        sign = 1.0 if self.regime == ABOUT_SMALLEST else -1.0
+        sign = 1.0 if self.regime == Regime.ABOUT_SMALLEST else -1.0
         low, high = self.bounds.quotients if sign > 0.0 else (-self.bounds.quotients[1], -self.bounds.quotients[0])
         along, across, coupling = known.about(self.axis, sign)
         # e = x along + (1 - x) across + 2 sqrt(x (1 - x)) coupling, x the cosine's square; 2 sqrt(...) <= 1.
         least = _share(low - coupling - across[:, 1], along[:, 1] - across[:, 1], 0.0)
         greatest = _share(high + coupling - across[:, 0], along[:, 0] - across[:, 0], 1.0)
-        safe = 1.0 + 1e-13
-        return np.sqrt(np.clip(least / safe, 0.0, 1.0)), np.sqrt(np.clip(greatest * safe + 1e-15, 0.0, 1.0))
+        return (
+            np.sqrt(np.clip(least / _COSINE_ROUND_UP, 0.0, 1.0)),
+            np.sqrt(np.clip(greatest * _COSINE_ROUND_UP + _COSINE_ROUNDING, 0.0, 1.0)),
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class CrownRegion:
     """The part of the momentum sphere that Pi can reach over an interval.
 
-    The union over time of the level sets of E_t between its bounds; where the regime is certain, only that on the
-    axis's side.
+    The union over time of the level sets of E_t between its bounds; where the regime is certain, only the part on the
+    side of the axis.
 
     Attributes
     ----------
@@ -93,11 +112,11 @@ class CrownRegion:
     certificate: RegimeCertificate
 
     def contains(self, momenta: ArrayLike) -> Mask:
-        """Whether Pi might be there at some time of the interval: (..., 3), of any size above 0 -> (...)."""
+        """Whether Pi may be there at some time of the interval: (..., 3), of any norm above 0 -> (...)."""
         vectors = finite_array(momenta, "momenta", (3,))
         flat = vectors.reshape(-1, 3)
-        size = np.linalg.norm(flat, axis=1, keepdims=True)
-        directions = np.divide(flat, size, out=np.zeros_like(flat), where=size > 0.0)
+        magnitude = np.linalg.norm(flat, axis=1, keepdims=True)
+        directions = np.divide(flat, magnitude, out=np.zeros_like(flat), where=magnitude > 0.0)
         bounds = self.certificate.bounds
         low, high = bounds.quotients
         inside = np.empty(len(flat), dtype=np.bool_)
@@ -107,7 +126,7 @@ class CrownRegion:
             inside[start : start + step] = np.any((greatest >= low) & (least <= high), axis=-1)
         if self.certificate.certain:
             inside &= directions @ self.certificate.axis > 0.0
-        return (inside & (size[:, 0] > 0.0)).reshape(vectors.shape[:-1])[()]
+        return (inside & (magnitude[:, 0] > 0.0)).reshape(vectors.shape[:-1])[()]
 
     @property
     def cosines(self) -> tuple[float, float]:
@@ -126,7 +145,7 @@ def regime_certificate(
 ) -> RegimeCertificate:
     """Which principal axis the momentum of a deforming body circles over an interval, or that this is not certain.
 
-    No motion is computed: E_t and the energy at which Pi could change sides are bounded over the interval.
+    No motion is computed: E_t, and the energy at which Pi could cross to the other side, are bounded over the interval.
 
     Parameters
     ----------
@@ -143,17 +162,12 @@ def regime_certificate(
     bounds = energy_bounds(deformation, momentum, attitude, interval, resolution=resolution)
     known = bounds.enclosure
     low, high = bounds.quotients
-    half = 0.5 * bounds.size * bounds.size
-    best = (-np.inf, 1.0, np.array([0.0, 0.0, 1.0]), np.zeros(len(low)))
-    for axis in _candidates(known):
-        for sign in (1.0, -1.0):
-            plane = known.about(axis, sign)[1][:, 1]
-            margin = float(((low if sign > 0.0 else -high) - plane).min())
-            if margin > best[0]:
-                best = (margin, sign, axis, sign * plane)
-    margin, sign, axis, plane = best
-    certain = margin > 0.0 and bounds.size > 0.0
-    regime = MAY_CROSS if not certain else ABOUT_SMALLEST if sign > 0.0 else ABOUT_LARGEST
+    half = 0.5 * bounds.magnitude * bounds.magnitude
+    margin, sign, axis, plane = _widest_margin(known, low, high)
+    if margin <= 0.0 or bounds.magnitude == 0.0:
+        regime = Regime.MAY_CROSS
+    else:
+        regime = Regime.ABOUT_SMALLEST if sign > 0.0 else Regime.ABOUT_LARGEST
     middle_low, middle_high = (part[:, 1] for part in known.eigenvalues)
     return RegimeCertificate(
         regime=regime,
@@ -162,7 +176,7 @@ def regime_certificate(
         energy=(bounds.least, bounds.greatest),
         threshold=(half * float(middle_low.min()), half * float(middle_high.max())),
         interval=(float(known.edges[0]), float(known.edges[-1])),
-        start=body / bounds.size if bounds.size else np.zeros(3),
+        start=body / bounds.magnitude if bounds.magnitude else np.zeros(3),
         bounds=bounds,
         plane=half * plane,
         why=_reason(regime, half * margin, bounds, known, low - plane if sign > 0.0 else plane - high),
@@ -182,37 +196,57 @@ def crown_region(
     return CrownRegion(regime_certificate(deformation, momentum, attitude, interval))
 
 
+def _widest_margin(known: Enclosure, low: Array, high: Array) -> tuple[float, float, Array, Array]:
+    """The axis and the side of the energy with the widest margin of e, from its bounds on the cells.
+
+    Returns
+    -------
+    margin : the least over the cells [1/(kg m^2)]
+    sign : +1 where e must stay above its values on the plane across the axis, -1 below
+    axis : (3,) body axes
+    plane : (K,) the greatest (least) e on that plane [1/(kg m^2)]
+    """
+    best = (-np.inf, 1.0, np.array([0.0, 0.0, 1.0]), np.zeros(len(low)))
+    for axis in _candidates(known):
+        for sign in (1.0, -1.0):
+            plane = known.about(axis, sign)[1][:, 1]
+            margin = float(((low if sign > 0.0 else -high) - plane).min())
+            if margin > best[0]:
+                best = (margin, sign, axis, sign * plane)
+    return best
+
+
 def _candidates(known: Enclosure) -> list[Array]:
     """Principal axes at times spread over the interval."""
-    picked = known.inverse[np.unique(np.linspace(0, len(known.inverse) - 1, _FRAMES).astype(int))]
+    picked = known.inverse[np.unique(np.linspace(0, len(known.inverse) - 1, _CANDIDATE_TIMES).astype(int))]
     axes = list(known.frame.T)
     for frame in np.linalg.eigh(picked)[1]:
         for axis in (known.frame @ frame).T:
-            if not any(abs(axis @ other) > 1.0 - 1e-9 for other in axes):
+            if not any(abs(axis @ other) > _SAME_AXIS for other in axes):
                 axes.append(axis)
     return axes
 
 
 def _share(part: Array, whole: Array, otherwise: float) -> Array:
-    """part/whole where whole > 0."""
+    """part/whole where whole > 0, else `otherwise`."""
     known = whole > 0.0
     return np.where(known, part / np.where(known, whole, 1.0), otherwise)
 
 
-def _reason(regime: str, margin: float, bounds: EnergyBounds, known: Enclosure, distance: Array) -> str:
-    if not bounds.size:
-        return "there is no angular momentum, which could circle an axis"
-    if regime == MAY_CROSS:
+def _reason(regime: Regime, margin: float, bounds: EnergyBounds, known: Enclosure, distance: Array) -> str:
+    if not bounds.magnitude:
+        return "there is no angular momentum that could circle an axis"
+    if regime == Regime.MAY_CROSS:
         when = known.edges[int(np.argmin(distance))]
         return (
-            f"from t = {when:.6g} s on it is not certain that the energy keeps from the homoclinic one: its bounds "
-            f"overlap there by {-margin:.3g} J"
+            f"from t = {when:.6g} s on it is not certain that the energy stays away from the homoclinic energy: the "
+            f"bounds of the two overlap there by {-margin:.3g} J"
         )
-    side, plane = ("above", "the most") if regime == ABOUT_SMALLEST else ("below", "the least")
-    slack = _STEADY * bounds.greatest / float(known.widths.sum())
+    side, extreme = ("above", "greatest") if regime == Regime.ABOUT_SMALLEST else ("below", "least")
+    slack = _NO_CHANGE * bounds.greatest / float(known.widths.sum())
     falls, rises = np.all(bounds.rate_upper <= slack), np.all(bounds.rate_lower >= -slack)
     change = "stays" if falls == rises else "falls but stays" if falls else "rises but stays"
     return (
-        f"the energy {change} {side} {plane} that it can be on the plane across the axis, l^2/(2 I_2) where that is a "
-        f"principal axis, by {margin:.3g} J or more"
+        f"the energy {change} {side} the {extreme} value possible on the plane across the axis (l^2/(2 I_2) for a "
+        f"principal axis) by at least {margin:.3g} J"
     )

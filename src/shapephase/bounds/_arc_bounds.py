@@ -1,6 +1,6 @@
-"""Bounds of how far Pi gets on its sphere, how fast it goes round an axis, and how soon it can be back.
+"""Bounds of the length of Pi's curve, of the rate at which it circles an axis, and of the time until it returns.
 
-All follow from what `energy_bounds` and `regime_certificate` know before the motion is computed.
+All follow from `energy_bounds` and `regime_certificate`, before the motion is computed.
 """
 
 from __future__ import annotations
@@ -12,11 +12,14 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ._energy_bounds import EnergyBounds, turning
-from .regimes import ABOUT_SMALLEST, RegimeCertificate
+from ._enclosure import ROUND_UP
+from ._energy_bounds import EnergyBounds, cross_product_bound
+from .regimes import Regime, RegimeCertificate
 
-_ROUND_UP = 1.0 + 1e-12
+# Counterpart of ROUND_UP for lower bounds.
 _ROUND_DOWN = 1.0 - 1e-12
+# Of the fastest azimuth rate [1]: what a difference of two rates may have lost to rounding.
+_CANCELLATION = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +31,7 @@ class ArcLengthBounds:
     general : l times the integral of (l + |L_o|)/I_1, I_1 the least moment; without L_o it is l^2 times that of 1/I_1
     by_drift : l times the integral of l/I_1 + |I^-1 L_o|
     by_energy : l times the integral of l sqrt((1/I_1 - e)(e - 1/I_3)) + |I^-1 L_o|, e = 2 E/l^2 anywhere in its bounds;
-        zero for a body with three equal moments, whose momentum stands still
+        zero for a body with three equal moments, whose momentum does not move
     """
 
     general: float
@@ -38,7 +41,7 @@ class ArcLengthBounds:
 
 @dataclass(frozen=True, eq=False)
 class AzimuthBounds:
-    """Bounds of the rate at which Pi goes round the certified axis, on each of K cells.
+    """Bounds of the rate at which Pi circles the certified axis, on each of K cells.
 
     Attributes
     ----------
@@ -60,8 +63,8 @@ class ReturnTimeBounds:
     Attributes
     ----------
     by_latitude : 2 pi |Pi x axis|/(l^2 max 1/I_1)
-    by_inertia : 2 pi/(l max (1/I_1 - 1/I_3)), never less
-    by_azimuth : when the fastest azimuth has gone round, never less
+    by_inertia : 2 pi/(l max (1/I_1 - 1/I_3)), at least `by_latitude`
+    by_azimuth : when the fastest possible azimuth has gone once round, at least `by_inertia`
     within : whether Pi can be back in the interval at all; if not, all three are at most the interval's length
     latest : an upper bound of the time after which Pi has gone once round the axis; infinite where nothing is certain
     """
@@ -78,20 +81,23 @@ def arc_length_bounds(bounds: EnergyBounds) -> ArcLengthBounds:
 
     Source: Cabrera 2006, section 4.1; theory.md E6, E7.
     """
-    known, size = bounds.enclosure, bounds.size
+    known, magnitude = bounds.enclosure, bounds.magnitude
     low, high = bounds.quotients
     bottom, top = known.eigenvalues
-    spread = [turning(*row) for row in zip(bottom[:, 0], top[:, 2], low, high, strict=True)]
-    rates = (
-        top[:, 2] * (size + known.internal_momentum_size),
-        size * top[:, 2] + known.drift_size,
-        size * np.array(spread) + known.drift_size,
+    spread = [cross_product_bound(*row) for row in zip(bottom[:, 0], top[:, 2], low, high, strict=True)]
+
+    def length(speed: Array) -> float:
+        return float(known.widths @ speed) * magnitude * ROUND_UP
+
+    return ArcLengthBounds(
+        general=length(top[:, 2] * (magnitude + known.internal_momentum_magnitude)),
+        by_drift=length(magnitude * top[:, 2] + known.drift_magnitude),
+        by_energy=length(magnitude * np.array(spread) + known.drift_magnitude),
     )
-    return ArcLengthBounds(*(float(known.widths @ rate) * size * _ROUND_UP for rate in rates))
 
 
 def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Array:
-    """How fast Pi goes round a principal axis without internal momentum: (...) [rad/s].
+    """How fast Pi circles a principal axis without internal momentum: (...) [rad/s].
 
     With axes k, i, j in cyclic order and Pi = l (cos(theta), sin(theta) cos(phi), sin(theta) sin(phi)) in them,
 
@@ -108,7 +114,7 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
     ShapeError
         Along the axis, where there is no azimuth, and for a moment that is not above zero.
 
-    Source: Cabrera 2006, equation (14), with the l it lacks (theory.md C-E4); E10.
+    Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
     """
     values, pi = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
     if isinstance(axis, bool) or axis not in (0, 1, 2):
@@ -127,8 +133,8 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
 def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     """Bounds of the azimuth's rate about a certified axis, for any deformation.
 
-    With n the coupling of the axis with the plane across in I^-1, A' the part of I^-1 in it, and w = I^-1 L_o,
-    phi' = Pi_k (p.A'p - 1/I_k), p the unit vector across, up to (l |n| + |w|)/sin(theta).
+    With n the part of I^-1 that couples the axis with the plane across, A' the part of I^-1 in that plane, p the
+    direction of Pi in it, and w = I^-1 L_o, phi' = Pi_k (p.A'p - 1/I_k) up to (l |n| + |w|)/sin(theta).
 
     Raises
     ------
@@ -138,63 +144,58 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
     """
     if not certificate.certain:
-        raise ShapeError(f"certificate: an axis that is certain is needed, and {certificate.why}")
+        raise ShapeError(f"certificate: a certain axis is needed, but {certificate.why}")
     bounds, axis = certificate.bounds, certificate.axis
-    known, size = bounds.enclosure, bounds.size
-    sign = 1.0 if certificate.regime == ABOUT_SMALLEST else -1.0
+    known, magnitude = bounds.enclosure, bounds.magnitude
+    sign = 1.0 if certificate.regime == Regime.ABOUT_SMALLEST else -1.0
     along, across, coupling = known.about(axis, sign)
     least, greatest = certificate.cosines
     sine = np.sqrt(np.maximum(0.0, 1.0 - greatest**2))
     with np.errstate(divide="ignore"):
-        stray = (size * coupling + known.drift_size) / sine
+        stray = (magnitude * coupling + known.drift_magnitude) / sine
     near, far = along[:, 0] - across[:, 1], along[:, 1] - across[:, 0]
-    fast = (size * greatest * far + stray) * _ROUND_UP
-    slow = (size * np.where(near > 0.0, least, greatest) * near - stray) - 1e-12 * fast
-    return AzimuthBounds(-sign, slow, fast, bool(np.all(slow > 0.0)))
+    fast = (magnitude * greatest * far + stray) * ROUND_UP
+    slow = (magnitude * np.where(near > 0.0, least, greatest) * near - stray) - _CANCELLATION * fast
+    return AzimuthBounds(sense=-sign, slow=slow, fast=fast, monotone=bool(np.all(slow > 0.0)))
 
 
 def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
-    """How soon Pi can be back at its start: it must go round the certified axis for that.
+    """How soon Pi can be back at its start, for which it must go once round the certified axis.
 
-    The first two bounds are for principal axes that stay where they are without internal momentum; they are also
-    given wherever the azimuth is certain not to go faster than they take it to. About the axis of the largest moment
-    they are the same, with the least moment in them.
+    The formulas of the first two bounds hold for fixed principal axes without internal momentum. For other
+    deformations they are lowered where the fastest possible azimuth exceeds the rate they assume. About the axis of
+    the largest moment they are the same, with the least moment in them.
 
-    Source: Cabrera 2006, remark 4.1, read as theory.md C-E10 says; E12.
+    Source: Cabrera 2006, remark 4.1, as corrected in theory.md C-E10; E12.
     """
     known = certificate.bounds.enclosure
-    length = float(known.widths.sum())
-    nothing = ReturnTimeBounds(0.0, 0.0, 0.0, True, np.inf)
-    if not certificate.certain:
-        return nothing
-    azimuth = azimuth_bounds(certificate)
-    # Standing still on the axis, or going back and forth: then Pi may be back without going round.
-    if not azimuth.monotone:
-        return nothing
+    azimuth = azimuth_bounds(certificate) if certificate.certain else None
+    # Where the azimuth may stop or turn back, Pi may be back at its start without having gone round the axis.
+    if azimuth is None or not azimuth.monotone:
+        return ReturnTimeBounds(by_latitude=0.0, by_inertia=0.0, by_azimuth=0.0, within=True, latest=np.inf)
     bottom, top = known.eigenvalues
-    size = certificate.bounds.size
-    most, spread = size * float(top[:, 2].max()), size * float((top[:, 2] - bottom[:, 0]).max())
+    magnitude = certificate.bounds.magnitude
+    most, spread = magnitude * float(top[:, 2].max()), magnitude * float((top[:, 2] - bottom[:, 0]).max())
     fastest = float(azimuth.fast.max())
     sine = float(np.linalg.norm(np.cross(certificate.start, certificate.axis))) * _ROUND_DOWN
-    by_azimuth = _when(azimuth.fast, known.widths, 2.0 * np.pi) * _ROUND_DOWN
-    room = max(0.0, fastest - spread)
-    by_inertia = 2.0 * np.pi / (spread + room) * _ROUND_DOWN
+    by_azimuth = _time_of_full_turn(azimuth.fast, known.widths) * _ROUND_DOWN
+    by_inertia = 2.0 * np.pi / (spread + max(0.0, fastest - spread)) * _ROUND_DOWN
     by_latitude = 2.0 * np.pi * sine / max(most, fastest) * _ROUND_DOWN
-    within = np.isfinite(by_azimuth)
-    cap = float(by_azimuth) if within else length
+    within = bool(np.isfinite(by_azimuth))
+    cap = float(by_azimuth) if within else float(known.widths.sum())
     return ReturnTimeBounds(
-        min(by_latitude, cap),
-        min(by_inertia, cap),
-        cap,
-        bool(within),
-        _when(azimuth.slow, known.widths, 2.0 * np.pi) * _ROUND_UP,
+        by_latitude=min(by_latitude, cap),
+        by_inertia=min(by_inertia, cap),
+        by_azimuth=cap,
+        within=within,
+        latest=_time_of_full_turn(azimuth.slow, known.widths) * ROUND_UP,
     )
 
 
-def _when(rates: Array, widths: Array, goal: float) -> float:
-    """When the integral of positive rates reaches a goal; infinite if it does not."""
+def _time_of_full_turn(rates: Array, widths: Array) -> float:
+    """When the integral of positive rates reaches 2 pi; infinite if it does not."""
     turned = np.concatenate([[0.0], np.cumsum(rates * widths)])
-    if turned[-1] < goal:
+    if turned[-1] < 2.0 * np.pi:
         return np.inf
-    cell = int(np.searchsorted(turned, goal)) - 1
-    return float(widths[:cell].sum() + (goal - turned[cell]) / rates[cell])
+    cell = int(np.searchsorted(turned, 2.0 * np.pi)) - 1
+    return float(widths[:cell].sum() + (2.0 * np.pi - turned[cell]) / rates[cell])

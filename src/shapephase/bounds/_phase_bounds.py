@@ -1,0 +1,107 @@
+"""Two-sided bounds of the phases from those of the energy.
+
+theta_D = (1/l) integral of 2 E_t - Pi.w dt with w = I^-1 L_o, and theta_M = theta_D - Lambda for the signed solid angle
+Lambda, whatever the axis and however large the loop (theory.md C-E6: no rule of signs is needed).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ShapeError
+from ._arc_bounds import azimuth_bounds
+from ._energy_bounds import EnergyBounds
+from .regimes import RegimeCertificate
+
+# Relative: thousands of roundings, and far below what the bounds are apart.
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class PhaseBounds:
+    """A phase lies in [lower, upper] [rad]."""
+
+    lower: float
+    upper: float
+
+    @property
+    def width(self) -> float:
+        """upper - lower [rad]."""
+        return self.upper - self.lower
+
+    @property
+    def is_informative(self) -> bool:
+        """Whether they restrict the phase modulo 2 pi: width < 2 pi. Source: Cabrera 2006, remark 4.2."""
+        return self.width < 2.0 * np.pi
+
+    def of_loop(self, solid_angle: float) -> PhaseBounds:
+        """Bounds of theta_M = theta_D - solid_angle, the signed one [sr], if these are bounds of theta_D.
+
+        Source: Cabrera 2006, equation (15), with the signed solid angle for its two signs; theory.md E13.
+        """
+        return PhaseBounds(lower=self.lower - solid_angle, upper=self.upper - solid_angle)
+
+
+def dynamic_phase_bounds(bounds: EnergyBounds) -> PhaseBounds:
+    """Bounds of theta_D from those of the energy at each time, the sharper ones; zero without momentum.
+
+    Source: theory.md E13.
+    """
+    if not bounds.magnitude:
+        return PhaseBounds(lower=0.0, upper=0.0)
+    known = bounds.enclosure
+    stray = float(known.widths @ known.drift_magnitude)
+    low, high = (2.0 / bounds.magnitude * float(known.widths @ part) for part in (bounds.lower, bounds.upper))
+    return _rounded(low - stray, high + stray)
+
+
+def dynamic_phase_bounds_by_extremes(bounds: EnergyBounds) -> PhaseBounds:
+    """Bounds of theta_D from the extreme energies: (2/l) E_min dt to (2/l) E_max dt, and what L_o adds to both.
+
+    Without L_o their width is 2 (E_max - E_min) dt/l. Both are zero without momentum.
+
+    Source: Cabrera 2006, equation (15), remark 4.2; theory.md E14.
+    """
+    if not bounds.magnitude:
+        return PhaseBounds(lower=0.0, upper=0.0)
+    known = bounds.enclosure
+    stray, length = float(known.widths @ known.drift_magnitude), float(known.widths.sum())
+    low, high = (2.0 / bounds.magnitude * energy * length for energy in (bounds.least, bounds.greatest))
+    return _rounded(low - stray, high + stray)
+
+
+def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
+    """Bounds of the signed solid angle of any closed curve of Pi that goes once round the certified axis [sr].
+
+    2 pi (1 - cos(theta)) for the least and the greatest angle possible between Pi and the axis, negative about the
+    axis of the smallest moment.
+
+    Raises
+    ------
+    ShapeError
+        If no axis is certain, or the sense in which Pi circles it is not.
+
+    Source: theory.md E8, E13.
+    """
+    azimuth = azimuth_bounds(certificate)
+    if not azimuth.monotone:
+        raise ShapeError("certificate: it is not certain that Pi circles the axis in one sense only")
+    least, greatest = certificate.cosines
+    narrow, wide = 2.0 * np.pi * (1.0 - float(greatest.max())), 2.0 * np.pi * (1.0 - float(least.min()))
+    return _rounded(narrow, wide) if azimuth.sense > 0.0 else _rounded(-wide, -narrow)
+
+
+def loop_phase_bounds(certificate: RegimeCertificate) -> PhaseBounds:
+    """Bounds of theta_M before the motion is computed, if Pi closes once round the axis just at the interval's end.
+
+    Raises as `solid_angle_bounds`. Source: theory.md E13, E8.
+    """
+    dynamic, area = dynamic_phase_bounds(certificate.bounds), solid_angle_bounds(certificate)
+    return PhaseBounds(lower=dynamic.lower - area.upper, upper=dynamic.upper - area.lower)
+
+
+def _rounded(lower: float, upper: float) -> PhaseBounds:
+    room = _ROUNDING * (abs(lower) + abs(upper))
+    return PhaseBounds(lower=lower - room, upper=upper + room)
