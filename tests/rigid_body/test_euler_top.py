@@ -432,8 +432,10 @@ def test_h12_series_of_sn():
     top = EulerTop.principal(MOMENTS, with_energy(MOMENTS, 1.7, 1.3))
     m, u = 1.0 - top.complement, 0.05
     series = u - (1 + m) * u**3 / 6 + (1 + 14 * m + m * m) * u**5 / 120 - (1 + 135 * (m + m * m) + m**3) * u**7 / 5040
+    series += (1 + 1228 * (m + m**3) + 5478 * m * m + m**4) * u**9 / 362880
     sn = top.body_momentum(u / top.rate)[1] / (top.magnitude * top.orbit.amplitudes[1])
-    assert abs(sn - series) < 3e-15
+    # The next coefficient is below 62000 for m < 1; a quotient and a product round by some units of u.
+    assert abs(sn - series) < 62000 * u**11 / 39916800 + 8.0 * np.finfo(float).eps * u
 
 
 def test_h13_jacobi_functions_solve_euler_s_equations():
@@ -446,7 +448,8 @@ def test_h13_jacobi_functions_solve_euler_s_equations():
     sn, cn, dn = scaled[:, 1], scaled[:, orbit.other], scaled[:, orbit.circled]
     reference = ellipj(u, 1.0 - orbit.complement)
     for value, truth in zip((sn, cn, dn), reference[:3], strict=True):
-        assert np.abs(value - truth).max() < 2e-15
+        # Values up to 1 by a descending recurrence, of arguments up to 4 that are rounded, on either side.
+        assert np.abs(value - truth).max() < 16.0 * np.finfo(float).eps
 
 
 def test_momentum_below_the_least_is_taken_as_zero_and_scales_do_not_matter():
