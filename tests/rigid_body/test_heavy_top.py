@@ -22,6 +22,7 @@ from shapephase.rigid_body.lagrange_top import (
 )
 
 UP = np.array([0.0, 0.0, 1.0])
+EPS = float(np.finfo(float).eps)
 
 
 def random_top(rng):
@@ -125,12 +126,14 @@ def test_m1_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations(
         assert np.abs(pi - raw_pi).max() < 2e-10 * (3.0 + np.linalg.norm(momentum))
         product, square = casimirs(pi, up)
         assert np.abs(product - momentum @ gamma).max() < 4e-15 * np.linalg.norm(pi, axis=-1).max()
-        assert np.abs(square - 1.0).max() < 2e-15
+        # A product of quaternions has a length within 4 eps of one, its matrix the square of it, and the square of a row
+        # the fourth power: 16 eps, and as much for the sums.
+        assert np.abs(square - 1.0).max() < 32.0 * EPS
         energy = top.energy(pi, up)
         assert np.abs(energy - top.energy(momentum, gamma)).max() < motion.energy_drift + 1e-9
         assert motion.energy_drift < 1e-9
         rotation = motion.attitude(times)
-        assert np.abs(so3.transpose(rotation) @ rotation - np.eye(3)).max() < 2e-15
+        assert np.abs(so3.transpose(rotation) @ rotation - np.eye(3)).max() < 32.0 * EPS
         # R' = R hat(Omega), by differences of the attitude.
         step = 1e-4
         middle = np.linspace(0.1, 9.9, 20)
@@ -162,7 +165,8 @@ def test_m1_without_weight_the_spatial_momentum_stands_still():
     times = np.linspace(0.0, 20.0, 50)
     spatial = so3.apply(motion.attitude(times), motion.body_momentum(times))
     assert np.abs(spatial - attitude @ momentum).max() < 1e-14
-    assert np.abs(motion.attitude(0.0) - attitude).max() < 1e-15
+    # A given rotation is made a quaternion and a matrix again.
+    assert np.abs(motion.attitude(0.0) - attitude).max() < 16.0 * EPS
 
 
 def test_m1_hanging_at_rest_swings_like_a_plane_pendulum():
