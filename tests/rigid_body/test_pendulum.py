@@ -288,8 +288,8 @@ def test_n6_closed_solution_is_the_motion_of_the_body(moments, order):
         assert np.abs(motion.momentum(times) - truth[:, pendulum.axes[2]]).max() < 3e-12
         _, theta, _ = pendulum.coordinates(truth)
         assert np.abs(np.exp(1j * motion.angle(times)) - np.exp(1j * theta)).max() < 2e-11
-        # Angles up to pi, whose own spacing is 2 eps, from an arctangent on one side and an amplitude on the other: four
-        # spacings for either.
+        # Angles up to pi, whose own spacing is 2 eps, from an arctangent on one side and an amplitude on the other:
+        # four spacings for either.
         assert abs(motion.angle(0.0) - theta[0]) < 16.0 * EPS
         assert np.abs(motion.body_momentum(0.0) - pi).max() < 1e-15 * np.abs(pi).max() * 4
         if pendulum.axes[2] == 2:
