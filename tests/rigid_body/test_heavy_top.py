@@ -126,8 +126,8 @@ def test_m1_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations(
         assert np.abs(pi - raw_pi).max() < 2e-10 * (3.0 + np.linalg.norm(momentum))
         product, square = casimirs(pi, up)
         assert np.abs(product - momentum @ gamma).max() < 4e-15 * np.linalg.norm(pi, axis=-1).max()
-        # A product of quaternions has a length within 4 eps of one, its matrix the square of it, the square of a row the
-        # fourth power: 16 eps, and as much for the sums.
+        # A product of quaternions has a length within 4 eps of one, its matrix the square of that, the square of a row
+        # the fourth power: 16 eps, and as much again for the sums.
         assert np.abs(square - 1.0).max() < 32.0 * EPS
         energy = top.energy(pi, up)
         assert np.abs(energy - top.energy(momentum, gamma)).max() < motion.energy_drift + 1e-9
