@@ -9,6 +9,7 @@ import pytest
 from shapephase import elliptic
 from shapephase.errors import ShapeError
 
+EPS = float(np.finfo(float).eps)
 M1 = [1.0, 0.9, 0.5, 1e-3, 1e-8, 1e-15, 1e-30]
 BELOW = np.nextafter(0.5 * np.pi, 0.0)
 ABOVE = np.nextafter(0.5 * np.pi, 2.0)
@@ -59,8 +60,8 @@ def test_the_argument_of_sn_and_cn(m1):
             assert abs(float(mp(found) - truth)) < 2e-15 * max(1.0, float(truth))
             assert elliptic.argument_of(-factor * sine, factor * cosine, m1) == -found
         sn, cn, _, _ = elliptic.jacobi(found, m1)
-        assert abs(float(sn) - sine) < 1e-15
-        assert abs(float(cn) - cosine) < 1e-15
+        assert abs(float(sn) - sine) < 8.0 * EPS
+        assert abs(float(cn) - cosine) < 8.0 * EPS
     assert elliptic.argument_of(1.0, 0.0, 0.0) == np.inf
     for sine, cosine in ((0.5, -0.1), (0.0, 0.0)):
         with pytest.raises(ShapeError, match="cn"):
@@ -118,8 +119,8 @@ def test_jacobi_functions(m1):
         amplitude = turns * mpmath.pi + mpmath.atan2(sign * truth[0], sign * truth[1])
         assert abs(float(am - amplitude)) < 1e-15 * max(1.0, abs(u) + abs(am))
         if abs(u) < 1.0:
-            assert off(sn, truth[0]) < 1e-15
-            assert off(am, amplitude) < 1e-15
+            assert off(sn, truth[0]) < 8.0 * EPS
+            assert off(am, amplitude) < 8.0 * EPS
         if abs(u) < 0.99 * quarter:
             assert off(cn, truth[1]) < 1e-13
 
@@ -198,8 +199,9 @@ def test_laws_of_the_functions(m1, rng):
     reach = 3.0 * min(elliptic.complete_k(m1), 7.0)
     u, v = rng.uniform(-reach, reach, (2, 500))
     (s1, c1, d1, a1), (s2, c2, d2, _), (s, c, d, _) = (elliptic.jacobi(w, m1) for w in (u, v, u + v))
-    assert np.abs(s1 * s1 + c1 * c1 - 1.0).max() < 1e-15
-    assert np.abs(d1 * d1 - c1 * c1 - m1 * s1 * s1).max() < 1e-15
+    # Squares of numbers up to 1 that are right to a unit of rounding or two.
+    assert np.abs(s1 * s1 + c1 * c1 - 1.0).max() < 8.0 * EPS
+    assert np.abs(d1 * d1 - c1 * c1 - m1 * s1 * s1).max() < 8.0 * EPS
     assert np.abs(np.sin(a1) - s1).max() < 1e-14
     divisor = c1 * c1 + s1 * s1 * (c2 * c2 + m1 * s2 * s2)
     assert np.abs(s * divisor - (s1 * c2 * d2 + s2 * c1 * d1)).max() < 1e-13

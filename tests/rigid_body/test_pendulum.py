@@ -452,7 +452,8 @@ def test_n7_half_turn_symmetry_equilibria_and_stability(order):
     assert [e.angle for e in equilibria] == [0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi]
     for equilibrium in equilibria:
         momentum = pendulum.body_momentum(r, equilibrium.angle, 0.0)
-        assert np.abs(euler(ASCENDING, momentum)).max() < 1e-15
+        # A rounded sine of pi is no zero: some units of r, times the differences of the rates.
+        assert np.abs(euler(ASCENDING, momentum)).max() < 8.0 * EPS * r * r
         assert momentum[equilibrium.axis] * equilibrium.sign > 0.0
         growth = np.linalg.eigvals(np.array(linearised(momentum))).real.max()
         assert equilibrium.stability == ("unstable" if growth > 0.1 else "stable")
@@ -463,7 +464,8 @@ def test_n7_half_turn_symmetry_equilibria_and_stability(order):
     theta, p = np.linspace(-3.0, 3.0, 13), 0.4
     assert np.abs(pendulum.hamiltonian(r, theta + np.pi, p) - pendulum.hamiltonian(r, theta, p)).max() < 1e-14
     mirrored = pendulum.body_momentum(r, theta + np.pi, p) * np.where(np.arange(3) == order[2], 1.0, -1.0)
-    assert np.abs(mirrored - pendulum.body_momentum(r, theta, p)).max() < 1e-15
+    # Angles up to 2 pi are rounded by up to four units.
+    assert np.abs(mirrored - pendulum.body_momentum(r, theta, p)).max() < 8.0 * EPS * r
 
 
 def test_n7_equilibria_stay():

@@ -16,6 +16,9 @@ laws = settings(derandomize=True, max_examples=40, deadline=None)
 ShapePath = sp.ShapePath
 
 
+EPS = float(np.finfo(float).eps)
+
+
 def slope(path, t, order=1, step=1e-3):
     """A derivative of the shape by the five-point rule, inside a smooth piece: (N,) -> (N, n)."""
     a, b, c, d, e = (path.shape(t + k * step) for k in (-2, -1, 0, 1, 2))
@@ -45,15 +48,17 @@ def zigzag(knots, rng, n=2, closed=True):
 def test_a_fourier_loop_is_its_sum(rng):
     mean, a, b = rng.normal(size=3), rng.normal(size=(3, 4)), rng.normal(size=(3, 4))
     path = ShapePath.fourier(mean, a, b, 2.5)
+    # Each term is the product of an amplitude and a sine of an angle up to 8 pi, which is itself rounded.
+    rounding = 2.0 * EPS * (1.0 + 8.0 * np.pi) * (np.abs(a) + np.abs(b)).sum(axis=1).max()
     for t in (0.0, 0.3, 1.7, 2.5):
         shape, rate = mean.copy(), np.zeros(3)
         for k in range(1, 5):
             w = 2.0 * np.pi * k / 2.5
             shape += a[:, k - 1] * np.cos(w * t) + b[:, k - 1] * np.sin(w * t)
             rate += w * (b[:, k - 1] * np.cos(w * t) - a[:, k - 1] * np.sin(w * t))
-        np.testing.assert_allclose(path.shape(t), shape, atol=1e-14, rtol=0)
+        np.testing.assert_allclose(path.shape(t), shape, atol=rounding, rtol=0)
         np.testing.assert_allclose(path.rate(t), rate, atol=1e-13, rtol=0)
-    np.testing.assert_allclose(path.gap, 0.0, atol=1e-14, rtol=0)
+    np.testing.assert_allclose(path.gap, 0.0, atol=rounding, rtol=0)
     np.testing.assert_array_equal(path.breaks, [0.0, 2.5])
     assert (path.duration, path.n_shape, path.joint_names) == (2.5, 3, None)
 
@@ -123,7 +128,9 @@ def test_a_spline_is_c2_and_goes_through_its_samples(closed, rng):
         )
         assert np.all(np.abs(path.rate(after) - path.rate(before)) < 1e3 * gap[:, None] + 1e-12)
     if closed:
-        np.testing.assert_allclose(path.shape(0.0), path.shape(3.0), atol=1e-15, rtol=0)
+        # The value of a cubic at the end of its piece: four terms of the size of the samples.
+        rounding = 4.0 * EPS * max(1.0, np.abs(samples).max())
+        np.testing.assert_allclose(path.shape(0.0), path.shape(3.0), atol=rounding, rtol=0)
         np.testing.assert_allclose(path.rate(0.0), path.rate(3.0), atol=1e-12, rtol=0)
 
 
@@ -217,12 +224,18 @@ def test_waypoints_are_quintics_from_rest_to_rest(rng):
         here = t[i] - 1.0 + s * (t[i + 1] - t[i])
         move = corners[i + 1] - corners[i]
         want = corners[i] + np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, move)
-        np.testing.assert_allclose(path.shape(here), want, atol=1e-14, rtol=0)
+        # The powers of s have coefficients whose magnitudes sum up to 31; and a time is rounded by its spacing, in which
+        # a path moves on by up to 15/8 of its corners' distance over their time.
+        steepest = 15.0 / 8.0 * np.abs(move).max() / (t[i + 1] - t[i])
+        rounding = EPS * (np.abs(corners).max() + 31.0 * np.abs(move).max() + 2.0 * t[-1] * steepest)
+        np.testing.assert_allclose(path.shape(here), want, atol=rounding, rtol=0)
         rate = np.outer(30 * s**2 - 60 * s**3 + 30 * s**4, move) / (t[i + 1] - t[i])
         np.testing.assert_allclose(path.rate(here), rate, atol=1e-12, rtol=0)
     for side in (0.0, 99.0):
         corner = np.clip(np.nextafter(path.breaks, side), 0.0, path.duration)
-        np.testing.assert_allclose(path.shape(corner), corners, atol=1e-14, rtol=0)
+        # At its end the quintic is the sum of those coefficients times the distance of the corners.
+        rounding = EPS * (np.abs(corners).max() + 31.0 * np.abs(np.diff(corners, axis=0)).max())
+        np.testing.assert_allclose(path.shape(corner), corners, atol=rounding, rtol=0)
         np.testing.assert_allclose(path.rate(corner), 0.0, atol=1e-12, rtol=0)
     # Rest means no acceleration either: the rate leaves zero with the square of the time.
     near = path.breaks[1:-1, None] + np.array([-1e-3, -5e-4, 5e-4, 1e-3])
