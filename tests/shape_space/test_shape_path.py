@@ -224,8 +224,8 @@ def test_waypoints_are_quintics_from_rest_to_rest(rng):
         here = t[i] - 1.0 + s * (t[i + 1] - t[i])
         move = corners[i + 1] - corners[i]
         want = corners[i] + np.outer(10 * s**3 - 15 * s**4 + 6 * s**5, move)
-        # The powers of s have coefficients whose magnitudes sum up to 31; and a time is rounded by its spacing, in which
-        # a path moves on by up to 15/8 of its corners' distance over their time.
+        # The powers of s have coefficients whose magnitudes sum up to 31; and a time is rounded by its spacing, in
+        # which a path moves on by up to 15/8 of its corners' distance over their time.
         steepest = 15.0 / 8.0 * np.abs(move).max() / (t[i + 1] - t[i])
         rounding = EPS * (np.abs(corners).max() + 31.0 * np.abs(move).max() + 2.0 * t[-1] * steepest)
         np.testing.assert_allclose(path.shape(here), want, atol=rounding, rtol=0)
