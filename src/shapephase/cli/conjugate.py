@@ -15,7 +15,7 @@ from .text import Outcome, check_writable
 
 _ENDINGS = (".svg", ".pdf", ".png")
 _PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
-"""The p listed without being asked for, in parts of the way from sqrt(I_2) to sqrt(I_1)."""
+"""The p listed without --momenta, in parts of the way from the separatrix' p to the largest."""
 
 
 def conjugate_command(
@@ -34,13 +34,14 @@ def conjugate_command(
     Parameters
     ----------
     i1
-        the largest principal moment [kg m^2]
+        principal moment about axis 1 [kg m^2]; the three must differ and may come in any order
     i2
-        the middle one
+        principal moment about axis 2 [kg m^2]
     i3
-        the least one
+        principal moment about axis 3 [kg m^2]
     momenta
-        p = |Pi|/sqrt(2 E) of the geodesics, sqrt(i2) < p <= sqrt(i1); without it six of them
+        p = |Pi|/sqrt(2 E) of the geodesics, above the square root of the middle moment, at most that of the largest;
+        without it six of them
     order
         which conjugate point of each geodesic, 1 the first
     out
@@ -48,11 +49,11 @@ def conjugate_command(
     json
         print JSON
     """
-    from ..rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
+    from ..rigid_body.geodesics import serret_andoyer_metric
 
     check_writable(out, "--out", *_ENDINGS)
     metric = serret_andoyer_metric((i1, i2, i3))
-    low, high = float(np.sqrt(metric.moments[1])), metric.largest_momentum
+    low, high = metric.separatrix_momentum, metric.largest_momentum
     p = finite_array(momenta if momenta else [low + part * (high - low) for part in _PARTS], "--momenta", (None,))
     p = p if momenta else np.minimum(p, high)
     if np.any((p <= low) | (p > high)):

@@ -11,20 +11,24 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, Integers, finite_array
 from ..errors import ShapeError
-from ..rigid_body.geodesics._conjugate_locus import conjugate_locus, conjugate_points
-from ..rigid_body.geodesics._ellipsoid import ellipsoid
-from ..rigid_body.geodesics._extremal import extremal
-from ..rigid_body.geodesics.left_invariant import left_invariant_metric
-from ..rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
-from ..rigid_body.geodesics.surface_of_revolution import SurfaceOfRevolution
+from ..rigid_body.geodesics import (
+    SurfaceOfRevolution,
+    conjugate_locus,
+    conjugate_points,
+    ellipsoid,
+    extremal,
+    left_invariant_metric,
+    serret_andoyer_metric,
+)
 from .plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_axes, check_flat_axes, finish
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _POINTS = 400
+"""Of a curve: no corner is seen at the width of a page."""
 _NEAREST = 2e-3
-"""The last p of a locus, in parts of the way from sqrt(I_2) to sqrt(I_1)."""
+"""The last p of a locus, in parts of the way from the separatrix' p, where theta is infinite, to the equator's."""
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.7, "zorder": 1.0}
 
 
@@ -33,15 +37,17 @@ def plot_conjugate_locus(
 ) -> Axes:
     """The conjugate locus of a point on the equator of the Serret-Andoyer surface: phi against theta, p_theta > 0.
 
-    Two branches, one the mirror image of the other, from their common cusp of p_theta = sqrt(I_1) on the equator
-    towards the asymptotes phi = -K/alpha and K/alpha; faint the geodesics from the point up to where they touch it.
+    Two branches, one the mirror image of the other, from their common cusp on the equator, where p_theta is the root of
+    the largest moment, towards the asymptotes phi = -K/alpha and K/alpha; faint the geodesics from the point up to
+    where they touch it.
 
     Parameters
     ----------
     ax : flat axes
-    moments : (3,) I_1 > I_2 > I_3 [kg m^2]
+    moments : (3,) principal moments, three different ones in any order [kg m^2]
     order : which conjugate points of each geodesic
-    momenta : (N,) p_theta whose conjugate points are marked, sqrt(I_2) < p_theta <= sqrt(I_1) [sqrt(kg) m]
+    momenta : (N,) p_theta whose conjugate points are marked, above the root of the middle moment, at most that of the
+        largest [sqrt(kg) m]
     geodesics : how many are drawn to either side
 
     Raises
@@ -58,10 +64,10 @@ def plot_conjugate_locus(
             "momenta: the figure shows p_theta > 0; the locus of -p_theta is its mirror image, theta -> -theta"
         )
     shown = metric.geodesics(marked).conjugate_points(order) if marked.size else None
-    low, high = np.sqrt(metric.moments[1]), metric.largest_momentum
+    low, high = metric.separatrix_momentum, metric.largest_momentum
     p = np.minimum(low + (high - low) * np.geomspace(1.0, _NEAREST, _POINTS), high)
     locus = metric.geodesics(p).conjugate_points(order)
-    faint = _some(_POINTS, geodesics)
+    faint = _evenly_chosen(_POINTS, geodesics)
     family = metric.geodesics(p[faint])
     times = np.linspace(0.0, 1.0, _POINTS)[:, None] * locus.time[faint]
     phi, theta = family.phi(times), family.theta(times)
@@ -141,7 +147,7 @@ def plot_caustic(
     """The conjugate locus of the identity on SO(3), as rotation vectors: the images of a grid of starting velocities.
 
     A rotation vector [rad] is axis times angle; on the sphere of radius pi opposite points are the same rotation, where
-    a surface that leaves there goes on opposite. The grid has the axis of the largest moment as its pole.
+    a surface that leaves there continues on the opposite side. The grid has the axis of the largest moment as its pole.
 
     Parameters
     ----------
@@ -193,21 +199,21 @@ def plot_caustic(
     return ax
 
 
-def _some(count: int, wanted: int) -> Integers:
-    """So many of the indices below count, evenly, the ends left out."""
-    if isinstance(wanted, bool) or not isinstance(wanted, int | np.integer) or not 0 <= wanted <= count:
-        raise ShapeError(f"geodesics: a whole number from 0 to {count} is needed, got {wanted!r}")
-    return np.linspace(0, count - 1, wanted + 2)[1:-1].astype(np.int64)
+def _evenly_chosen(count: int, chosen: int) -> Integers:
+    """`chosen` of the indices below `count`, evenly spread, the ends left out."""
+    if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer) or not 0 <= chosen <= count:
+        raise ShapeError(f"geodesics: a whole number from 0 to {count} is needed, got {chosen!r}")
+    return np.linspace(0, count - 1, chosen + 2)[1:-1].astype(np.int64)
 
 
 def _about_centre(longitude: Array, momentum: Array, order: int) -> Array:
-    """Longitude less n pi, whole turns aside: eastward extremals have gained n pi, westward ones lost it."""
+    """Longitude less n pi for extremals to the east, plus n pi for those to the west; whole turns do not matter."""
     return longitude - np.where(momentum < 0.0, -1.0, 1.0) * order * np.pi
 
 
 def _past_first(ax: Any, surface: SurfaceOfRevolution, latitude: float, geodesics: int, reach: float) -> None:
-    """Extremals in directions spread evenly, until they have passed the first conjugate point and gone `reach` on."""
-    chosen = _some(_POINTS, geodesics)
+    """Draw extremals in evenly spread directions, from the start to `reach` past the last first conjugate point."""
+    chosen = _evenly_chosen(_POINTS, geodesics)
     directions = 2.0 * np.pi * (np.arange(len(chosen)) + 0.5) / max(len(chosen), 1)
     if not len(directions):
         return
@@ -222,14 +228,14 @@ def _past_first(ax: Any, surface: SurfaceOfRevolution, latitude: float, geodesic
 
 
 def _directions(polar: Array, azimuth: Array) -> Array:
-    """Unit vectors of angles from axis 1 and about it: (N,), (M,) -> (N, M, 3)."""
+    """Unit vectors of angles from axis 3 and about it: (N,), (M,) -> (N, M, 3)."""
     angle, turn = polar[:, None], azimuth[None, :]
     sine = np.sin(angle)
-    return np.stack(np.broadcast_arrays(np.cos(angle), sine * np.cos(turn), sine * np.sin(turn)), axis=-1)
+    return np.stack(np.broadcast_arrays(sine * np.sin(turn), -sine * np.cos(turn), np.cos(angle)), axis=-1)
 
 
 def _meshes(vectors: Array) -> Array:
-    """Four corners of each mesh of a grid (N, M, 3) that does not pass the boundary of the ball: (Q, 4, 3)."""
+    """Corners of the meshes of a grid (N, M, 3), those left out that leave the ball of radius pi: (Q, 4, 3)."""
     corners = np.stack([vectors[:-1, :-1], vectors[1:, :-1], vectors[1:, 1:], vectors[:-1, 1:]], axis=-2).reshape(
         -1, 4, 3
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import mpmath
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from scipy.optimize import brentq
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.geodesics import conjugate_search
+from shapephase.rigid_body.geodesics import _conjugate_search as conjugate_search
 from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
 
 METRICS = {
@@ -160,6 +162,23 @@ def test_geodesics_are_the_motions_of_the_euler_top():
     # An eigenvalue routine is right for a tensor within some units of rounding of the given one.
     rounding = 16.0 * np.finfo(float).eps * np.trace(inertia)
     np.testing.assert_allclose(metric.axes @ np.diag(metric.moments) @ metric.axes.T, inertia, rtol=0, atol=rounding)
+
+
+@pytest.mark.parametrize("moments", list(itertools.permutations((0.2, 0.47, 0.8))), ids=str)
+def test_q2_next_to_the_unstable_axis_with_one_component_zero(moments):
+    """P and Q of the closed form are equal there when rounded; which axis is circled is decided by their difference."""
+    metric = left_invariant_metric(moments)
+    for momentum in itertools.permutations((1.0, 1e-9, 0.0)):
+        top = EulerTop.principal(moments, momentum)
+        np.testing.assert_allclose(metric.attitude(momentum, 5.0), top.attitude(5.0), rtol=0, atol=1e-12)
+
+
+def test_moments_and_axes_ascend_and_are_those_given():
+    for moments in itertools.permutations((3.0, 2.0, np.inf)):
+        metric = left_invariant_metric(moments)
+        np.testing.assert_array_equal(metric.moments, [2.0, 3.0, np.inf])
+        np.testing.assert_array_equal((metric.axes * metric.inverse_moments) @ metric.axes.T, np.diag(inverse(moments)))
+        assert np.linalg.det(metric.axes) == pytest.approx(1.0, abs=1e-15)
 
 
 def test_q5_the_sub_riemannian_closed_form_is_a_top_turned_back_about_its_momentum():

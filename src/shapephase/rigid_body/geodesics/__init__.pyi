@@ -11,20 +11,19 @@ from ._cut_locus import CutLocus, cut_locus, cut_time
 from ._ellipsoid import EllipsoidStretch, astroid, ellipsoid, ellipsoid_period, meridian_length, metric_coefficients
 from ._extremal import Extremal, Start, extremal, start_of, stretch_at, variational_jacobi_field
 from ._sadov_variables import SadovVariables, sadov_frequencies, sadov_variables
+from ._serret_andoyer_constants import (
+    GeodesicClass,
+    GeodesicConstants,
+    constants_of,
+    constants_of_momentum,
+    separatrix_constants,
+)
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .distance import ShortestGeodesic, shortest_geodesic
 from .left_invariant import LeftInvariantMetric, left_invariant_metric
 from .metric_profile import Assumptions, TabulatedStretch, assumptions, surface_of_metric
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
-from .serret_andoyer_constants import (
-    GeodesicConstants,
-    constants_of,
-    constants_of_momentum,
-    moment_gaps,
-    refuse,
-    separatrix_constants,
-)
-from .serret_andoyer_geodesics import GeodesicFamily
+from .serret_andoyer_geodesics import EquatorialConjugatePoints, GeodesicFamily
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 __all__ = [
@@ -35,7 +34,9 @@ __all__ = [
     "ConjugatePoints",
     "CutLocus",
     "EllipsoidStretch",
+    "EquatorialConjugatePoints",
     "Extremal",
+    "GeodesicClass",
     "GeodesicConstants",
     "GeodesicFamily",
     "LeftInvariantMetric",
@@ -66,8 +67,6 @@ __all__ = [
     "left_invariant_metric",
     "meridian_length",
     "metric_coefficients",
-    "moment_gaps",
-    "refuse",
     "sadov_frequencies",
     "sadov_variables",
     "separatrix_constants",

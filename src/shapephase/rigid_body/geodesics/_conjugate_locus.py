@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from ...roots import ROUNDING, root
+from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
-from .arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution
 
 _ORDERS = 1000

@@ -19,7 +19,7 @@ from scipy.special import elliprd, elliprf, elliprj
 from ... import elliptic
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from .arc_quadrature import Arcs, folded_cosine
+from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 _ASPECTS = (1e-3, 1e3)

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from ...arrays import Array, finite_array
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, root
-from .arc_quadrature import Arcs
+from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
 

@@ -1,17 +1,19 @@
 """Euler's equations for inverse moments, zero included: momentum, attitude and their derivatives, batched.
 
-In principal axes of ascending inverse moments a_1 <= a_2 <= a_3 and with delta = (a_3 − a_2, a_1 − a_3, a_2 − a_1) the
-addition theorem of Jacobi's functions makes the flow a rational map of the momentum at its start,
+In principal axes of ascending moments, so of descending inverse moments a_1 >= a_2 >= a_3, and with
+delta = (a_3 − a_2, a_1 − a_3, a_2 − a_1) the addition theorem of Jacobi's functions makes the flow a rational map of
+the initial momentum,
 
     Pi_1(t) = (Pi_1 c + delta_1 Pi_2 Pi_3 S d)/D,   Pi_2(t) = (Pi_2 c d + delta_2 Pi_3 Pi_1 S)/D,
     Pi_3(t) = (Pi_3 d + delta_3 Pi_1 Pi_2 S c)/D,   D = 1 − delta_1 delta_3 Pi_2² S²,
 
-where S' = c d, c² = 1 − P S², d² = 1 − Q S², and P, Q are quadratic in Pi and conserved. Neither phase nor modulus is
-in it, so it has a derivative in closed form that is right in every case: at rest, along any axis, on the separatrix,
-for equal moments, and for a_1 = 0, the sub-Riemannian metrics.
+where S' = c d, c² = 1 − P S², d² = 1 − Q S², and P, Q are quadratic in Pi and conserved. It contains neither phase nor
+modulus, so it has a derivative in closed form that holds in every case: at rest, along any axis, on the separatrix,
+for equal moments, and for a_3 = 0, the sub-Riemannian metrics.
 
-The attitude is that of `EulerTop`, which takes finite moments, one body at a time. Only differences of the a_i are in
-it but for the even turn about the momentum: a_i + c in place of a_i turns R by c t about Pi, in inertial axes.
+The attitude is that of `EulerTop`, which takes finite moments, one body at a time. It depends on the differences of the
+a_i only, except for a uniform turn about the momentum: a_i + c in place of a_i turns R by c t about Pi, in inertial
+axes.
 
 Sources: theory.md D17, H3-H6, Q2, Q3; Carlson's form of the derivative, DLMF 19.25 and 19.29.
 """
@@ -26,14 +28,17 @@ from ...arrays import Array
 from ...errors import ShapeError
 
 _LONGEST_STEP = 1.0
+"""In units of 1/sqrt(max(P, Q)), of which a quarter period is at least pi/2: no step nears a zero of c or d."""
 _MOST_STEPS = 20_000
+"""Limit of the time and memory of one call; rounding grows with the steps, too."""
 _SMALL_TURN = 0.02
+"""[rad] Below, R dPi(t)/dPi − 1 would lose two digits, and Gauss's rule of six nodes is right to rounding."""
 
 
 def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[Array, Array]:
-    """Pi(t) and its derivative by Pi(0): (3,) ascending, (N, 3), (N,) -> (N, 3), (N, 3, 3).
+    """Pi(t) and its derivative by Pi(0): (3,) descending, (N, 3), (N,) -> (N, 3), (N, 3, 3).
 
-    In equal steps short enough that none is near a zero of c or d; errors grow as the flow itself.
+    In equal steps short enough that none is near a zero of c or d; errors grow as the flow itself does.
 
     Raises
     ------
@@ -57,14 +62,14 @@ def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[A
 
 
 def attitude_flow(inverse_moments: Array, start: Array, times: Array) -> Array:
-    """R(t) with R(0) the identity, body axes to inertial axes: (3,) ascending, (N, 3), (N,) -> (N, 3, 3)."""
+    """R(t) with R(0) the identity, body axes to inertial axes: (3,) descending, (N, 3), (N,) -> (N, 3, 3)."""
     p, q = _conserved(inverse_moments, start)
-    # At rest, along an axis, or of two equal moments: the turn is even.
-    still = (np.maximum(p, q) == 0.0) | ((start[:, 0] == 0.0) & (start[:, 2] == 0.0))
+    # At rest, along an axis, or for three equal moments the body turns uniformly.
+    uniform = (np.maximum(p, q) == 0.0) | ((start[:, 0] == 0.0) & (start[:, 2] == 0.0))
     attitude = so3.exp(times[:, None] * inverse_moments * start)
-    if not still.all():
-        attitude[~still] = so3.matrix_from_quat(
-            _quaternion(inverse_moments, start[~still], times[~still], p[~still], q[~still])
+    if not uniform.all():
+        attitude[~uniform] = so3.matrix_from_quat(
+            _quaternion(inverse_moments, start[~uniform], times[~uniform], p[~uniform], q[~uniform])
         )
     return attitude
 
@@ -72,30 +77,29 @@ def attitude_flow(inverse_moments: Array, start: Array, times: Array) -> Array:
 def exponential_fields(inverse_moments: Array, start: Array, times: Array, attitude: Array, slope: Array) -> Array:
     """Y with delta R = hat(Y delta Pi) R, the derivative of R(t) by Pi(0) in inertial axes: -> (N, 3, 3).
 
-    With the attitude and the derivative of the momentum's flow, `slope`, everything is in closed form, as
-    R delta Pi(t) = delta Pi + Pi x y gives what of y is at right angles to Pi, and Gauss's lemma, y.Pi = t u.delta Pi,
-    the rest:
+    With the attitude and the derivative of the momentum's flow, `slope`, everything is in closed form:
+    R delta Pi(t) = delta Pi + Pi x y gives the part of y across Pi, Gauss's lemma y.Pi = t u.delta Pi the one along it,
 
         Y = (t Pi u^T − hat(Pi)(R dPi(t)/dPi − 1))/|Pi|².
 
     For turns so small that the difference would lose digits, Y is the integral of R a dPi(t)/dPi, by Gauss's rule.
     """
-    size = np.linalg.norm(start, axis=-1)
-    small = size * np.abs(times) * inverse_moments[2] < _SMALL_TURN
+    magnitude = np.linalg.norm(start, axis=-1)
+    small = magnitude * np.abs(times) * inverse_moments[0] < _SMALL_TURN
     fields = np.empty((*start.shape, 3))
     if small.any():
         fields[small] = _small_fields(inverse_moments, start[small], times[small])
     large = ~small
     if large.any():
-        unit = start[large] / size[large, None]
+        unit = start[large] / magnitude[large, None]
         change = attitude[large] @ slope[large] - np.eye(3)
         along = times[large, None, None] * _outer(unit, inverse_moments * start[large])
-        fields[large] = (along - so3.hat(unit) @ change) / size[large, None, None]
+        fields[large] = (along - so3.hat(unit) @ change) / magnitude[large, None, None]
     return fields
 
 
 def exponential_derivative(inverse_moments: Array, start: Array, times: Array) -> Array:
-    """Z with delta R = R hat(Z delta Pi), body axes: (3,) ascending, (N, 3), (N,) -> (N, 3, 3)."""
+    """Z with delta R = R hat(Z delta Pi), body axes: (3,) descending, (N, 3), (N,) -> (N, 3, 3)."""
     attitude = attitude_flow(inverse_moments, start, times)
     slope = momentum_flow(inverse_moments, start, times)[1]
     return so3.transpose(attitude) @ exponential_fields(inverse_moments, start, times, attitude, slope)
@@ -112,7 +116,10 @@ def _small_fields(inverse_moments: Array, start: Array, times: Array) -> Array:
 
 
 def differences(inverse_moments: Array) -> Array:
-    """delta_i = a_k − a_j, i j k in cyclic order, of Pi_i' = delta_i Pi_j Pi_k: (3,) -> (3,)."""
+    """delta_i = a_k − a_j, i j k in cyclic order, of Pi_i' = delta_i Pi_j Pi_k: (3,) -> (3,).
+
+    Only the second is above 0 for descending a_i.
+    """
     a = inverse_moments
     return np.array([a[2] - a[1], a[0] - a[2], a[1] - a[0]])
 
@@ -125,10 +132,10 @@ def _conserved(inverse_moments: Array, momentum: Array) -> tuple[Array, Array]:
 
 
 def _separation(inverse_moments: Array, momentum: Array) -> Array:
-    """P − Q."""
+    """P − Q, to all digits."""
     d1, d2, d3 = differences(inverse_moments)
-    third, first = np.sqrt(d1) * momentum[:, 2], np.sqrt(d3) * momentum[:, 0]
-    return -d2 * (third - first) * (third + first)
+    third, first = np.sqrt(-d1) * momentum[:, 2], np.sqrt(-d3) * momentum[:, 0]
+    return d2 * (third - first) * (third + first)
 
 
 def _step_functions(
@@ -137,10 +144,11 @@ def _step_functions(
     """S, c, d and the derivatives of S by P and Q."""
     largest = np.maximum(p, q)
     rate = np.sqrt(np.where(largest > 0.0, largest, 1.0))
-    complement = np.minimum(np.abs(_separation(inverse_moments, start)) / rate**2, 1.0)
+    separation = _separation(inverse_moments, start)
+    complement = np.minimum(np.abs(separation) / rate**2, 1.0)
     sn, cn, dn, _ = elliptic.jacobi(rate * times, complement)
     s = np.where(largest > 0.0, sn / rate, times)
-    third = p >= q
+    third = separation >= 0.0
     c = np.where(largest > 0.0, np.where(third, cn, dn), 1.0)
     d = np.where(largest > 0.0, np.where(third, dn, cn), 1.0)
     slope = -c * d * s**3 / 6.0
@@ -160,47 +168,53 @@ def _addition(
     grad_s = s_p[:, None] * grad_p + s_q[:, None] * grad_q
     grad_c = -((s * s)[:, None] * grad_p + (2.0 * p * s)[:, None] * grad_s) / (2.0 * c)[:, None]
     grad_d = -((s * s)[:, None] * grad_q + (2.0 * q * s)[:, None] * grad_s) / (2.0 * d)[:, None]
-    below = 1.0 - d1 * d3 * (y * s) ** 2
+    denominator = 1.0 - d1 * d3 * (y * s) ** 2
     end = np.stack([x * c + d1 * y * z * s * d, y * c * d + d2 * z * x * s, z * d + d3 * x * y * s * c], axis=-1)
-    end /= below[:, None]
+    end /= denominator[:, None]
     explicit = np.stack(
         [c, d1 * z * s * d, d1 * y * s * d, d2 * z * s, c * d, d2 * x * s, d3 * y * s * c, d3 * x * s * c, d], axis=-1
     ).reshape(-1, 3, 3)
     by_s = np.stack([d1 * y * z * d, d2 * z * x, d3 * x * y * c], axis=-1)
     by_c = np.stack([x, y * d, d3 * x * y * s], axis=-1)
     by_d = np.stack([d1 * y * z * s, y * c, z], axis=-1)
-    grad_below = -2.0 * d1 * d3 * ((y * s * s)[:, None] * np.array([0.0, 1.0, 0.0]) + (y * y * s)[:, None] * grad_s)
-    jacobian = explicit + _outer(by_s, grad_s) + _outer(by_c, grad_c) + _outer(by_d, grad_d) - _outer(end, grad_below)
-    return end, jacobian / below[:, None, None]
+    grad_denominator = (
+        -2.0 * d1 * d3 * ((y * s * s)[:, None] * np.array([0.0, 1.0, 0.0]) + (y * y * s)[:, None] * grad_s)
+    )
+    jacobian = (
+        explicit + _outer(by_s, grad_s) + _outer(by_c, grad_c) + _outer(by_d, grad_d) - _outer(end, grad_denominator)
+    )
+    return end, jacobian / denominator[:, None, None]
 
 
 def _quaternion(inverse_moments: Array, start: Array, times: Array, p: Array, q: Array) -> Array:
-    """The attitude of momenta that go round an axis, as `EulerTop` has it."""
+    """The attitude of momenta that circle an axis, as in `EulerTop`."""
     d1, d2, d3 = differences(inverse_moments)
-    third = p >= q
-    sense = np.where(third, -1.0, 1.0)
+    # Next to the axis of the middle moment P and Q are equal when rounded, and their difference is not.
+    separation = _separation(inverse_moments, start)
+    third = separation >= 0.0
+    sense = np.where(third, 1.0, -1.0)
     rate = np.sqrt(np.maximum(p, q))
-    complement = np.minimum(np.abs(_separation(inverse_moments, start)) / rate**2, 1.0)
+    complement = np.minimum(np.abs(separation) / rate**2, 1.0)
     inner, outer = np.where(third, d1, d3), np.where(third, d3, d1)
     circled, other = np.where(third, 2, 0), np.where(third, 0, 2)
     rows = np.arange(len(start))
-    # The amplitudes of the momentum's components: p/delta_3 and q/delta_1 without the division.
+    # The amplitudes of the momentum's components: -Q/delta_3 and -P/delta_1 without the division.
     x, y, z = start.T
-    near = np.where(third, d1 * y * y - d2 * x * x, d3 * y * y - d2 * z * z)
-    side = np.copysign(np.sqrt(near / -d2), start[rows, other])
-    middle = np.copysign(np.sqrt(near / inner), -np.copysign(1.0, x) * np.copysign(1.0, z))
+    near = np.where(third, d2 * x * x - d1 * y * y, d2 * z * z - d3 * y * y)
+    side = np.copysign(np.sqrt(near / d2), start[rows, other])
+    middle = np.copysign(np.sqrt(near / -inner), np.copysign(1.0, x) * np.copysign(1.0, z))
     moving = near > 0.0
     sine = np.where(moving, y / np.where(moving, middle, 1.0), 0.0)
     cosine = np.where(moving, start[rows, other] / np.where(moving, side, 1.0), 1.0)
     phase = elliptic.argument_of(sine, cosine, complement)
-    size = np.linalg.norm(start, axis=-1)
+    magnitude = np.linalg.norm(start, axis=-1)
     characteristic = -outer / inner
     root = np.sqrt(1.0 - characteristic)
     axis = np.zeros((len(start), 3))
     axis[rows, circled] = np.copysign(1.0, start[rows, circled])
-    top = np.sqrt(np.where(third, d3 * y * y - d2 * z * z, d1 * y * y - d2 * x * x) / -d2)
+    top = np.sqrt(np.where(third, d2 * z * z - d3 * y * y, d2 * x * x - d1 * y * y) / d2)
 
-    def carried(u: Array) -> tuple[Array, Array]:
+    def onto_axis(u: Array) -> tuple[Array, Array]:
         """The turn of the momentum's direction onto the axis, and the swing about it."""
         sn, cn, dn, amplitude, kind = elliptic.jacobi_and_pi_excess(characteristic, u, complement)
         azimuth = amplitude + np.arctan2((root - 1.0) * sn * cn, cn * cn + root * sn * sn)
@@ -211,11 +225,11 @@ def _quaternion(inverse_moments: Array, start: Array, times: Array, p: Array, q:
         direction = so3.normalised(direction)
         scalar = 1.0 + np.sum(direction * axis, axis=-1, keepdims=True)
         turn = so3.normalised(np.concatenate([np.cross(direction, axis), scalar], axis=-1))
-        return turn, sense * (-d2 * size / rate * kind - azimuth)
+        return turn, sense * (d2 * magnitude / rate * kind - azimuth)
 
-    before, first = carried(phase)
-    after, last = carried(rate * times + phase)
-    half = 0.5 * (size * inverse_moments[1] * times + last - first)
+    before, first = onto_axis(phase)
+    after, last = onto_axis(rate * times + phase)
+    half = 0.5 * (magnitude * inverse_moments[1] * times + last - first)
     about = np.concatenate([np.sin(half)[:, None] * axis, np.cos(half)[:, None]], axis=-1)
     return so3.quat_product(so3.quat_product(so3.quat_inverse(before), about), after)
 

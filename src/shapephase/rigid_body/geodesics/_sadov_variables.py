@@ -1,12 +1,14 @@
 """Action and angle variables of the free rigid body (Sadov's), from Andoyer's, and its two frequencies.
 
-The actions are J, the integral of L dl round the closed curve in the (l, L) plane by 2 pi, G and K. Their angles
+The actions are J, the integral of L dl round the closed curve in the (l, L) plane over 2 pi, G and K. Their angles
 advance evenly in free motion: that of J at `own_rate`, once round in a period of the momentum in the body; that of G
-at `precession_rate`, the mean of g'; that of K, k itself, not at all. Body axes are principal, I_1 > I_2 > I_3.
+at `precession_rate`, the mean of g'; that of K, k itself, not at all. Body axes are principal.
 
-J is even in the sense of the motion; it grows from 0, with the momentum along axis 1, to G, along axis 3. Where the
-momentum circles axis 1 or -1, angles count from l = pi/2 or -pi/2, L > 0; where it circles axis 3 or -3, from l = pi/2.
-Along axis 1 the angle of J is undefined, along axis 3 it goes with l.
+g, l and L here belong to axes whose third is that of the smallest moment, I_1, and whose first is that of the largest,
+I_3 (`SerretAndoyerMetric.andoyer_axes`); the papers number these moments in descending order. J does not depend on the
+sense of the motion; it grows from 0, with the momentum along the axis of I_3, to G, along that of I_1. Where the
+momentum circles the axis of I_3 or its opposite, angles count from l = pi/2 or -pi/2, L > 0; where it circles that of
+I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it goes with l.
 
 Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
 speed by homogeneity: the action and the rates are sqrt(2 E) times theirs.
@@ -22,7 +24,8 @@ from numpy.typing import ArrayLike
 from ... import elliptic, so3
 from ...arrays import Array, Mask, finite_array
 from ...errors import ShapeError
-from ._andoyer_variables import AndoyerVariables
+from ...inertia_tensor import ascending_moments
+from ._andoyer_variables import AndoyerVariables, andoyer_variables
 from .serret_andoyer import serret_andoyer_metric
 
 
@@ -53,24 +56,30 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
 
     Parameters
     ----------
-    moments : (3,) about the body axes 1, 2, 3, descending [kg m^2]
-    variables : of a body whose axes are those
+    moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
+    variables : of a body with those axes
 
     Raises
     ------
     ShapeError
-        If the moments do not descend strictly, or a state is on the separatrix or along axis 2, where the period is
-        infinite and there are no angles. Next to it their digits are lost as 1/m1.
+        If two moments are equal, or a state is on the separatrix or along the axis of the middle moment, where the
+        period is infinite and there are no angles. Next to it they lose digits in proportion to 1/m1, m1 the
+        complement of the elliptic modulus.
     """
     metric = serret_andoyer_metric(moments)
+    axes = metric.andoyer_axes
+    if not np.array_equal(axes, np.eye(3)):
+        variables = andoyer_variables(variables.attitude @ axes, variables.body_momentum @ axes)
+        metric = serret_andoyer_metric(np.sort(metric.moments)[::-1])
     momentum = variables.body_momentum
     family = metric.geodesics_of(momentum)
     lost = family.complement == 0.0
     if lost.any():
         where = tuple(int(i) for i in np.argwhere(lost)[0])
         raise ShapeError(
-            f"variables: entry {list(where)} is on the separatrix or along axis 2, where the period is infinite and "
-            "there are no angle variables; the action alone is `SerretAndoyerMetric.separatrix().action`"
+            f"variables: entry {list(where)} is on the separatrix or along the axis of the middle moment, where the "
+            "period is infinite and there are no angle variables; the action alone is "
+            "`SerretAndoyerMetric.separatrix().action`"
         )
     speed = np.sqrt(2.0 * variables.hamiltonian(np.diag(metric.moments)))
     u = _argument(metric.moments, momentum, variables.l, family.is_oscillating, family.complement)
@@ -92,13 +101,13 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
 def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Array, Array]:
     """dH/dJ and dH/dG, the frequencies of free motion through these momenta: (3,), (..., 3) -> (...), (...) [rad/s].
 
-    The rate of the momentum's way round in the body, and the mean rate about the momentum; both limits on the
-    separatrix, where the first is 0. Principal axes, that of the largest moment first.
+    The rate at which the momentum goes round in the body, and the mean rate about the momentum; on the separatrix their
+    limits, of which the first is 0. The moments, in any order, are those about the momenta's axes.
 
     Raises
     ------
     ShapeError
-        If the moments do not descend strictly, or a momentum is zero.
+        If two moments are equal, or a momentum is zero.
 
     Source: theory.md R15.
     """
@@ -110,14 +119,14 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
 
 
 def _argument(moments: Array, momentum: Array, angle: Array, oscillating: Mask, complement: Array) -> Array:
-    """u of a state in [-K, 3 K), from l = +-pi/2 on."""
-    i1, i2, i3 = moments
-    h1, h2, h3 = np.moveaxis(momentum, -1, 0)
-    near, rest, far = (i1 - i2) / i2, i1 * (i2 - i3) / i2, i1 - i3
-    # Along axis 3 by l, as there is no momentum across.
-    oscillation = -np.copysign(1.0, h1) * h2 * np.sqrt(near * i3)
-    rotation = -np.copysign(1.0, h3) * np.cos(angle) * np.sqrt(rest)
+    """u of a state in [-K, 3 K), from l = +-pi/2 on; moments and momenta in `andoyer_axes`."""
+    i1, i2, i3 = ascending_moments(moments)[0]
+    largest, middle, smallest = np.moveaxis(momentum, -1, 0)
+    near, rest, far = (i3 - i2) / i2, i3 * (i2 - i1) / i2, i3 - i1
+    oscillation = -np.copysign(1.0, largest) * middle * np.sqrt(near * i1)
+    # By l, which is defined along the axis of the smallest moment too, where no momentum is across it.
+    rotation = -np.copysign(1.0, smallest) * np.cos(angle) * np.sqrt(rest)
     sine = np.where(oscillating, oscillation, rotation)
-    cosine = np.where(oscillating, h3, np.sin(angle)) * np.sqrt(far)
+    cosine = np.where(oscillating, smallest, np.sin(angle)) * np.sqrt(far)
     short = elliptic.argument_of(sine, np.abs(cosine), complement)
     return np.where(cosine < 0.0, 2.0 * elliptic.complete_k(complement) - short, short)

@@ -8,6 +8,9 @@ Pontryagin's principle, the shortest curves are the motions of a free rigid body
 and their speed is sqrt(2 H): with H = 1/2 time is length. A moment may be infinite: then its component of u is
 forbidden, a has a zero, and the metric is sub-Riemannian. `momentum_flow` has both cases in one closed form.
 
+Principal moments ascend, I_1 <= I_2 <= I_3, so that an infinite one is I_3; those of Bonnard et al. descend: their I_1,
+I_2, I_3 are our I_3, I_2, I_1. Inertias are given, and momenta and attitudes answered, in the caller's body axes.
+
 Sources: Bonnard, Cots and Shcherbakova 2013, section 3; theory.md Q1-Q6.
 """
 
@@ -22,9 +25,12 @@ from ... import so3
 from ...arguments import inertia_argument, moments_argument
 from ...arrays import Array, finite_array, real_array
 from ...errors import ShapeError
-from ...inertia_tensor import principal_axes
+from ...inertia_tensor import ascending_moments, principal_axes
+from ._conjugate_search import conjugate_times
 from ._momentum_flow import attitude_flow, exponential_derivative
-from .conjugate_search import conjugate_times
+
+_LEAST_SPEED = 1e-12
+"""In parts of the largest speed of such a momentum: below, rounding decides whether it is along the forbidden axis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +43,16 @@ class LeftInvariantMetric:
     """
 
     moments: Array
-    """(3,) principal moments, descending [kg m^2]; infinite where the direction is forbidden."""
+    """(3,) principal moments, ascending [kg m^2]; infinite where the direction is forbidden."""
     axes: Array
     """(3, 3) whose columns are the principal axes in body axes, determinant +1."""
     inverse_moments: Array
-    """(3,) a_i = 1/I_i, ascending [1/(kg m^2)]; 0 where the direction is forbidden."""
+    """(3,) a_i = 1/I_i, descending [1/(kg m^2)]; 0 where the direction is forbidden."""
 
     @property
     def is_sub_riemannian(self) -> bool:
         """Whether a direction is forbidden."""
-        return bool(self.inverse_moments[0] == 0.0)
+        return bool(self.inverse_moments[2] == 0.0)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
         """u = a Pi, which maximises the pseudo-Hamiltonian: (..., 3) -> (..., 3), body axes [rad/s].
@@ -64,9 +70,9 @@ class LeftInvariantMetric:
             If u has a component that the metric forbids.
         """
         pi, u = self._principal(momentum), self._principal(angular_velocity, "angular_velocity", "rad/s")
-        if self.is_sub_riemannian and np.any(u[..., 0] != 0.0):
+        if self.is_sub_riemannian and np.any(u[..., 2] != 0.0):
             raise ShapeError(
-                f"angular_velocity: its component along {self.axes[:, 0]} must be 0, the metric forbids this direction"
+                f"angular_velocity: its component along {self.axes[:, 2]} must be 0, the metric forbids this direction"
             )
         weights = np.where(np.isfinite(self.moments), self.moments, 0.0)
         return np.sum(u * pi, axis=-1) - 0.5 * np.sum(weights * u * u, axis=-1)
@@ -135,7 +141,7 @@ class LeftInvariantMetric:
         ShapeError
             Where H is 0, or if `order` is not a whole number of 1 or more.
         AccuracyNotReached
-            If none is found in ten thousand steps of the search, with moments too unequal.
+            If none is found in ten thousand steps of the search, because the moments are too unequal.
 
         Source: theory.md Q6; `conjugate_times`.
         """
@@ -154,14 +160,14 @@ class LeftInvariantMetric:
         return finite_array(value, name, (3,), unit=unit) @ self.axes
 
     def _moving(self, momentum: Array) -> Array:
-        """The speeds, all above 0."""
+        """The speeds; raises unless all are above 0."""
         speed = self.speed(momentum)
-        still = ~(speed > 1e-12 * np.sqrt(self.inverse_moments[2]) * np.linalg.norm(momentum, axis=-1))
+        still = ~(speed > _LEAST_SPEED * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
         if still.any():
             where = tuple(int(i) for i in np.argwhere(still)[0])
             raise ShapeError(
                 f"momentum: entry {list(where)} is {momentum[where]}, with which nothing moves; it must not be zero"
-                + (f", nor along the forbidden direction {self.axes[:, 0]}" if self.is_sub_riemannian else "")
+                + (f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else "")
             )
         return speed
 
@@ -195,8 +201,8 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     """
     values = real_array(inertia, "inertia", "kg m^2")
     if values.shape == (3, 3):
-        moments, frame = principal_axes(inertia_argument(finite_array(values, "inertia")[None])[0])
-        return _metric(moments[::-1], frame[:, ::-1] * [1.0, 1.0, -1.0])
+        moments, axes = principal_axes(inertia_argument(finite_array(values, "inertia")[None])[0])
+        return LeftInvariantMetric(moments=moments, axes=axes, inverse_moments=1.0 / moments)
     if values.shape != (3,):
         raise ShapeError(f"inertia: three principal moments (3,) or a tensor (3, 3) are needed, got {values.shape}")
     infinite = values == np.inf
@@ -205,11 +211,8 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
             f"inertia: at most one moment may be infinite, got {values}; turns about two axes at least must be allowed"
         )
     finite = moments_argument(np.where(infinite, values[~infinite].max(), values))
-    order = np.argsort(-np.where(infinite, np.inf, finite), kind="stable")
-    axes = np.eye(3)[:, order]
-    axes[:, 2] *= np.round(np.linalg.det(axes))
-    return _metric(np.where(infinite, np.inf, finite)[order], axes)
-
-
-def _metric(moments: Array, axes: Array) -> LeftInvariantMetric:
-    return LeftInvariantMetric(moments.copy(), axes, 1.0 / moments)
+    # Read backwards, so that of equal moments the axis given first counts as that of the larger one.
+    moments, order, parity = ascending_moments(np.where(infinite, np.inf, finite)[::-1])
+    axes = np.eye(3)[::-1, order]
+    axes[:, 1] *= -parity
+    return LeftInvariantMetric(moments=moments, axes=axes, inverse_moments=1.0 / moments)

@@ -1,14 +1,18 @@
 """The Serret-Andoyer metric of the free rigid body and its polar form.
 
-In Andoyer's variables x = g, y = l, with p_x = G and p_y = L (see `andoyer_variables`), the energy is that of the
-geodesics of a surface,
+Principal moments ascend, I_1 < I_2 < I_3, and a_i = 1/I_i, so that a_1 > a_2 > a_3. In Andoyer's variables x = g and
+y = l, p_x = G and p_y = L, of axes whose third is that of the smallest moment (`SerretAndoyerMetric.andoyer_axes`), the
+energy is that of the geodesics of a surface,
 
-    H = ((p_x^2 - p_y^2)(A sin^2 y + B cos^2 y) + C p_y^2)/2,  A = 1/I_1 < B = 1/I_2 < C = 1/I_3,
+    H = ((p_x^2 - p_y^2)(a_3 sin^2 y + a_2 cos^2 y) + a_1 p_y^2)/2,
 
-with the metric dx^2/w + dy^2/(C - w), w = A sin^2 y + B cos^2 y. With y = pi/2 - am(alpha phi, k) and theta = x it is
-the surface of revolution d phi^2 + m(phi) d theta^2, 1/m = A + (B - A) sn^2(alpha phi, k). Along a geodesic of unit
-speed, H = 1/2, and p_theta = G/sqrt(2 E) for a body of energy E, whose time is the arc length over sqrt(2 E). All
-lengths and p_theta are in sqrt(kg) m, theta and y in radians.
+with the metric dx^2/w + dy^2/(a_1 - w), w = a_3 sin^2 y + a_2 cos^2 y. With y = pi/2 - am(alpha phi, k) and theta = x
+it is the surface of revolution d phi^2 + m(phi) d theta^2, 1/m = a_3 + (a_2 - a_3) sn^2(alpha phi, k). Along a geodesic
+of unit speed H = 1/2, and p_theta = G/sqrt(2 E) for a body of energy E, whose time is the arc length over sqrt(2 E).
+All lengths and p_theta are in sqrt(kg) m, theta and y in radians.
+
+Bonnard et al. number the moments in descending order: their I_1, I_2, I_3 are our I_3, I_2, I_1, their A < B < C our
+a_3, a_2, a_1. A metric takes the moments in any order and momenta in the caller's axes.
 
 Its geodesics are in `serret_andoyer_geodesics`.
 
@@ -26,7 +30,8 @@ from ... import elliptic
 from ...arguments import moments_argument
 from ...arrays import Array, common_shape, finite_array
 from ...errors import ShapeError
-from .serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants
+from ...inertia_tensor import ascending_moments
+from ._serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants
 from .serret_andoyer_geodesics import GeodesicFamily
 
 
@@ -35,29 +40,43 @@ class SerretAndoyerMetric:
     """The metric of three principal moments, see `serret_andoyer_metric`."""
 
     moments: Array
-    """(3,) descending principal moments I_1 > I_2 > I_3 [kg m^2]."""
+    """(3,) three different principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
 
     @property
     def inverse_moments(self) -> Array:
-        """(3,) A < B < C [1/(kg m^2)]."""
+        """(3,) 1/I about the caller's axes 1, 2, 3 [1/(kg m^2)]."""
         return 1.0 / self.moments
 
     @property
+    def andoyer_axes(self) -> Array:
+        """(3, 3) whose columns are the axes, in the caller's, that Andoyer's variables y and p_y refer to.
+
+        Those of the largest, the middle and the smallest moment, the middle one reversed where this order is
+        left-handed: the identity if the moments descend. The body momentum p_y along the third and
+        sqrt(G^2 - p_y^2) (sin y, cos y) along the others is that of Bonnard et al., before (5).
+        """
+        _, order, parity = ascending_moments(self.moments)
+        axes = np.eye(3)[:, order[::-1]]
+        # Reading three axes backwards is odd.
+        axes[:, 1] *= -parity
+        return axes
+
+    @property
     def alpha(self) -> float:
-        """sqrt(C - A), the rate of the elliptic argument along phi [1/(sqrt(kg) m)]."""
-        i1, _, i3 = self.moments
-        return float(np.sqrt((i1 - i3) / (i1 * i3)))
+        """sqrt(a_1 - a_3), the rate of the elliptic argument along phi [1/(sqrt(kg) m)]."""
+        i1, _, i3 = self._ascending
+        return float(np.sqrt((i3 - i1) / (i3 * i1)))
 
     @property
     def modulus(self) -> float:
-        """k of the elliptic functions of alpha phi, k^2 = (B - A)/(C - A)."""
+        """k of the elliptic functions of alpha phi, k^2 = (a_2 - a_3)/(a_1 - a_3)."""
         return float(np.sqrt(1.0 - self.complement))
 
     @property
     def complement(self) -> float:
-        """1 - k^2 = (C - B)/(C - A)."""
-        i1, i2, i3 = self.moments
-        return float(i1 * (i2 - i3) / (i2 * (i1 - i3)))
+        """1 - k^2 = (a_1 - a_2)/(a_1 - a_3)."""
+        i1, i2, i3 = self._ascending
+        return float(i3 * (i2 - i1) / (i2 * (i3 - i1)))
 
     @property
     def crest(self) -> float:
@@ -65,12 +84,17 @@ class SerretAndoyerMetric:
         return float(elliptic.complete_k(self.complement)) / self.alpha
 
     @property
+    def separatrix_momentum(self) -> float:
+        """sqrt(I_2), p_theta of the separatrix, above which geodesics oscillate [sqrt(kg) m]."""
+        return float(np.sqrt(self._ascending[1]))
+
+    @property
     def largest_momentum(self) -> float:
-        """sqrt(I_1), p_theta of the equator [sqrt(kg) m]."""
-        return float(np.sqrt(self.moments[0]))
+        """sqrt(I_3), p_theta of the equator [sqrt(kg) m]."""
+        return float(np.sqrt(self._ascending[2]))
 
     def w(self, y: ArrayLike) -> Array:
-        """A sin^2 y + B cos^2 y, z/2 of the paper: (...) [rad] -> (...) [1/(kg m^2)].
+        """a_3 sin^2 y + a_2 cos^2 y, z/2 of the paper: (...) [rad] -> (...) [1/(kg m^2)].
 
         Raises
         ------
@@ -80,26 +104,26 @@ class SerretAndoyerMetric:
         Source: Bonnard et al., before (7).
         """
         angle = finite_array(y, "y", unit="rad")
-        first, second, _ = self.inverse_moments
-        return first * np.sin(angle) ** 2 + second * np.cos(angle) ** 2
+        _, a2, a3 = self._inverse
+        return a3 * np.sin(angle) ** 2 + a2 * np.cos(angle) ** 2
 
     def coefficients(self, y: ArrayLike) -> tuple[Array, Array]:
-        """1/w and 1/(C - w), of dx^2 and dy^2: (...) [rad] -> (...), (...) [kg m^2].
+        """1/w and 1/(a_1 - w), of dx^2 and dy^2: (...) [rad] -> (...), (...) [kg m^2].
 
         Source: Bonnard et al. (7); the metric of the paper's introduction is half of it (theory.md B-E1).
         """
-        i1, i2, i3 = self.moments
+        i1, i2, i3 = self._ascending
         angle = finite_array(y, "y", unit="rad")
         sine, cosine = np.sin(angle) ** 2, np.cos(angle) ** 2
-        return 1.0 / self.w(angle), 1.0 / (sine * (i1 - i3) / (i1 * i3) + cosine * (i2 - i3) / (i2 * i3))
+        return 1.0 / self.w(angle), 1.0 / (sine * (i3 - i1) / (i3 * i1) + cosine * (i2 - i1) / (i2 * i1))
 
     def energy(self, y: ArrayLike, p_x: ArrayLike, p_y: ArrayLike) -> Array:
-        """H = (w p_x^2 + (C - w) p_y^2)/2: (...) each -> (...); [J] for p in [kg m^2/s].
+        """H = (w p_x^2 + (a_1 - w) p_y^2)/2: (...) each -> (...); [J] for p in [kg m^2/s].
 
-        Also outside |p_y| <= p_x, where no rigid body is.
+        Also for |p_y| > p_x, which no rigid body has.
         Source: Bonnard et al. (6).
         """
-        angle, first, second = _together(y=y, p_x=p_x, p_y=p_y)
+        angle, first, second = _checked(y=y, p_x=p_x, p_y=p_y)
         across, along = self.coefficients(angle)
         return 0.5 * (first**2 / across + second**2 / along)
 
@@ -118,7 +142,7 @@ class SerretAndoyerMetric:
         return 0.5 * np.pi - elliptic.jacobi(self.alpha * finite_array(phi, "phi"), self.complement)[3]
 
     def m(self, phi: ArrayLike) -> Array:
-        """m in d phi^2 + m d theta^2, even and of period 2 K/alpha, from I_1 down to I_2: (...) -> (...) [kg m^2].
+        """m in d phi^2 + m d theta^2, even and of period 2 K/alpha, from I_3 down to I_2: (...) -> (...) [kg m^2].
 
         Source: Bonnard et al., proposition 8.
         """
@@ -127,53 +151,55 @@ class SerretAndoyerMetric:
     def m_derivatives(self, phi: ArrayLike) -> tuple[Array, Array]:
         """m' and m'' by phi: (...) [sqrt(kg) m] -> (...) [sqrt(kg) m], (...) [1]."""
         sn, cn, dn, _ = self._jacobi(phi)
-        first, square = self._rise, self.modulus**2
-        slope = 2.0 * self.alpha * first * sn * cn * dn
-        bend = 2.0 * self.alpha**2 * first * ((cn * dn) ** 2 - (sn * dn) ** 2 - square * (sn * cn) ** 2)
+        rise, square = self._rise, self.modulus**2
+        slope = 2.0 * self.alpha * rise * sn * cn * dn
+        bend = 2.0 * self.alpha**2 * rise * ((cn * dn) ** 2 - (sn * dn) ** 2 - square * (sn * cn) ** 2)
         value = 1.0 / self._inverse_m(phi)
         return -slope * value**2, (2.0 * slope**2 * value - bend) * value**2
 
     def potential(self, phi: ArrayLike, p_theta: ArrayLike) -> Array:
         """V = p_theta^2/m, with phi'^2 + V = 1 along a geodesic of unit speed: (...), (...) -> (...).
 
-        Its minimum is A p_theta^2, on the equator, its maximum B p_theta^2, at `crest`.
+        Its minimum is a_3 p_theta^2, on the equator, its maximum a_2 p_theta^2, at `crest`.
         Source: Bonnard et al., lemma 4.1.
         """
-        place, momentum = _together(phi=phi, p_theta=p_theta)
+        place, momentum = _checked(phi=phi, p_theta=p_theta)
         return momentum**2 * self._inverse_m(place)
 
     def gauss_curvature(self, phi: ArrayLike) -> Array:
         """The curvature of the surface at phi: (...) [sqrt(kg) m] -> (...) [1/(kg m^2)].
 
-        (B - A)(C - A)/A on the equator, -(B - A)(C - B)/B at `crest`; see `curvature_range` for what is between.
+        (a_2 - a_3)(a_1 - a_3)/a_3 on the equator, -(a_2 - a_3)(a_1 - a_2)/a_2 at `crest`; see `curvature_range` for
+        the values between.
         Source: Bonnard et al., lemma 4.2.
         """
-        first, second, third = self.inverse_moments
+        a1, a2, a3 = self._inverse
         above = self._rise * self._jacobi(phi)[0] ** 2
-        w = first + above
-        at_equator = first * self._rise * self.alpha**2
-        slope = 2.0 * (second * third - first**2)
-        return (at_equator - above * (slope - (first + second + third) * above)) / w**2
+        w = a3 + above
+        at_equator = a3 * self._rise * self.alpha**2
+        slope = 2.0 * (a2 * a1 - a3**2)
+        return (at_equator - above * (slope - (a3 + a2 + a1) * above)) / w**2
 
     @property
     def curvature_range(self) -> tuple[float, float]:
-        """The least and the largest Gauss curvature [1/(kg m^2)].
+        """The smallest and the largest Gauss curvature [1/(kg m^2)].
 
-        The largest is (B - A)(C - A)/A, on the equator. The curvature is a convex quadratic of m: its least value is
-        -(B - A)(C - B)/B, at `crest`, only if I_2 >= (I_1 + I_3)/2; else it is lower, where m = (I_1 + I_2 + I_3)/3.
+        The largest is (a_2 - a_3)(a_1 - a_3)/a_3, on the equator. The curvature is a convex quadratic of m: its
+        smallest value is -(a_2 - a_3)(a_1 - a_2)/a_2, at `crest`, only if I_2 >= (I_1 + I_3)/2; else it is lower, where
+        m = (I_1 + I_2 + I_3)/3.
 
         Source: Bonnard et al., lemma 4.2.
         """
-        a, b, c = self.inverse_moments.tolist()
-        i1, i2, i3 = self.moments.tolist()
-        rise, fall, all_ = self._rise, self.complement * self.alpha**2, self.alpha**2
-        least = -rise * fall / b
-        if i2 < 0.5 * (i1 + i3):
-            least = -((b * all_) ** 2 + (c * rise) ** 2 + (a * fall) ** 2) / (6.0 * a * b * c)
-        return least, rise * all_ / a
+        a1, a2, a3 = self._inverse.tolist()
+        i1, i2, i3 = self._ascending.tolist()
+        rise, fall, whole = self._rise, self.complement * self.alpha**2, self.alpha**2
+        smallest = -rise * fall / a2
+        if i2 < 0.5 * (i3 + i1):
+            smallest = -((a2 * whole) ** 2 + (a1 * rise) ** 2 + (a3 * fall) ** 2) / (6.0 * a3 * a2 * a1)
+        return smallest, rise * whole / a3
 
     def geodesics(self, p_theta: ArrayLike) -> GeodesicFamily:
-        """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_1): (...).
+        """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_3): (...).
 
         Raises
         ------
@@ -182,20 +208,20 @@ class SerretAndoyerMetric:
 
         Source: Bonnard et al., sections 4.2 and 4.3.
         """
-        return GeodesicFamily(constants_of(self.moments, p_theta))
+        return GeodesicFamily(constants=constants_of(self.moments, p_theta))
 
     def separatrix(self) -> GeodesicFamily:
-        """The geodesic from the equator whose p_theta is sqrt(I_2) without rounding; it tends to `crest`.
+        """The geodesic from the equator with p_theta = sqrt(I_2), not rounded; it tends to `crest`.
 
         Source: Bonnard et al., proposition 7.
         """
-        return GeodesicFamily(separatrix_constants(self.moments))
+        return GeodesicFamily(constants=separatrix_constants(self.moments))
 
     def geodesics_of(self, body_momentum: ArrayLike) -> GeodesicFamily:
         """The geodesics of free motions through these momenta, p_theta = |Pi|/sqrt(2 E): (..., 3) [kg m^2/s] -> (...).
 
-        In principal axes, that of the largest moment first. The class is decided by the momenta as they are, so to
-        rounding also next to the separatrix.
+        In the caller's axes. The class follows from the momenta as given, so that it is right to rounding next to the
+        separatrix too.
 
         Raises
         ------
@@ -205,42 +231,56 @@ class SerretAndoyerMetric:
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
         if np.any(np.all(momentum == 0.0, axis=-1)):
             raise ShapeError("body_momentum: a zero momentum does not move; give one that is not zero")
-        return GeodesicFamily(constants_of_momentum(self.moments, momentum))
+        return GeodesicFamily(constants=constants_of_momentum(self.moments, momentum))
 
     @property
     def _rise(self) -> float:
-        """B - A."""
-        i1, i2, _ = self.moments
-        return float((i1 - i2) / (i1 * i2))
+        """a_2 - a_3."""
+        _, i2, i3 = self._ascending
+        return float((i3 - i2) / (i3 * i2))
+
+    @property
+    def _ascending(self) -> Array:
+        """I_1 < I_2 < I_3."""
+        return ascending_moments(self.moments)[0]
+
+    @property
+    def _inverse(self) -> Array:
+        """a_1 > a_2 > a_3."""
+        return 1.0 / self._ascending
 
     def _jacobi(self, phi: ArrayLike) -> tuple[Array, Array, Array, Array]:
         return elliptic.jacobi(self.alpha * finite_array(phi, "phi"), self.complement)
 
     def _inverse_m(self, phi: ArrayLike) -> Array:
         sn, cn, _, _ = self._jacobi(phi)
-        first, second, _ = self.inverse_moments
-        return first * cn**2 + second * sn**2
+        _, a2, a3 = self._inverse
+        return a3 * cn**2 + a2 * sn**2
 
 
 def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
-    """The Serret-Andoyer metric of principal moments (3,), I_1 > I_2 > I_3 [kg m^2].
+    """The Serret-Andoyer metric of three different principal moments.
+
+    Parameters
+    ----------
+    moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
 
     Raises
     ------
     ShapeError
-        If the moments are not positive, or do not descend strictly.
+        If the moments are not positive, or two of them are equal.
     """
     values = moments_argument(moments)
-    if not (values[0] > values[1] > values[2]):
+    if not np.all(np.diff(np.sort(values)) > 0.0):
         raise ShapeError(
-            f"moments: got {values}; expected I_1 > I_2 > I_3. Sort them; with two equal moments the metric has no "
-            "oscillating geodesics or no equator to speak of"
+            f"moments: got {values}; three different moments are needed: with two equal ones the metric has no "
+            "oscillating geodesics, or its equator is not singled out"
         )
-    return SerretAndoyerMetric(values)
+    return SerretAndoyerMetric(moments=values)
 
 
-def _together(**values: ArrayLike) -> list[Array]:
-    """Checked arguments, of shapes that go together."""
+def _checked(**values: ArrayLike) -> list[Array]:
+    """Finite arguments whose shapes broadcast together."""
     arrays = {name: finite_array(value, name) for name, value in values.items()}
     common_shape(**arrays)
     return list(arrays.values())

@@ -1,23 +1,26 @@
 """Geodesics of the Serret-Andoyer metric in closed real form, their returns to the equator and conjugate points.
 
-With u = M t, the sine and cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and n <= 0 are, up to a common factor,
+Moments ascend, I_1 < I_2 < I_3, a_i = 1/I_i (A, B, C of Bonnard et al. are a_3, a_2, a_1, their I_1 our I_3; see
+`serret_andoyer`), and p = |p_theta|. With u = M t, the sine and cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and
+n <= 0 are, up to a common factor,
 
-    oscillating  I_2 < p^2 <= I_1   m sn(u) : k' dn(u)          n = -(1 - A p^2)/(C p^2 - 1)       f = cn
-    rotating     I_3 <= p^2 < I_2   sn(u) : k' cn(u)            n = -(B - A)/(C - B)               f = dn
-    extended     p^2 < I_3          sqrt(m1) sn(u) : k' cn(u)   n = -p^2 (B - A)/(1 - B p^2)       f = 1
+    oscillating  I_2 < p^2 <= I_3   m sn(u) : k' dn(u)          n = -(1 - a_3 p^2)/(a_1 p^2 - 1)       f = cn
+    rotating     I_1 <= p^2 < I_2   sn(u) : k' cn(u)            n = -(a_2 - a_3)/(a_1 - a_2)           f = dn
+    extended     p^2 < I_1          sqrt(m1) sn(u) : k' cn(u)   n = -p^2 (a_2 - a_3)/(1 - a_2 p^2)     f = 1
     separatrix   p^2 = I_2          as rotating, with m = 1
 
-with m1 = 1 - m^2 the complement of each one's own modulus. In all of them phi' = sqrt(1 - A p^2) f(u)/sqrt(1 - n sn^2),
+with m1 = 1 - m^2 the complement of each one's own modulus. In all of them
+phi' = sqrt(1 - a_3 p^2) f(u)/sqrt(1 - n sn^2),
 
     theta = s t - c (Pi(n; u) - u/(1 - n)),
 
-s = 1/p or B p, and the derivative of theta by p at constant phi, which decides on the conjugate points, is
+s = 1/p or a_2 p, and the derivative of theta by p at constant phi, whose zeros are the conjugate points, is
 
-    (A u + q S(u))/(M (1 - A p^2)),  S = the integral of (sn/f)^2,
+    (a_3 u + q S(u))/(M (1 - a_3 p^2)),  S = the integral of (sn/f)^2,
 
-with constants c, q >= 0. Nothing is complex, and but for theta, which next to its start has I_1/I_2 times the rounding
-of its last digit, no terms cancel. What is small near the separatrix and near the equator, 1 - B p^2 and 1 - A p^2, is
-found from p without rounding.
+with constants c, q >= 0. Everything is real, and no terms cancel except in theta, whose error next to its start is
+I_3/I_2 times the rounding of its last digit. 1 - a_2 p^2 and 1 - a_3 p^2, small near the separatrix and near the
+equator, are computed from p without cancellation.
 
 Sources: Bonnard, Cots and Shcherbakova 2013, sections 4.3 and 4.4, with the misprints and the case of theory.md B-E6,
 B-E7, B-E8, B-E11; theory.md R6 to R13.
@@ -33,20 +36,22 @@ from scipy.special import elliprd, hyp2f1
 
 from ... import elliptic
 from ...arrays import Array, Mask, finite_array
-from ...errors import AccuracyNotReached, ShapeError
-from .serret_andoyer_constants import EXTENDED, ROTATING, SEPARATRIX, GeodesicConstants, moment_gaps, refuse
+from ...errors import ShapeError
+from ...roots import root
+from ._checks import check_entries
+from ._serret_andoyer_constants import GeodesicClass, GeodesicConstants, moment_gaps
 
-CLASSES = ("extended", "rotating", "separatrix", "oscillating", "equator")
-_STEPS = 200
 _NOT_ZERO = 1e-100
-"""In place of a cn that vanishes, at a pole of S, where only f S is finite."""
+"""Stands for a cn that vanishes, at a pole of S, where only f S is finite; its square does not underflow."""
+_SERIES_PARAMETER = 0.4
+"""m up to which the second derivative of K is a hypergeometric series; Legendre's equation would divide by m."""
 
 
 @dataclass(frozen=True, eq=False)
 class GeodesicFamily:
-    """Geodesics of unit speed from the equator towards phi >= 0, of given p_theta; all times broadcast against them.
+    """Geodesics of unit speed from the equator towards phi >= 0, with given p_theta (...).
 
-    `SerretAndoyerMetric.geodesics` makes them.
+    Made by `SerretAndoyerMetric.geodesics`. Times broadcast against the axes of p_theta.
     """
 
     constants: GeodesicConstants
@@ -70,13 +75,13 @@ class GeodesicFamily:
     def trajectory_class(self) -> str | np.ndarray:
         """The names of the classes, of one geodesic as a string.
 
-        "oscillating" about the equator (the momentum circles the axis of I_1) and its limit, the "equator" itself;
-        "rotating" (the momentum circles the axis of I_3); "separatrix"; "extended": |p_theta| below sqrt(I_3), where
-        there is a geodesic but no rigid body.
+        "oscillating" about the equator (the momentum circles the axis of the largest moment, I_3) and its limit, the
+        "equator" itself; "rotating" (the momentum circles the axis of the smallest, I_1); "separatrix"; "extended":
+        |p_theta| below sqrt(I_1), where there is a geodesic but no rigid body.
 
         Source: Bonnard et al., section 4.2.
         """
-        names = np.array(CLASSES)[self.constants.kind]
+        names = np.array([member.name.lower() for member in GeodesicClass])[self.constants.kind]
         return str(names) if names.ndim == 0 else names
 
     @property
@@ -102,7 +107,7 @@ class GeodesicFamily:
 
     @property
     def mean_theta_rate(self) -> Array:
-        """2 R/T, the mean of theta'; on the separatrix its limit, B p: (...) [1/(sqrt(kg) m)]."""
+        """2 R/T, the mean of theta'; on the separatrix its limit, a_2 p: (...) [1/(sqrt(kg) m)]."""
         third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
         return self._turned(self.constants.drift - 4.0 * self.constants.third_kind * third / self.period)
 
@@ -133,7 +138,7 @@ class GeodesicFamily:
         open_ = self.constants.at_crest > 0.0
         rising = np.where(open_, self.constants.at_crest * np.where(open_, self.period, 0.0), 0.0)
         third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
-        return (rising + 4.0 * self.constants.size * self.constants.third_kind * third) / (2.0 * np.pi)
+        return (rising + 4.0 * self.constants.magnitude * self.constants.third_kind * third) / (2.0 * np.pi)
 
     @property
     def amplitude(self) -> Array:
@@ -142,23 +147,25 @@ class GeodesicFamily:
         Raises ShapeError for rotating geodesics, which have none.
         Source: Bonnard et al., section 4.2.
         """
-        bad = self.constants.kind < SEPARATRIX
-        refuse(bad, self.p_theta, "p_theta", "only an oscillating geodesic has a largest phi: |p_theta| >= sqrt(I_2)")
-        _, b, c = moment_gaps(self.constants.moments)
-        # Y_+ = (1 - A p^2)/((B - A) p^2) and 1 - Y_+.
+        bad = self.constants.kind < GeodesicClass.SEPARATRIX
+        check_entries(
+            bad, self.p_theta, "p_theta", "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
+        )
+        _, upper, whole = moment_gaps(self.constants.moments)
+        # Y_+ = (1 - a_3 p^2)/((a_2 - a_3) p^2) and 1 - Y_+, up to a common factor.
         sine, cosine = np.sqrt(self.constants.at_equator), np.sqrt(np.maximum(-self.constants.at_crest, 0.0))
-        return elliptic.argument_of(sine, cosine, b / c) / np.sqrt(c)
+        return elliptic.argument_of(sine, cosine, upper / whole) / np.sqrt(whole)
 
     def phi(self, t: ArrayLike) -> Array:
         """phi along the geodesics: (...) [sqrt(kg) m] -> (...) [sqrt(kg) m].
 
         Source: Bonnard et al. (16); theory.md R9.
         """
-        _, b, c = moment_gaps(self.constants.moments)
+        _, upper, whole = moment_gaps(self.constants.moments)
         turns, sine, cosine = self._tangent(self._arguments(t))
-        complement = b / c
+        complement = upper / whole
         rest = elliptic.argument_of(sine, cosine, complement)
-        return (2.0 * turns * elliptic.complete_k(complement) + rest) / np.sqrt(c)
+        return (2.0 * turns * elliptic.complete_k(complement) + rest) / np.sqrt(whole)
 
     def y(self, t: ArrayLike) -> Array:
         """Andoyer's y = l, continuous, from pi/2 down: (...) [sqrt(kg) m] -> (...) [rad].
@@ -179,9 +186,9 @@ class GeodesicFamily:
 
         Source: Bonnard et al. (8), with theory.md B-E5 for the sign.
         """
-        _, b, c = moment_gaps(self.constants.moments)
+        _, upper, whole = moment_gaps(self.constants.moments)
         _, sine, cosine = self._tangent(self._arguments(t))
-        square = (b * sine**2 + c * cosine**2) / (sine**2 + cosine**2)
+        square = (upper * sine**2 + whole * cosine**2) / (sine**2 + cosine**2)
         return -self.p_phi(t) / np.sqrt(square)
 
     def theta(self, t: ArrayLike) -> Array:
@@ -197,52 +204,51 @@ class GeodesicFamily:
         """The normal Jacobi field J with J(0) = 0, J'(0) = 1, in closed form: (...) [sqrt(kg) m] -> (...).
 
         J'' + G J = 0 with the Gauss curvature G; its zeros are the points conjugate to t = 0. It is the derivative of
-        theta by p at constant phi, times sqrt(I_1 m) phi'(0) phi'(t).
+        theta by p at constant phi, times sqrt(I_3 m) phi'(0) phi'(t).
         Source: Bonnard et al., lemma 2.7; theory.md R12, R13.
         """
         u = self._arguments(t)
         sn, cn, dn, _ = elliptic.jacobi(u, self.complement)
         f = self._denominator(cn, dn)
-        first = 1.0 / self.constants.moments[0]
-        rising = first * u * f + self.constants.growth * self._spread_integral(u, sn, cn, dn)
+        _, a2, a3 = 1.0 / self.constants.moments
+        rising = a3 * u * f + self.constants.second_kind * self._second_kind_integral(u, sn, cn, dn)
         _, sine, cosine = self._tangent(u)
-        second = 1.0 / self.constants.moments[1]
-        w = (first * cosine**2 + second * sine**2) / (sine**2 + cosine**2)
-        return rising / (self.constants.rate * np.sqrt(first * w * (1.0 - self.constants.characteristic * sn**2)))
+        w = (a3 * cosine**2 + a2 * sine**2) / (sine**2 + cosine**2)
+        return rising / (self.constants.rate * np.sqrt(a3 * w * (1.0 - self.constants.characteristic * sn**2)))
 
-    def conjugate_points(self, order: int = 1) -> ConjugatePoints:
+    def conjugate_points(self, order: int = 1) -> EquatorialConjugatePoints:
         """The points of oscillating geodesics conjugate to their start on the equator, of an order 1, 2, ...
 
-        The first locus is the curve of these points for sqrt(I_2) < p <= sqrt(I_1), on phi <= 0, and its mirror image
-        in the equator, of the geodesics that start downward; it starts with a cusp on the equator at p = sqrt(I_1) and
+        The first locus is the curve of these points for sqrt(I_2) < p <= sqrt(I_3), on phi <= 0, and its mirror image
+        in the equator, of the geodesics that start downward; it starts with a cusp on the equator at p = sqrt(I_3) and
         tends to phi = -K/alpha, theta infinite, as p falls to sqrt(I_2).
 
         Raises
         ------
         ShapeError
-            If a geodesic is not oscillating: the others have no conjugate point (theory.md R13).
-        AccuracyNotReached
-            If Newton's iteration does not come to rest.
+            If the order is no such number, or a geodesic does not oscillate: the others have no conjugate point
+            (theory.md R13).
 
         Source: Bonnard et al., section 4.4; theory.md R12.
         """
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
             raise ShapeError(f"order: expected a whole number from 1 on, got {order!r}")
-        first = 1.0 / self.constants.moments[0]
-        wanted = -order * self._period_slopes()[0] * self.constants.rate * self.constants.at_equator
-        v = _rising_root(first, self.constants.growth, self.complement, wanted)
+        a3 = float(1.0 / self.constants.moments[2])
+        level = -order * self._period_slopes()[0] * self.constants.rate * self.constants.at_equator
+        v = _argument_of_level(a3, self.constants.second_kind, self.complement, level)
         u = 2.0 * order * elliptic.complete_k(self.complement) + v
         third = elliptic.complete_pi_excess(self.constants.characteristic, self.complement)
         rest = elliptic.jacobi_and_pi_excess(self.constants.characteristic, v, self.complement)[4]
         time = u / self.constants.rate
         theta = self._turned(self.constants.drift * time - self.constants.third_kind * (2.0 * order * third + rest))
         _, sine, cosine = self._tangent(v)
-        _, b, c = moment_gaps(self.constants.moments)
-        size = elliptic.argument_of(sine, cosine, b / c) / np.sqrt(c)
-        return ConjugatePoints(time=time, phi=np.where(order % 2, -1.0, 1.0) * size, theta=theta)
+        _, upper, whole = moment_gaps(self.constants.moments)
+        distance = elliptic.argument_of(sine, cosine, upper / whole) / np.sqrt(whole)
+        return EquatorialConjugatePoints(time=time, phi=np.where(order % 2, -1.0, 1.0) * distance, theta=theta)
 
     def _turned(self, theta: Array) -> Array:
-        return self.p_theta / self.constants.size * theta
+        """theta of p = `magnitude` made that of p_theta: its sign, and its share where that is tiny."""
+        return self.p_theta / self.constants.magnitude * theta
 
     def _arguments(self, t: ArrayLike) -> Array:
         times = finite_array(t, "t", unit="sqrt(kg) m")
@@ -254,57 +260,67 @@ class GeodesicFamily:
             ) from None
 
     def _denominator(self, cn: Array, dn: Array) -> Array:
-        return np.where(self.constants.oscillating, cn, np.where(self.constants.kind >= ROTATING, dn, 1.0))
+        """f of the module's table."""
+        return np.where(
+            self.constants.oscillating, cn, np.where(self.constants.kind >= GeodesicClass.ROTATING, dn, 1.0)
+        )
 
     def _tangent(self, u: Array) -> tuple[Array, Array, Array]:
-        """Half turns of am(alpha phi), and up to a common factor the sine and cosine >= 0 of its rest."""
+        """Half turns of am(alpha phi), and up to a common factor the sine and cosine >= 0 of the remainder."""
         sn, cn, dn, amplitude = elliptic.jacobi(u, self.complement)
-        _, b, c = moment_gaps(self.constants.moments)
+        _, upper, whole = moment_gaps(self.constants.moments)
         oscillating = self.constants.oscillating
-        odd, whole = _half_turns(amplitude, cn)
+        odd, turns = _half_turns(amplitude, cn)
         sign = 1.0 - 2.0 * odd
-        sine = sn * np.where(self.constants.kind == EXTENDED, np.sqrt(self.complement), self.constants.modulus)
-        factor = np.sqrt(b / c)
+        sine = sn * np.where(
+            self.constants.kind == GeodesicClass.EXTENDED, np.sqrt(self.complement), self.constants.modulus
+        )
+        factor = np.sqrt(upper / whole)
         turned = np.where(oscillating, sine, sign * sine), factor * np.where(oscillating, dn, np.abs(cn))
-        return np.where(oscillating, 0.0, whole), *turned
+        return np.where(oscillating, 0.0, turns), *turned
 
-    def _spread_integral(self, u: Array, sn: Array, cn: Array, dn: Array) -> Array:
-        """f times the integral of (sn/f)^2, for oscillating geodesics continued past the poles."""
+    def _second_kind_integral(self, u: Array, sn: Array, cn: Array, dn: Array) -> Array:
+        """f S, for oscillating geodesics continued past the poles of S, where cn = 0.
+
+        Whole half periods of S and the remainder, each finite when multiplied by f.
+        """
         amplitude = elliptic.jacobi(u, self.complement)[3]
         odd, turns = _half_turns(amplitude, cn)
-        refuse(dn < _NOT_ZERO, u / self.constants.rate, "t", "there the Jacobi field is beyond 1e100")
+        check_entries(dn < _NOT_ZERO, u / self.constants.rate, "t", "there the Jacobi field is beyond 1e100")
         m1, sine, cosine = self.complement, (1.0 - 2.0 * odd) * sn, np.maximum(np.abs(cn), _NOT_ZERO)
-        regular = np.where(m1 > 0.0, m1, 1.0)
-        rest = sine**3 / 3.0
-        flat = rest * elliprd(cosine**2, dn**2, 1.0)
-        tame = dn * rest * elliprd(cosine**2, 1.0, dn**2)
-        wild = (1.0 - 2.0 * odd) * cosine * rest * elliprd(dn**2, 1.0, cosine**2)
-        whole_wild = -2.0 * elliptic.complete_e(regular) / regular * cn
-        whole_tame = 2.0 * dn * elliprd(0.0, 1.0, regular) / 3.0
-        whole_flat = 2.0 * elliprd(0.0, regular, 1.0) / 3.0
-        oscillating, plain = self.constants.oscillating, self.constants.kind == EXTENDED
-        part = np.where(oscillating, wild, np.where(plain, flat, tame))
-        return part + turns * np.where(oscillating, whole_wild, np.where(plain, whole_flat, whole_tame))
+        # On the separatrix, m1 = 0, there are no half periods.
+        positive_m1 = np.where(m1 > 0.0, m1, 1.0)
+        cube = sine**3 / 3.0
+        extended_rest = cube * elliprd(cosine**2, dn**2, 1.0)
+        regular_rest = dn * cube * elliprd(cosine**2, 1.0, dn**2)
+        near_pole_rest = (1.0 - 2.0 * odd) * cosine * cube * elliprd(dn**2, 1.0, cosine**2)
+        extended_half = 2.0 * elliprd(0.0, positive_m1, 1.0) / 3.0
+        regular_half = 2.0 * dn * elliprd(0.0, 1.0, positive_m1) / 3.0
+        near_pole_half = -2.0 * elliptic.complete_e(positive_m1) / positive_m1 * cn
+        oscillating, extended = self.constants.oscillating, self.constants.kind == GeodesicClass.EXTENDED
+        rest = np.where(oscillating, near_pole_rest, np.where(extended, extended_rest, regular_rest))
+        half = np.where(oscillating, near_pole_half, np.where(extended, extended_half, regular_half))
+        return rest + turns * half
 
     def _period_slopes(self) -> tuple[Array, Array]:
         """dT/d(p^2) and d^2 T/d(p^2)^2, the terms of each all of one sign."""
-        bad = ~self.constants.oscillating
-        wanted = "the geodesic must oscillate, sqrt(I_2) < |p_theta| <= sqrt(I_1)"
-        refuse(bad, self.p_theta, "p_theta", wanted)
-        (a, b, _), c = moment_gaps(self.constants.moments), 1.0 / self.constants.moments[2]
-        excess = self.constants.rate**2 / a
+        requirement = "the geodesic must oscillate, sqrt(I_2) < |p_theta| <= sqrt(I_3), the largest moment's"
+        check_entries(~self.constants.oscillating, self.p_theta, "p_theta", requirement)
+        (lower, upper, _), a1 = moment_gaps(self.constants.moments), 1.0 / self.constants.moments[0]
+        # a_1 p^2 - 1.
+        excess = self.constants.rate**2 / lower
         m1 = self.complement
-        m_slope = -b * (a + b) / (a * excess**2)
+        m_slope = -upper * (lower + upper) / (lower * excess**2)
         k, k_slope, k_bend = elliptic.complete_k(m1), elliprd(0.0, 1.0, m1) / 6.0, _second_derivative_of_k(m1)
-        fall = c / (2.0 * excess)
+        fall = a1 / (2.0 * excess)
         first = 4.0 / self.constants.rate * (k_slope * m_slope - k * fall)
         second = 4.0 / self.constants.rate * (k_bend * m_slope**2 - 6.0 * fall * k_slope * m_slope + 3.0 * k * fall**2)
         return first, second
 
 
 @dataclass(frozen=True, eq=False)
-class ConjugatePoints:
-    """Points conjugate to a point of the equator, as `GeodesicFamily.conjugate_points` finds them."""
+class EquatorialConjugatePoints:
+    """Points conjugate to a start on the equator, see `GeodesicFamily.conjugate_points`."""
 
     time: Array
     """(...) arc length from the start [sqrt(kg) m]."""
@@ -315,7 +331,7 @@ class ConjugatePoints:
 
 
 def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
-    """Whether their number is odd, and the number of half turns of an amplitude whose cosine is known better."""
+    """Whether the number of half turns of an amplitude is odd, and this number; the cosine decides which is nearest."""
     odd = np.where(cosine < 0.0, 1.0, 0.0)
     return odd, 2.0 * np.rint(0.5 * (amplitude / np.pi - odd)) + odd
 
@@ -323,32 +339,29 @@ def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
 def _second_derivative_of_k(m1: Array) -> Array:
     """d^2 K/dm^2 by the hypergeometric series for small m, else by Legendre's equation."""
     m = 1.0 - m1
-    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, 0.4))
-    large = np.maximum(m, 0.4)
-    small = 1.0 - large
-    small = np.where(m > 0.4, m1, small)
+    by_series = m <= _SERIES_PARAMETER
+    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, _SERIES_PARAMETER))
+    large = np.maximum(m, _SERIES_PARAMETER)
+    small = np.where(by_series, 1.0 - large, m1)
     equation = (0.25 * elliptic.complete_k(small) - (small - large) * elliprd(0.0, 1.0, small) / 6.0) / (large * small)
-    return np.where(m > 0.4, equation, series)
+    return np.where(by_series, series, equation)
 
 
-def _rising_root(first: float, spread: Array, m1: Array, wanted: Array) -> Array:
-    """The v in [0, K) where first v + spread S(v) = wanted >= 0, S the integral of (sn/cn)^2.
+def _argument_of_level(a3: float, second_kind: Array, m1: Array, level: Array) -> Array:
+    """The v in [0, K) where a_3 v + second_kind S(v) = level >= 0, S the integral of (sn/cn)^2.
 
-    The left side is convex and grows without bound, so Newton's steps come down to the root from above; one that leaves
-    the bracket is replaced by its middle.
+    The left side is convex and grows without bound towards K, so Newton's steps come down to the root from above.
     """
     quarter = elliptic.complete_k(m1)
-    low, high = np.zeros(np.shape(wanted)), np.minimum(quarter, wanted / first)
-    # Not from K itself, a pole, whose neighbourhood Newton's steps leave slowly.
-    v = np.minimum(high, 0.9 * quarter)
-    for _ in range(_STEPS):
+    shape = np.shape(level)
+    m1, second_kind, level, quarter = (np.broadcast_to(a, shape).ravel() for a in (m1, second_kind, level, quarter))
+
+    def step(v: Array) -> tuple[Array, Array]:
         sn, cn, dn, _ = elliptic.jacobi(v, m1)
         cn = np.maximum(np.abs(cn), _NOT_ZERO)
-        gap = first * v + spread * sn**3 / 3.0 * elliprd(dn**2, 1.0, cn**2) - wanted
-        low, high = np.where(gap <= 0.0, v, low), np.where(gap > 0.0, v, high)
-        step = v - gap / (first + spread * (sn / cn) ** 2)
-        v, before = np.where((step >= low) & (step <= high), step, 0.5 * (low + high)), v
-        # The steps' size is squared each time, in parts of the distance to the pole.
-        if np.all(np.abs(v - before) <= 1e-9 * np.minimum(quarter - v, 1.0)):
-            return v
-    raise AccuracyNotReached(f"conjugate points: Newton's iteration is not at rest after {_STEPS} steps")
+        excess = a3 * v + second_kind * sn**3 / 3.0 * elliprd(dn**2, 1.0, cn**2) - level
+        return excess, v - excess / (a3 + second_kind * (sn / cn) ** 2)
+
+    high = np.minimum(quarter, level / a3)
+    # Not from the pole K itself, whose neighbourhood Newton's steps leave slowly.
+    return root(step, np.minimum(high, 0.9 * quarter), np.zeros(level.shape), high).reshape(shape)

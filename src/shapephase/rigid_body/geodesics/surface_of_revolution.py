@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from ...arrays import Array, Mask, finite_array
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, root
-from .arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
+from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
 
 ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]
 """p >= 0, q, depth - q and phases in [-pi/2, pi/2], all (N,) -> `Arcs`: what `quadrature` finds by nodes."""

@@ -21,44 +21,51 @@ from ...errors import AccuracyNotReached
 from ._momentum_flow import attitude_flow, exponential_fields, momentum_flow
 
 _TURN = 2.0 * np.pi
+"""[rad]"""
+_STEP_SAFETY = 0.9
+"""A step is so much of the shortest time in which the angles' sum could grow by a whole turn, and a turn be missed."""
 _STEPS_EACH = 10_000
+"""Steps for each order: moments (3, 2, 1) need about ten, only moments some thousandfold apart need more than this."""
 _SLACK = 1e-6
+"""[rad] By so much rounding may set the angles' sum back; far below the growth in a step."""
 _EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
-class _Left:
-    """Where the steps begin in which the conjugate times lie."""
+class _StepStart:
+    """The beginnings of the steps in which the conjugate times lie, for N geodesics."""
 
     time: Array
+    """(N,)"""
     total: Array
-    """The sum of the angles."""
+    """(N,) sum of the angles [rad]."""
     attitude: Array
+    """(N, 3, 3)"""
     frame: Array
     """X above Y, with orthonormal columns: (N, 6, 3)."""
 
 
 def conjugate_times(inverse_moments: Array, momenta: Array, order: int) -> Array:
-    """The `order`-th conjugate time of each geodesic, counted with multiplicity: (3,) ascending, (N, 3) -> (N,).
+    """The `order`-th conjugate time of each geodesic, counted with multiplicity: (3,) descending, (N, 3) -> (N,).
 
     Raises
     ------
     AccuracyNotReached
-        If there is none in ten thousand steps for each one asked for, each of some tenths of a turn about the axis of
-        the least moment: the moments are too unequal.
+        If there is none in ten thousand steps times `order`, each of some tenths of a turn about the axis of the
+        smallest moment: the moments are too unequal.
     """
-    size = np.linalg.norm(momenta, axis=-1)
-    directions = momenta / size[:, None]
-    # Nine tenths of what the angles' sum would need for a whole turn.
-    step = 0.9 * _TURN / (2.5 * float(inverse_moments.sum()))
+    magnitude = np.linalg.norm(momenta, axis=-1)
+    directions = momenta / magnitude[:, None]
+    step = _STEP_SAFETY * _TURN / (2.5 * float(inverse_moments.sum()))
     left = _brackets(inverse_moments, directions, order, step)
-    return _roots(inverse_moments, directions, order, left, step) / size
+    return _roots(inverse_moments, directions, order, left, step) / magnitude
 
 
-def _brackets(inverse_moments: Array, directions: Array, order: int, step: float) -> _Left:
+def _brackets(inverse_moments: Array, directions: Array, order: int, step: float) -> _StepStart:
     eyes = np.tile(np.eye(3), (len(directions), 1, 1))
     still = np.zeros(len(directions))
-    left = _Left(still, still.copy(), eyes, np.concatenate([eyes, np.zeros(eyes.shape)], axis=-2))
+    frame = np.concatenate([eyes, np.zeros(eyes.shape)], axis=-2)
+    left = _StepStart(time=still, total=still.copy(), attitude=eyes, frame=frame)
     rows = np.arange(len(directions))
     for index in range(1, order * _STEPS_EACH + 1):
         if not rows.size:
@@ -70,7 +77,7 @@ def _brackets(inverse_moments: Array, directions: Array, order: int, step: float
         ahead = _count(total, angles) < order
         rows = rows[ahead]
         left.time[rows], left.total[rows] = time, total[ahead]
-        # Without this the columns would soon be one, that of the fastest growth.
+        # Else all columns would soon be along the field that grows fastest.
         left.frame[rows] = np.linalg.qr(frame[ahead])[0]
         left.attitude[rows] = attitude_flow(inverse_moments, directions[rows], np.full(rows.size, time))
     raise AccuracyNotReached(
@@ -79,7 +86,7 @@ def _brackets(inverse_moments: Array, directions: Array, order: int, step: float
     )
 
 
-def _roots(inverse_moments: Array, directions: Array, order: int, left: _Left, step: float) -> Array:
+def _roots(inverse_moments: Array, directions: Array, order: int, left: _StepStart, step: float) -> Array:
     """The crossings, by Chandrupatla's bracketing method, all at once."""
 
     def crossing(rows: Integers, times: Array) -> Array:
@@ -122,7 +129,7 @@ def _roots(inverse_moments: Array, directions: Array, order: int, left: _Left, s
     return best
 
 
-def _frame(inverse_moments: Array, directions: Array, left: _Left, rows: Integers, times: Array) -> Array:
+def _frame(inverse_moments: Array, directions: Array, left: _StepStart, rows: Integers, times: Array) -> Array:
     """X above Y at times after the step's beginning: (N,) -> (N, 6, 3)."""
     attitude, momenta, fields = left.attitude[rows], left.frame[rows, :3], left.frame[rows, 3:]
     further, turn = times - left.time[rows], 0.5 * so3.hat(directions[rows])
