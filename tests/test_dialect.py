@@ -11,7 +11,6 @@ ROOT = Path(__file__).parents[1] / "src" / "shapephase"
 # Folders that still have such names.
 NOT_YET = {
     "body",
-    "bounds",
     "cli",
     "deformation",
     "examples",
