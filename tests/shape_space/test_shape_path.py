@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shapephase as sp
+from shapephase.chebyshev import inside
 from shapephase.errors import OpenPathError, ShapeError, TrajectoryError, UnknownNameError
-from shapephase.integrator.interpolant import inside
 from support.bodies import joint, link, random_loop, urdf
 
 laws = settings(derandomize=True, max_examples=40, deadline=None)

@@ -9,15 +9,15 @@ only at the times where it is evaluated, and nothing rules out a feature that li
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from ..arguments import interval_argument
 from ..arrays import Array, Mask
+from ..chebyshev import derivative_matrix, local_coordinate, restriction_matrix
 from ..deformation.deformation import Deformation
 from ..inertia_tensor import inverse_inertia
-from ..integrator.interpolant import Interpolant, chebyshev, unit_nodes, values_to_coefficients
+from ..integrator.interpolant import Interpolant
 
 # Relative rounding of one operation. The factors before it below count the operations of each formula, generously.
 _EPS = float(np.finfo(float).eps)
@@ -231,7 +231,7 @@ def series_bounds(coefficients: Array) -> tuple[Array, Array]:
 
 def restricted(coefficients: Array, left: float, right: float) -> Array:
     """The series on [left, right] of [-1, 1], stretched to [-1, 1]: (..., n, channels), as many coefficients."""
-    return _restriction(coefficients.shape[-2], left, right) @ coefficients
+    return restriction_matrix(coefficients.shape[-2], left, right) @ coefficients
 
 
 def _ball(series: Array) -> tuple[Array, Array]:
@@ -308,8 +308,8 @@ def _within(sampled: Interpolant, start: float, end: float) -> tuple[Array, Arra
     ends = np.concatenate([[start], edges[kept[1:]], [end]])
     for panel in {0, len(kept) - 1}:
         left, right = edges[kept[panel]], edges[kept[panel] + 1]
-        low, high = (2.0 * ends[panel : panel + 2] - left - right) / (right - left)
-        coefficients[panel] = restricted(coefficients[panel], max(-1.0, low), min(1.0, high))
+        low, high = local_coordinate(ends[panel : panel + 2], left, right)
+        coefficients[panel] = restricted(coefficients[panel], low, high)
     return ends, coefficients
 
 
@@ -329,7 +329,7 @@ def _divided(
     """Panels halved until the series hardly vary on each: left ends, right ends, coefficients, in any order."""
     left, right, series = edges[:-1], edges[1:], coefficients
     count = series.shape[1]
-    halves = _restriction(count, -1.0, 0.0), _restriction(count, 0.0, 1.0)
+    halves = restriction_matrix(count, -1.0, 0.0), restriction_matrix(count, 0.0, 1.0)
     done: list[tuple[Array, Array, Array]] = []
     finished = 0
     inverse, drift = _norms(np.abs(series).sum(axis=1)).max(axis=0)
@@ -365,20 +365,4 @@ def _norms(channels: Array) -> Array:
 
 def _rates(series: Array, width: Array) -> Array:
     """The series of the derivatives: (K, n, 9) [1/s]."""
-    return (_derivative(series.shape[1]) @ series) * (2.0 / width)[:, None, None]
-
-
-@lru_cache(maxsize=64)
-def _restriction(count: int, left: float, right: float) -> Array:
-    """Coefficients on [left, right], stretched to [-1, 1], from those on [-1, 1], as many: (count, count)."""
-    nodes = 0.5 * (left + right) + 0.5 * (right - left) * unit_nodes(count - 1)
-    return values_to_coefficients(count - 1) @ chebyshev(np.clip(nodes, -1.0, 1.0), count)
-
-
-@lru_cache(maxsize=16)
-def _derivative(count: int) -> Array:
-    """Coefficients of the derivative from those of a series, as many: (count, count)."""
-    matrix = np.zeros((count, count))
-    if count > 1:
-        matrix[:-1] = np.polynomial.chebyshev.chebder(np.eye(count))
-    return matrix
+    return (derivative_matrix(series.shape[1]) @ series) * (2.0 / width)[:, None, None]

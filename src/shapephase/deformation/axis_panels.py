@@ -14,8 +14,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Integers, Mask
+from ..chebyshev import chebyshev, exact_local_coordinate, inside
 from ..errors import GaugeError
-from ..integrator.interpolant import chebyshev, inside
 from .deformation import Deformation
 
 _NODES, COUNT = 25, 20  # nodes of a panel, and coefficients of each polynomial on it
@@ -170,7 +170,7 @@ def _is_diagonal(tensors: Array, limit: Array) -> Mask:
 def is_diagonal_at(deformation: Deformation, panels: AxisPanels, points: Array, limit: Array) -> Mask:
     """Whether the panels' frames make the inertia diagonal at points (K,) of [-1, 1]."""
     times, inertia = inertia_in(deformation, panels.left, panels.right, points)
-    local = local_time(times, panels.left[:, None], panels.right[:, None])
+    local = exact_local_coordinate(times, panels.left[:, None], panels.right[:, None])
     size = np.linalg.norm(panels.quats(local), axis=-1)
     return _is_diagonal(_seen_from(panels, local, inertia), limit) & (size.min(axis=-1) > 0.5)
 
@@ -269,12 +269,6 @@ def to_series() -> Array:
     matrix = chebyshev(panel_nodes(), COUNT).T * (2.0 / _NODES)
     matrix[0] *= 0.5
     return matrix
-
-
-def local_time(times: Array, left: Array, right: Array) -> Array:
-    """Times in their intervals, from -1 to 1."""
-    # Differences of near times are exact; 2 t - left - right would lose digits late in a long motion.
-    return np.clip(((times - left) - (right - times)) / (right - left), -1.0, 1.0)
 
 
 @lru_cache(maxsize=1)

@@ -13,9 +13,10 @@ from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coefficients
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
-from ..integrator.interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
+from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import Sampler, sampler
 from ..shape_space.body_path import path_sampler
 from ..shape_space.shape_path import ShapePath
@@ -240,10 +241,7 @@ class SampledDescription(UngaugedDescription):
         return rate_of(lambda t: self.sample(t)[0], times, self.interpolant.edges)
 
     def centre_of_mass(self, times: Array) -> Array:
-        panel = self.interpolant.panel_of(times)
-        left, right = self.interpolant.edges[panel], self.interpolant.edges[panel + 1]
-        basis = chebyshev(np.clip((2.0 * times - left - right) / (right - left), -1.0, 1.0), self.centre.shape[1])
-        return np.einsum("nk,nkc->nc", basis, self.centre[panel % len(self.centre)])
+        return PiecewiseChebyshev(self.interpolant.edges, self.centre)(times)
 
     def sampler(self, breaks: Array) -> Sampler:
         edges = np.union1d(breaks, self.interpolant.edges)

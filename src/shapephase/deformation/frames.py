@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import times_argument
 from ..arrays import Array, finite_array
+from ..chebyshev import PiecewiseChebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import SteppedRotation, stepped_rotation
-from ..integrator.interpolant import chebyshev, inside, unit_nodes, values_to_coefficients
 from ..integrator.sampling import sampler
 from .deformation import Deformation
 from .principal_frame import Frames, principal_frames
@@ -80,7 +80,7 @@ def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> Frames:
     done: list[tuple[Array, Array, Array]] = []
     while len(left):
         middle, half = 0.5 * (left + right), 0.5 * (right - left)
-        times = np.clip(middle[:, None] + half[:, None] * unit_nodes(_DEGREE), left[:, None], right[:, None])
+        times = np.clip(nodes_on(left, right, _DEGREE), left[:, None], right[:, None])
         series = values_to_coefficients(_DEGREE) @ turns(times.ravel()).reshape(len(left), _DEGREE + 1, 9)
         sizes = np.linalg.norm(series, axis=-1)
         fastest = max(fastest, float(np.max(sizes[:, 1] / half)))
@@ -100,17 +100,14 @@ def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> Frames:
         )
     left, right, series = (np.concatenate(parts) for parts in zip(*done))
     order = np.argsort(left)
-    left, right, slopes = left[order], right[order], np.polynomial.chebyshev.chebder(series[order], axis=1)
-    starts = left.copy()
-    starts[np.searchsorted(left, breaks[:-1])] = breaks[:-1]
+    edges = np.append(left[order], breaks[-1])
+    # Samples were taken just inside the breaks, closer to them than matters: panels reach up to the breaks themselves.
+    edges[np.searchsorted(left[order], breaks[:-1])] = breaks[:-1]
+    slopes = PiecewiseChebyshev(edges, series[order]).derivative()
 
     def frames(times: Array) -> tuple[Array, Array]:
         turned = turns(times)
-        panel = np.searchsorted(starts, times, side="right") - 1
-        width = right[panel] - left[panel]
-        local = np.clip((2.0 * times - left[panel] - right[panel]) / width, -1.0, 1.0)
-        slope = (chebyshev(local, _DEGREE)[:, None, :] @ slopes[panel])[:, 0] * (2.0 / width)[:, None]
-        return turned, so3.vee(so3.transpose(turned) @ slope.reshape(-1, 3, 3))
+        return turned, so3.vee(so3.transpose(turned) @ slopes(times).reshape(-1, 3, 3))
 
     return frames
 

@@ -8,9 +8,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..arrays import Array
+from ..chebyshev import inside, nodes_on
 from ..errors import SingularInertiaError, UnphysicalInertiaError, UnphysicalInertiaWarning
 from ..inertia_tensor import triangle_defect
-from ..integrator.interpolant import inside, unit_nodes
 
 # A flat body stands exactly at the limit of the triangle inequality, and rounding puts it on either side.
 _ROUNDING = 1e-9
@@ -32,7 +32,7 @@ def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float
     """
     left, right = inside(breaks[:-1], breaks[1:])
     count = int(np.clip(_NODES * _MOST_PIECES_FINE // len(left), 8, _NODES))
-    times = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(count)
+    times = nodes_on(left, right, count)
     values = _in_chunks(function, times)
     padded = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
     piece, node = np.nonzero((values <= padded[:, :-2]) & (values <= padded[:, 2:]))

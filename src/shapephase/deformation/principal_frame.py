@@ -16,8 +16,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..chebyshev import PiecewiseChebyshev, chebyshev, exact_local_coordinate
 from ..errors import GaugeError
-from ..integrator.interpolant import chebyshev
 from .axis_panels import (
     COUNT,
     EQUAL,
@@ -31,7 +31,6 @@ from .axis_panels import (
     in_order,
     inertia_in,
     is_diagonal_at,
-    local_time,
     moments_at,
     nearest_cube_turn,
     panel_nodes,
@@ -81,29 +80,23 @@ def principal_frames(deformation: Deformation) -> Frames:
 
 @dataclass(frozen=True, eq=False)
 class _Track:
-    """Quaternions xyzw, not of length one, and their derivatives as Chebyshev series (P, n, 8) between edges."""
+    """Quaternions xyzw, not of length one, and their derivatives, as a function of time: (N,) -> (N, 8)."""
 
-    edges: Array
-    series: Array
+    series: PiecewiseChebyshev
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        frames, rates = np.empty((len(times), 3, 3)), np.empty((len(times), 3))
-        for start in range(0, len(times), 20_000):
-            part = slice(start, start + 20_000)
-            panel = np.clip(np.searchsorted(self.edges, times[part], side="right") - 1, 0, len(self.series) - 1)
-            left, right = self.edges[panel], self.edges[panel + 1]
-            both = chebyshev(local_time(times[part], left, right), self.series.shape[1])[:, None] @ self.series[panel]
-            quat_xyzw, slope = both[:, 0, :4], both[:, 0, 4:] * (2.0 / (right - left))[:, None]
-            size = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
-            frames[part] = so3.matrix_from_quat(quat_xyzw / size)
-            rates[part] = so3.turn_of(quat_xyzw, slope) / size**2
-        return frames, rates
+        panel = self.series.panel_of(times)
+        local = exact_local_coordinate(times, self.series.edges[panel], self.series.edges[panel + 1])
+        both = self.series.at_local(local[:, None], panel)[:, 0]
+        quat_xyzw, slope = both[:, :4], both[:, 4:]
+        norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
+        return so3.matrix_from_quat(quat_xyzw / norm), so3.turn_of(quat_xyzw, slope) / norm**2
 
 
 def _track(panels: AxisPanels) -> _Track:
-    slopes = np.zeros_like(panels.series)
-    slopes[:, :-1] = np.polynomial.chebyshev.chebder(panels.series, axis=1)
-    return _Track(panels.edges, np.concatenate([panels.series, slopes], axis=-1))
+    quats = PiecewiseChebyshev(panels.edges, panels.series)
+    both = np.concatenate([quats.coefficients, quats.derivative().coefficients], axis=-1)
+    return _Track(PiecewiseChebyshev(panels.edges, both))
 
 
 def _joined(deformation: Deformation) -> tuple[AxisPanels, _Freedom]:

@@ -8,8 +8,9 @@ from math import ceil, inf, log, pi
 import numpy as np
 
 from ..arrays import Array, Integers
+from ..chebyshev import unit_nodes, values_to_coefficients
 from ._spectral_error import EPS, Channels, estimate_tail, fourier_norms, unaveraged_share
-from .interpolant import Interpolant, unit_nodes, values_to_coefficients
+from .interpolant import Interpolant
 
 # Samples of a loop, beyond which panels need fewer.
 _MOST_SAMPLES = 768

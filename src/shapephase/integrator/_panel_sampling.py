@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Array, Integers, Mask
+from ..chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import AccuracyNotReached
 from ._spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_norms
-from .interpolant import Interpolant, chebyshev, inside, unit_nodes, values_to_coefficients
+from .interpolant import Interpolant
 
 # Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
 _FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
@@ -68,7 +69,7 @@ class _PanelsToSample:
 
     def new_points(self) -> Array:
         """(G, m) times; the ends are moved a little inwards, to this side of a break."""
-        nodes = _nodes_in(self.left, self.right, self.degree)
+        nodes = nodes_on(self.left, self.right, self.degree)
         if self.known is not None:
             return nodes[:, ~self._old()]
         if self.degree:
@@ -259,15 +260,10 @@ class PanelSampler:
         if self._probe is None:
             return np.broadcast_to(_TEST_FRACTIONS[::16], (len(rows), 4))
         there = chebyshev(2.0 * _TEST_FRACTIONS - 1.0, g.degree + 1) @ values_to_coefficients(g.degree)
-        nodes = _nodes_in(*inside(g.left[rows], g.right[rows]), g.degree)
+        nodes = nodes_on(*inside(g.left[rows], g.right[rows]), g.degree)
         between = g.left[rows, None] + g.width[rows, None] * _TEST_FRACTIONS
         seen, truth = (self._probe(t.ravel()).reshape(*t.shape, -1) for t in (nodes, between))
         gap = np.abs(there @ seen - truth)
         half = gap.shape[-1] // 2
         worst = [np.argmax(part.max(axis=-1), axis=1) for part in (gap[..., :half], gap[..., half:])]
         return _TEST_FRACTIONS[np.stack(worst, axis=-1)]
-
-
-def _nodes_in(left: Array, right: Array, degree: int) -> Array:
-    """Ascending Chebyshev points of panels (G, degree + 1), ends included."""
-    return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)

@@ -8,9 +8,9 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..chebyshev import inside
 from ..errors import AccuracyNotReached
 from ._spectral_error import Evaluate
-from .interpolant import inside
 
 # SciPy refuses a smaller relative tolerance.
 _LEAST_RELATIVE_TOLERANCE = 3e-14

@@ -17,12 +17,13 @@ import numpy as np
 from .. import so3, sphere
 from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
+from ..chebyshev import chebyshev
 from ..errors import AccuracyNotReached
 from ._error_propagator import amplification, exact_propagators, momentum_slope
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
 from ._step_control import StepRequirements, carried_over, finer
 from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest
-from .interpolant import Interpolant, chebyshev
+from .interpolant import Interpolant
 from .sampling import Sampler
 
 _EPS = np.finfo(float).eps

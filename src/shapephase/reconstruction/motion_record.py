@@ -17,11 +17,12 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..chebyshev import nodes_on, values_to_coefficients
 from ..deformation.deformation import Deformation, sampled_deformation
 from ..errors import InputFileNotFoundError, ResultFileError
 from ..files import write_whole
 from ..integrator.integrate import SteppedRotation
-from ..integrator.interpolant import Interpolant, unit_nodes, values_to_coefficients
+from ..integrator.interpolant import Interpolant
 
 _FORMAT = "shapephase motion 3"
 _STEPS = (
@@ -161,9 +162,8 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
 
 def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> Array:
     """Chebyshev coefficients of the centre of mass on the interpolant's panels: (P, n, 3)."""
-    nodes = unit_nodes(_CENTRE_DEGREE)
     edges = interpolant.edges[: len(interpolant.coefficients) + 1]
-    left, right = edges[:-1, None], edges[1:, None]
-    times = np.clip(0.5 * (left + right) + 0.5 * (right - left) * nodes, left, right)
+    left, right = edges[:-1], edges[1:]
+    times = np.clip(nodes_on(left, right, _CENTRE_DEGREE), left[:, None], right[:, None])
     values = deformation.description.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
     return values_to_coefficients(_CENTRE_DEGREE) @ values

@@ -1,0 +1,123 @@
+"""Functions of time as Chebyshev series on panels: nodes, coefficients, evaluation and derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from .arrays import Array, Integers
+
+# Numbers in the largest intermediate array of an evaluation: 16 megabytes.
+_CHUNK = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseChebyshev:
+    """A vector-valued function that is a Chebyshev series on each of its panels.
+
+    Attributes
+    ----------
+    edges : (m P + 1,) ascending ends of the panels; with m > 1 the P series are repeated m times
+    coefficients : (P, n, c) of T_0 ... T_(n-1), padded with zeros to one degree
+    """
+
+    edges: Array
+    coefficients: Array
+
+    def panel_of(self, times: Array) -> Integers:
+        """The panel of each time, an edge belonging to the panel on its right: (N,) -> (N,)."""
+        return np.clip(np.searchsorted(self.edges, times, side="right") - 1, 0, len(self.edges) - 2)
+
+    def local(self, times: Array, panel: Integers) -> Array:
+        """Times as coordinates of their panels, clipped to [-1, 1]: (N, k), (N,) -> (N, k)."""
+        return local_coordinate(times, self.edges[panel, None], self.edges[panel + 1, None])
+
+    def at_local(self, local: Array, panel: Integers) -> Array:
+        """Values at coordinates in [-1, 1] of given panels: (N, k), (N,) -> (N, k, c)."""
+        count, degrees, components = self.coefficients.shape
+        values = np.empty((*local.shape, components))
+        chunk = max(1, _CHUNK // (degrees * (components + local.shape[1])))
+        for start in range(0, len(local), chunk):
+            part = slice(start, start + chunk)
+            values[part] = chebyshev(local[part], degrees) @ self.coefficients[panel[part] % count]
+        return values
+
+    def on_panels(self, times: Array, panel: Integers) -> Array:
+        """Values at times of given panels: (N, k), (N,) -> (N, k, c)."""
+        return self.at_local(self.local(times, panel), panel)
+
+    def __call__(self, times: Array) -> Array:
+        """Values: (N,) -> (N, c)."""
+        return self.on_panels(times[:, None], self.panel_of(times))[:, 0]
+
+    def derivative(self) -> PiecewiseChebyshev:
+        """The derivative with respect to time."""
+        count, degrees, _ = self.coefficients.shape
+        widths = np.diff(self.edges[: count + 1])
+        slopes = (derivative_matrix(degrees) @ self.coefficients) * (2.0 / widths)[:, None, None]
+        return PiecewiseChebyshev(self.edges, slopes)
+
+
+def chebyshev(x: Array, count: int) -> Array:
+    """T_0 ... T_(count-1) at x in [-1, 1]: (...) -> (..., count)."""
+    return np.cos(np.arccos(x)[..., None] * np.arange(count))
+
+
+def local_coordinate(times: Array, left: Array, right: Array) -> Array:
+    """Times as coordinates of their intervals, clipped to [-1, 1]."""
+    return np.clip((2.0 * times - left - right) / (right - left), -1.0, 1.0)
+
+
+def exact_local_coordinate(times: Array, left: Array, right: Array) -> Array:
+    """As `local_coordinate`, to rounding for short intervals late in a long motion too."""
+    # Differences of near times are exact; 2 t - left - right would lose digits.
+    return np.clip(((times - left) - (right - times)) / (right - left), -1.0, 1.0)
+
+
+def inside(left: Array, right: Array) -> tuple[Array, Array]:
+    """Times just inside intervals.
+
+    The margin is wider than the rounding of stretching, reversing and joining paths, and too small to matter.
+    """
+    margin = np.minimum(64.0 * np.spacing(np.max(right)), 1e-3 * (right - left))
+    return left + margin, right - margin
+
+
+@lru_cache(maxsize=16)
+def unit_nodes(degree: int) -> Array:
+    """The ascending Chebyshev points of [-1, 1], ends included: (degree + 1,)."""
+    return -np.cos(np.pi * np.arange(degree + 1) / degree) if degree else np.zeros(1)
+
+
+def nodes_on(left: Array, right: Array, degree: int) -> Array:
+    """The ascending Chebyshev points of panels, ends included but for rounding: (P,), (P,) -> (P, degree + 1)."""
+    return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)
+
+
+@lru_cache(maxsize=16)
+def values_to_coefficients(degree: int) -> Array:
+    """Values at the ascending Chebyshev points of [-1, 1] -> Chebyshev coefficients: (degree + 1, degree + 1)."""
+    if degree == 0:
+        return np.ones((1, 1))
+    matrix = chebyshev(unit_nodes(degree), degree + 1).T * (2.0 / degree)
+    matrix[:, [0, -1]] *= 0.5
+    matrix[[0, -1], :] *= 0.5
+    return matrix
+
+
+@lru_cache(maxsize=16)
+def derivative_matrix(count: int) -> Array:
+    """Coefficients of a series -> those of its derivative on [-1, 1], the last being zero: (count, count)."""
+    matrix = np.zeros((count, count))
+    if count > 1:
+        matrix[:-1] = np.polynomial.chebyshev.chebder(np.eye(count))
+    return matrix
+
+
+@lru_cache(maxsize=64)
+def restriction_matrix(count: int, left: float, right: float) -> Array:
+    """Coefficients of a series on [-1, 1] -> those of the same function on a part of it, as many: (count, count)."""
+    nodes = 0.5 * (left + right) + 0.5 * (right - left) * unit_nodes(count - 1)
+    return values_to_coefficients(count - 1) @ chebyshev(np.clip(nodes, -1.0, 1.0), count)
