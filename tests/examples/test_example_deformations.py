@@ -15,7 +15,7 @@ from shapephase import so3
 from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
 from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, UnknownNameError, UnphysicalInertiaError
-from shapephase.examples.closed_form_motions import Scale, expansion, pulsation
+from shapephase.examples._closed_form_motions import Scale, expansion, pulsation
 from shapephase.examples.example_deformations import (
     EXAMPLES,
     astronaut,
@@ -243,7 +243,11 @@ def test_a_true_stretch_goes_round_at_the_corrected_rate_c_e13():
 @pytest.mark.parametrize(
     ("make", "limit", "fine"),
     [
-        (lambda end, **more: axial_as_printed(2.0, 1.5, growth=end / 2.0 - 1.0, duration=1.0, **more), 3.0, 2.9),
+        (
+            lambda end, **more: axial_as_printed(2.0, 1.5, expansion_rate=end / 2.0 - 1.0, duration=1.0, **more),
+            3.0,
+            2.9,
+        ),
         (lambda end, **more: printed_antenna(1, grown=end, **more), 3.5, 3.4),
         (lambda end, **more: printed_antenna(3, grown=end, **more), 2.5, 2.4),
     ],
@@ -519,11 +523,11 @@ def test_after_a_deployment_the_body_has_the_area_it_had_f5(law, order):
                 deformation = sp.prescribed(even_growth(length), None, length)
             starts = top.body_momentum(np.linspace(0.0, 0.5 * top.period, 9)[:-1])
             last = sp.reconstruct(deformation, starts, tolerance=1e-9).body_momentum(length)
-            wanted = orbit_of_area([1.0, 1.5, 2.4], top.magnitude, top.solid_angle)
+            expected = orbit_of_area([1.0, 1.5, 2.4], top.magnitude, top.solid_angle)
             for late in (EulerTop(end, momentum) for momentum in last):
                 areas[row] = max(areas[row], abs(late.solid_angle - top.solid_angle))
-                phases[row] = max(phases[row], abs(late.montgomery_phase - wanted.montgomery_phase))
-            assert abs(wanted.montgomery_phase - top.montgomery_phase) > 1.0
+                phases[row] = max(phases[row], abs(late.montgomery_phase - expected.montgomery_phase))
+            assert abs(expected.montgomery_phase - top.montgomery_phase) > 1.0
     for gaps in (areas, phases):
         assert -np.polyfit(np.log(seconds), np.log(gaps), 1)[0] == pytest.approx(order, abs=0.12)
 
@@ -688,10 +692,10 @@ def test_every_example_is_computed_to_1e_12(name):
         (
             lambda: adiabatic_precession(dipole_antenna().deformation, (0.1, 0.1, 1.0), 20.0),
             ShapeError,
-            "axes that stay",
+            "fixed axes",
         ),
         (lambda: adiabatic_precession(with_internal_momentum(), (0.1, 0.1, 1.0), 1.0), ShapeError, "internal"),
-        (lambda: adiabatic_precession(sp.rigid(TILTED, 2.0), (0.1, 0.1, 1.0), 1.0), ShapeError, "axes that stay"),
+        (lambda: adiabatic_precession(sp.rigid(TILTED, 2.0), (0.1, 0.1, 1.0), 1.0), ShapeError, "fixed axes"),
         (lambda: adiabatic_precession(printed_antenna(3).deformation, (0.3, 0.4, 0.9), -1.0), ShapeError, "until"),
         (lambda: slow_phase_slope((1.0, 1.5, 2.0), (1e-9, 1.0, 1e-8)), AccuracyNotReached, "separatrix"),
         (lambda: homothety(inertia=np.diag([1.0, 1.5, 2.6])), UnphysicalInertiaError, "triangle"),

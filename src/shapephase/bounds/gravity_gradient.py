@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import positive_argument
+from ..arguments import positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
@@ -79,8 +79,11 @@ class KeplerOrbit:
             For a velocity along the position, or a parabola (eccentricity 1 to within 1e-12).
         """
         pull = positive_argument(gm, "gm", "a number in m^3/s^2")
-        middle = _vector(centre, "centre", "m")
-        arm, rate = _vector(position, "position", "m") - middle, _vector(velocity, "velocity", "m/s")
+        middle = vector_argument(centre, "centre", unit="m")
+        arm, rate = (
+            vector_argument(position, "position", unit="m") - middle,
+            vector_argument(velocity, "velocity", unit="m/s"),
+        )
         distance, speed = float(np.linalg.norm(arm)), float(np.linalg.norm(rate))
         specific_momentum = np.cross(arm, rate)
         magnitude = float(np.linalg.norm(specific_momentum))
@@ -146,7 +149,7 @@ class KeplerOrbit:
             eccentricity=e,
             axes=axes,
             mean_anomaly=mean,
-            centre=_vector(centre, "centre", "m"),
+            centre=vector_argument(centre, "centre", unit="m"),
         )
 
     @property
@@ -407,10 +410,3 @@ def _distance(arm: Array) -> Array:
     if np.any(distance < _MIN_DISTANCE):
         raise ShapeError("position: the centre of mass is at the attracting body's centre, where gravity is infinite")
     return distance
-
-
-def _vector(value: ArrayLike, name: str, unit: str) -> Array:
-    vector = finite_array(value, name, (3,), unit=unit)
-    if vector.ndim != 1:
-        raise ShapeError(f"{name}: one vector (3,) [{unit}] is needed, got {vector.shape}")
-    return vector

@@ -1,19 +1,15 @@
-from .closed_form_motions import (
+from ._closed_form_motions import (
     AxialMotion,
     Example,
     KnownMotion,
     Scale,
     SteadyTurn,
     TimeReparametrisedRigid,
-    clock_of,
-    diagonal,
     expansion,
-    first_time,
-    momentum_argument,
-    positive,
     pulsation,
 )
 from .example_deformations import (
+    EXAMPLES,
     astronaut,
     axial_as_printed,
     axial_stretch,
@@ -27,6 +23,8 @@ from .example_deformations import (
     rigid_body,
 )
 from .scenarios import (
+    CLOSED_ORBITS,
+    MOTIONS,
     NamedMotion,
     antenna_deployment,
     astronaut_arm_circles,
@@ -40,13 +38,15 @@ from .scenarios import (
 from .slow_deformation import (
     adiabatic_precession,
     first_loop,
-    orbit_about_third,
     orbit_of_area,
     slow_antenna,
     slow_phase_slope,
 )
 
 __all__ = [
+    "CLOSED_ORBITS",
+    "EXAMPLES",
+    "MOTIONS",
     "AxialMotion",
     "Example",
     "KnownMotion",
@@ -63,22 +63,16 @@ __all__ = [
     "axial_stretch",
     "cat",
     "cat_righting",
-    "clock_of",
     "closed_orbit",
-    "diagonal",
     "dipole_antenna",
     "expansion",
     "first_loop",
-    "first_time",
     "furniture",
     "homothety",
     "kane_scher",
-    "momentum_argument",
     "named_example",
     "named_motion",
-    "orbit_about_third",
     "orbit_of_area",
-    "positive",
     "printed_antenna",
     "pulsation",
     "regime_crossing",

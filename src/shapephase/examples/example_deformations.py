@@ -1,11 +1,12 @@
 """The worked examples of deforming bodies, each with its source, physical parameters and known answer.
 
-Cabrera's section 4.2: a body that grows as a whole, one with a symmetry axis, antennas, slow deformations; and things
-that move in a spacecraft, the cat, the astronaut, the rigid body. At the start the body's axes are the inertial ones.
+Those of Cabrera's section 4.2: a body that grows as a whole, one with a symmetry axis, antennas, slow deformations; and
+somebody walking in a spacecraft, the cat, the astronaut, the rigid body. At the start the body's axes are the inertial
+ones.
 
-A mass that moves out along one axis makes the other two moments grow, never that axis' own. The paper's examples 4.4
-and 4.5, taken as printed, are bodies that widen across the axis and shorten along it; they are possible as long as
-the triangle inequality holds (C-E13), and beyond that these functions refuse them. Both models are here.
+A mass that moves out along one axis increases the moments about the other two axes, never the one about its own. The
+paper's examples 4.4 and 4.5, taken as printed, are bodies that widen across the axis and shorten along it; they exist
+as long as the triangle inequality holds (C-E13), and beyond it these functions refuse them. Both models are here.
 
 Source: Cabrera 2006, section 4.2; theory.md F1 to F9.
 """
@@ -25,7 +26,7 @@ from ..deformation.deformation import articulated, prescribed, rigid
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
-from .closed_form_motions import (
+from ._closed_form_motions import (
     AxialMotion,
     Example,
     Scale,
@@ -42,6 +43,8 @@ from .scenarios import astronaut_arm_circles, astronaut_leg_swing, cat_righting,
 from .slow_deformation import slow_antenna
 
 _DEGREE = np.pi / 180.0
+# Half angle of the cone [degrees] by which Kane and Scher's cat turns by exactly 180 degrees; from their equation.
+_HALF_TURN_CONE = 59.426458741516
 
 
 def homothety(
@@ -54,7 +57,7 @@ def homothety(
 ) -> Example:
     """F1: a body that grows and shrinks as a whole, I = a(t)^2 I_0, L_o = 0.
 
-    It moves as the rigid body with I_0 does in the time tau = int a^-2 dt, and its phase is the rigid one.
+    It moves as the rigid body with inertia I_0 in the time tau = int a^-2 dt, and its phase is the rigid one.
 
     Parameters
     ----------
@@ -66,7 +69,7 @@ def homothety(
     Raises
     ------
     TrajectoryError
-        If Pi never comes back and no duration is given, or the clock is not that of the scale.
+        If Pi never comes back and no duration is given, or the clock does not belong to the scale.
     AccuracyNotReached
         If the scale has no clock and is too rough for quadrature.
 
@@ -83,22 +86,29 @@ def homothety(
         lambda t: growing.at(t)[:, None, None] ** 2 * top.inertia, None, length, breaks, on_unphysical="error"
     )
     phase = top.montgomery_phase if duration is None else None
-    return Example(deformation, top.momentum, TimeReparametrisedRigid(top, clock), phase, rigid=top)
+    return Example(
+        deformation=deformation,
+        momentum=top.momentum,
+        known=TimeReparametrisedRigid(top=top, clock=clock),
+        phase=phase,
+        rigid=top,
+    )
 
 
 def axial_as_printed(
     axial: float = 2.0,
     transverse: float = 1.5,
     *,
-    growth: float = 0.02,
+    expansion_rate: float = 0.02,
     momentum: ArrayLike = (3.0, 0.8, 0.6),
     duration: float | None = None,
     on_unphysical: str = "error",
 ) -> Example:
-    """F2: moments (I_1 (1 + growth t), I_2, I_2), example 4.4 as printed.
+    """F2: moments (I_1 (1 + expansion_rate t), I_2, I_2), example 4.4 as printed.
 
-    Pi moves as that of the body frozen at the start, by the clock int (1/I_1 − 1/I_2) / (1/I_1(0) − 1/I_2). After its
-    first loop, at T, the phase is l T/I_2 modulo 2 pi, which is not the rigid one, l T_RB/I_2.
+    Pi moves as that of the rigid body with the inertia of the start, in the time
+    int (1/I_1 − 1/I_2) dt / (1/I_1(0) − 1/I_2). After its first loop, at T, the phase is l T/I_2 modulo 2 pi, which is
+    not the rigid one, l T_RB/I_2.
 
     Such a body gets wider and keeps its transverse moments by getting shorter; no body has I_1 > 2 I_2, where it
     would be flatter than flat (C-E13).
@@ -106,7 +116,7 @@ def axial_as_printed(
     Parameters
     ----------
     axial, transverse : I_1(0) and I_2 [kg m^2]
-    growth : above 0 [1/s]
+    expansion_rate : of I_1, relative, above 0 [1/s]
     momentum : (3,) with a part along axis 1
     duration : [s]; None: one loop of Pi
     on_unphysical : as for `prescribed`
@@ -114,9 +124,9 @@ def axial_as_printed(
     Source: Cabrera 2006, example 4.4; theory.md F2, C-E13.
     """
     start, across = positive(axial, "axial", "kg m^2"), positive(transverse, "transverse", "kg m^2")
-    pace = positive(growth, "growth", "1/s")
+    rate = positive(expansion_rate, "expansion_rate", "1/s")
     return _axial(
-        (lambda t: start * (1.0 + pace * t), lambda t: np.log1p(pace * t) / (pace * start)),
+        (lambda t: start * (1.0 + rate * t), lambda t: np.log1p(rate * t) / (rate * start)),
         (lambda t: np.full_like(t, across), lambda t: t / across),
         momentum,
         duration,
@@ -135,8 +145,8 @@ def axial_stretch(
 ) -> Example:
     """F2b: a uniform cylinder that gets longer along its axis 1: I_1 = m r²/2 stays, I_2 = I_3 = m (3 r² + h²)/12.
 
-    With h = length + speed t the integral of 1/I_2 is an arctangent. Pi goes round the axis at Pi_1 (1/I_2 − 1/I_1),
-    and after its first loop, at T, the phase is l int_0^T dt/I_2 modulo 2 pi.
+    With h = length + speed t the integral of 1/I_2 is an arctangent. Pi circles the axis at the rate
+    Pi_1 (1/I_2 − 1/I_1), and after its first loop, at T, the phase is l int_0^T dt/I_2 modulo 2 pi.
 
     Parameters
     ----------
@@ -144,19 +154,19 @@ def axial_stretch(
     speed : above 0 [m/s]
     momentum, duration : as for `axial_as_printed`
 
-    Source: Cabrera 2006, example 4.4, as its words mean it; theory.md F2b, C-E13.
+    Source: Cabrera 2006, example 4.4, by what its text describes; theory.md F2b, C-E13.
     """
     weight, wide = positive(mass, "mass", "kg"), positive(radius, "radius", "m")
-    first, pace = positive(length, "length", "m"), positive(speed, "speed", "m/s")
+    first, rate = positive(length, "length", "m"), positive(speed, "speed", "m/s")
     along, width = 0.5 * weight * wide**2, np.sqrt(3.0) * wide
 
     def transverse_integral(t: Array) -> Array:
-        angle = np.arctan2(pace * t * width, width**2 + first * (first + pace * t))
-        return 12.0 * angle / (weight * pace * width)
+        angle = np.arctan2(rate * t * width, width**2 + first * (first + rate * t))
+        return 12.0 * angle / (weight * rate * width)
 
     return _axial(
         (lambda t: np.full_like(t, along), lambda t: t / along),
-        (lambda t: weight * (width**2 + (first + pace * t) ** 2) / 12.0, transverse_integral),
+        (lambda t: weight * (width**2 + (first + rate * t) ** 2) / 12.0, transverse_integral),
         momentum,
         duration,
         "error",
@@ -173,12 +183,11 @@ def printed_antenna(
     coast: float = 20.0,
     on_unphysical: str = "error",
 ) -> Example:
-    """F3 and F4: the moment about axis 1 or 3 grows evenly, the others stay: example 4.5 as printed.
+    """F3 and F4: the moment about axis 1 or 3 grows at a constant rate, the others are constant: example 4.5 as printed.
 
-    The energy Pi.I^-1 Pi/2 falls as long as the moment grows, by half Pi_k² times the rate of 1/I_k. With axis 3, the
-    largest moment, Pi stays in its regime if it circles axis 3 at the start. With axis 1, the smallest, it can
-    pass from circling axis 1 to circling axis 3: with the moments given here it does, while the order of
-    the moments stays.
+    The energy Pi.I^-1 Pi/2 falls as long as the moment grows, at half Pi_k² times the rate of 1/I_k. With axis 3, the
+    largest moment, Pi stays in its regime if it circles axis 3 at the start. With axis 1, the smallest, it can pass
+    from circling axis 1 to circling axis 3; with the moments given here it does, although their order does not change.
 
     No body has a moment above the sum of the two others (C-E13): I_1 ends at I_2 + I_3 and I_3 at I_1 + I_2.
 
@@ -186,9 +195,9 @@ def printed_antenna(
     ----------
     axis : 1 or 3
     moments : (3,) at the start [kg m^2]; None: (1, 1.5, 2)
-    grown : what the moment grows to [kg m^2]; None: 1.45 about axis 1, 2.4 about axis 3
+    grown : the moment at the end [kg m^2]; None: 1.45 about axis 1, 2.4 about axis 3
     momentum : (3,); None: (0.8, 0.1, 0.6) with axis 1, (0.3, 0.4, 0.9) with axis 3
-    extension_time, coast : how long it grows, and how long the body then is rigid [s]
+    extension_time, coast : how long the moment grows, and how long the body is then rigid [s]
     on_unphysical : as for `prescribed`
 
     Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
@@ -211,11 +220,11 @@ def printed_antenna(
 
 
 def regime_crossing(coast: float = 20.0) -> Example:
-    """E11, the paper's case 3: I_3 grows fast from 1.06 to 2.05 kg m^2, moments 1 and 1.05 stay, Pi starts near axis 1.
+    """E11, the paper's case 3: I_3 grows fast from 1.06 to 2.05 kg m^2, I_1 = 1 and I_2 = 1.05 kg m^2 are constant.
 
-    The energy falls from 0.48189 to 0.33610 J in the 0.2 s, through that of the separatrix, l²/(2 I_2) = 0.47619 J:
-    Pi leaves axis 1 and circles axis 3. The moments end on the limit of the triangle inequality, a flat body: I_3 can
-    grow as fast as one wants, but no further.
+    Pi starts near axis 1. The energy falls from 0.48189 to 0.33610 J in the 0.2 s, through that of the separatrix,
+    l²/(2 I_2) = 0.47619 J: Pi leaves axis 1 and circles axis 3. The moments end at the limit of the triangle
+    inequality, a flat body: I_3 can grow as fast as one likes, but no further.
 
     Source: Cabrera 2006, section 4.1.1, case 3; theory.md E11 and section 6.
     """
@@ -232,19 +241,19 @@ def dipole_antenna(
     extension_time: float = 5.0,
     coast: float = 20.0,
 ) -> Example:
-    """F4b: a physical antenna: two tip masses go out evenly from the hub, to both sides along an axis.
+    """F4b: a physical antenna: two tip masses move out from the hub at constant speed, to both sides along an axis.
 
-    The two other moments grow by 2 m x², the axis' own stays, whatever the axis; the energy falls here too. Along the
-    axis of the largest moment it becomes the smallest, so the order does not last: the paper's conclusion for its
-    example 4.5 is that of the printed model alone. Along the axis of the smallest moment the order lasts.
+    Whatever the axis, the two other moments grow by 2 m x² and its own is constant; the energy falls here too. The
+    largest moment, if it is that of the axis, becomes the smallest: the paper's conclusion for its example 4.5 holds
+    for the printed model only. Along the axis of the smallest moment the order of the moments does not change.
 
     Parameters
     ----------
     axis : 1, 2 or 3
-    hub : (3,) moments of the hub, tips stowed at its centre [kg m^2]
-    tip_mass : of each [kg]
-    reach : of each at the end, from the centre [m]
-    extension_time, coast : [s]
+    hub : (3,) moments of the hub, with the tip masses at its centre [kg m^2]
+    tip_mass : of each tip [kg]
+    reach : distance of each tip mass from the centre at the end [m]
+    extension_time, coast : as for `printed_antenna` [s]
 
     Source: theory.md F4b, C-E13.
     """
@@ -266,32 +275,33 @@ def furniture(
     height: float = 0.0,
     momentum: ArrayLike = (0.0, 0.0, 30.0),
 ) -> Example:
-    """F6: somebody walks evenly round in a rigid spacecraft, once, with the centre of the hub as centre: L_o != 0.
+    """F6: somebody walks once round a circle about the centre of a rigid spacecraft, at constant speed: L_o != 0.
 
-    With the reduced mass m = mass hub_mass/(mass + hub_mass) and p the place as seen from the hub's own centre of mass,
-    I = I_hub + m (p² 1 − p p^T) and L_o = m p x p'. Where the walk is in the plane of axes 1 and 2 and the momentum
-    along axis 3, the spacecraft turns about that axis alone, by (l duration − 2 pi m radius²)/(I_3 + m radius²): the
-    second term is the holonomy, the same at every speed. Otherwise there is no closed form.
+    With the reduced mass m = mass hub_mass/(mass + hub_mass) and p the position from the hub's own centre of mass,
+    I = I_hub + m (p² 1 − p p^T) and L_o = m p x p'. If the walk is in the plane of axes 1 and 2 and the momentum along
+    axis 3, the spacecraft turns about that axis alone, by (l duration − 2 pi m radius²)/(I_3 + m radius²): the second
+    term is the holonomy, the same at every speed. Otherwise there is no closed form.
 
     Parameters
     ----------
-    duration : of one round [s]
-    hub_mass, hub : the spacecraft, (3,) principal moments within the triangle inequality [kg], [kg m^2]
-    mass, radius : what moves and how far out [kg], [m]
-    height : of its plane along axis 3 [m]
+    duration : of the walk [s]
+    hub_mass, hub : mass of the spacecraft [kg], its (3,) principal moments within the triangle inequality [kg m^2]
+    mass, radius : what moves and how far from the centre [kg], [m]
+    height : of the circle along axis 3 [m]
 
     Source: Cabrera 2006, example 2.2; theory.md F6.
     """
     moments, inner, outer = moments_argument(hub), positive(hub_mass, "hub_mass", "kg"), positive(mass, "mass", "kg")
-    wide, pace = positive(radius, "radius", "m"), 2.0 * np.pi / positive(duration, "duration", "s")
+    wide, walk_rate = positive(radius, "radius", "m"), 2.0 * np.pi / positive(duration, "duration", "s")
     spatial = momentum_argument(momentum)
     walk = ShapePath.fourier([0.0, 0.0, height], [[wide], [0.0], [0.0]], [[0.0], [wide], [0.0]], duration)
     deformation = assembly(rigid_part(inner, np.diag(moments)), [moving_mass(outer, walk)])
     if height or spatial[0] or spatial[1]:
-        return Example(deformation, spatial)
+        return Example(deformation=deformation, momentum=spatial)
     added = inner * outer / (inner + outer) * wide**2
-    rate = (spatial[2] - added * pace) / (moments[2] + added)
-    return Example(deformation, spatial, SteadyTurn(spatial, np.array([0.0, 0.0, rate])), turn=rate * duration)
+    rate = (spatial[2] - added * walk_rate) / (moments[2] + added)
+    known = SteadyTurn(momentum=spatial, angular_velocity=np.array([0.0, 0.0, rate]))
+    return Example(deformation=deformation, momentum=spatial, known=known, turn=rate * duration)
 
 
 def cat(halves: bool = False) -> Example:
@@ -300,9 +310,10 @@ def cat(halves: bool = False) -> Example:
     Source: Kane and Scher 1969; `scenarios.kane_scher`, `scenarios.cat_righting`; theory.md F7 and section 7.
     """
     if halves:
-        path = kane_scher(0.0, 59.426458741516 * _DEGREE)
-        return Example(articulated(load_body("cat_two_halves"), path), np.zeros(3), turn=np.pi)
-    return Example(articulated(load_body("cat"), cat_righting()), np.zeros(3), turn=np.pi)
+        deformation = articulated(load_body("cat_two_halves"), kane_scher(0.0, _HALF_TURN_CONE * _DEGREE))
+    else:
+        deformation = articulated(load_body("cat"), cat_righting())
+    return Example(deformation=deformation, momentum=np.zeros(3), turn=np.pi)
 
 
 def astronaut(legs: bool = False) -> Example:
@@ -311,7 +322,8 @@ def astronaut(legs: bool = False) -> Example:
     Source: `scenarios.astronaut_arm_circles`, `scenarios.astronaut_leg_swing`; theory.md F8.
     """
     path, degrees = (astronaut_leg_swing(), 12.297356) if legs else (astronaut_arm_circles(), 11.860224)
-    return Example(articulated(load_body("astronaut"), path), np.zeros(3), turn=degrees * _DEGREE)
+    deformation = articulated(load_body("astronaut"), path)
+    return Example(deformation=deformation, momentum=np.zeros(3), turn=degrees * _DEGREE)
 
 
 def rigid_body(moments: ArrayLike = (1.0, 1.5, 2.0), momentum: ArrayLike = (0.6, 0.5, 1.2)) -> Example:
@@ -323,7 +335,7 @@ def rigid_body(moments: ArrayLike = (1.0, 1.5, 2.0), momentum: ArrayLike = (0.6,
     if not np.isfinite(top.period):
         raise TrajectoryError("momentum: Pi of this body does not come back, so there is no period to show")
     deformation = rigid(top.inertia, top.period)
-    return Example(deformation, top.momentum, top, top.montgomery_phase, rigid=top)
+    return Example(deformation=deformation, momentum=top.momentum, known=top, phase=top.montgomery_phase, rigid=top)
 
 
 EXAMPLES: Mapping[str, Callable[[], Example]] = {
@@ -344,7 +356,7 @@ EXAMPLES: Mapping[str, Callable[[], Example]] = {
 
 
 def named_example(name: str) -> Example:
-    """One of `EXAMPLES`, with its own parameters. Raises UnknownNameError."""
+    """One of `EXAMPLES`, with its default parameters. Raises UnknownNameError."""
     if name not in EXAMPLES:
         raise unknown_name("example", name, EXAMPLES)
     return EXAMPLES[name]()
@@ -359,7 +371,7 @@ def _axial(
 ) -> Example:
     """A body with a symmetry axis, from its two moments and the integrals of their inverses."""
     spatial = momentum_argument(momentum)
-    known = AxialMotion(spatial, axial[1], transverse[1])
+    known = AxialMotion(momentum=spatial, axial=axial[1], transverse=transverse[1])
     ends = [float(moment(np.zeros(1))[0]) for moment in (axial[0], transverse[0])]
     top = EulerTop.principal([ends[0], ends[1], ends[1]], spatial)
     looped = duration is None
@@ -370,15 +382,17 @@ def _axial(
         return np.stack([axial[0](times), across, across], axis=-1)
 
     phase = float(top.magnitude * known.transverse(np.asarray(length))) if looped else None
-    return Example(diagonal(moments, length, (), on_unphysical), spatial, known, phase, rigid=top)
+    deformation = diagonal(moments, length, (), on_unphysical)
+    return Example(deformation=deformation, momentum=spatial, known=known, phase=phase, rigid=top)
 
 
 def _extension(
     moments: Callable[[Array], Array], momentum: ArrayLike, extension_time: float, coast: float, on_unphysical: str
 ) -> Example:
-    """Moments by the share of the extension, which goes evenly from 0 to 1; then the body is rigid."""
+    """Moments as a function of the share of the extension, from 0 to 1 at a constant rate; then the body is rigid."""
     moving = positive(extension_time, "extension_time", "s")
     length = moving + positive(coast, "coast", "s")
     spatial = momentum_argument(momentum)
     deformation = diagonal(lambda t: moments(np.minimum(t / moving, 1.0)), length, (moving,), on_unphysical)
-    return Example(deformation, spatial, rigid=EulerTop.principal(moments(np.zeros(1))[0], spatial))
+    rigid_start = EulerTop.principal(moments(np.zeros(1))[0], spatial)
+    return Example(deformation=deformation, momentum=spatial, rigid=rigid_start)

@@ -1,4 +1,4 @@
-"""Named, ready motions of the bodies we ship, each with its source and its known answer."""
+"""Ready motions of the bodies that come with the library, by name, each with its source and its known answer."""
 
 from __future__ import annotations
 
@@ -17,12 +17,15 @@ from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 
+# Joints of the waist of both cats, in the order of their angles.
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
+# Of the reconstruction of a closed orbit [rad]: its phases are then good to ten digits.
+_TOLERANCE = 1e-11
 
 
 @dataclass(frozen=True)
 class NamedMotion:
-    """A motion that comes with the library: the body it is for, how to make it, and what it does."""
+    """A motion that comes with the library: its body, the function that makes its path, and what it does in words."""
 
     body: str
     path: Callable[[], ShapePath]
@@ -30,7 +33,7 @@ class NamedMotion:
 
 
 def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
-    """The righting of the two-half cat `cat_two_halves`: bend without twist, the bend going once around.
+    """The righting of the cat of two halves, `cat_two_halves`: it bends without twisting, and the bend goes once round.
 
     The rear half's axis b goes round a cone of half angle `beta` about a line that leans by `alpha` from the
     front half's axis towards the belly; the waist does not twist. The bend goes from alpha + beta (belly)
@@ -55,9 +58,10 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
 def cat_righting(duration: float = 0.5) -> ShapePath:
     """The realistic `cat` rights itself from rest to rest: 180 degrees about its long axis at zero momentum.
 
-    The bend of the untwisted waist rises, its direction goes once around, and it falls, with the legs tucked and
-    neck and tail bending along. Two numbers, the largest bend and the tail's share, are solved for; a loop that
-    is its own mirror image run backwards turns about an axis in the plane of symmetry, so two are enough.
+    The waist bends without twisting, the direction of the bend goes once round, and the waist straightens, with the
+    legs tucked and neck and tail bending along. Two numbers were solved for, the largest bend and the tail's share;
+    two are enough, because a loop that is its own mirror image run backwards turns about an axis in the plane of
+    symmetry.
     """
     names = load_body("cat").joint_names
     return _loop(_CatRighting(float(duration), names), duration, names)
@@ -110,7 +114,7 @@ def antenna_deployment(duration: float = 60.0) -> ShapePath:
 
 
 def satellite_sweep(duration: float = 60.0) -> ShapePath:
-    """One sweep of the `satellite`: the boom goes out and in while its arm swings to and fro, a quarter behind.
+    """One sweep of the `satellite`: the boom goes out and in while its arm swings to and fro, a quarter period behind.
 
     At zero momentum it turns by 5.405499 degrees, most of it about the z axis. The numbers are our own.
     """
@@ -139,7 +143,7 @@ CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
     "astronaut": ("astronaut_leg_swing", 2.0),
     "satellite": ("satellite_sweep", 1.0),
 }
-"""Ready motions whose shape and momentum close together: the loop of shapes, the size of the momentum [kg m^2/s]."""
+"""Motions whose shape and momentum close together: the loop of shapes, and the momentum's magnitude [kg m^2/s]."""
 
 
 def named_motion(name: str) -> ShapePath:
@@ -150,51 +154,59 @@ def named_motion(name: str) -> ShapePath:
 
 
 def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
-    """A motion of `CLOSED_ORBITS`: shape and momentum close together, so that all of its split is phase and holonomy.
+    """A motion of `CLOSED_ORBITS`: shape and momentum close together, so that its split has only phase and holonomy.
 
     Parameters
     ----------
-    gauge : where the momentum closes: "horizontal", where total_rotation = exp(montgomery_phase hat(mu)) holonomy,
-        or "base", where total_rotation = exp(montgomery_phase hat(mu))
+    gauge : in which the momentum closes: "horizontal", so that total_rotation = exp(montgomery_phase hat(mu)) holonomy,
+        or "base", so that total_rotation = exp(montgomery_phase hat(mu))
 
     Returns
     -------
-    the first of `closed_orbits`, seen from the base: `split(closed_orbit("cat"))` has no tilt
+    the first of `closed_orbits`, in the base gauge: `split(closed_orbit("cat"))` has no tilt
 
     Raises
     ------
     UnknownNameError
-        For another name or gauge.
+        For an unknown name or gauge.
     """
     if name not in CLOSED_ORBITS:
         raise unknown_name("closed orbit", name, CLOSED_ORBITS)
     if gauge not in ("horizontal", "base"):
         raise unknown_name("gauge of a closed orbit", gauge, ("horizontal", "base"))
-    motion, size = CLOSED_ORBITS[name]
+    motion, magnitude = CLOSED_ORBITS[name]
     deformation = articulated(load_body(MOTIONS[motion].body), named_motion(motion))
-    seen = horizontal_gauge(deformation) if gauge == "horizontal" else deformation
-    start = closed_orbits(seen, size)[0].initial_attitude
-    return reconstruct(deformation, [0.0, 0.0, size], start, tolerance=1e-11)
+    gauged = horizontal_gauge(deformation) if gauge == "horizontal" else deformation
+    start = closed_orbits(gauged, magnitude)[0].initial_attitude
+    return reconstruct(deformation, [0.0, 0.0, magnitude], start, tolerance=_TOLERANCE)
 
 
 @dataclass(frozen=True)
 class _KaneScher:
+    """Waist angles of `kane_scher` and their rates at times (N,)."""
+
     alpha: float
     beta: float
     duration: float
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        pace = 2.0 * np.pi / self.duration
-        c, s = np.cos(pace * times), np.sin(pace * times)
+        frequency = 2.0 * np.pi / self.duration
+        c, s = np.cos(frequency * times), np.sin(frequency * times)
         ca, sa, cb, sb = np.cos(self.alpha), np.sin(self.alpha), np.cos(self.beta), np.sin(self.beta)
         axis = np.stack([ca * cb - sa * sb * c, -sb * s, sa * cb + ca * sb * c], axis=-1)
-        rate = pace * np.stack([sa * sb * s, -sb * c, -ca * sb * s], axis=-1)
+        rate = frequency * np.stack([sa * sb * s, -sb * c, -ca * sb * s], axis=-1)
         return _untwisted(axis, rate)
 
 
 @dataclass(frozen=True)
 class _CatRighting:
-    """Every joint from the bend S(t), which rises and falls, and its direction h(t), which goes once around."""
+    """Every joint of the cat from the bend, which rises and falls, and its direction (ny, nz), which goes once round.
+
+    Attributes
+    ----------
+    largest_bend : of the waist [rad]
+    tail_share : of the bend that the tail makes, relative
+    """
 
     duration: float
     joint_names: tuple[str, ...]
@@ -204,22 +216,11 @@ class _CatRighting:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         x = times / self.duration
         s = x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3)
-        pace = 140.0 * x**3 * (1.0 - x) ** 3 / self.duration
-        bend, bend_rate = np.sin(np.pi * s), np.pi * pace * np.cos(np.pi * s)
+        s_rate = 140.0 * x**3 * (1.0 - x) ** 3 / self.duration
+        bend, bend_rate = np.sin(np.pi * s), np.pi * s_rate * np.cos(np.pi * s)
         ny, nz = np.cos(2.0 * np.pi * s), -np.sin(2.0 * np.pi * s)
-        ny_rate, nz_rate = 2.0 * np.pi * pace * nz, -2.0 * np.pi * pace * ny
-        gamma, gamma_rate = self.largest_bend * bend, self.largest_bend * bend_rate
-        cosine, sine = np.cos(gamma), np.sin(gamma)
-        axis = np.stack([cosine, nz * sine, -ny * sine], axis=-1)
-        axis_rate = np.stack(
-            [
-                -sine * gamma_rate,
-                nz_rate * sine + nz * cosine * gamma_rate,
-                -ny_rate * sine - ny * cosine * gamma_rate,
-            ],
-            axis=-1,
-        )
-        waist, waist_rate = _untwisted(axis, axis_rate)
+        ny_rate, nz_rate = 2.0 * np.pi * s_rate * nz, -2.0 * np.pi * s_rate * ny
+        waist, waist_rate = self._waist(bend, bend_rate, (ny, nz), (ny_rate, nz_rate))
         pitch, pitch_rate = bend * ny, bend_rate * ny + bend * ny_rate
         yaw, yaw_rate = bend * nz, bend_rate * nz + bend * nz_rate
         shapes, rates = (np.zeros((len(times), len(self.joint_names))) for _ in range(2))
@@ -240,11 +241,29 @@ class _CatRighting:
             shapes[:, place], rates[:, place] = factor * value, factor * rate
         return shapes, rates
 
+    def _waist(
+        self, bend: Array, bend_rate: Array, normal: tuple[Array, Array], normal_rate: tuple[Array, Array]
+    ) -> tuple[Array, Array]:
+        """The three waist angles and their rates, (N, 3), from the bend and its direction."""
+        (ny, nz), (ny_rate, nz_rate) = normal, normal_rate
+        gamma, gamma_rate = self.largest_bend * bend, self.largest_bend * bend_rate
+        cosine, sine = np.cos(gamma), np.sin(gamma)
+        axis = np.stack([cosine, nz * sine, -ny * sine], axis=-1)
+        axis_rate = np.stack(
+            [
+                -sine * gamma_rate,
+                nz_rate * sine + nz * cosine * gamma_rate,
+                -ny_rate * sine - ny * cosine * gamma_rate,
+            ],
+            axis=-1,
+        )
+        return _untwisted(axis, axis_rate)
+
 
 def _untwisted(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
     """Waist angles pitch, yaw, roll (Ry Rz Rx) that carry the x axis to `axis` without twist, and their rates.
 
-    The turn is the one along the great circle from x to `axis`; all (N, 3).
+    The rotation is the one along the great circle from x to `axis`; all (N, 3).
     """
     (x, y, z), (dx, dy, dz) = axis.T, axis_rate.T
     upper, lower = y * z, x * (1.0 + x) + z * z

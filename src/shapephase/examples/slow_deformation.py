@@ -1,4 +1,4 @@
-"""Slow deformations: how near the phase is to that of a rigid body.
+"""Slow deformations, and how near their phase is to that of a rigid body.
 
 Source: Cabrera 2006, remark 4.6; theory.md F5. The orders are derived here.
 """
@@ -20,11 +20,16 @@ from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_na
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body._momentum_orbit import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop
-from .closed_form_motions import Example, diagonal, positive
+from ._closed_form_motions import Example, diagonal, positive
 
-_ROUND = (0.0, 2.0 * np.pi)
-_NODES = (14, 28, 56, 112, 224, 448)
+# One revolution of the angle along an orbit [rad].
+_REVOLUTION = (0.0, 2.0 * np.pi)
+# Degrees of the Chebyshev series tried for an integral, in turn; the last is reached only very near the separatrix.
+_DEGREES = (14, 28, 56, 112, 224, 448)
+# Last coefficients of a series over the largest one at which its integral is known to about ten digits.
 _RESOLVED = 1e-11
+# Angles from the axis [rad] between which an orbit of given area is sought: nearer to either end the area is rounding.
+_END_MARGIN = 1e-9
 
 _LAWS: Mapping[str, Callable[[Array], Array]] = {
     "even": lambda s: s,
@@ -38,24 +43,24 @@ def slow_antenna(
     law: str = "even",
     *,
     moments: ArrayLike = (1.0, 1.5, 2.0),
-    growth: float = 0.2,
+    expansion: float = 0.2,
     momentum: ArrayLike = (0.4, 0.3, 3.2),
 ) -> Example:
-    """F5: the largest moment grows slowly, I_3(t) = I_3 (1 + growth f(rate t)); `rigid` is the body at the start.
+    """F5: the largest moment grows slowly, I_3(t) = I_3 (1 + expansion f(rate t)); `rigid` is the body at the start.
 
     With f(s) = s ("even") the phase of the first loop of Pi about axis 3 is that of the rigid body up to a term of
-    first order in the rate, growth rate `slow_phase_slope`: Pi does not come back but spirals, and the moments that
-    count are those half a loop later. Against the body frozen in the middle of the loop, where Pi crosses a plane of
-    two axes there, the difference is of second order.
+    first order in the rate, expansion rate `slow_phase_slope`: Pi does not come back but spirals, and the moments that
+    count are those half a loop later. Against the rigid body with the inertia of the middle of the loop, if Pi crosses
+    a plane of two principal axes there, the difference is of second order.
 
     With f(s) = sin²(pi s) ("periodic"), 1/rate being its period, the deformation starts from its turning point. Within
     a loop it is of second order in the rate, and so is the difference of the phases.
 
-    With f(s) = 10 s³ − 15 s⁴ + 6 s⁵ ("deployment"), from rest to rest in 1/rate: the area that Pi goes round is the
-    adiabatic invariant. The body that comes out is `orbit_of_area(I(end), l, area at the start)` in area and phase up
-    to a term of third order, since the third derivative of f is the first that jumps at the ends; in general, of the
-    order of the first derivative that jumps, for the even law the first. Here "deployment" lasts for all of 1/rate,
-    the others for one and a quarter rigid periods.
+    With f(s) = 10 s³ − 15 s⁴ + 6 s⁵ ("deployment"), from rest to rest in 1/rate: the area that Pi encloses is the
+    adiabatic invariant. At the end the body agrees with `orbit_of_area(I(end), l, area at the start)` in area and
+    phase up to a term of third order, because the third derivative of f is the first that jumps at the ends; in
+    general the order is that of the first derivative that jumps, for the even law the first. Here "deployment" lasts
+    for all of 1/rate, the others for one and a quarter rigid periods.
 
     Over all of a slow deformation, as long as 1/rate, the precession is `adiabatic_precession` up to a term of first
     order, which is second order a loop.
@@ -65,23 +70,23 @@ def slow_antenna(
     rate : above 0 [1/s]
     law : "even", "periodic" or "deployment"
     moments : (3,), ascending [kg m^2]
-    growth : of I_3, relative
+    expansion : relative increase of I_3 where f is 1, above 0
     momentum : (3,), on an orbit about axis 3
 
-    Source: Cabrera 2006, remark 4.6, whose scale is wrong (C-E12); orders derived here; theory.md F5.
+    Source: Cabrera 2006, remark 4.6, with the scale corrected (C-E12); orders derived here; theory.md F5.
     """
     if law not in _LAWS:
         raise unknown_name("law", law, _LAWS)
-    pace, start = positive(rate, "rate", "1/s"), moments_argument(moments)
+    slow, start = positive(rate, "rate", "1/s"), moments_argument(moments)
     top = orbit_about_third(start, momentum)
-    slope = positive(growth, "growth", "1") * start[2] * np.array([0.0, 0.0, 1.0])
-    length = 1.0 / pace if law == "deployment" else 1.25 * top.period
-    deformation = diagonal(lambda t: start + slope * _LAWS[law](pace * t)[:, None], length, (), "error")
-    return Example(deformation, top.momentum, rigid=top)
+    increase = positive(expansion, "expansion", "1") * start[2] * np.array([0.0, 0.0, 1.0])
+    length = 1.0 / slow if law == "deployment" else 1.25 * top.period
+    deformation = diagonal(lambda t: start + increase * _LAWS[law](slow * t)[:, None], length, (), "error")
+    return Example(deformation=deformation, momentum=top.momentum, rigid=top)
 
 
 def slow_phase_slope(moments: ArrayLike, momentum: ArrayLike) -> float:
-    """How the phase of one loop about axis 3 answers to a steady growth I_3 (1 + g t): d theta_M/dg at g = 0 [rad s].
+    """Derivative of the phase of one loop about axis 3 by a steady growth I_3 (1 + g t): d theta_M/dg at g = 0 [rad s].
 
     The loop ends where Pi is back on its meridian, closed along it. With u the angle along, a(u) the value of 1/I
     across axis 3, v = a − 1/I_3, w = Pi_1² + Pi_2² and L = Pi_3 of the rigid motion, dt = du/(L v), W = int w dt,
@@ -104,8 +109,8 @@ def slow_phase_slope(moments: ArrayLike, momentum: ArrayLike) -> float:
     """
     start = moments_argument(moments)
     top = orbit_about_third(start, momentum)
-    first, size, low = top.momentum, top.magnitude, 1.0 / start[2]
-    # Pi goes round axis 3 counterclockwise where Pi_3 > 0.
+    first, magnitude, low = top.momentum, top.magnitude, 1.0 / start[2]
+    # Pi circles axis 3 counterclockwise where Pi_3 > 0.
     sense, azimuth = np.sign(first[2]), np.arctan2(first[1], first[0])
 
     def across(u: Array) -> Array:
@@ -113,26 +118,29 @@ def slow_phase_slope(moments: ArrayLike, momentum: ArrayLike) -> float:
         return np.cos(angle) ** 2 / start[0] + np.sin(angle) ** 2 / start[1]
 
     def tilt(u: Array) -> Array:
-        return (2.0 * top.energy - low * size**2) / (across(u) - low)
+        return (2.0 * top.energy - low * magnitude**2) / (across(u) - low)
 
-    def pace(u: Array) -> Array:
-        return 1.0 / (np.sqrt(size**2 - tilt(u)) * (across(u) - low))
+    def time_per_angle(u: Array) -> Array:
+        return 1.0 / (np.sqrt(magnitude**2 - tilt(u)) * (across(u) - low))
 
-    time, swept = _primitive(pace, _ROUND), _primitive(lambda u: tilt(u) * pace(u), _ROUND)
+    time = _primitive(time_per_angle, _REVOLUTION)
+    swept = _primitive(lambda u: tilt(u) * time_per_angle(u), _REVOLUTION)
 
     def density(u: Array) -> Array:
-        along = size**2 - tilt(u)
+        along = magnitude**2 - tilt(u)
         change = swept(u) - (tilt(u) + 2.0 * along) * time(u)
-        return size * across(u) * low * change / (2.0 * along**1.5 * (across(u) - low) ** 2)
+        return magnitude * across(u) * low * change / (2.0 * along**1.5 * (across(u) - low) ** 2)
 
-    return float(_primitive(density, _ROUND)(2.0 * np.pi))
+    return float(_primitive(density, _REVOLUTION)(2.0 * np.pi))
 
 
-def orbit_of_area(moments: ArrayLike, size: float, solid_angle: float) -> EulerTop:
-    """The rigid body with these ascending moments whose Pi, of this size, goes round an area about axis 3.
+def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> EulerTop:
+    """The rigid body whose Pi encloses a given area about axis 3.
 
     Parameters
     ----------
+    moments : (3,), ascending [kg m^2]
+    magnitude : of Pi, above 0 [kg m^2/s]
     solid_angle : above 0 and below that of the separatrix [sr]
 
     Raises
@@ -142,39 +150,39 @@ def orbit_of_area(moments: ArrayLike, size: float, solid_angle: float) -> EulerT
 
     Source: Ehrenfest's adiabatic invariance, with the area as the action; theory.md F5.
     """
-    end, length = moments_argument(moments), positive(size, "size", "kg m^2/s")
+    end, norm = moments_argument(moments), positive(magnitude, "magnitude", "kg m^2/s")
     limit = separatrix_solid_angle(end, 2)
 
-    def orbit(height: float) -> EulerTop:
-        return EulerTop.principal(end, length * np.array([0.0, np.sin(height), np.cos(height)]))
+    def orbit(angle: float) -> EulerTop:
+        return EulerTop.principal(end, norm * np.array([0.0, np.sin(angle), np.cos(angle)]))
 
-    lowest, highest = 1e-9, 0.5 * np.pi - 1e-9
-    if not orbit(lowest).solid_angle < solid_angle < orbit(highest).solid_angle:
+    nearest, farthest = _END_MARGIN, 0.5 * np.pi - _END_MARGIN
+    if not orbit(nearest).solid_angle < solid_angle < orbit(farthest).solid_angle:
         raise ShapeError(
             f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {solid_angle!r}"
         )
-    found = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(lowest, highest), xtol=1e-15)
+    found = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
     return orbit(float(found.root))
 
 
 def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: float) -> float:
-    """What axis 3 turns through about the momentum from 0 to a time, if the area that Pi goes round stays [rad].
+    """The angle of axis 3 about the momentum from 0 to a time, if the area that Pi encloses is constant [rad].
 
-    The integral of `EulerTop.precession_frequency` along the orbits of one area. The one parameter of such a family
-    goes round no area of parameters, so there is no geometric part (Hannay's angle is zero). From one crossing of the
-    plane of axes 2 and 3 to another, the true precession differs by a term of first order in the rate, all loops
-    together; between other places also by what the orbit adds within a loop.
+    The integral of `EulerTop.precession_frequency` along the orbits of one area. A family of one parameter encloses no
+    area of parameters, so there is no geometric part (Hannay's angle is zero). From one crossing of the plane of axes 2
+    and 3 to another, the true precession differs by a term of first order in the rate, all loops together; between
+    other points also by what varies within a loop.
 
     Parameters
     ----------
-    deformation : with principal axes that stay, in the order of ascending moments, and no internal momentum
+    deformation : with fixed principal axes, in the order of ascending moments, and no internal momentum
     momentum : (3,), on an orbit about axis 3 [kg m^2/s]
     until : [s]
 
     Raises
     ------
     ShapeError
-        For another deformation, or where the orbits of that area come to an end, at a separatrix.
+        For another deformation, or if there is no orbit of that area any more, because it met the separatrix.
     AccuracyNotReached
         Very near a separatrix.
 
@@ -193,8 +201,8 @@ def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: f
 
 def _primitive(function: Callable[[Array], Array], domain: tuple[float, float]) -> np.polynomial.Chebyshev:
     """The integral from the left end of a smooth function, as a polynomial. Raises AccuracyNotReached."""
-    for degree in _NODES:
-        # On the separatrix itself the function is infinite somewhere, and nothing converges.
+    for degree in _DEGREES:
+        # On the separatrix itself the function is infinite at some angle, and the series does not converge.
         with np.errstate(divide="ignore", invalid="ignore"):
             series = np.polynomial.Chebyshev.interpolate(function, degree, domain)
         if np.abs(series.coef[-3:]).max() < _RESOLVED * np.abs(series.coef).max():
@@ -211,27 +219,27 @@ def _ascending(deformation: Deformation, times: Array) -> Array:
     moments = np.diagonal(tensors, axis1=-2, axis2=-1)
     if np.any(internal) or np.any(tensors != moments[:, None] * np.eye(3)) or np.any(np.diff(moments, axis=-1) < 0.0):
         raise ShapeError(
-            "deformation: moments that ascend along axes that stay, and no internal momentum, are needed, as the "
-            "printed antennas have them"
+            "deformation: ascending moments about fixed axes, and no internal momentum, are needed, as in the printed "
+            "antennas"
         )
     return moments
 
 
 def first_loop(motion: Motion, axis: int = 3) -> float:
-    """When Pi has first gone once round a body axis, back to its meridian: time [s].
+    """The time at which Pi has first gone once round a body axis, back to its meridian [s].
 
     `arc_phases(motion, [0, this], "base")` is the phase of that loop, closed along the meridian.
 
     Parameters
     ----------
-    axis : 1, 2 or 3, which Pi goes round in one sense throughout
+    axis : 1, 2 or 3, which Pi circles in one sense throughout
 
     Raises
     ------
     ShapeError
-        If the motion is a batch, or the axis none of these.
+        If the motion is a batch, or the axis is none of these.
     TrajectoryError
-        If Pi does not get round within the motion.
+        If Pi does not go once round the axis during the motion.
     """
     if motion.batch or axis not in (1, 2, 3):
         raise ShapeError(f"one motion and axis 1, 2 or 3 are needed, got a batch {motion.batch} and axis {axis!r}")
@@ -241,13 +249,13 @@ def first_loop(motion: Motion, axis: int = 3) -> float:
         return np.arctan2(*np.moveaxis(motion.body_momentum(times)[..., across[::-1]], -1, 0))
 
     times = motion.solution.times
-    gone = np.unwrap(azimuth(times))
-    gone -= gone[0]
-    round_it = np.flatnonzero(np.abs(gone) >= 2.0 * np.pi)
-    if not len(round_it):
-        turned = np.degrees(np.abs(gone).max())
-        raise TrajectoryError(f"Pi does not get round axis {axis} in this motion, only {turned:.6g} degrees of the way")
-    last = int(round_it[0])
+    turned = np.unwrap(azimuth(times))
+    turned -= turned[0]
+    full_turns = np.flatnonzero(np.abs(turned) >= 2.0 * np.pi)
+    if not len(full_turns):
+        degrees = np.degrees(np.abs(turned).max())
+        raise TrajectoryError(f"Pi goes only {degrees:.6g} degrees round axis {axis} in this motion, not once round")
+    last = int(full_turns[0])
     start = azimuth(times[0])
     bracket = (float(times[last - 1]), float(times[last]))
     return float(

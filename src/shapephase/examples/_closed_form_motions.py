@@ -1,4 +1,4 @@
-"""What examples of deforming bodies are made of: motions in closed form, and the clocks they go by."""
+"""Building blocks of the examples: motions in closed form, and the time scales of bodies that change size."""
 
 from __future__ import annotations
 
@@ -12,13 +12,24 @@ from scipy.integrate import quad_vec
 from scipy.optimize import root_scalar
 
 from .. import so3
+from ..arguments import vector_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation, prescribed
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..rigid_body.euler_top import EulerTop
 
-_FARTHEST = 2.0**30
+# Of the first guess of a time: a function that has not reached its target by then is taken never to reach it.
+_MAX_STRETCH = 2.0**30
+# Relative error [1] allowed to the clock by quadrature; the closed forms are compared to about 1e-10.
 _QUADRATURE = 1e-11
+# Goal of that quadrature, absolute [s] and relative: as near to rounding as it gets.
+_QUADRATURE_GOAL = 1e-14
+# Of the duration: the step of the differences by which a given clock is checked; their error is about 1e-9.
+_CHECK_STEP = 1e-7
+# Of the rate of a given clock: finds any wrong formula, and passes an interpolated clock.
+_CHECK_RATE = 1e-3
+# Of the duration: how far from zero a given clock may start.
+_CHECK_START = 1e-9
 
 
 class KnownMotion(Protocol):
@@ -35,16 +46,16 @@ class KnownMotion(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A deformation, a momentum, and what is known about the motion they make.
+    """A deformation, a momentum, and what is known about the motion that results.
 
     Attributes
     ----------
-    deformation : what moves
+    deformation : of the body
     momentum : (3,) inertial axes, which are the body's axes at the start [kg m^2/s]
     known : the motion in closed form, or None
-    phase : theta_M of the whole duration in the base gauge, where Pi is back at its start then; modulo 2 pi [rad]
-    turn : the angle of the whole rotation at the end, where the example is known by it [rad]
-    rigid : the body frozen at the start, where the example is compared with it
+    phase : theta_M of the whole duration in the base gauge, modulo 2 pi, if Pi is back at its start by then [rad]
+    turn : the angle of the total rotation, if that is what is known of the example [rad]
+    rigid : the rigid body with the inertia of the start, if the example is compared with it
     """
 
     deformation: Deformation
@@ -57,7 +68,13 @@ class Example:
 
 @dataclass(frozen=True, eq=False)
 class TimeReparametrisedRigid:
-    """A body that moves as a rigid one does, by a clock of its own: R(t) = R_RB(tau(t)), Pi(t) = Pi_RB(tau(t))."""
+    """A rigid body's motion in a time of its own: R(t) = R_RB(tau(t)), Pi(t) = Pi_RB(tau(t)).
+
+    Attributes
+    ----------
+    top : the rigid body
+    clock : tau, times (...) -> (...) [s]
+    """
 
     top: EulerTop
     clock: Callable[[Array], Array]
@@ -75,7 +92,7 @@ class TimeReparametrisedRigid:
 class AxialMotion:
     """A body with moments (A(t), B(t), B(t)): R(t) = exp(b(t) hat(mu)) exp(Pi_1 (a(t) - b(t)) hat(e_1)).
 
-    a and b are the integrals of 1/A and 1/B from 0 to t, mu the momentum and Pi_1 its part along the axis, which stays.
+    a and b are the integrals of 1/A and 1/B from 0 to t, mu the momentum and Pi_1 its constant part along the axis.
 
     Attributes
     ----------
@@ -99,14 +116,14 @@ class AxialMotion:
         return so3.apply(back, np.broadcast_to(self.momentum, (*back.shape[:-2], 3)))
 
     def azimuth(self, t: ArrayLike) -> Array:
-        """The turn of the body about its axis, against which Pi goes round it: times (...) -> (...) [rad]."""
+        """The rotation of the body about its axis, opposite to that of Pi: times (...) -> (...) [rad]."""
         times = _times(t)
         return self.momentum[0] * (self.axial(times) - self.transverse(times))
 
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """A factor a(t) by which all distances in a body grow, and the time tau = int a^-2 dt by which it then turns.
+    """A factor a(t) by which all distances in a body grow, and the time tau = int a^-2 dt of its rotation.
 
     Attributes
     ----------
@@ -127,24 +144,24 @@ class Scale:
 
 def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
     """a^-2 = 1 + amount sin(2 pi t/period), 0 < |amount| < 1: tau = t + amount period (1 − cos)/(2 pi)."""
-    pace = 2.0 * np.pi / positive(period, "period", "s")
+    frequency = 2.0 * np.pi / positive(period, "period", "s")
     if not 0.0 < abs(amount) < 1.0:
         raise ShapeError(f"amount: a number between −1 and 1, not 0, is needed, got {amount!r}")
     return Scale(
-        lambda t: 1.0 / np.sqrt(1.0 + amount * np.sin(pace * t)),
-        lambda t: t + 2.0 * amount / pace * np.sin(0.5 * pace * t) ** 2,
+        factor=lambda t: 1.0 / np.sqrt(1.0 + amount * np.sin(frequency * t)),
+        clock=lambda t: t + 2.0 * amount / frequency * np.sin(0.5 * frequency * t) ** 2,
     )
 
 
 def expansion(rate: float = 0.02) -> Scale:
-    """a = 1 + rate t [1/s]: tau = t/(1 + rate t), below 1/rate for all time: it turns so far."""
-    pace = positive(rate, "rate", "1/s")
-    return Scale(lambda t: 1.0 + pace * t, lambda t: t / (1.0 + pace * t))
+    """a = 1 + rate t, rate in 1/s: tau = t/(1 + rate t) stays below 1/rate, so that the body turns by a finite angle."""
+    speed = positive(rate, "rate", "1/s")
+    return Scale(factor=lambda t: 1.0 + speed * t, clock=lambda t: t / (1.0 + speed * t))
 
 
 @dataclass(frozen=True, eq=False)
 class SteadyTurn:
-    """A body that turns evenly about its momentum: R(t) = exp(t hat(omega)), Pi constant.
+    """Steady rotation about the momentum: R(t) = exp(t hat(omega)), Pi constant.
 
     Attributes
     ----------
@@ -165,36 +182,42 @@ class SteadyTurn:
 
 
 def diagonal(moments: Callable[[Array], Array], duration: float, breaks: ArrayLike, on_unphysical: str) -> Deformation:
-    """The deformation whose principal axes stay, from its moments: times (N,) -> (N, 3) [kg m^2]."""
+    """The deformation with fixed principal axes and these moments: times (N,) -> (N, 3) [kg m^2]."""
     return prescribed(lambda t: moments(t)[:, :, None] * np.eye(3), None, duration, breaks, on_unphysical=on_unphysical)
 
 
 def clock_of(scale: Scale, duration: float) -> Callable[[Array], Array]:
-    """The clock of a scale. Raises TrajectoryError where the one given is not the integral of a^-2."""
+    """The clock of a scale. Raises TrajectoryError if the given one is not the integral of a^-2."""
     if scale.clock is None:
         return _clock_by_quadrature(scale.at)
-    times, step = duration * np.array([0.123, 0.456, 0.789]), 1e-7 * duration
-    pace = (scale.clock(times + step) - scale.clock(times - step)) / (2.0 * step)
+    times, step = duration * np.array([0.123, 0.456, 0.789]), _CHECK_STEP * duration
+    rate = (scale.clock(times + step) - scale.clock(times - step)) / (2.0 * step)
     start = float(scale.clock(np.zeros(())))
-    if abs(start) > 1e-9 * duration or not np.allclose(pace * scale.at(times) ** 2, 1.0, rtol=0.0, atol=1e-3):
+    ratio = rate * scale.at(times) ** 2
+    if abs(start) > _CHECK_START * duration or not np.allclose(ratio, 1.0, rtol=0.0, atol=_CHECK_RATE):
         raise TrajectoryError(
             f"the clock of the scale must be the integral of a^-2 from 0; it starts at {start:.6g} s and runs "
-            f"{pace * scale.at(times) ** 2} times as fast at t = {times} s; leave it out to have it computed"
+            f"{ratio} times as fast at t = {times} s; leave it out to have it computed"
         )
     return scale.clock
 
 
 def _clock_by_quadrature(factor: Callable[[Array], Array]) -> Callable[[Array], Array]:
-    """The integral of a^-2 from 0 to t for an array of times, all in one adaptive quadrature."""
+    """The integral of a^-2 from 0 to t, for all times in one adaptive quadrature."""
 
     def clock(times: Array) -> Array:
         value, error = quad_vec(
-            lambda s: times * factor(times * s) ** -2.0, 0.0, 1.0, epsabs=1e-14, epsrel=1e-14, limit=500
+            lambda s: times * factor(times * s) ** -2.0,
+            0.0,
+            1.0,
+            epsabs=_QUADRATURE_GOAL,
+            epsrel=_QUADRATURE_GOAL,
+            limit=500,
         )
         scale = np.linalg.norm(value) + 1.0
         if not error <= _QUADRATURE * scale:
             raise AccuracyNotReached(
-                f"the scale is too rough for quadrature: its clock is known to {error:.3g} s only; give the clock"
+                f"the scale is too rough for quadrature: its clock is known only to {error:.3g} s; give the clock"
             )
         return value
 
@@ -202,16 +225,16 @@ def _clock_by_quadrature(factor: Callable[[Array], Array]) -> Callable[[Array], 
 
 
 def first_time(function: Callable[[Array], Array], target: float, guess: float) -> float:
-    """When a growing function of time, 0 at 0, reaches the target."""
+    """The time at which an increasing function of time, 0 at 0, reaches the target."""
     late = guess
-    while late < _FARTHEST * guess:
+    while late < _MAX_STRETCH * guess:
         if function(np.asarray(late)) >= target:
             bracket = (0.0, late)
             return float(
                 root_scalar(lambda t: float(function(np.asarray(t)) - target), bracket=bracket, xtol=1e-14).root
             )
         late *= 2.0
-    raise TrajectoryError("the momentum does not come back to its start in the body; give a duration [s]")
+    raise TrajectoryError("the body momentum does not come back to its start; give a duration [s]")
 
 
 def _times(t: ArrayLike) -> Array:
@@ -219,19 +242,12 @@ def _times(t: ArrayLike) -> Array:
 
 
 def momentum_argument(value: ArrayLike) -> Array:
-    """A momentum (3,). Raises ShapeError."""
-    return _three(value, "momentum", "kg m^2/s")
-
-
-def _three(value: ArrayLike, name: str, unit: str) -> Array:
-    array = finite_array(value, name, (3,), unit=unit).copy()
-    if array.ndim != 1:
-        raise ShapeError(f"{name}: (3,) is needed, got {array.shape}; make an example for each")
-    return array
+    """A user's momentum (3,) [kg m^2/s]. Raises ShapeError."""
+    return vector_argument(value, "momentum", unit="kg m^2/s").copy()
 
 
 def positive(value: float, name: str, unit: str) -> float:
-    """A number above 0. Raises ShapeError."""
+    """A user's number, checked to be above 0. Raises ShapeError."""
     number = finite_array(value, name, unit=unit)
     if number.ndim or number <= 0.0:
         raise ShapeError(f"{name}: a number above 0 [{unit}] is needed, got {value!r}")
