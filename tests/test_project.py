@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from operator import attrgetter
 from pathlib import Path
@@ -145,6 +146,16 @@ def test_the_architecture_page_names_what_there_is():
     named = set(re.findall(r"`(\w+)\(\)`", text)) | set(re.findall(r"`([A-Z][a-z]\w+)`", text))
     assert len(named) > 40
     assert not named - defined
+
+
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
+def test_the_layers_are_those_of_the_import_contract(page):
+    (block,) = re.findall(r"```text\n *(cli\n.*?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+    said = [set(re.findall(r"\w+", re.sub(r"\(.*\)", "", line))) for line in block.strip().splitlines()]
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    assert said == [set(re.findall(r"\w+", layer)) for layer in contracts[0]["layers"] if layer != "__main__"]
 
 
 def test_nothing_refers_to_a_note_outside_the_repository():

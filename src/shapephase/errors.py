@@ -15,7 +15,7 @@ class ShapePhaseError(Exception):
 
 
 class ShapeError(ShapePhaseError, ValueError):
-    """An array has the wrong shape or type, or an entry that is no finite number.
+    """An array has the wrong shape or type, or an entry is not a finite number.
 
     Remedy: the message names the argument, what came and what was expected; arrays of text, objects, complex numbers
     or with masked entries are refused, never converted.
@@ -32,16 +32,16 @@ class UnknownNameError(ShapePhaseError, ValueError):
 class ModelFileError(ShapePhaseError, ValueError):
     """A body's file or model cannot be used as it is.
 
-    Causes: no or broken XML, numbers that are none, links that hang on nothing or twice, joints of several axes, macros
-    not yet expanded, or a model that came out of the parser other than the file says. Remedy: the message begins with
-    file, line and element, and says how to mend it.
+    Causes: missing or broken XML, text where a number belongs, links without a parent or with two, joints with several
+    axes, unexpanded macros, or a parsed model that differs from the file. Remedy: the message begins with file, line
+    and element, and says how to correct it.
     """
 
 
 class UnphysicalInertiaError(ModelFileError):
     """A link has a mass or an inertia that no body can have.
 
-    Remedy: mend the file; where only principal moments are negative, `load_body(..., on_unphysical="warn")` takes it.
+    Remedy: correct the file; where only principal moments are negative, `load_body(..., on_unphysical="warn")` takes it.
     """
 
 
@@ -50,7 +50,7 @@ class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
 
 
 class TrajectoryError(ShapePhaseError, ValueError):
-    """A trajectory that is no usable function of time: its times, joints, values or ends.
+    """A trajectory that cannot be used as a function of time: its times, joints, values or ends.
 
     Remedy: the message names file, row and joint; times must ascend, every joint of the body must be there, angles
     are in radians unless the file says degrees.
@@ -58,7 +58,7 @@ class TrajectoryError(ShapePhaseError, ValueError):
 
 
 class OpenPathError(TrajectoryError):
-    """A closed loop of shapes was needed, and the path ends elsewhere than it begins.
+    """A closed loop of shapes is needed, but the path does not end where it begins.
 
     Remedy: close the path (the message names the joint and its gap), or use what open paths have: `horizontal_lift`,
     `split`, `arc_phases`.
@@ -81,21 +81,21 @@ class AccuracyNotReached(ShapePhaseError, ArithmeticError):
 
 
 class GaugeError(ShapePhaseError, ArithmeticError):
-    """The frame asked for does not exist continuously along the motion, or not for this kind of deformation.
+    """The requested frame is not continuous along the motion, or does not exist for this kind of deformation.
 
     Remedy: the message names the time; the horizontal and the base gauge always exist.
     """
 
 
 class ChartPoleError(ShapePhaseError, ArithmeticError):
-    """Euler angles whose middle angle is at 0 or pi, or next to it, where they are no coordinates of rotations.
+    """Euler angles whose middle angle is at or next to 0 or pi, where they are not coordinates of rotations.
 
     Remedy: turn the inertial or the body axes by a constant rotation, or work with attitudes and body momenta.
     """
 
 
 class LieAlgebraError(ShapePhaseError, ValueError):
-    """Numbers that are no Lie algebra, or an element that is not of the algebra or group it is used in.
+    """Structure constants that define no Lie algebra, or an element outside the algebra or group it is used in.
 
     Remedy: the message names the law that fails and by how much; structure constants are c[i, j, k] with
     [e_i, e_j] = c[i, j, k] e_k.
@@ -119,14 +119,14 @@ class CompilerError(ShapePhaseError, RuntimeError):
 
 
 class PlanNotFound(ShapePhaseError, ArithmeticError):
-    """No motion of the joints was found that turns the body as asked.
+    """No motion of the joints was found that reaches the goal.
 
     Causes: a turn that no motion makes (a loop of one joint), joint or rate limits too tight for it, too short a time,
-    or a search that went astray. Remedy: loosen the limits, give more time, iterations or starts.
+    or a search that did not converge. Remedy: loosen the limits, give more time, iterations or starts.
 
     Attributes
     ----------
-    best : the best try, a `Plan` that misses the goal; None where not even one was left
+    best : the best try, a `Plan` that misses the goal; None if there was none
     """
 
     def __init__(self, message: str, best: object = None) -> None:
@@ -135,15 +135,15 @@ class PlanNotFound(ShapePhaseError, ArithmeticError):
 
 
 class UnphysicalInertiaWarning(UserWarning):
-    """Links whose inertia is doubtful, accepted because the caller asked so or because it does no harm."""
+    """Links whose inertia is doubtful, accepted because the caller allows it or because it does no harm."""
 
 
 class IgnoredElementWarning(UserWarning):
-    """Something a file says that a free-floating body of joints does not take up, named."""
+    """An element of a file that has no meaning for a free-floating body; the message names it."""
 
 
 class VisualWarning(UserWarning):
-    """Something of a body's looks is not shown as its file has it: a mesh, a faulty element, or a changed file."""
+    """A part of a body is not drawn as in its file: a mesh, a faulty element, or a changed file."""
 
 
 class CompiledCodeWarning(UserWarning):
