@@ -41,7 +41,7 @@ class ModelFileError(ShapePhaseError, ValueError):
 class UnphysicalInertiaError(ModelFileError):
     """A link has a mass or an inertia that no body can have.
 
-    Remedy: correct the file; where only principal moments are negative, `load_body(..., on_unphysical="warn")` takes it.
+    Remedy: correct the file; if only principal moments are negative, `load_body(..., on_unphysical="warn")` takes it.
     """
 
 
