@@ -9,11 +9,9 @@ import shutil
 import warnings
 import xml.etree.ElementTree as ElementTree
 
-import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-import trimesh
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
@@ -278,6 +276,8 @@ def test_a_body_remembers_its_file_wherever_one_goes(tmp_path, monkeypatch):
 
 def write_wedge(path):
     """A mesh that no mirror or turn takes to itself."""
+    import trimesh
+
     path.parent.mkdir(parents=True, exist_ok=True)
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]])
     faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
@@ -296,6 +296,8 @@ def write_wedge(path):
     ],
 )
 def test_meshes_are_found_around_the_urdf(tmp_path, filename, place, suffix):
+    import trimesh
+
     package = tmp_path / "wedge_description"
     write_wedge(package / (place + suffix))
     mesh = f"<visual>{TURN}<geometry><mesh filename='{filename}{suffix}' scale='0.1 -0.2 0.3'/></geometry></visual>"
@@ -410,6 +412,8 @@ MJCF = """
 
 
 def test_the_geoms_of_an_mjcf_are_where_mujoco_has_them(tmp_path):
+    import mujoco
+
     path = tmp_path / "toy.xml"
     path.write_text(MJCF)
     body = sp.load_body(path)

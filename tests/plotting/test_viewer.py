@@ -13,7 +13,6 @@ import urllib.request
 import msgspec
 import numpy as np
 import pytest
-import trimesh
 import zstandard
 from scipy.spatial.transform import Rotation
 
@@ -158,6 +157,8 @@ def test_everything_drawn_is_inside_the_bounds(righting):
     ],
 )
 def test_the_reach_is_that_of_the_corners_of_what_is_drawn(shape, half, tmp_path, load_urdf):
+    import trimesh
+
     trimesh.creation.box((0.2, 0.4, 0.6)).export(tmp_path / "box.stl")
     drawn = f'<visual><origin xyz="0 0 1"/><geometry><{shape}/></geometry></visual></link>'
     body = load_urdf(urdf(link("base", 1.0, [0.1, 0.2, 0.25], (0.0, 0.0, 1.0)).replace("</link>", drawn)))
@@ -563,6 +564,8 @@ def test_the_page_opens_in_a_browser_without_a_network_and_moves(cat_page, chrom
 @pytest.mark.parametrize(("radius", "length"), [(0.1, 0.5), (0.3, 0.01)])
 def test_capsules_are_closed_and_round(radius, length):
     """A barrel of 24 sides between two half balls: closed, facing outwards, with nearly their volume."""
+    import trimesh
+
     vertices, faces = scene_drawing._capsule(radius, length)
     drawn = trimesh.Trimesh(vertices, faces, validate=True)
     assert drawn.is_watertight

@@ -6,6 +6,7 @@ import random
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 GOOD = """<?xml version="1.0"?>
@@ -127,6 +128,7 @@ def _mjcf(name: str, old: str, new: str, said: str | None = None, at: str | None
     return _faulty(f"mjcf {name}", old, new, said, at, base=GOOD_MJCF, suffix=".xml", **rest)
 
 
+@cache
 def cases() -> list[Case]:
     """All of them; names are unique."""
     found = [
