@@ -154,7 +154,7 @@ def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
 
 
 def expansion(rate: float = 0.02) -> Scale:
-    """a = 1 + rate t, rate in 1/s: tau = t/(1 + rate t) stays below 1/rate, so that the body turns by a finite angle."""
+    """a = 1 + rate t, rate in 1/s: tau = t/(1 + rate t) stays below 1/rate, and the rotation is finite."""
     speed = positive(rate, "rate", "1/s")
     return Scale(factor=lambda t: 1.0 + speed * t, clock=lambda t: t / (1.0 + speed * t))
 

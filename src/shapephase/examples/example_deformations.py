@@ -183,7 +183,7 @@ def printed_antenna(
     coast: float = 20.0,
     on_unphysical: str = "error",
 ) -> Example:
-    """F3 and F4: the moment about axis 1 or 3 grows at a constant rate, the others are constant: example 4.5 as printed.
+    """F3 and F4: the moment about axis 1 or 3 grows at a constant rate, the others stay: example 4.5 as printed.
 
     The energy Pi.I^-1 Pi/2 falls as long as the moment grows, at half Pi_k² times the rate of 1/I_k. With axis 3, the
     largest moment, Pi stays in its regime if it circles axis 3 at the start. With axis 1, the smallest, it can pass
