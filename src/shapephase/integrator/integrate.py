@@ -223,7 +223,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     return _Integration(sampler, momentum, tolerance).solution()
 
 
-class _Growth(NamedTuple):
+class _ErrorGrowth(NamedTuple):
     """How errors grow along the motions of a batch."""
 
     amplification: Array  # (B,) from one time to a later one
@@ -259,7 +259,7 @@ class _Integration:
         share = _SAMPLING_SHARE if self._largest > 0.0 else _SAMPLING_SHARE_AT_REST
         self._sampling_target = share * tolerance
         # What earlier rounds found out: how errors grow where only the derivative shows it, and a finer plan.
-        self._growth: _Growth | None = None
+        self._error_growth: _ErrorGrowth | None = None
         self._refined: tuple[Array, Integers] | None = None  # panel ends [s], steps on each panel
 
     def solution(self) -> SteppedRotation:
@@ -286,7 +286,7 @@ class _Integration:
             # Steps so long that they overflowed: as wrong as an attitude can be.
             local = np.where(np.isfinite(local), local, np.pi)
             total = local.sum(axis=1)
-        growth = self._growth or _Growth(amplification(record.propagators), _end_propagator(record))
+        error_growth = self._error_growth or _ErrorGrowth(amplification(record.propagators), _end_propagator(record))
         rotation = SteppedRotation(
             interpolant=interpolant,
             momentum=self._momentum,
@@ -295,11 +295,11 @@ class _Integration:
             directions=record.directions,
             turns=record.turns,
             dynamics=record.dynamics,
-            sampling_error=growth.amplification * self._sampler.error(self._largest),
+            sampling_error=error_growth.amplification * self._sampler.error(self._largest),
             # Degrees that the plan took for insignificant count too.
-            stepping_error=growth.amplification * total + _INSIGNIFICANT_SHARE * self._tolerance,
-            amplification=growth.amplification,
-            propagator=growth.propagator,
+            stepping_error=error_growth.amplification * total + _INSIGNIFICANT_SHARE * self._tolerance,
+            amplification=error_growth.amplification,
+            propagator=error_growth.propagator,
         )
         return _Attempt(rotation, local)
 
@@ -315,10 +315,10 @@ class _Integration:
         else:
             planned = carried_over(interpolant, *self._refined)
         many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
-        if self._largest > 0.0 and self._growth is None and (many or (requirements.far and not short)):
-            self._growth = _growth_by_derivative(interpolant, self._momentum, self._magnitudes)
+        if self._largest > 0.0 and self._error_growth is None and (many or (requirements.far and not short)):
+            self._error_growth = _error_growth_by_derivative(interpolant, self._momentum, self._magnitudes)
             # The errors of so many steps add up and are amplified: each must be that much smaller.
-            worst = float(np.nan_to_num(self._growth.amplification).max())
+            worst = float(np.nan_to_num(self._error_growth.amplification).max())
             share = 0.01 * planned.sum() * interpolant.loops * max(1.0, worst)
             planned = requirements.first_plan(max(self._tolerance / share, _LEAST_STEP_TOLERANCE))
         return np.ceil(np.maximum(planned, least)).astype(int)
@@ -329,7 +329,7 @@ class _Integration:
         if not self._magnitudes.any():
             return integrate_steps_at_rest(channels, interpolant.loops)
         directions = _directions(self._momentum, self._magnitudes)
-        with_propagators = self._growth is None
+        with_propagators = self._error_growth is None
         return integrate_steps(
             channels, directions, self._magnitudes, interpolant.loops, with_propagators=with_propagators
         )
@@ -363,7 +363,7 @@ def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
     )
 
 
-def _growth_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> _Growth:
+def _error_growth_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> _ErrorGrowth:
     """How errors grow along a long motion, by the derivative of coarse steps.
 
     Propagators that are only nearly right would drift off over many turns; the steps' own derivative does not.
@@ -372,14 +372,14 @@ def _growth_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes:
     least = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE).least_steps()
     steps = np.ceil(np.maximum(least, 1.0)).astype(int)
     channels, directions = _stage_channels(interpolant, steps), _directions(momentum, magnitudes)
-    growth = _Growth(np.empty(len(magnitudes)), np.empty((len(magnitudes), 3, 3)))
+    error_growth = _ErrorGrowth(np.empty(len(magnitudes)), np.empty((len(magnitudes), 3, 3)))
     with np.errstate(all="ignore"):
         for row in range(len(magnitudes)):
             part = slice(row, row + 1)
             propagators = exact_propagators(channels, directions[part], magnitudes[part], interpolant.loops)
-            growth.amplification[part] = amplification(propagators)
-            growth.propagator[part] = propagators[:, -1]
-    return growth
+            error_growth.amplification[part] = amplification(propagators)
+            error_growth.propagator[part] = propagators[:, -1]
+    return error_growth
 
 
 def _end_propagator(record: StepRecord) -> Array:
