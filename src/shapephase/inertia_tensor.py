@@ -18,6 +18,12 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .errors import SingularInertiaError
 
+_WELL_CONDITIONED = 1e-3
+"""Determinant, relative to the cube of the trace, above which the condition number is at most some hundred, and so is
+the factor by which the adjugate magnifies rounding."""
+_SINGULAR = 1e-12
+"""Least ratio of the smallest to the largest moment: below it the inverse has no correct digits left."""
+
 
 def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
     """I^-1 of symmetric positive definite tensors: (..., 3, 3) -> (..., 3, 3), exactly symmetric.
@@ -32,9 +38,8 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
         adjugate, determinant = _adjugate(inertia)
         a = inertia[..., 0, 0]
         trace = np.trace(inertia, axis1=-2, axis2=-1)
-        # Above this no tensor is near-singular (the condition number is at most some hundred, and so are the digits
-        # that the adjugate loses), and the leading minors say whether it is positive.
-        safe = (determinant > 1e-3 * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
+        # The leading minors say whether such a tensor is positive definite.
+        safe = (determinant > _WELL_CONDITIONED * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
     if safe.all():
         return adjugate / determinant[..., None, None]
     return _careful_inverse(inertia, times)
@@ -60,7 +65,7 @@ def _careful_inverse(inertia: Array, times: Array | None) -> Array:
     finite = np.isfinite(flat).all(axis=(-1, -2))
     moments = np.full((len(flat), 3), np.nan)
     moments[finite] = np.linalg.eigvalsh(flat[finite])
-    bad = ~(moments[:, 0] > 1e-12 * moments[:, 2])
+    bad = ~(moments[:, 0] > _SINGULAR * moments[:, 2])
     if bad.any():
         first = int(np.argmax(bad))
         when = "" if times is None else f" at t = {np.ravel(times)[first]:.9g} s"

@@ -10,6 +10,15 @@ import numpy as np
 from .arrays import Array, finite_array
 from .errors import ShapeError
 
+_OPPOSITE = 1e-8
+"""Length of the sum of two unit vectors below which they count as opposite: half of its digits are rounding."""
+_SMALL_SINE = 1e-9
+"""Sine of half an angle below which sine and angle agree to the last digit (they differ by a sixth of its cube)."""
+_ORTHOGONAL = 1e-6
+"""Largest entry of R^T R - 1 in a rotation that a user gives: six digits, as people write them, are enough."""
+_UNIT_QUATERNION = 1e-3
+"""Farthest from 1 that the length of a user's quaternion may be: recordings keep as few as three digits."""
+
 
 def hat(vector: Array) -> Array:
     """The matrix of the cross product, hat(v) w = v x w: (..., 3) -> (..., 3, 3)."""
@@ -93,7 +102,7 @@ def between(start: Array, end: Array) -> Array:
     """
     start, end = np.broadcast_arrays(start, end)
     half = middle(start, end)
-    # In two turns of a quarter at most, so that ends nearly opposite do not leave the plane to rounding.
+    # Two turns of at most a quarter each, so that the plane is well determined also for nearly opposite ends.
     return _short_turn(half, end) @ _short_turn(start, half)
 
 
@@ -108,7 +117,7 @@ def middle(start: Array, end: Array) -> Array:
     """The unit vector halfway between two; for opposite vectors one fixed perpendicular: (..., 3)."""
     total = start + end
     length = np.linalg.norm(total, axis=-1, keepdims=True)
-    opposite = length < 1e-8
+    opposite = length < _OPPOSITE
     return np.where(opposite, perpendicular(start), total / np.where(opposite, 1.0, length))
 
 
@@ -129,7 +138,7 @@ def rotation_vector_from_quat(quat_xyzw: Array) -> Array:
     """The rotation vector with angle in [0, pi] of unit quaternions: (..., 4) -> (..., 3) [rad]."""
     quat = positive_scalar(quat_xyzw)
     sine = np.linalg.norm(quat[..., :3], axis=-1)
-    small = sine < 1e-9
+    small = sine < _SMALL_SINE
     scale = np.where(small, 2.0, 2.0 * np.arctan2(sine, quat[..., 3]) / np.where(small, 1.0, sine))
     return scale[..., None] * quat[..., :3]
 
@@ -168,7 +177,7 @@ def quat_inverse(quat_xyzw: Array) -> Array:
 
 
 def positive_scalar(quat_xyzw: Array) -> Array:
-    """The one of q and -q whose scalar part is not negative: (..., 4) -> (..., 4)."""
+    """q or -q, whichever has a scalar part that is not negative: (..., 4) -> (..., 4)."""
     return np.where(quat_xyzw[..., 3:] < 0.0, -quat_xyzw, quat_xyzw)
 
 
@@ -209,7 +218,7 @@ def rotation_argument(value: object, name: str) -> Array:
     """
     matrix = finite_array(value, name, (3, 3))  # type: ignore[arg-type]
     defect = float(np.max(np.abs(transpose(matrix) @ matrix - np.eye(3)), initial=0.0))
-    if defect > 1e-6:
+    if defect > _ORTHOGONAL:
         raise ShapeError(f"{name}: not a rotation, R^T R differs from the identity by {defect:.2g}")
     if np.any(np.linalg.det(matrix) < 0.0):
         raise ShapeError(f"{name}: a reflection (determinant -1), not a rotation")
@@ -234,6 +243,6 @@ def quat_argument(value: object, name: str) -> Array:
     quat_xyzw = finite_array(value, name, (4,))  # type: ignore[arg-type]
     length = np.linalg.norm(quat_xyzw, axis=-1)
     worst = float(np.max(np.abs(length - 1.0), initial=0.0))
-    if worst > 1e-3:
+    if worst > _UNIT_QUATERNION:
         raise ShapeError(f"{name}: a quaternion x y z w of length 1 is needed, its length differs by {worst:.3g}")
     return matrix_from_quat(normalised(quat_xyzw))

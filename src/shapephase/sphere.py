@@ -20,14 +20,12 @@ from .errors import AccuracyNotReached
 Curve = Callable[[Array], tuple[Array, Array]]
 """Times (N,) -> directions (..., N, 3) and a second vector along with them (..., N, 3)."""
 
-# Eight Gauss nodes for each piece of a curve: exact to degree 15, right to rounding where the piece bends little.
 _GAUSS = np.polynomial.legendre.leggauss(8)
-_NODES = _GAUSS[0]
-_WEIGHTS = _GAUSS[1]
-# The sixth-order Magnus formula of `transport` takes the curve at three Gauss nodes.
+"""Nodes in [-1, 1] and weights of `gauss_nodes`; exact for polynomials of degree 15."""
 _MAGNUS_NODES = np.polynomial.legendre.leggauss(3)[0]
-# Pieces are halved until two results agree; a curve that has not settled after this many is refused.
+"""Nodes in [-1, 1] of the sixth-order Magnus step in `transport`."""
 _HALVINGS = 12
+"""Most times that all steps are halved: a curve that needs steps 4096 times shorter has a kink between its edges."""
 
 
 def area_rate(reference: Array, direction: Array, direction_rate: Array) -> Array:
@@ -71,14 +69,14 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
     edges : (K + 1,) times; the curve's kinks must be among them, others may go unnoticed
     tolerance : of the area [sr]
 
-    Between an edge's arc and its chord the area is integrated with the chord's start as reference, where the area
-    form is smooth; the chords form a polygon whose area is exact. So no curve is near the singularity of the area
-    form, whatever it winds around.
+    The area between the curve and its chord, from edge to edge, is integrated with the chord's start as reference,
+    where the area form is smooth; the area of the polygon of chords is exact. So the singularity of the area form is
+    never near, whatever the curve winds around.
 
     Raises
     ------
     AccuracyNotReached
-        If halving the steps twelve times does not settle the area.
+        If the area has not converged after the steps were halved twelve times.
     """
     last = None
     for _ in range(_HALVINGS):
@@ -98,7 +96,7 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
 def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     """Parallel transport of the tangent plane along curves: the rotation F with F' = hat(u x u') F: (..., 3, 3).
 
-    It takes the curve's start to its end, and the sphere rolls along without twist; round a closed curve it is a turn
+    It takes the curve's start to its end, as the sphere rolls along without twisting; round a closed curve it is a turn
     about the start by the enclosed area.
 
     Parameters
@@ -110,7 +108,7 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     Raises
     ------
     AccuracyNotReached
-        If halving the steps twelve times does not settle it.
+        If the rotation has not converged after the steps were halved twelve times.
 
     Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
     """
@@ -141,9 +139,9 @@ def wrapped(area: Array) -> Array:
 
 
 def gauss_nodes(left: Array, right: Array) -> tuple[Array, Array]:
-    """Eight Gauss nodes in each step and their weights: (K,), (K,) -> (K, 8), (K, 8)."""
+    """Eight Gauss-Legendre nodes in each step and their weights: (K,), (K,) -> (K, 8), (K, 8)."""
     half = 0.5 * (right - left)[:, None]
-    return left[:, None] + half * (_NODES + 1.0), half * _WEIGHTS
+    return left[:, None] + half * (_GAUSS[0] + 1.0), half * _GAUSS[1]
 
 
 def far_reference(directions: Array) -> Array:

@@ -145,7 +145,7 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     directions = np.broadcast_to(orbit.direction, (count, 3))
     if orbit.rate:
         # Parametrised by the angle about the axis that is circled, because the time is infinite on the separatrix.
-        scaled = orbit.start / orbit.size / np.where(orbit.amplitudes == 0.0, 1.0, orbit.amplitudes)
+        scaled = orbit.start / orbit.magnitude / np.where(orbit.amplitudes == 0.0, 1.0, orbit.amplitudes)
         half, begin = orbit.regime == "separatrix", float(np.arctan2(scaled[1], scaled[orbit.other]))
         am = np.linspace(-0.5 * np.pi, 0.5 * np.pi, count) if half else begin + np.linspace(0.0, 2.0 * np.pi, count)
         sine, cosine = np.sin(am), np.cos(am)
@@ -154,9 +154,9 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
         directions[:, orbit.circled] = np.sqrt(cosine * cosine + orbit.complement * sine * sine)
         directions *= orbit.amplitudes
     return FrozenPolhode(
-        points=orbit.size * (directions @ top.axes.T),
+        points=orbit.magnitude * (directions @ top.axes.T),
         energy=top.energy,
-        homoclinic_energy=0.5 * orbit.size * orbit.size / float(top.moments[1]),
+        homoclinic_energy=0.5 * orbit.magnitude * orbit.magnitude / float(top.moments[1]),
         period=top.period,
         regime=top.regime,
     )

@@ -184,7 +184,7 @@ def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
         u = incomplete_f(np.linspace(-half, half, 721), top.complement)
         points = top.body_momentum((u - orbit.phase) / top.rate) @ top.axes / top.magnitude
         sphere.curve(points, "this top", **_OWN)
-    sphere.point(orbit.start / orbit.size, "t = 0", marker="*", color=GREEN, markersize=11)
+    sphere.point(orbit.start / orbit.magnitude, "t = 0", marker="*", color=GREEN, markersize=11)
 
 
 def spread_energies(moments: Array) -> Array:

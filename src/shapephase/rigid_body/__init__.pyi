@@ -4,9 +4,9 @@ from ._flow import ascending_times, flow
 from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, twist_defect
 from ._momentum_orbit import MomentumOrbit, momentum_orbit, separatrix_solid_angle
 from ._nutation import Nutation, nutation
-from .euler_angles import EulerChart, canonical_bracket, precession_rate
+from .euler_angles import ZXZ, ZYZ, EulerChart, canonical_bracket, precession_rate
 from .euler_top import EulerTop
-from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, marched, semidirect_bracket
+from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, heavy_top_steps, semidirect_bracket
 from .lagrange_top import (
     LagrangeTop,
     SleepingTop,
@@ -26,6 +26,8 @@ from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference
 from .stability import SteadyRotation, steady_rotation, steady_rotations
 
 __all__ = [
+    "ZXZ",
+    "ZYZ",
     "AndoyerPendulum",
     "Closure",
     "Cones",
@@ -57,10 +59,10 @@ __all__ = [
     "geodesics",
     "half_twist",
     "half_twist_from_tilt",
+    "heavy_top_steps",
     "heteroclinics",
     "inverse_difference",
     "lie",
-    "marched",
     "momentum_orbit",
     "nutation",
     "polhodes",

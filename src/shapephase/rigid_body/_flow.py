@@ -1,4 +1,4 @@
-"""The flow of a smooth vector field at given times, near rounding."""
+"""The flow of a smooth vector field at given times, accurate nearly to rounding."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 
 _TOLERANCE = 3e-14
-"""Relative tolerance of a step, near the least that SciPy takes."""
+"""Relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value."""
 _STEPS = 20_000
-"""Most steps between two times; a motion that needs more is stiff, and no task for an explicit method."""
+"""Most steps from one time to the next; a motion that needs more is too stiff for an explicit method."""
 
 
 def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Array | float | None = None) -> Array:
@@ -26,10 +26,11 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
     rate : (..., d) -> (..., d), smooth
     start : (..., d), all integrated together
     times : (N,) strictly ascending, as `ascending_times` returns them
-    scale : the size of y to which the tolerance 3e-14 refers, broadcast to start; None: that of each vector of it
+    scale : magnitude of y that the tolerance 3e-14 is relative to, broadcast to start; None: the largest entry of
+        each vector of start
 
-    Every time is the end of a step, so that no error of interpolation enters. The error in phase grows with the square
-    of the time: along a tumbling body 1e-11 over ten periods, 1e-9 over eighty.
+    Every time is the end of a step, so no interpolation error enters. The error in phase grows with the square of the
+    time: for a tumbling body it is 1e-11 after ten periods and 1e-9 after eighty.
 
     Raises
     ------
@@ -41,9 +42,9 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
     shape, out = start.shape, [start]
     if not start.size:
         return np.zeros((*shape[:-1], len(times), shape[-1]))
-    size = np.abs(start).max(axis=-1, keepdims=True) if scale is None else scale
-    absolute: Any = _TOLERANCE * np.maximum(np.broadcast_to(size, shape).ravel(), np.finfo(float).tiny)
-    state, pace = start.ravel(), None
+    magnitude = np.abs(start).max(axis=-1, keepdims=True) if scale is None else scale
+    absolute: Any = _TOLERANCE * np.maximum(np.broadcast_to(magnitude, shape).ravel(), np.finfo(float).tiny)
+    state, next_step = start.ravel(), None
 
     def slope(_: float, flat: Array) -> Array:
         return rate(flat.reshape(shape)).ravel()
@@ -51,27 +52,27 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
     for left, right in pairwise(times):
         with np.errstate(all="ignore"):
             if not np.isfinite(slope(left, state)).all():
-                raise AccuracyNotReached(f"the motion has no finite rate at t = {left:.9g}; its numbers are too large")
-            first = None if pace is None else min(pace, right - left)
+                raise AccuracyNotReached(f"the motion has no finite rate at t = {left:.9g}; its values are too large")
+            first = None if next_step is None else min(next_step, right - left)
             solver = DOP853(slope, left, state, right, rtol=_TOLERANCE, atol=absolute, first_step=first)
             steps = 0
             while solver.status == "running" and steps < _STEPS:
                 solver.step()
-                # The step that ends here was cut short; its proposal for the next one is the natural pace.
-                pace, steps = solver.h_abs, steps + 1
+                # The last step was cut short by the end time; the step proposed after it was not.
+                next_step, steps = solver.h_abs, steps + 1
         state = solver.y
         if solver.status != "finished" or not np.isfinite(state).all():
             raise AccuracyNotReached(
                 f"the motion cannot be followed beyond t = {solver.t:.9g}: it grows without bound, is too rough, or "
-                f"takes more than {_STEPS} steps from one time to the next; ask for times before that, or more of them"
+                f"takes more than {_STEPS} steps from one time to the next; give earlier times, or more of them"
             )
         out.append(state.reshape(shape))
     return np.stack(out, axis=-2)
 
 
 def ascending_times(times: ArrayLike) -> Array:
-    """A user's times: (N,), strictly ascending, at least one. Raises ShapeError."""
+    """A user's times, checked: (N,), strictly ascending, at least one. Raises ShapeError."""
     array = finite_array(times, "times", (None,))
     if array.ndim != 1 or not array.size or np.any(np.diff(array) <= 0.0):
-        raise ShapeError("times: strictly ascending times (N,) are needed, the first is that of the start")
+        raise ShapeError("times: expected strictly ascending times (N,), the first one that of the start")
     return array

@@ -1,6 +1,7 @@
 """Flips of a body that spins about its intermediate axis: the half twist (Dzhanibekov) and the tennis racket.
 
-Body axes are principal axes; moments and momentum are taken as exact, so times are right however near the separatrix.
+Body axes are principal axes. Moments and momentum are taken as exact, so that times are accurate however near the
+separatrix is.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from ..arrays import Array, common_shape, finite_array
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import ascending_moments
+from ..roots import root
 from ._momentum_orbit import momentum_orbit
 
 
@@ -45,7 +47,7 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     """Time between the flips of a free rigid body, from its principal moments and its body momentum.
 
     Between two flips Pi circles the axis of the largest or of the smallest moment by half a turn, 2K of the elliptic
-    functions. The tilt off the separatrix is found without rounding; parts of Pi below 1e-140 count as zero.
+    functions. The distance from the separatrix is computed without rounding; parts of Pi below 1e-140 count as zero.
 
     Parameters
     ----------
@@ -68,7 +70,8 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     vector = np.take_along_axis(vector, order, -1)
     rows = [_flip(i, x) for i, x in zip(inertia.reshape(-1, 3), vector.reshape(-1, 3))]
     table = np.array(rows, dtype=float).reshape(*inertia.shape[:-1], 5)
-    return HalfTwist(*(table[..., k][()] for k in range(5)))
+    time, asymptote, complement, rate, growth_rate = (table[..., k][()] for k in range(5))
+    return HalfTwist(time=time, asymptote=asymptote, complement=complement, rate=rate, growth_rate=growth_rate)
 
 
 def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLike, azimuth: ArrayLike) -> HalfTwist:
@@ -87,12 +90,12 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
         As `half_twist`.
     """
     inertia, _, _ = ascending_moments(_moments(moments))
-    size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
-    lean, towards = finite_array(tilt, "tilt", unit="rad"), finite_array(azimuth, "azimuth", unit="rad")
-    common_shape(magnitude=size, tilt=lean, azimuth=towards)
-    size, lean, towards = np.broadcast_arrays(size, lean, towards)
-    across = size * np.sin(lean)
-    momentum = np.stack([across * np.cos(towards), size * np.cos(lean), across * np.sin(towards)], axis=-1)
+    norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
+    polar, around = finite_array(tilt, "tilt", unit="rad"), finite_array(azimuth, "azimuth", unit="rad")
+    common_shape(magnitude=norm, tilt=polar, azimuth=around)
+    norm, polar, around = np.broadcast_arrays(norm, polar, around)
+    across = norm * np.sin(polar)
+    momentum = np.stack([across * np.cos(around), norm * np.cos(polar), across * np.sin(around)], axis=-1)
     return half_twist(inertia, momentum)
 
 
@@ -112,7 +115,7 @@ def twist_defect(moments: ArrayLike) -> Array:
 
     Returns
     -------
-    (...) eps in (0, pi/2) [rad]; a value below 1e-308 comes as 0
+    (...) eps in (0, pi/2) [rad]; 0 where it would be below 1e-308
 
     Raises
     ------
@@ -127,36 +130,33 @@ def twist_defect(moments: ArrayLike) -> Array:
         raise ShapeError("moments: two are equal; a tennis racket needs three different principal moments")
     a, b = (middle - low) / low, (high - middle) / high
     share, scale = b / (a + b), np.sqrt(a * b)
-    # By w = arsinh(sqrt(a/(a + b)) cot eps), the value of the artanh: no digits are lost however small eps is.
     lower, upper = scale * np.pi, scale * (np.pi + np.arcsin(np.sqrt(share)))
-    for _ in range(60):
-        w = 0.5 * (lower + upper)
-        sine = _sine(a, b, w)
-        short = w < scale * (np.pi + np.arctan2(np.sqrt(share * (1.0 - sine * sine)), _rest(share, sine)))
-        lower, upper = np.where(short, w, lower), np.where(short, upper, w)
-    w = 0.5 * (lower + upper)
-    return np.arctan2(np.sqrt(a) * _fade(w), np.sqrt(a + b))[()]
+
+    # The unknown is the value w of the artanh, sinh w = sqrt(a/(a + b)) cot eps: no digits are lost however small eps.
+    def newton(w: Array) -> tuple[Array, Array]:
+        tangent = np.sqrt(a / (a + b)) * _reciprocal_sinh(w)
+        cosine = 1.0 / np.hypot(1.0, tangent)
+        sine = tangent * cosine
+        # The arcsin is of sqrt(share) cos eps; its sine's complement is free of cancellation in this form.
+        complement = np.sqrt(1.0 - share + share * sine * sine)
+        value = w - scale * (np.pi + np.arctan2(np.sqrt(share) * cosine, complement))
+        slope = 1.0 - scale * np.sqrt(share) * sine * sine * cosine / (complement * np.tanh(w))
+        return value, w - value / slope
+
+    w = root(newton, 0.5 * (lower + upper), lower, upper)
+    return np.arctan2(np.sqrt(a) * _reciprocal_sinh(w), np.sqrt(a + b))[()]
 
 
-def _fade(w: Array) -> Array:
+def _reciprocal_sinh(w: Array) -> Array:
     """1/sinh w, without overflow."""
     return 2.0 * np.exp(-w) / -np.expm1(-2.0 * w)
-
-
-def _sine(a: Array, b: Array, w: Array) -> Array:
-    tangent = np.sqrt(a / (a + b)) * _fade(w)
-    return tangent / np.hypot(1.0, tangent)
-
-
-def _rest(share: Array, sine: Array) -> Array:
-    return np.sqrt(1.0 - share + share * sine * sine)
 
 
 def _flip(moments: Array, momentum: Array) -> tuple[float, float, float, float, float]:
     """Time, asymptote, complement, rate and growth rate of one top, moments ascending."""
     low, middle, high = moments.tolist()
     orbit = momentum_orbit(moments, momentum)
-    growth = orbit.size * math.sqrt((middle - low) / low * ((high - middle) / high)) / middle
+    growth = orbit.magnitude * math.sqrt((middle - low) / low * ((high - middle) / high)) / middle
     m1, rate = orbit.complement, orbit.rate
     asymptote = math.log(16.0 / m1) / growth if m1 and growth else math.inf
     turns_over = rate > 0.0 and orbit.regime != "steady"

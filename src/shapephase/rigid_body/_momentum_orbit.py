@@ -5,9 +5,9 @@ positive and 1 where it is negative (L = |Pi|, E the energy; a is the other one 
 
     Pi_k = ± A_k dn(u),  Pi_a = ± A_a cn(u),  Pi_2 = ± A_2 sn(u),  u = rate t + u0,
 
-with the complementary parameter m1 proportional to |D|. Everything near the separatrix hangs on D, a difference: it is
-found in rational arithmetic, once, so that moments and momentum given as doubles are answered to rounding on both sides
-of the separatrix and on it.
+with the complementary parameter m1 proportional to |D|. Near the separatrix everything depends on D, a difference. It
+is computed once, in rational arithmetic, so that for moments and momentum given as doubles the results are accurate to
+rounding on the separatrix and on both sides of it.
 
 Sources: Jacobi 1850; Marsden and Ratiu, section 15.8, whose I1 >= I2 >= I3 are our I3, I2, I1, corrected
 according to theory.md M-E1, M-E2, M-E7.
@@ -27,6 +27,7 @@ from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 
 _NEGLIGIBLE = 1e-140
+"""Components of Pi below this (in units of its own power of two) count as zero: squares of smaller ones underflow."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +38,11 @@ class MomentumOrbit:
     ----------
     moments : (3,) ascending [kg m^2]
     start : (3,) Pi at t = 0 [kg m^2/s]
-    size : |Pi|
+    magnitude : |Pi| [kg m^2/s]
     regime : "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"
     circled, other : the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles nothing
     direction : (3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing
-    amplitudes : (3,) signed, relative to the size
+    amplitudes : (3,) signed, of Pi/|Pi|
     rate : of u [rad/s]; 0 where Pi circles nothing
     complement : m1
     phase : u0
@@ -55,7 +56,7 @@ class MomentumOrbit:
 
     moments: Array
     start: Array
-    size: float
+    magnitude: float
     regime: str
     circled: int
     other: int
@@ -76,7 +77,7 @@ class MomentumOrbit:
         return self._direction(*elliptic.jacobi(u, self.complement)[:3])
 
     def directions_and_swing(self, u: Array) -> tuple[Array, Array]:
-        """Pi/|Pi|, and what the angle psi of `EulerTop` has beside spin t: (...) -> (..., 3), (...) [rad]."""
+        """Pi/|Pi|, and the angle psi of `EulerTop` less its steady part spin t: (...) -> (..., 3), (...) [rad]."""
         sn, cn, dn, amplitude, third = elliptic.jacobi_and_pi_excess(self.characteristic, u, self.complement)
         q = np.sqrt(1.0 - self.characteristic)
         # arctan(q tan am), continued along am: the azimuth of Pi round ê, without its sign.
@@ -85,7 +86,7 @@ class MomentumOrbit:
 
     @property
     def third_kind(self) -> float:
-        """What psi + sense azimuth gains in a period beside spin t [rad]."""
+        """What psi + sense azimuth gains in a period in excess of spin t [rad]."""
         return 4.0 * self.precession * float(elliptic.complete_pi_excess(self.characteristic, self.complement))
 
     def _direction(self, sn: Array, cn: Array, dn: Array) -> Array:
@@ -103,14 +104,14 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
 
     Components below 1e-140 of the momentum are taken as zero.
     """
-    size = float(np.linalg.norm(start))
+    magnitude = float(np.linalg.norm(start))
     # Powers of two, so that squares neither overflow nor round.
-    momentum_unit, inertia_unit = np.exp2(np.frexp([size or 1.0, moments[2]])[1])
+    momentum_unit, inertia_unit = np.exp2(np.frexp([magnitude or 1.0, moments[2]])[1])
     x = start / momentum_unit
     x = np.where(np.abs(x) < _NEGLIGIBLE, 0.0, x)
     i1, i2, i3 = i = (moments / inertia_unit).tolist()
-    if not size or i1 == i3 or not (x[0] or x[2]) or (i1 == i2 and not x[2]) or (i2 == i3 and not x[0]):
-        return _still(moments, start, size)
+    if not magnitude or i1 == i3 or not (x[0] or x[2]) or (i1 == i2 and not x[2]) or (i2 == i3 and not x[0]):
+        return _stationary_orbit(moments, start, magnitude)
     separation = _separation(i, x)
     k, a = (2, 0) if separation >= 0 else (0, 2)
     ends, inner, outer = i3 - i1, abs(i[k] - i2), abs(i2 - i[a])
@@ -119,13 +120,13 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
     near = x[a] ** 2 * ends / i[a] + x[1] ** 2 * inner / i2
     m1 = min(1.0, float(abs(separation) * Fraction(ends) / (Fraction(far) * Fraction(inner))))
     length = float(np.linalg.norm(x))
-    # Of m1, for a change of x by one part of its length in any direction, as rounding turns the axes.
+    # The change of m1 for a relative change of x in any direction, such as rounding of the axes brings.
     slope = length * (abs(x[2]) * (i3 - i2) / i3 + abs(x[0]) * (i2 - i1) / i1) * ends / (far * inner)
     scale = float(momentum_unit / inertia_unit)
     amplitudes, direction = np.empty(3), np.zeros(3)
     amplitudes[k] = np.copysign(np.sqrt(i[k] * far / ends), x[k])
     amplitudes[a] = np.copysign(np.sqrt(i[a] * near / ends), x[a])
-    # By Euler's second equation; the signs and not the product, which may underflow.
+    # The sign follows from Euler's second equation; a product of signs, as that of x[0] and x[2] may underflow.
     amplitudes[1] = np.copysign(np.sqrt(i2 * near / inner), np.copysign(1.0, x[0]) * np.copysign(1.0, x[2]))
     direction[k] = np.copysign(1.0, x[k])
     sine, cosine = (x[1] / amplitudes[1], x[a] / amplitudes[a]) if near else (0.0, 1.0)
@@ -134,7 +135,7 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
     return MomentumOrbit(
         moments=moments,
         start=start,
-        size=size,
+        magnitude=magnitude,
         regime="steady" if not near else "axisymmetric" if axisymmetric else "circling" if m1 else "separatrix",
         circled=k,
         other=a,
@@ -144,7 +145,7 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
         complement=m1,
         phase=float(elliptic.argument_of(sine, cosine, m1)),
         characteristic=-i[k] * outer / (i[a] * inner),
-        spin=size / float(moments[1]),
+        spin=magnitude / float(moments[1]),
         excess=-float(separation) / (i2 * length) * scale,
         precession=length * (i[k] - i[a]) / (i[k] * i[a]) / rate,
         sense=1.0 if k == 2 else -1.0,
@@ -180,15 +181,15 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     return 4.0 * float(np.arctan2(own, opposite))
 
 
-def _still(moments: Array, start: Array, size: float) -> MomentumOrbit:
-    """Pi stands still in the body, and the body turns about it."""
-    direction = start / size if size else np.zeros(3)
-    unstable = bool(size) and bool(moments[0] < moments[1] < moments[2])
+def _stationary_orbit(moments: Array, start: Array, magnitude: float) -> MomentumOrbit:
+    """Pi is constant in the body, which turns about it, and circles nothing."""
+    direction = start / magnitude if magnitude else np.zeros(3)
+    unstable = bool(magnitude) and bool(moments[0] < moments[1] < moments[2])
     return MomentumOrbit(
         moments=moments,
         start=start,
-        size=size,
-        regime="rest" if not size else "spherical" if moments[0] == moments[2] else "steady",
+        magnitude=magnitude,
+        regime="rest" if not magnitude else "spherical" if moments[0] == moments[2] else "steady",
         circled=-1,
         other=-1,
         direction=direction,
@@ -197,7 +198,7 @@ def _still(moments: Array, start: Array, size: float) -> MomentumOrbit:
         complement=0.0 if unstable else 1.0,
         phase=0.0,
         characteristic=0.0,
-        spin=float(np.sum(direction**2 / moments)) * size,
+        spin=float(np.sum(direction**2 / moments)) * magnitude,
         excess=0.0,
         precession=0.0,
         sense=0.0,
@@ -206,6 +207,6 @@ def _still(moments: Array, start: Array, size: float) -> MomentumOrbit:
 
 
 def _separation(moments: list[float], x: Array) -> Fraction:
-    """L² − 2 E I2 without rounding: its sign tells the axis circled, and it vanishes on the separatrix."""
+    """L² − 2 E I2 without rounding: its sign says which axis is circled, and it vanishes on the separatrix."""
     i1, i2, i3 = map(Fraction, moments)
     return Fraction(float(x[2])) ** 2 * (i3 - i2) / i3 - Fraction(float(x[0])) ** 2 * (i2 - i1) / i1

@@ -15,6 +15,9 @@ from ..elliptic import complete_k, incomplete_f, jacobi
 from ..errors import ShapeError
 from .lagrange_top import LagrangeTop
 
+_UNIT = 1e-6
+"""Farthest from 1 that the length of a vertical may be: six digits, as people write them, are enough."""
+
 
 @dataclass(frozen=True)
 class Nutation:
@@ -23,7 +26,7 @@ class Nutation:
     Attributes
     ----------
     lowest, highest : the range of cos(theta)
-    third_root : the root of the cubic above it, >= 1
+    third_root : the root of the cubic above this range, >= 1
     rate : argument of the elliptic functions per second [rad/s]
     complement : m1 = 1 - k^2
     period : 2K/rate; infinite where the axis only approaches the vertical [s]
@@ -47,8 +50,8 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     """The height u = Gamma_3 = cos(theta) of the top's axis in closed form.
 
     u'^2 is a cubic in u with roots u1 <= u2 <= 1 <= u3; u = u1 + (u2 - u1) sn^2 with k^2 = (u2 - u1)/(u3 - u1).
-    Steady precession and the upright spin are double roots: next to one the digits of 1 - k^2 are those that the
-    initial values have of the distance from it.
+    Steady precession and the upright spin are double roots. Next to one of them 1 - k^2 has as many digits as the
+    initial values determine of the distance from it.
 
     Parameters
     ----------
@@ -68,13 +71,13 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     if body.shape != (3,) or up.shape != (3,):
         raise ShapeError(f"momentum (3,) and gamma (3,) are needed, got {body.shape}, {up.shape}")
     length = float(np.linalg.norm(up))
-    if abs(length - 1.0) > 1e-6:
+    if abs(length - 1.0) > _UNIT:
         raise ShapeError(f"gamma: the vertical must have length 1, got {length:.6g}")
     return _nutation(top, body, up / length)
 
 
 def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
-    """The cubic is formed in w = u - u(0), where its coefficients have no cancelling terms."""
+    """The closed form, from the cubic in w = u - u(0): there the terms of its coefficients do not cancel."""
     i1, height = top.transverse, float(gamma[2])
     beta, spin = 2.0 * top.mgl / i1, float(momentum[2]) / i1
     speed = float(momentum[0] ** 2 + momentum[1] ** 2) / i1**2
@@ -95,11 +98,11 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
     width = high - low
     rate = float(np.sqrt(0.25 * beta * (third - low)))
     if width == 0.0 or third == low:
-        return Nutation(height, height, height + third, rate, 1.0, np.inf, 0.0)
+        return _without_nutation(height, third, rate)
     complement = (third - high) / (third - low)
     amplitude = np.copysign(np.arctan2(np.sqrt(-low), np.sqrt(high)), climb)
     if complement == 0.0 and abs(amplitude) >= 0.5 * np.pi:
-        return Nutation(height, height, height + third, rate, 1.0, np.inf, 0.0)
+        return _without_nutation(height, third, rate)
     return Nutation(
         lowest=height + low,
         highest=height + high,
@@ -111,11 +114,24 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
     )
 
 
+def _without_nutation(height: float, third: float, rate: float) -> Nutation:
+    """The axis stays at its height: steady precession, or the approach to the vertical that rounding cannot resolve."""
+    return Nutation(
+        lowest=height,
+        highest=height,
+        third_root=height + third,
+        rate=rate,
+        complement=1.0,
+        period=np.inf,
+        _phase=0.0,
+    )
+
+
 def _three_real_roots(cubic: Array) -> tuple[float, float, float]:
     """Ascending roots of a cubic that has three real ones.
 
     The root farthest from the others is simple and found to rounding; it is divided out from the end that loses no
-    digits, so the other two are right relative to their own size also where both are tiny.
+    digits, so the other two are accurate relative to their own magnitude even where both are tiny.
     """
     lead, second, first, last = cubic.tolist()
     slope, start = np.polyder(cubic), np.sort(np.roots(cubic).real)

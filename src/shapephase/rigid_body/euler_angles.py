@@ -1,13 +1,13 @@
 """Euler angles of the free rigid body: attitudes, rates, conjugate momenta, energy and Hamilton's equations.
 
-Two charts of SO(3), one code. Angles are (phi, theta, psi) in the order of the factors of the attitude:
-`ZXZ`, R = R_z(phi) R_x(theta) R_z(psi), of Marsden and Ratiu, and `ZYZ`, R = R_z(phi) R_y(theta) R_z(psi), of Bonnard
-et al. (their phi_1, phi_2, phi_3). They differ in the axis of the middle turn only, the line of nodes.
+Both charts of SO(3) are computed by the same formulas. Angles are (phi, theta, psi) in the order of the factors of the
+attitude: `ZXZ`, R = R_z(phi) R_x(theta) R_z(psi), of Marsden and Ratiu, and `ZYZ`, R = R_z(phi) R_y(theta) R_z(psi), of
+Bonnard et al. (their phi_1, phi_2, phi_3). They differ in the axis of the middle turn only, the line of nodes.
 
 A chart is regular for 0 < theta < pi. At its poles, theta = 0 and pi, phi and psi turn about one line: an attitude
-still has angles there (see `EulerChart.angles`), and rates still give an angular velocity; but no rates belong to some
-velocities, and (phi, theta, psi) and their momenta are no coordinates. What needs them is refused within 1e-8 of a
-pole, where half of the digits are gone, with `ChartPoleError`.
+still has angles there (see `EulerChart.angles`), and rates still give an angular velocity; but some velocities have no
+rates, and (phi, theta, psi) and their momenta are not coordinates. Functions that need coordinates raise
+`ChartPoleError` within 1e-8 of a pole, where half of the digits are gone.
 
 Sources: Marsden and Ratiu, sections 15.6 and 15.7 (whose (15.6.6) gives the inverse of the attitude); Bonnard, Cots and
 Shcherbakova 2013, section 3.3 (whose H_3 has the wrong sign); theory.md J1 to J10.
@@ -27,7 +27,9 @@ from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
 
 _NEAREST = 1e-8
-_AT_POLE = 1e-15  # sine of half the angle to a pole; an attitude's rounding is as large
+"""Sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits."""
+_AT_POLE = 1e-15
+"""Sine of half the angle to a pole, up to which an attitude is at it: the rounding of an attitude is as large."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,8 @@ class EulerChart:
     def angles(self, attitude: ArrayLike) -> Array:
         """Angles of an attitude, theta in [0, pi], phi and psi in (-pi, pi]: (..., 3, 3) -> (..., 3) [rad].
 
-        At a pole, as far as rounding can tell, theta is exactly 0 or pi (as rounded), psi is 0 and phi takes the whole
-        turn: phi + psi, or at pi phi - psi, is what the attitude determines.
+        At a pole, to rounding, theta is exactly 0 or pi (as rounded), psi is 0 and phi takes the whole turn: there the
+        attitude determines phi + psi, or at pi phi - psi, alone.
 
         Raises
         ------
@@ -73,15 +75,15 @@ class EulerChart:
     def continuous_angles(self, attitudes: ArrayLike) -> Array:
         """Angles of successive attitudes, phi and psi unwrapped along them: (..., N, 3, 3) -> (..., N, 3) [rad].
 
-        phi + psi and phi - psi are each followed to the nearest value. Past theta = 0 only the first, past pi only the
-        second is known well, and there phi and psi may jump by half turns that leave the attitude as it is. Samples at
-        a pole keep the other combination of the sample before. Successive attitudes must be less than half a turn
-        apart.
+        phi + psi and phi - psi are each followed to the nearest value. Next to theta = 0 only the first, next to pi
+        only the second is well determined, and there phi and psi may jump by half turns that do not change the
+        attitude. Samples at a pole keep the other combination from the sample before. Successive attitudes must be
+        less than half a turn apart.
 
         Raises
         ------
         ShapeError
-            If there is no axis of samples, or a matrix is no rotation.
+            If there is no axis of samples, or a matrix is not a rotation.
         """
         matrices = finite_array(attitudes, "attitudes", (None, 3, 3))
         if matrices.shape[-3] == 0:
@@ -91,9 +93,11 @@ class EulerChart:
         flips = np.sum(quat[..., 1:, :] * quat[..., :-1, :], axis=-1) < 0.0
         flipped = np.cumsum(np.pad(flips, [(0, 0)] * (flips.ndim - 1) + [(1, 0)]), axis=-1) % 2 == 1
         # The other sign of a quaternion adds a half turn to both half sums.
-        half_sum = np.unwrap(_held(half_sum + np.pi * flipped, pole & (theta > 0.0), half_difference), axis=-1)
+        half_sum = np.unwrap(
+            _filled_forward(half_sum + np.pi * flipped, pole & (theta > 0.0), half_difference), axis=-1
+        )
         half_difference = np.unwrap(
-            _held(half_difference + np.pi * flipped, pole & (theta == 0.0), half_sum[..., :1]), axis=-1
+            _filled_forward(half_difference + np.pi * flipped, pole & (theta == 0.0), half_sum[..., :1]), axis=-1
         )
         return np.stack([half_sum + half_difference, theta, half_sum - half_difference], axis=-1)
 
@@ -324,7 +328,7 @@ class EulerChart:
             where = tuple(int(i) for i in np.argwhere(bad)[0])
             raise ChartPoleError(
                 f"angles: entry {list(where)} has theta = {angles[where][1]:.17g}, a pole of the {self.name.upper()} "
-                f"chart to {_NEAREST:g}, where the angles are no coordinates; turn the inertial or the body axes by a "
+                f"chart to {_NEAREST:g}, where the angles are not coordinates; turn the inertial or the body axes by a "
                 "constant rotation, or use attitudes and body momenta"
             )
 
@@ -346,12 +350,12 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     ChartPoleError
         If the body's third axis is within 1e-8 of the momentum's line.
 
-    Source: Bonnard et al. (4), the last form, which has no case to distinguish.
+    Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
     """
     momentum, velocity = _pair(body_momentum, angular_velocity, "angular_velocity", "rad/s", first="body_momentum")
-    size = np.linalg.norm(momentum, axis=-1)
+    magnitude = np.linalg.norm(momentum, axis=-1)
     across = np.hypot(momentum[..., 0], momentum[..., 1])
-    bad = across <= _NEAREST * size
+    bad = across <= _NEAREST * magnitude
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         raise ChartPoleError(
@@ -359,7 +363,7 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
             "then undefined; turn the body axes, so that another axis is the third"
         )
     unit = momentum[..., :2] / across[..., None]
-    return size * _dot(unit, velocity[..., :2]) / across
+    return magnitude * _dot(unit, velocity[..., :2]) / across
 
 
 def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
@@ -408,7 +412,7 @@ def _same_batch(**arrays: Array) -> tuple[int, ...]:
         raise ShapeError(f"{shapes}: the leading axes cannot be broadcast together") from None
 
 
-def _held(values: Array, unknown: Mask, start: Array) -> Array:
+def _filled_forward(values: Array, unknown: Mask, start: Array) -> Array:
     """The last known value in place of each unknown one; `start` holds the first, should that be unknown."""
     filled = np.where(unknown & (np.arange(values.shape[-1]) == 0), start[..., :1], values)
     known = np.where(unknown, 0, np.arange(values.shape[-1]))

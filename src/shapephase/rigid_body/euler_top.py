@@ -8,10 +8,10 @@ where Q(t) is the shortest turn that takes the direction of Pi to ê, never fart
 
     psi' = L/I_k + (2 E/L − L/I_k)/(1 + ê.Pi/L),
 
-whose integral is L t/I_2 and Legendre's third kind of a characteristic n <= 0 without the part that grows evenly. There
-are no Euler angles and so no poles, and one path for every case.
+whose integral is L t/I_2 plus a Legendre integral of the third kind, of characteristic n <= 0, less the part of it that
+grows in proportion to t. No Euler angles enter, so there are no poles and one formula serves every case.
 
-Sources: Marsden and Ratiu, exercise 15.8-1; van Zon and Schofield 2007 for what others do; theory.md D17, H.
+Sources: Marsden and Ratiu, exercise 15.8-1; compare van Zon and Schofield 2007; theory.md D17, H.
 """
 
 from __future__ import annotations
@@ -27,8 +27,12 @@ from ..inertia_tensor import ascending_moments, principal_axes
 from ._momentum_orbit import MomentumOrbit, momentum_orbit
 
 _TURNS = 1e12
-_EPS = float(np.finfo(float).eps)
+"""Turns of the body [1] after which times are refused: twelve of the sixteen digits of the phase are gone by then."""
+_EQUAL = 4.0 * float(np.finfo(float).eps)
+"""Moments of a tensor that is not diagonal closer than this, relative to the largest, count as equal: `eigh` errs by
+as much."""
 _BLOCK = 16_384
+"""Times evaluated together: the arrays of so many (half a megabyte each) stay in a processor's cache."""
 
 
 class EulerTop:
@@ -53,7 +57,7 @@ class EulerTop:
     Raises
     ------
     ShapeError
-        For arrays of the wrong shape or entries that are no finite numbers.
+        For arrays of the wrong shape or entries that are not finite numbers.
     UnphysicalInertiaError, SingularInertiaError
         If the inertia is not symmetric, or not positive definite.
     """
@@ -73,7 +77,7 @@ class EulerTop:
 
     @classmethod
     def principal(cls, moments: ArrayLike, momentum: ArrayLike, attitude: ArrayLike | None = None) -> EulerTop:
-        """A body whose axes are its principal axes, with its momentum in those: nothing is rounded on the way in.
+        """A body whose axes are its principal axes, with its momentum along them, so that no rounding enters.
 
         Parameters
         ----------
@@ -92,11 +96,11 @@ class EulerTop:
         self.inertia, self.momentum, self.initial_attitude = inertia, momentum, attitude
         self.moments, self.axes = _principal(inertia)
         self.orbit = orbit = momentum_orbit(self.moments, self.axes.T @ body_momentum)
-        # What stands left and right of exp(psi ê) Q(t) stays as it is: one linear map of quaternions.
+        # The factors left and right of exp(psi ê) Q(t) are constant: together they are one linear map of quaternions.
         ends = so3.quat_from_matrix(self.axes)
         outward = so3.quat_product(so3.quat_from_matrix(attitude), ends)
         left = so3.quat_product(
-            outward, so3.quat_inverse(so3.normalised(_carried(orbit, np.zeros(()), np.asarray(orbit.phase))))
+            outward, so3.quat_inverse(so3.normalised(_precessing_frame(orbit, np.zeros(()), np.asarray(orbit.phase))))
         )
         columns = so3.quat_product(np.eye(4), np.broadcast_to(so3.quat_inverse(ends), (4, 4)))
         self._around = so3.quat_product(np.broadcast_to(left, (4, 4)), columns)
@@ -108,7 +112,7 @@ class EulerTop:
     def body_momentum(self, t: ArrayLike) -> Array:
         """Pi(t): times (...) of either sign -> (..., 3), body axes [kg m^2/s]."""
         orbit = self.orbit
-        return orbit.size * (orbit.directions(self._argument(t)[1]) @ self.axes.T)
+        return orbit.magnitude * (orbit.directions(self._argument(t)[1]) @ self.axes.T)
 
     def angular_velocity(self, t: ArrayLike) -> Array:
         """omega(t) = I^-1 Pi(t): times (...) -> (..., 3), body axes [rad/s]."""
@@ -125,7 +129,7 @@ class EulerTop:
     @property
     def magnitude(self) -> float:
         """|Pi| [kg m^2/s]."""
-        return self.orbit.size
+        return self.orbit.magnitude
 
     @property
     def energy(self) -> float:
@@ -153,7 +157,7 @@ class EulerTop:
 
     @property
     def rate(self) -> float:
-        """Of the argument of the elliptic functions [rad/s]; 0 where Pi stands still and circles nothing."""
+        """Rate of the argument of the elliptic functions [rad/s]; 0 where Pi stands still and circles nothing."""
         return self.orbit.rate
 
     @property
@@ -163,24 +167,24 @@ class EulerTop:
 
     @property
     def complement(self) -> float:
-        """m1 = 1 − k², right in all its digits, however small; from 0 on the separatrix to 1 next to the axis."""
+        """m1 = 1 − k², accurate in all its digits however small; from 0 on the separatrix to 1 next to the axis."""
         return self.orbit.complement
 
     @property
     def condition(self) -> float:
         """How much a change of inertia or momentum, relative to its largest entry, is magnified in each half turn.
 
-        I3/I1 or more; about 1/m1 near the separatrix, infinite on it and along the intermediate axis. What was rounded
-        before it came here (a tensor turned out of its principal axes, say) is magnified so.
+        I3/I1 or more; about 1/m1 near the separatrix, infinite on it and along the intermediate axis. Rounding of the
+        input is magnified by it, such as that of a tensor given in other axes than the principal ones.
         """
         return self.orbit.condition
 
     @property
     def period(self) -> float:
-        """4 K/rate, after which Pi comes back [s].
+        """4 K/rate, after which Pi is what it was [s].
 
-        Infinite on the separatrix and where Pi stands still and circles nothing; along the axes of the largest and
-        the smallest moment that of the small circles nearby.
+        Infinite on the separatrix and where Pi stands still and circles nothing; along the axes of the largest and the
+        smallest moment the period of the small circles nearby.
 
         Source: theory.md H7.
         """
@@ -196,9 +200,9 @@ class EulerTop:
 
     @property
     def solid_angle(self) -> float:
-        """The signed area that the direction of Pi goes round in a period, in the body, on the side of `axis` [sr].
+        """The signed area that the direction of Pi encloses in a period, in the body, on the side of `axis` [sr].
 
-        Between −2 pi and 2 pi; negative about the axis of the smallest moment, which Pi goes round clockwise. On the
+        Between −2 pi and 2 pi; negative about the axis of the smallest moment, which Pi circles clockwise. On the
         separatrix its limit, plus or minus `separatrix_solid_angle`; 0 where Pi stands still.
 
         Source: theory.md D12 and section 7.
@@ -213,8 +217,8 @@ class EulerTop:
     def montgomery_phase(self) -> float:
         """dynamic_phase − solid_angle: R(t + T) = exp(this mu^) R(t), mu^ the momentum's direction [rad].
 
-        Not reduced modulo 2 pi. It is also what an axis that Pi does not circle turns through about the momentum,
-        counted along t. Infinite without a finite period; 0 at rest.
+        Not reduced modulo 2 pi. It is also the angle that an axis which Pi does not circle turns through about the
+        momentum, followed continuously in t. Infinite without a finite period; 0 at rest.
 
         Source: Montgomery 1991; Marsden and Ratiu, section 15.9, remark 4; theory.md D12, D17.
         """
@@ -222,9 +226,9 @@ class EulerTop:
 
     @property
     def precession_per_period(self) -> float:
-        """The angle that the circled axis turns through about the momentum in a period, counted along t [rad].
+        """The angle that the circled axis turns through about the momentum in a period, followed along t [rad].
 
-        `montgomery_phase` and a turn more about the axis of the largest moment, a turn less about that of the smallest.
+        `montgomery_phase` plus a full turn about the axis of the largest moment, less one about that of the smallest.
 
         Source: theory.md D17 (from Marsden and Ratiu, exercise 15.8-1).
         """
@@ -239,7 +243,7 @@ class EulerTop:
 
     @property
     def polhode_frequency(self) -> float:
-        """2 pi/period, of the momentum's way round in the body [rad/s]; 0 where there is no finite period."""
+        """2 pi/period, at which the momentum circles in the body [rad/s]; 0 where there is no finite period."""
         return 2.0 * np.pi / self.period
 
     @property
@@ -256,14 +260,14 @@ class EulerTop:
         return 2.0 * self.energy / self.magnitude if self.magnitude else 0.0
 
     def _argument(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Times and the elliptic argument there."""
+        """Times, checked, and the argument of the elliptic functions there."""
         times = finite_array(t, "t", unit="s")
         longest = _TURNS * min(self.period, 2.0 * np.pi * self.moments[0] / (self.magnitude or 1.0))
         far = float(np.abs(times).max(initial=0.0))
         if self.magnitude and far > longest:
             raise ShapeError(
-                f"t: {far:.6g} s is more than 1e12 turns of this body away, too far for digits of the attitude to be "
-                "left; the largest time taken is " + f"{longest:.6g} s"
+                f"t: {far:.6g} s is more than 1e12 turns of this body away, where rounding leaves no digits of the "
+                f"attitude; the largest time accepted is {longest:.6g} s"
             )
         return times, self.rate * times + self.orbit.phase
 
@@ -271,19 +275,18 @@ class EulerTop:
         times, u = self._argument(t)
         flat, u = times.ravel(), u.ravel()
         quaternion = np.empty((flat.size, 4))
-        # In blocks that fit a processor's cache.
         for start in range(0, flat.size, _BLOCK):
             part = slice(start, start + _BLOCK)
-            quaternion[part] = so3.normalised(_carried(self.orbit, flat[part], u[part]) @ self._around)
+            quaternion[part] = so3.normalised(_precessing_frame(self.orbit, flat[part], u[part]) @ self._around)
         return quaternion.reshape(*times.shape, 4)
 
 
-def _carried(orbit: MomentumOrbit, times: Array, u: Array) -> Array:
-    """Quaternions of exp(psi ê) Q, in principal axes, psi up to a constant: (...) -> (..., 4), of any length."""
+def _precessing_frame(orbit: MomentumOrbit, times: Array, u: Array) -> Array:
+    """Quaternions of exp(psi ê) Q, in principal axes, psi up to a constant: (...) -> (..., 4), not normalised."""
     direction, swing = orbit.directions_and_swing(u)
     half = 0.5 * (orbit.spin * times + swing)
     cosine, sine = np.cos(half), np.sin(half)
-    # Q is by the half angle from Pi to ê, about their cross product, which is at right angles to ê.
+    # Q turns about the cross product of Pi and ê, which is at right angles to ê; its quaternion has the half angle.
     across = direction @ so3.hat(orbit.direction)
     scalar = 1.0 + direction @ orbit.direction
     turn = np.empty((*direction.shape[:-1], 4))
@@ -306,7 +309,7 @@ def _attitude(value: ArrayLike | None) -> Array:
 
 
 def _principal(tensor: Array) -> tuple[Array, Array]:
-    """Ascending moments and axes: those of a diagonal tensor as they are, else with moments equal to rounding equal."""
+    """Ascending moments and axes: of a diagonal tensor exactly, else with moments equal that differ by rounding."""
     diagonal = np.diagonal(tensor)
     if np.array_equal(tensor, np.diag(diagonal)):
         moments, order, parity = ascending_moments(diagonal)
@@ -314,7 +317,7 @@ def _principal(tensor: Array) -> tuple[Array, Array]:
         axes[:, 2] *= parity
         return moments, axes
     moments, axes = principal_axes(tensor)
-    close = np.diff(moments) < 4.0 * _EPS * moments[2]
+    close = np.diff(moments) < _EQUAL * moments[2]
     if close[0]:
         moments[0] = moments[1]
     if close[1]:

@@ -10,7 +10,7 @@ Source: Marsden and Ratiu, section 15.10; theory.md M1, M2, M10.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,13 +23,23 @@ from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 
 _FLOOR = 3e-14
-"""The local tolerance below which rounding decides."""
+"""Relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14."""
 _RATIO = 32.0
-"""Between the local tolerances of the two runs of a motion."""
+"""Ratio of the local tolerances of the two runs of a motion, far enough apart that their difference shows the error."""
 _SHARE = 0.1
-"""Of their difference, at most what the finer run errs by: its error is smaller by about the ratio (measured)."""
+"""Share of the runs' difference given as the error of the finer one: measured it is about 1/32, so this is cautious."""
+_FIRST = 0.01
+"""Local tolerance of the first try, relative to that of the whole motion: errors of steps add up."""
+_AIM = 0.3
+"""Error aimed at when a try is repeated, relative to the tolerance, so that one repetition mostly suffices."""
+_DROP = 1e-3
+"""Most that the local tolerance is lowered from one try to the next, as estimates of coarse runs are rough."""
 _STEPS = 200_000
+"""Most steps of one run, some minutes of computing."""
+_UNIT = 1e-6
+"""Farthest from 1 that the length of a unit vector may be: six digits, as people write them, are enough."""
 _UP = np.array([0.0, 0.0, 1.0])
+"""The upward vertical e_z, inertial axes."""
 
 Pair = tuple[Array, Array]
 """A point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)."""
@@ -65,7 +75,7 @@ class HeavyTop:
         tensor = inertia_argument(tensor.reshape(-1, 3, 3)).reshape(tensor.shape)
         direction = finite_array(chi, "chi", (3,))
         length = np.linalg.norm(direction, axis=-1)
-        if np.any(np.abs(length - 1.0) > 1e-6):
+        if np.any(np.abs(length - 1.0) > _UNIT):
             raise ShapeError(f"chi: must have length 1 (the distance belongs to mgl), got {np.ravel(length)[0]:.6g}")
         strength = finite_array(mgl, "mgl", unit="J")
         _common(inertia=tensor.shape[:-2], mgl=strength.shape, chi=direction.shape[:-1])
@@ -129,8 +139,8 @@ class HeavyTop:
         With Pi = dl/dOmega and Gamma = dl/dv the heavy top is Euler-Poincare on se(3): Pi' = Pi x Omega + Gamma x v,
         Gamma' = Gamma x Omega: (..., 3), (..., 3) -> (...). Source: Marsden and Ratiu, exercise 15.10-1 (b).
         """
-        turning, rest = finite_array(omega, "omega", (3,)), finite_array(v, "v", (3,)) - self.mgl[..., None] * self.chi
-        return 0.5 * np.sum(turning * so3.apply(self.inertia, turning), axis=-1) + 0.5 * np.sum(rest * rest, axis=-1)
+        rate, rest = finite_array(omega, "omega", (3,)), finite_array(v, "v", (3,)) - self.mgl[..., None] * self.chi
+        return 0.5 * np.sum(rate * so3.apply(self.inertia, rate), axis=-1) + 0.5 * np.sum(rest * rest, axis=-1)
 
     def motion(
         self,
@@ -141,18 +151,19 @@ class HeavyTop:
         attitude: ArrayLike | None = None,
         tolerance: float = 1e-9,
     ) -> HeavyTopMotion:
-        """The motion from these initial values, with both Casimirs right to rounding at every time.
+        """The motion from these initial values, with both Casimirs exact to rounding at every time.
 
-        The attitude is integrated as a quaternion, and with it the two horizontal components of the spatial momentum
+        The attitude is integrated as a quaternion, together with the two horizontal components of the spatial momentum
         R Pi; its vertical component, Pi.Gamma, is constant and enters as given. Gamma = R^T e_z and Pi = R^T (R Pi) are
-        formed of them, so Pi.Gamma and |Gamma| cannot drift. By Dormand and Prince's order 8(5,3), twice.
+        formed from these, so Pi.Gamma and |Gamma| cannot drift. The method is Dormand and Prince's of order 8(5,3); a
+        second run with a looser tolerance gives the error estimate.
 
         Parameters
         ----------
         momentum : (..., 3) body momentum at the start [kg m^2/s]
         gamma : (..., 3) upward vertical in body axes at the start; the attitude is then the shortest rotation that
-            takes it to e_z. Or give
-        attitude : (..., 3, 3) body to inertial axes; with neither of the two, the identity
+            takes it to e_z
+        attitude : (..., 3, 3) body to inertial axes at the start, instead of gamma; with neither, the identity
         duration : of the motion [s]
         tolerance : of the attitude over the whole motion, in [1e-12, 1e-2] [rad]
 
@@ -163,22 +174,29 @@ class HeavyTop:
         AccuracyNotReached
             If the tolerance cannot be met: unstable or chaotic motions magnify rounding exponentially.
         """
-        start, body, time, wanted = self._arguments(momentum, gamma, attitude, duration, tolerance)
+        start, body, time, requested = self._arguments(momentum, gamma, attitude, duration, tolerance)
         least = _RATIO * _FLOOR
-        local = max(0.01 * wanted, least)
+        local = max(_FIRST * requested, least)
         while True:
-            coarse = _solution(self, start, body, time, local)
-            fine = _solution(self, start, body, time, local / _RATIO)
+            coarse = _integrated(self, start, body, time, local)
+            fine = _integrated(self, start, body, time, local / _RATIO)
             estimate = _SHARE * _difference(coarse, fine)
             worst = float(np.max(estimate, initial=0.0))
-            if worst <= wanted:
-                return replace(fine, error_estimate=estimate)
+            if worst <= requested:
+                return HeavyTopMotion(
+                    top=self,
+                    duration=time,
+                    vertical_momentum=fine.vertical,
+                    error_estimate=estimate,
+                    energy_drift=fine.energy_drift,
+                    _run=fine,
+                )
             if local <= least:
                 raise AccuracyNotReached(
-                    f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance {wanted:.2g}; "
-                    "shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
+                    f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance "
+                    f"{requested:.2g}; shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
                 )
-            local = max(local * max(0.3 * wanted / worst, 1e-3), least)
+            local = max(local * max(_AIM * requested / worst, _DROP), least)
 
     def _arguments(
         self,
@@ -190,20 +208,20 @@ class HeavyTop:
     ) -> tuple[Array, Array, float, float]:
         body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         if gamma is not None and attitude is not None:
-            raise ShapeError("gamma, attitude: give one of them, each determines where the vertical is")
+            raise ShapeError("gamma, attitude: give one of them; each determines where the vertical is")
         if gamma is not None:
             vertical = finite_array(gamma, "gamma", (3,))
             length = np.linalg.norm(vertical, axis=-1)
-            if np.any(np.abs(length - 1.0) > 1e-6):
+            if np.any(np.abs(length - 1.0) > _UNIT):
                 raise ShapeError(f"gamma: the vertical must have length 1, got {np.ravel(length)[0]:.6g}")
             start = so3.between(so3.normalised(vertical), np.broadcast_to(_UP, vertical.shape))
         else:
             start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
         time = finite_array(duration, "duration", unit="s")
-        wanted = finite_array(tolerance, "tolerance", unit="rad")
+        requested = finite_array(tolerance, "tolerance", unit="rad")
         if time.shape != () or time <= 0.0:
             raise ShapeError(f"duration: one number above 0 s is needed, got {duration}")
-        if wanted.shape != () or not 1e-12 <= wanted <= 1e-2:
+        if requested.shape != () or not 1e-12 <= requested <= 1e-2:
             raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {tolerance}")
         shape = _common(
             inertia=self.inertia.shape[:-2],
@@ -216,7 +234,7 @@ class HeavyTop:
             np.broadcast_to(start, (*shape, 3, 3)),
             np.broadcast_to(body, (*shape, 3)),
             float(time),
-            float(wanted),
+            float(requested),
         )
 
 
@@ -229,7 +247,7 @@ class HeavyTopMotion:
     top : the `HeavyTop`
     duration : [s]
     vertical_momentum : (...) Pi.Gamma, constant [kg m^2/s]
-    error_estimate : (...) of the attitude over the whole motion, a tenth of its largest difference from a run with 32
+    error_estimate : (...) of the attitude over the whole motion, a tenth of the largest difference from a run with 32
         times the local tolerance [rad]
     energy_drift : (...) largest |H(t) - H(0)| at the ends of the steps [J]
     """
@@ -239,8 +257,7 @@ class HeavyTopMotion:
     vertical_momentum: Array
     error_estimate: Array
     energy_drift: Array
-    _scale: Array = field(repr=False)
-    _solution: OdeSolution = field(repr=False)
+    _run: _Run = field(repr=False)
 
     def attitude(self, t: ArrayLike) -> Array:
         """R(t), body to inertial axes: (...) -> (..., 3, 3)."""
@@ -265,11 +282,28 @@ class HeavyTopMotion:
         times = finite_array(t, "t", unit="s")
         if np.any((times < 0.0) | (times > self.duration)):
             raise ShapeError(f"t: from {times.min():.6g} to {times.max():.6g} s; the motion is on [0, {self.duration}]")
-        batch = self._scale.shape
-        flat = self._solution(times.ravel()) if times.size else np.empty((6 * self._scale.size, 0))
+        return self._run.state(times)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One integration of a motion: what belongs to its states, and the interpolant of its steps."""
+
+    vertical: Array
+    """(...) vertical momentum, constant [kg m^2/s]."""
+    scale: Array
+    """(...) unit of the horizontal momentum in the state [kg m^2/s]."""
+    energy_drift: Array
+    """(...) largest |H(t) - H(0)| at the ends of the steps [J]."""
+    solution: OdeSolution
+
+    def state(self, times: Array) -> tuple[Array, Array]:
+        """Quaternions xyzw and spatial momentum: times (...) -> batch + time + (4,), batch + time + (3,)."""
+        batch = self.scale.shape
+        flat = self.solution(times.ravel()) if times.size else np.empty((6 * self.scale.size, 0))
         rows = np.moveaxis(flat.reshape(*batch, 6, times.size), -2, -1).reshape(*batch, *times.shape, 6)
         lift = (..., *(None,) * times.ndim)
-        return _unpacked(rows, self._scale[lift], self.vertical_momentum[lift])
+        return _unpacked(rows, self.scale[lift], self.vertical[lift])
 
 
 def semidirect_bracket(
@@ -301,13 +335,19 @@ def casimirs(momentum: ArrayLike, gamma: ArrayLike) -> tuple[Array, Array]:
     return np.sum(pi * up, axis=-1), np.sum(up * up, axis=-1)
 
 
-def marched(
-    top: HeavyTop, attitude: Array, momentum: Array, duration: float, local: float
+def heavy_top_steps(
+    top: HeavyTop, attitude: Array, momentum: Array, duration: float, local_tolerance: float
 ) -> Iterator[tuple[float, Array, Array, DenseOutput]]:
     """Steps of the integration: time, attitude (quaternions xyzw) and spatial momentum after each, and its interpolant.
 
-    All tops of the batch take the same steps; `local` is the tolerance of one step, of the attitude and of the momentum
-    relative to max(|Pi|, sqrt(Mgl I)).
+    All tops of the batch take the same steps. The tolerance of one step applies to the attitude [rad] and to the
+    momentum relative to max(|Pi|, sqrt(Mgl I)).
+
+    Parameters
+    ----------
+    attitude : (..., 3, 3) at the start, body to inertial axes
+    momentum : (..., 3) body momentum at the start [kg m^2/s]
+    duration : [s]
 
     Raises
     ------
@@ -323,7 +363,7 @@ def marched(
         rotation = so3.matrix_from_quat(quat)
         omega = so3.apply(top.inverse, so3.apply(so3.transpose(rotation), spatial))
         vector, scalar = state[..., :3], state[..., 3]
-        # Written out: np.cross would take half of the whole time.
+        # Not by np.cross, which would take half of the whole time.
         out[..., :3] = 0.5 * (scalar[..., None] * omega + so3.apply(so3.hat(vector), omega))
         out[..., 3] = -0.5 * np.sum(vector * omega, axis=-1)
         arm = so3.apply(rotation, top.chi)
@@ -331,7 +371,9 @@ def marched(
         out[..., 5] = strength * arm[..., 0]
         return out.ravel()
 
-    solver = DOP853(rates, 0.0, start.ravel(), duration, rtol=_FLOOR, atol=local / np.sqrt(max(scale.size, 1)))
+    solver = DOP853(
+        rates, 0.0, start.ravel(), duration, rtol=_FLOOR, atol=local_tolerance / np.sqrt(max(scale.size, 1))
+    )
     for _ in range(_STEPS):
         message = solver.step()
         if solver.status == "failed":
@@ -345,13 +387,13 @@ def marched(
 
 
 def _packed(top: HeavyTop, attitude: Array, momentum: Array) -> tuple[Array, Array, Array]:
-    """Vertical momentum, scale of momentum and state (quaternion, horizontal momentum over scale)."""
+    """Vertical momentum, unit of momentum and state (quaternion, horizontal momentum in that unit)."""
     spatial = so3.apply(attitude, momentum)
     moment = np.trace(top.inertia, axis1=-2, axis2=-1)
     scale = np.maximum(np.linalg.norm(momentum, axis=-1), np.sqrt(np.abs(top.mgl) * moment))
     scale = np.where(scale > 0.0, scale, 1.0)
     state = np.concatenate([so3.quat_from_matrix(attitude), spatial[..., :2] / scale[..., None]], axis=-1)
-    # Pi.Gamma of the data given: the rounding of the attitude does not enter.
+    # Pi.Gamma from the given data, so that the rounding of the product R Pi does not enter.
     return np.sum(momentum * attitude[..., 2, :], axis=-1), scale, state
 
 
@@ -362,24 +404,25 @@ def _unpacked(state: Array, scale: Array, vertical: Array) -> tuple[Array, Array
     return so3.normalised(state[..., :4]), np.concatenate([horizontal, upright], axis=-1)
 
 
-def _solution(top: HeavyTop, attitude: Array, momentum: Array, duration: float, local: float) -> HeavyTopMotion:
+def _integrated(top: HeavyTop, attitude: Array, momentum: Array, duration: float, local_tolerance: float) -> _Run:
     vertical, scale, _ = _packed(top, attitude, momentum)
     before = top.energy(momentum, attitude[..., 2, :])
     times, pieces, drift = [0.0], [], np.zeros(scale.shape)
-    for t, quat, spatial, piece in marched(top, attitude, momentum, duration, local):
+    for t, quat, spatial, piece in heavy_top_steps(top, attitude, momentum, duration, local_tolerance):
         rotation = so3.matrix_from_quat(quat)
         energy = top.energy(so3.apply(so3.transpose(rotation), spatial), rotation[..., 2, :])
         drift = np.maximum(drift, np.abs(energy - before))
         times.append(t)
         pieces.append(piece)
-    return HeavyTopMotion(top, duration, vertical, np.zeros(scale.shape), drift, scale, OdeSolution(times, pieces))
+    return _Run(vertical=vertical, scale=scale, energy_drift=drift, solution=OdeSolution(times, pieces))
 
 
-def _difference(coarse: HeavyTopMotion, fine: HeavyTopMotion) -> Array:
-    """Largest angle between the attitudes, at the ends and middles of the finer steps."""
-    ends = fine._solution.ts
+def _difference(coarse: _Run, fine: _Run) -> Array:
+    """Largest angle between the attitudes, at the ends and middles of the finer steps [rad]."""
+    ends = fine.solution.ts
     times = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
-    turn = so3.transpose(coarse.attitude(times)) @ fine.attitude(times)
+    before, after = (so3.matrix_from_quat(run.state(times)[0]) for run in (coarse, fine))
+    turn = so3.transpose(before) @ after
     return so3.angle(turn).max(axis=-1)
 
 
@@ -395,4 +438,4 @@ def _common(**shapes: tuple[int, ...]) -> tuple[int, ...]:
         return np.broadcast_shapes(*shapes.values())
     except ValueError:
         listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-        raise ShapeError(f"axes of {listed}: cannot be broadcast together") from None
+        raise ShapeError(f"leading axes of {listed}: cannot be broadcast together") from None

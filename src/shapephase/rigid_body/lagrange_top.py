@@ -16,7 +16,15 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, Mask, finite_array
 from ..errors import ShapeError, SingularInertiaError
-from .heavy_top import HeavyTop, marched
+from .heavy_top import HeavyTop, heavy_top_steps
+
+_GROWTH = 50.0
+"""Tilt, relative to the first one, up to which a simulated spin counts as stable: room for the wide
+nutation of stable spins next to the threshold."""
+_LARGEST_TILT = 0.01
+"""Largest first tilt of a simulation [rad]: its growth by the factor above is still less than a right angle."""
+_LOCAL_TOLERANCE = 1e-9
+"""Local tolerance of a simulation [rad], far below the least sensible tilt."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +34,7 @@ class LagrangeTop:
     Raises
     ------
     ShapeError
-        If an entry is no finite number.
+        If an entry is not a finite number.
     SingularInertiaError
         If a moment is not positive.
     """
@@ -44,18 +52,18 @@ class LagrangeTop:
 
     @property
     def heavy_top(self) -> HeavyTop:
-        """The same as a general `HeavyTop`."""
+        """This top as a general `HeavyTop`."""
         return HeavyTop(np.diag([self.transverse, self.transverse, self.axial]), self.mgl)
 
     @property
     def critical_momentum(self) -> float:
-        """2 sqrt(Mgl I1), the least Pi_3 of a fast top; 0 for a hanging one [kg m^2/s]."""
+        """2 sqrt(Mgl I1), above which Pi_3 is that of a fast top; 0 for a hanging one [kg m^2/s]."""
         return 2.0 * np.sqrt(max(self.mgl, 0.0) * self.transverse)
 
 
 @dataclass(frozen=True)
 class SleepingTop:
-    """The upright spin of a Lagrange top and what two methods say of its stability.
+    """The upright spin of a Lagrange top and what two methods say about its stability.
 
     The conserved quantity is H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3); dots are derivatives by Pi.Gamma.
 
@@ -70,7 +78,7 @@ class SleepingTop:
     eigenvalues : (4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]
     energy_casimir : whether the second variation is definite (stable in the sense of Liapunov)
     spectrally_stable : whether no eigenvalue has a positive real part
-    verdict : "stable", "unstable", or "marginal" where p^2 = 4 Mgl I1: the first method and the spectrum are silent
+    verdict : "stable", "unstable", or "marginal" where p^2 = 4 Mgl I1, which neither method decides
     """
 
     momentum: float
@@ -94,7 +102,7 @@ class StabilityChart:
     Attributes
     ----------
     axial_ratios : (R,) I3/I1
-    momenta : (P,) Pi_3 in units of sqrt(Mgl I1); 2 is the threshold
+    momenta : (P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2
     energy_casimir, spectrum, simulation : (R, P) True where the method finds the spin stable
     largest_tilt : (R, P) of the simulated motions [rad]
     """
@@ -110,12 +118,12 @@ class StabilityChart:
 def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     """The upright spin with Pi_3 = `momentum` [kg m^2/s], and its stability: stable if Pi_3^2 > 4 Mgl I1, else not.
 
-    The free number e = -Phi_dot/p is taken at the top of the e-quadratic, 1/(2 I1).
+    The free number e = -Phi_dot/p is taken where the e-quadratic is largest, at 1/(2 I1).
 
     Raises
     ------
     ShapeError
-        If the momentum is no finite number.
+        If the momentum is not a finite number.
 
     Source: Marsden and Ratiu, theorem 15.10.1.
     """
@@ -152,8 +160,8 @@ def second_variation(
     """Second derivative of H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3) at the upright spin: (6, 6) by (Pi, Gamma).
 
     Phi' and phi' are those of a vanishing first variation, Phi' = -(Mgl + Phi_dot p)/2 and phi' = -(p/I3 + Phi_dot);
-    a = phi'', b = 4 Phi'', c = Phi_dot_dot, d = 2 Phi_dot'. Entries a36 = Phi_dot + p c + d and
-    a66 = 2 Phi' + b + p^2 c + 2 p d, otherwise than printed.
+    a = phi'', b = 4 Phi'', c = Phi_dot_dot, d = 2 Phi_dot'. The entries a36 = Phi_dot + p c + d and
+    a66 = 2 Phi' + b + p^2 c + 2 p d differ from the printed ones.
 
     Source: Marsden and Ratiu (15.10.5-7) with theory.md M-E9.
     """
@@ -181,7 +189,8 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
 
     Parameters
     ----------
-    moments : (..., 3) principal moments, I1 and I2 need not be equal; the centre of mass lies on axis 3 [kg m^2]
+    moments : (..., 3) principal moments by body axis, in any order; I1 and I2 need not be equal, and the centre of
+        mass lies on axis 3 [kg m^2]
     mgl : (...) [J]
     momentum : (...) p = Pi_3 [kg m^2/s]
 
@@ -190,7 +199,7 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
     ShapeError, SingularInertiaError
         If an argument is of a wrong shape or value, or a moment is not positive.
 
-    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10; I2 of its own.
+    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
     """
     i1, i2, i3, weight, p = _upright(moments, mgl, momentum)
     matrix = np.zeros((*p.shape, 4, 4))
@@ -204,8 +213,8 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
 def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, Array, Array]:
     """B, C and the discriminant B^2 - 4C of lambda^4 + B lambda^2 + C of `sleeping_matrix`: three of (...).
 
-    For I1 = I2 the discriminant is (2 I1 - I3)^2 (p/I3)^2 (p^2 - 4 Mgl I1)/I1^4. It vanishes for I3 = 2 I1 whatever p
-    is: both pairs of roots coincide, and the sign of B decides.
+    For I1 = I2 the discriminant is (2 I1 - I3)^2 (p/I3)^2 (p^2 - 4 Mgl I1)/I1^4. For I3 = 2 I1 it vanishes for every
+    p: the two pairs of roots coincide, and the sign of B decides.
 
     Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments and errors as `sleeping_matrix`.
     """
@@ -221,7 +230,7 @@ def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: Arra
 def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> np.ndarray:
     """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments and errors as there.
 
-    Through the squares (-B +- sqrt(B^2 - 4C))/2, so they come in pairs of opposite sign.
+    Found through their squares (-B +- sqrt(B^2 - 4C))/2, so they come in pairs of opposite sign.
     """
     b, c, discriminant = characteristic_polynomial(moments, mgl, momentum)
     root = np.sqrt(np.asarray(discriminant, dtype=complex))
@@ -246,9 +255,9 @@ def stability_chart(
 ) -> StabilityChart:
     """Stability of upright spins by energy-Casimir, by spectrum and by simulation, in units of I1, Mgl, sqrt(I1/Mgl).
 
-    Simulated is the heavy top released with its axis tilted and Pi along the axis; a spin counts as stable if the tilt
-    stays within 50 times the first one. Growth next to the threshold is slow, with rate sqrt(1 - Pi_3^2/4): there long
-    durations are needed.
+    The simulation releases the heavy top with its axis tilted and Pi along the axis; a spin counts as stable if the
+    tilt stays within 50 times the first one. Next to the threshold the tilt grows slowly, at the rate
+    sqrt(1 - Pi_3^2/4), and long durations are needed.
 
     Parameters
     ----------
@@ -270,7 +279,7 @@ def stability_chart(
     lean, time = _number(tilt, "tilt"), _number(duration, "duration")
     if ratios.ndim != 1 or spins.ndim != 1 or not ratios.size or not spins.size:
         raise ShapeError(f"axial_ratios, momenta: two lists are needed, got shapes {ratios.shape}, {spins.shape}")
-    if not 0.0 < lean <= 0.01 or time <= 0.0:
+    if not 0.0 < lean <= _LARGEST_TILT or time <= 0.0:
         raise ShapeError(f"tilt must be in (0, 0.01] rad and duration above 0, got {lean:.6g}, {time:.6g}")
     moments = np.ones((len(ratios), 1, 3))
     moments[..., 0, 2] = ratios
@@ -281,7 +290,7 @@ def stability_chart(
         momenta=spins,
         energy_casimir=np.broadcast_to(spins * spins > 4.0, spectrum.shape).copy(),
         spectrum=spectrum,
-        simulation=largest <= 50.0 * lean,
+        simulation=largest <= _GROWTH * lean,
         largest_tilt=largest,
     )
 
@@ -291,8 +300,8 @@ def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> 
     attitude = np.broadcast_to(so3.exp(np.array([tilt, 0.0, 0.0])), (*shape, 3, 3))
     momentum = np.broadcast_to(spins[:, None] * np.array([0.0, 0.0, 1.0]), (*shape, 3))
     largest = np.full(shape, tilt)
-    for _, quat, _, _ in marched(top, attitude, momentum, duration, 1e-9):
-        # Half the angle between body axis 3 and the vertical, from the quaternion's parts.
+    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, _LOCAL_TOLERANCE):
+        # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
         across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
         largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
     return largest

@@ -6,10 +6,10 @@ On an elliptic cylinder K = r^2/2 in the space of body momenta,
 
 N = p^2/2 + (k_2 r)^2/(2 k_3^2) sin^2(theta) is a pendulum's energy, and the angle obeys
 theta'' = -r^2/(2 k_1^2 k_3^2) sin(2 theta). 1, 2, 3 are the body's principal axes in an order that can be chosen; the
-book's is that of ascending moments. The third axis must have the largest or the smallest moment; then the same
-formulas hold with 1/k_1^2 = |1/I_1 - 1/I_3|, 1/k_2^2 = |1/I_2 - 1/I_3| and, of either sign,
-1/k_3^2 = k_1^2 (1/k_1^2 - 1/k_2^2); and theta' = sigma p/(k_1 k_2), sigma = 1 for an even order of the axes with the
-largest moment last, and changing sign with either.
+order of ascending moments, used everywhere else, is also the book's in section 15.11. The third axis must have the
+largest or the smallest moment; then the same formulas hold with 1/k_1^2 = |1/I_1 - 1/I_3|, 1/k_2^2 = |1/I_2 - 1/I_3|
+and, of either sign, 1/k_3^2 = k_1^2 (1/k_1^2 - 1/k_2^2); and theta' = sigma p/(k_1 k_2), where sigma is 1 for an even
+order of the axes with the largest moment last, and changes sign with either.
 
 Momenta along the third axis, where r = 0, have no angle: they are the equilibria that this cylinder leaves out, and
 another choice of the third axis has them.
@@ -33,7 +33,8 @@ from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 
-_FAINT = 1e-140  # squares of smaller parts underflow
+_FAINT = 1e-140
+"""Least part of a momentum, relative to the largest, that is not zero: squares of smaller parts underflow."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class RigidBodyPendulum:
         Raises
         ------
         ShapeError
-            If a momentum is along the third axis, where the angle is undefined, or no three finite numbers.
+            If a momentum is along the third axis, where the angle is undefined, or is not three finite numbers.
 
         Source: Marsden and Ratiu (15.11.12).
         """
@@ -84,7 +85,7 @@ class RigidBodyPendulum:
             where = tuple(int(i) for i in np.argwhere(bad)[0])
             raise ShapeError(
                 f"momentum: entry {list(where)} is {pi[where]}, along the cylinders' axis {self.axes[2]}, where theta "
-                "is undefined; an order of the axes with another one last has it"
+                "is undefined; choose an order of the axes with another one last"
             )
         cosine, sine = first / self.k1, second / self.k2
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
@@ -142,7 +143,7 @@ class RigidBodyPendulum:
 
     @property
     def equilibria(self) -> tuple[PendulumEquilibrium, ...]:
-        """The four of every cylinder r > 0, along its axes 1 and 2.
+        """The four equilibria of every cylinder r > 0, along its axes 1 and 2.
 
         Source: Marsden and Ratiu, after corollary 15.11.2.
         """
@@ -150,17 +151,17 @@ class RigidBodyPendulum:
         across = {"neutral": "neutral", "stable": "unstable", "unstable": "stable"}[at_zero]
         first, second, _ = self.axes
         return (
-            PendulumEquilibrium(0.0, first, 1, at_zero),
-            PendulumEquilibrium(0.5 * np.pi, second, 1, across),
-            PendulumEquilibrium(np.pi, first, -1, at_zero),
-            PendulumEquilibrium(1.5 * np.pi, second, -1, across),
+            PendulumEquilibrium(angle=0.0, axis=first, sign=1, stability=at_zero),
+            PendulumEquilibrium(angle=0.5 * np.pi, axis=second, sign=1, stability=across),
+            PendulumEquilibrium(angle=np.pi, axis=first, sign=-1, stability=at_zero),
+            PendulumEquilibrium(angle=1.5 * np.pi, axis=second, sign=-1, stability=across),
         )
 
     def motion(self, momentum: ArrayLike) -> PendulumMotion:
         """The motion in closed form from a body momentum (3,) at t = 0 [kg m^2/s].
 
-        How far it is from the separatrix is computed in exact arithmetic from the numbers given, so a motion next to
-        it, and one on it, is as accurate as any.
+        The distance from the separatrix is computed in exact arithmetic from the numbers given, so a motion next to it
+        or on it is as accurate as any other.
 
         Raises
         ------
@@ -195,9 +196,9 @@ class PendulumMotion:
     phase: float
     """Argument of Jacobi's functions at t = 0."""
     swing: float
-    """The sine of the largest angle from the stable equilibrium; 0 at an equilibrium, 1 where theta goes round."""
+    """The sine of the largest angle from the stable equilibrium; 0 at an equilibrium, 1 where theta rotates."""
     centre: float
-    """The equilibrium angle that the argument is counted from, a multiple of pi/2 [rad]."""
+    """The equilibrium angle that Jacobi's amplitude is counted from, a multiple of pi/2 [rad]."""
 
     @property
     def modulus(self) -> float:
@@ -243,7 +244,7 @@ class PendulumMotion:
 
     @property
     def _swings(self) -> bool:
-        """Whether sn is the sine of delta over its largest; else it is the sine itself."""
+        """Whether sn is the sine of delta divided by its maximum; otherwise sn is the sine itself."""
         return self.regime == "libration" or self.swing == 0.0
 
     @property
@@ -268,8 +269,8 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     Raises
     ------
     ShapeError
-        If the moments are not positive, or all equal (no momentum moves then), or `axes` is no permutation, or the
-        third axis is the intermediate one or has a moment that is not its own: K is then no elliptic cylinder.
+        If the moments are not positive, or all equal (then every momentum is at rest), or `axes` is not a permutation,
+        or the third axis is the intermediate one or shares its moment with another: K is then not an elliptic cylinder.
 
     Source: Marsden and Ratiu (15.11.7) to (15.11.13).
     """
@@ -295,18 +296,18 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     sign = 1.0 if (by_first > 0) == even else -1.0
     stiffness = abs(by_first) - abs(by_second)
     return RigidBodyPendulum(
-        values,
-        (first, second, third),
-        float(abs(by_first)) ** -0.5,
-        float(abs(by_second)) ** -0.5,
-        float(stiffness / abs(by_first)),
-        float(stiffness),
-        sign,
+        moments=values,
+        axes=(first, second, third),
+        k1=float(abs(by_first)) ** -0.5,
+        k2=float(abs(by_second)) ** -0.5,
+        inverse_square_k3=float(stiffness / abs(by_first)),
+        stiffness=float(stiffness),
+        orientation=sign,
     )
 
 
 def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
-    """In the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
+    """By the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
     # In units of the largest momentum and the least moment, so that nothing overflows.
     largest, least = float(np.max(np.abs(pi))), float(np.min(pendulum.moments))
     x, y, z = (Fraction(float(pi[i])) / Fraction(largest) for i in pendulum.axes)
@@ -343,7 +344,16 @@ def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
     sn, cn, dn = start
     phase = sn * float(elliprf(cn * cn, dn * dn, 1.0))
     centre = quarter if quarter < 2 or (quarter == 2 and sn <= 0.0) else quarter - 4
-    return PendulumMotion(pendulum, r, regime, direction * rate, complement, phase, swing, 0.5 * np.pi * centre)
+    return PendulumMotion(
+        pendulum=pendulum,
+        radius=r,
+        regime=regime,
+        rate=direction * rate,
+        complement=complement,
+        phase=phase,
+        swing=swing,
+        centre=0.5 * np.pi * centre,
+    )
 
 
 def _root(value: Fraction) -> float:

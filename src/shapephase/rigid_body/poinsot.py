@@ -22,14 +22,22 @@ from .euler_top import EulerTop
 from .portrait import inverse_difference
 
 _TAIL = 60.0
-"""Beyond this many 1/rate from the flip, what is left of the separatrix is shorter than 1e-25 of it."""
+"""Argument u beyond which the separatrix is not integrated: the arc that is left is shorter than 1e-25 of it."""
+_QUADRATURE = 1e-14
+"""Error of a panel, relative to the arc length, below which it is not halved again; near rounding."""
+_EQUAL = 1e-12
+"""Moments closer than this, relative to the larger, count as equal: inertias are seldom known to more digits."""
 
 
 @dataclass(frozen=True)
 class Closure:
-    """After `lobes` waves between its two circles and `turns` about mu, a herpolhode meets itself within `gap` [rad].
+    """How a herpolhode closes; a circle has no lobes and closes in one turn, a point has neither.
 
-    A circle has no lobes and closes in one turn; a point has neither.
+    Attributes
+    ----------
+    turns : about mu
+    lobes : waves between the two circles that the herpolhode touches
+    gap : angle between its start and its end [rad]
     """
 
     turns: int
@@ -39,8 +47,10 @@ class Closure:
 
 @dataclass(frozen=True)
 class Cones:
-    """The cones of an axisymmetric body: the body cone rolls on the space cone, both with the tip in the centre.
+    """The cones of an axisymmetric body: the body cone rolls on the space cone, both with their apex in the centre.
 
+    Attributes
+    ----------
     body_half_angle : of the body cone, about the axis of symmetry on the side of the momentum [rad]
     space_half_angle : of the space cone, about the momentum [rad]
     space_inside_body : the space cone lies inside the body cone (oblate), or the two touch from outside (prolate)
@@ -60,8 +70,8 @@ class Poinsot:
     """The rolling ellipsoid of a top.
 
     Times are any real (...) [s]. A steady rotation, and every rotation of a body of three equal moments, is a single
-    point in contact: radius, angle and arc length are zero. On the separatrix the herpolhode comes from the foot of
-    the normal, reaches the outer circle once, and spirals back: the inner radius is 0, the angle per period infinite.
+    point of contact: radius, angle and arc length are zero. On the separatrix the herpolhode comes from the foot of
+    the normal, touches the outer circle once, and spirals back: the inner radius is 0, the angle per period infinite.
 
     Raises
     ------
@@ -72,7 +82,7 @@ class Poinsot:
     top: EulerTop
 
     def __post_init__(self) -> None:
-        """Refuse what has no plane."""
+        """Refuse a top at rest, which has no invariable plane."""
         if not self.top.magnitude > 0.0:
             raise ShapeError("top: its angular momentum is zero, so there is no invariable plane; give it a momentum")
 
@@ -96,7 +106,7 @@ class Poinsot:
         if self._is_point:
             first = so3.perpendicular(normal)
         else:
-            # Omega less its part along n is (n x Omega) x n, and `_across` has n x Omega without a loss of digits.
+            # Omega less its part along n is (n x Omega) x n, and `_across` gives n x Omega without loss of digits.
             perpendicular = np.cross(_across(self._start, self.top.moments), self._start)
             # Next to a steady rotation the square of its length would underflow.
             perpendicular /= np.abs(perpendicular).max()
@@ -105,7 +115,7 @@ class Poinsot:
 
     @property
     def semi_axes(self) -> Array:
-        """Semi-axes sqrt(2K/I) of the inertia ellipsoid, as the top's moments: (3,) [rad/s]."""
+        """Semi-axes sqrt(2K/I) of the inertia ellipsoid, in the order of the top's moments: (3,) [rad/s]."""
         return np.sqrt(self.distance * self.top.magnitude / self.top.moments)
 
     def ellipsoid(self, t: ArrayLike) -> Array:
@@ -122,7 +132,7 @@ class Poinsot:
         Raises
         ------
         ShapeError
-            For another side than 1 and -1.
+            If side is not 1 or -1.
         """
         if side not in (1, -1):
             raise ShapeError(f"side: expected 1 or -1, got {side!r}")
@@ -153,7 +163,7 @@ class Poinsot:
     def herpolhode_angle(self, t: ArrayLike) -> Array:
         """Angle of the herpolhode about mu from where it is at t = 0, unwrapped: (...) -> (...) [rad].
 
-        The azimuth of the circled axis, an integral of the third kind, and an arctangent that comes back to itself.
+        The azimuth of the circled axis, an integral of the third kind, and a periodic arctangent.
         Source: theory.md H9; the arctangent is derived from Pi x (Omega x Pi).
         """
         times = finite_array(t, "t", unit="s")
@@ -168,7 +178,7 @@ class Poinsot:
             return 0.0, 0.0
         orbit, moments = self.top.orbit, self.top.moments
         outer = inverse_difference(moments, orbit.other, orbit.circled)
-        widest = orbit.size * abs(orbit.amplitudes[orbit.other] * orbit.amplitudes[orbit.circled] * outer)
+        widest = orbit.magnitude * abs(orbit.amplitudes[orbit.other] * orbit.amplitudes[orbit.circled] * outer)
         share = inverse_difference(moments, 1, orbit.circled) / outer
         return float(widest * np.sqrt(orbit.complement * share)), float(widest)
 
@@ -189,8 +199,8 @@ class Poinsot:
     def closure(self, tolerance: float = 1e-6, most_lobes: int = 10_000) -> Closure | None:
         """The first time that the herpolhode closes, within an angle [rad]; None if not within that many lobes.
 
-        The lobes, half periods of Pi, are the denominators of the continued fraction of the turns per lobe: no
-        smaller number comes nearer. On the separatrix the curve never closes.
+        The numbers of lobes tried, half periods of Pi, are the denominators of the continued fraction of the turns per
+        lobe: no smaller number comes nearer. On the separatrix the curve never closes.
 
         Raises
         ------
@@ -228,7 +238,7 @@ class Poinsot:
 
     @property
     def length_per_period(self) -> float:
-        """Arc length of either curve in a period of Pi [rad/s]; on the separatrix of the whole curve, still finite."""
+        """Arc length of either curve in a period of Pi [rad/s]; on the separatrix that of the whole curve."""
         if self._is_point:
             return 0.0
         quarter = min(float(elliptic.complete_k(self.top.complement)), _TAIL)
@@ -266,8 +276,8 @@ class Poinsot:
         quotient = np.divide(cn, dn, out=np.ones(np.shape(dn)), where=dn > 0.0)
         across, outer = inverse_difference(moments, other, 1), inverse_difference(moments, other, circled)
         bend = across / outer * orbit.amplitudes[1] / (orbit.amplitudes[other] * orbit.amplitudes[circled])
-        # What is proportional to u has made L/I_k into L/I_2.
-        azimuth = orbit.size * (times / moments[1] + outer / orbit.rate * third)
+        # The part of the integral proportional to u is what makes L/I_k into L/I_2.
+        azimuth = orbit.magnitude * (times / moments[1] + outer / orbit.rate * third)
         return azimuth - orbit.sense * np.arctan(bend * sn * quotient)
 
     def _radius(self, direction: Array) -> Array:
@@ -304,7 +314,7 @@ class Poinsot:
         return rest if whole == 0.0 else rest + whole * self._integral(speed, -0.5 * half, 0.5 * half)
 
     def _integral(self, speed: Callable[[Array], Array], left: float, right: float) -> float:
-        """Of the speed over time, between two values of u; where it nearly has a corner the panels are halved."""
+        """The integral of a speed over time between two values of u; panels are halved where it nearly has a kink."""
 
         def panels(starts: Array, ends: Array) -> Array:
             nodes, weights = sphere.gauss_nodes(starts, ends)
@@ -313,7 +323,7 @@ class Poinsot:
         edges = np.linspace(left, right, max(4, int(np.ceil(2.0 * abs(right - left)))) + 1)
         starts, ends = edges[:-1], edges[1:]
         whole, total = panels(starts, ends), 0.0
-        allowed = 1e-14 * abs(whole.sum())
+        allowed = _QUADRATURE * abs(whole.sum())
         while len(starts):
             middle = 0.5 * (starts + ends)
             first, second = panels(starts, middle), panels(middle, ends)
@@ -327,8 +337,8 @@ class Poinsot:
 def cones(top: EulerTop) -> Cones:
     """The body cone and the space cone of an axisymmetric body, drawn by Omega about its axis and about mu.
 
-    Two moments that agree to 1e-12 count as equal. Turning about its axis the body has cones of no width; turning about
-    an axis across, the body cone is flat.
+    Two moments that agree to 1e-12 count as equal. For a body that spins about its axis of symmetry both cones have no
+    width; for one that spins about an axis across, the body cone is a plane.
 
     Raises
     ------
@@ -339,7 +349,7 @@ def cones(top: EulerTop) -> Cones:
     symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
     """
     moments, magnitude = top.moments, top.magnitude
-    close = np.diff(moments) <= 1e-12 * moments[1:]
+    close = np.diff(moments) <= _EQUAL * moments[1:]
     if close.sum() != 1 or not magnitude > 0.0:
         raise ShapeError(
             f"cones: exactly two equal moments and a momentum are needed, got moments {moments} kg m^2 and momentum "

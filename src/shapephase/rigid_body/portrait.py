@@ -15,14 +15,19 @@ from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 
+_ROUNDED = 1e-12
+"""An energy outside its range by no more than this, relative to the bound, is taken for the bound, rounded."""
+
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A principal axis on the momentum sphere, where a steady rotation stands still.
+    """A steady rotation as a point on the momentum sphere, on a principal axis.
 
+    Attributes
+    ----------
     direction : (3,) unit vector
     kind : "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)
-    rate : of turning about a centre, of growth along a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
+    rate : angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
     """
 
     direction: Array
@@ -40,7 +45,8 @@ def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
     for axis in range(3):
         product = inverse_difference(inertia, (axis + 1) % 3, axis) * inverse_difference(inertia, (axis + 2) % 3, axis)
         kind = "degenerate" if product == 0.0 else "centre" if product > 0.0 else "saddle"
-        found += [Equilibrium(side * np.eye(3)[axis], kind, float(np.sqrt(abs(product)))) for side in (1.0, -1.0)]
+        rate = float(np.sqrt(abs(product)))
+        found += [Equilibrium(direction=side * np.eye(3)[axis], kind=kind, rate=rate) for side in (1.0, -1.0)]
     return tuple(found)
 
 
@@ -77,16 +83,16 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     Parameters
     ----------
     moments : (3,) in any order [kg m^2]
-    energies : (N,) for |Pi| = 1, from 1/(2 I_max) to 1/(2 I_min) [1/(kg m^2)]; those of a top divided by |Pi|^2
-    count : points of each closed curve, the last one the first
+    energies : (N,) for |Pi| = 1, from 1/(2 I_max) to 1/(2 I_min) [1/(kg m^2)]; for a top its energy over |Pi|^2
+    count : points of each closed curve, of which the last is the first again
 
-    The two curves of an energy circle the same axis on its two sides. At the ends they are points; at 1/(2 I_middle)
-    each is two halves of the separatrices.
+    The two curves of an energy circle the same axis on its two sides. At both ends of the range they are points; at
+    1/(2 I_middle) each consists of two halves of separatrices.
 
     Raises
     ------
     ShapeError
-        For an energy outside, or three equal moments: then no point of the sphere moves.
+        If an energy is out of range, or the three moments are equal: then no point of the sphere moves.
     """
     inertia = moments_argument(moments)
     levels = np.atleast_1d(finite_array(energies, "energies", unit="1/(kg m^2)"))
@@ -94,7 +100,7 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     lowest, highest = 0.5 / ascending[2], 0.5 / ascending[0]
     if lowest == highest:
         raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
-    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - 1e-12)) | (levels > highest * (1.0 + 1e-12))):
+    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - _ROUNDED)) | (levels > highest * (1.0 + _ROUNDED))):
         raise ShapeError(f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {levels}")
     phase = np.linspace(0.0, 2.0 * np.pi, count)
     curves = np.empty((len(levels), 2, count, 3))
@@ -114,5 +120,5 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
 
 
 def inverse_difference(moments: Array, first: int, second: int) -> float:
-    """1/I_first - 1/I_second, right in all digits for moments that nearly agree [1/(kg m^2)]."""
+    """1/I_first - 1/I_second, accurate in all digits also for moments that nearly agree [1/(kg m^2)]."""
     return float((moments[second] - moments[first]) / (moments[first] * moments[second]))

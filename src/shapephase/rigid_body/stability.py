@@ -20,7 +20,14 @@ from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 
 _ROUNDING = 16.0 * np.finfo(float).eps
-"""Moments of a turned tensor closer than this, relative to its trace, cannot be told from equal ones."""
+"""Moments of a tensor that is not diagonal closer than this, relative to its trace, may be equal but for rounding."""
+_ALIGNED = 1e-12
+"""Distance of I n from the line of n, relative to the trace of I, up to which n is a principal axis: what rounding
+leaves of axes that were computed."""
+_LEAST = 1e-100
+"""Smallest momentum taken [kg m^2/s]: its square and the curvature, its inverse square, must be finite."""
+_MOST = 1e100
+"""Largest momentum taken [kg m^2/s], for the same reason."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +47,8 @@ class SteadyRotation:
     eigenvalues : (2,) complex, plus and minus, of the linearisation on the tangent plane of the sphere [1/s]
     sphere_hessian : (2, 2) second derivative of H restricted to the momentum sphere, in the basis `tangent`
     index : number of negative directions of `sphere_hessian`
-    verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (this moment equals exactly
-        one of the others: a neighbour drifts along the circle of equilibria, and stays near the circle)
+    verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals
+        exactly one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)
 
     A spherical body is "stable" everywhere: every momentum stands still.
     """
@@ -99,14 +106,14 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     largest = np.abs(vector).max()
     if largest == 0.0:
         raise ShapeError("momentum: the body is at rest; a steady rotation needs a momentum other than zero")
-    if not 1e-100 < largest < 1e100:
+    if not _LEAST < largest < _MOST:
         raise ShapeError(f"momentum: {largest:.3g} kg m^2/s is out of range, 1e-100 to 1e100; take other units")
     magnitude = float(largest * np.linalg.norm(vector / largest))
     axis = vector / magnitude
     image = tensor @ axis
     moment = float(axis @ image)
     tilt = float(np.linalg.norm(image - moment * axis))
-    if tilt > 1e-12 * np.trace(tensor):
+    if tilt > _ALIGNED * np.trace(tensor):
         raise ShapeError(
             f"momentum: {vector} is not along a principal axis, so the rotation is not steady (I n leaves n by "
             f"{tilt:.3g} kg m^2); take the axes from `steady_rotations`"
@@ -114,7 +121,7 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     others, tangent = _across(tensor, axis)
     gaps = (moment - others) / (moment * others)
     gaps[np.abs(moment - others) <= _tie(tensor, axis)] = 0.0
-    return _judged(vector, magnitude, axis, moment, others, gaps, tangent)
+    return _classified(vector, magnitude, axis, moment, others, gaps, tangent)
 
 
 def steady_rotations(
@@ -139,11 +146,11 @@ def steady_rotations(
     Source: Marsden and Ratiu, theorem 15.9.1.
     """
     tensor = _tensor(inertia)
-    size = finite_array(magnitude, "magnitude", unit="kg m^2/s")
-    if size.shape != () or size <= 0.0:
+    norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
+    if norm.shape != () or norm <= 0.0:
         raise ShapeError(f"magnitude: one number above 0 kg m^2/s is needed, got {magnitude}")
     _, axes = principal_axes(tensor)
-    smallest, intermediate, largest = (steady_rotation(tensor, size * axes[:, k]) for k in range(3))
+    smallest, intermediate, largest = (steady_rotation(tensor, norm * axes[:, k]) for k in range(3))
     return smallest, intermediate, largest
 
 
@@ -165,14 +172,15 @@ def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
 
 
 def _tie(tensor: Array, axis: Array) -> float:
-    """Moments of a diagonal tensor came as they stand: only equal ones are equal."""
+    """Largest difference of equal moments [kg m^2]: none for a diagonal tensor, whose moments are exact."""
     exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
     return 0.0 if exact else _ROUNDING * float(np.trace(tensor))
 
 
-def _judged(
+def _classified(
     momentum: Array, magnitude: float, axis: Array, moment: float, others: Array, gaps: Array, tangent: Array
 ) -> SteadyRotation:
+    """The steady rotation of these moments; `gaps` are 1/I_i - 1/I_e along the columns of `tangent`."""
     low, high = float(gaps.min()), float(gaps.max())
     if low > 0.0:
         definiteness, verdict = "positive definite", "stable"
