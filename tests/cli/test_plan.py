@@ -60,15 +60,15 @@ def test_what_cannot_be_planned_is_refused_in_one_line(arguments, code, words, c
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
-    """The signal itself, in the third iteration; the motion written turns the body nearly as asked."""
-    plain = cli_plan._Search.watch
+    """The signal itself, in the third iteration; the motion written reaches the goal nearly."""
+    plain = cli_plan._InterruptibleSearch.report
 
     def pressed(self, now):
         if (now.stage, now.iteration) == ("search", 3):
             signal.raise_signal(signal.SIGINT)
         return plain(self, now)
 
-    monkeypatch.setattr(cli_plan._Search, "watch", pressed)
+    monkeypatch.setattr(cli_plan._InterruptibleSearch, "report", pressed)
     handler = signal.getsignal(signal.SIGINT)
     out = tmp_path / "plan.csv"
     with pytest.raises(SystemExit) as ended:
@@ -98,8 +98,8 @@ def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
 
 def test_pressed_twice_gives_it_up():
     with steps(1) as work:
-        search = cli_plan._Search(work)
-        search.watch(Progress("search", 1, 1, 0, 1.0, 0.0))
+        search = cli_plan._InterruptibleSearch(work)
+        search.report(Progress(stage="search", start=1, starts=1, iteration=0, cost=1.0, infeasibility=0.0))
         search.interrupted()
         assert search.stopped
         with pytest.raises(KeyboardInterrupt):

@@ -10,9 +10,15 @@ from scipy.optimize import brentq
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
-from shapephase.optimal_control import extremals
-from shapephase.optimal_control._jacobi_fields import conjugate_times, jacobi_fields, shoot
-from shapephase.optimal_control.extremals import extremal, wong_residual
+from shapephase.optimal_control import (
+    _hamiltonian,
+    _wong_residual,
+    conjugate_times,
+    extremal,
+    jacobi_fields,
+    shoot,
+    wong_residual,
+)
 from support.bodies import joint, link, random_loop, urdf
 
 X = np.array([1.0, 0.0, 0.0])
@@ -310,7 +316,7 @@ def test_an_extremals_path_is_recognised_with_its_charge(which, kind, request):
     np.testing.assert_allclose(fit.rate, RATE, rtol=0, atol=1e-7)
 
 
-def test_loops_that_are_no_extremals_are_told(cat, rng):
+def test_loops_that_are_no_extremals_are_recognised(cat, rng):
     path, _ = small_circle(cat, np.radians(0.1))
     assert wong_residual(cat, path).residual < 0.01
     # An ellipse of the same area, and any loop; and the first metric's extremal in the second.
@@ -383,9 +389,9 @@ def test_jacobi_fields_are_differences_of_extremals(sliding, kind):
     metric = metric_of(sliding, START, kind)
 
     def end(change):
-        rate = RATE + np.linalg.solve(metric, change[:3] * fields.momentum_sizes)
+        rate = RATE + np.linalg.solve(metric, change[:3] * fields.momentum_scales)
         moved = extremal(
-            sliding, START, rate, charge + change[3:] * fields.charge_size, span, metric=kind, tolerance=1e-13
+            sliding, START, rate, charge + change[3:] * fields.charge_scale, span, metric=kind, tolerance=1e-13
         )
         return np.concatenate([moved.shape(span), so3.log(moved.attitude(span) @ central.attitude(span).T)])
 
@@ -396,7 +402,7 @@ def test_jacobi_fields_are_differences_of_extremals(sliding, kind):
 def test_the_way_itself_is_a_jacobi_field(sliding):
     """Faster with more charge is further along the same way: t times the velocity, the turning included."""
     fields = jacobi_fields(sliding, "kinetic", START, RATE, CHARGE, 1.0, 1e-12)
-    scaling = np.concatenate([metric_of(sliding, START) @ RATE / fields.momentum_sizes, CHARGE / fields.charge_size])
+    scaling = np.concatenate([metric_of(sliding, START) @ RATE / fields.momentum_scales, CHARGE / fields.charge_scale])
     motion = extremal(sliding, START, RATE, CHARGE, 1.0)
     times = np.array([0.3, 1.0])
     turning = -so3.apply(sp.mechanical_connection(sliding, motion.shape(times)), motion.rate(times))
@@ -448,15 +454,15 @@ def test_a_motion_without_energy_is_refused(load_urdf, cat):
         wong_residual(cat, sp.ShapePath.function(into_it, 2.0, breaks=(1.0,)))
 
 
-def test_an_extremal_that_cannot_be_integrated_is_told(cat, monkeypatch):
-    monkeypatch.setattr(extremals, "_MOST", 2000)
+def test_an_extremal_that_cannot_be_integrated_is_refused(cat, monkeypatch):
+    monkeypatch.setattr(_hamiltonian, "_MOST", 2000)
     with pytest.raises(AccuracyNotReached, match="charge"):
         extremal(cat, START, RATE, 1e6 * CHARGE, 1.0)
 
 
-def test_a_solution_that_grows_without_end_is_told():
+def test_a_solution_that_grows_without_end_is_refused():
     with pytest.raises(AccuracyNotReached, match="breaks down at 1 s"):
-        extremals.integrated(lambda y: y**2, 2.0, np.ones(1), 1e-9, np.ones(1))
+        _hamiltonian.integrated(lambda y: y**2, 2.0, np.ones(1), 1e-9, np.ones(1))
 
 
 def test_an_extremal_at_rest_has_no_conjugate_times(cat):
@@ -477,13 +483,13 @@ def test_a_path_whose_rate_jumps_is_no_extremal(cat):
     assert wong_residual(cat, sp.ShapePath.function(corner, 1.0)).residual == pytest.approx(declared, rel=1e-2)
 
 
-def test_a_path_too_rough_for_its_samples_is_told(cat, rng, monkeypatch):
-    monkeypatch.setattr(extremals, "_PIECES", (1, 2))
+def test_a_path_too_rough_for_its_samples_is_refused(cat, rng, monkeypatch):
+    monkeypatch.setattr(_wong_residual, "_PANELS", (1, 2))
     with pytest.raises(AccuracyNotReached, match="as breaks of the path"):
         wong_residual(cat, random_loop(cat, rng, harmonics=6))
 
 
-def test_a_target_out_of_reach_is_told(planar):
+def test_a_target_out_of_reach_is_refused(planar):
     loop = sp.ShapePath.fourier([0.6, -0.4], [[0.1], [0.0]], [[0.0], [0.1]], 1.0)
     with pytest.raises(AccuracyNotReached, match="no extremal found"):
         shoot(planar, loop, so3.exp(0.5 * X))

@@ -12,9 +12,17 @@ from scipy.interpolate import CubicSpline
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached
-from shapephase.optimal_control._jacobi_fields import conjugate_times, shoot
-from shapephase.optimal_control.extremals import integrated, wong_residual
-from shapephase.optimal_control.planning import path_cost, plan_reorientation
+from shapephase.optimal_control import (
+    Goal,
+    Limits,
+    Search,
+    conjugate_times,
+    path_cost,
+    plan_reorientation,
+    shoot,
+    wong_residual,
+)
+from shapephase.optimal_control._hamiltonian import integrated
 from support.independent import apart, mujoco_motion, pinocchio_motion
 
 X, Y, Z = np.eye(3)
@@ -23,9 +31,9 @@ SKEW = so3.exp(np.array([0.9, 0.5, -0.3]))
 LARGE = {
     "cat rate": ("cat", np.radians(60.0) * X, "rate", {}),
     "cat kinetic": ("cat", np.radians(8.0) * X, "kinetic", {}),
-    "satellite": ("satellite", np.radians(5.0) * Y, "rate", {"joint_limits": False}),
-    "astronaut": ("astronaut", np.radians(60.0) * Z, "rate", {"joint_limits": False}),
-    "human": ("example:human", np.radians(60.0) * X, "rate", {"joint_limits": False}),
+    "satellite": ("satellite", np.radians(5.0) * Y, "rate", {"limits": Limits(joint_limits=False)}),
+    "astronaut": ("astronaut", np.radians(60.0) * Z, "rate", {"limits": Limits(joint_limits=False)}),
+    "human": ("example:human", np.radians(60.0) * X, "rate", {"limits": Limits(joint_limits=False)}),
 }
 
 
@@ -37,7 +45,7 @@ def two_halves():
 @pytest.fixture(scope="module")
 def skew(two_halves):
     """The plan of a skew turn on a few pieces, and its extremal."""
-    plan = plan_reorientation(two_halves, SKEW, pieces=12)
+    plan = plan_reorientation(two_halves, SKEW, search=Search(pieces=12))
     return plan, shoot(two_halves, plan.path, SKEW)
 
 
@@ -49,9 +57,12 @@ def within_limits(body, path):
 
 def wave(rng, joints, duration=1.0):
     """A smooth motion that starts and ends at zero, and its rate."""
-    pace = np.pi / duration * np.arange(1, 5)
+    frequencies = np.pi / duration * np.arange(1, 5)
     sines = rng.normal(size=(4, joints)) / np.arange(1, 5)[:, None]
-    return lambda t: (np.sin(np.outer(t, pace)) @ sines, (np.cos(np.outer(t, pace)) * pace) @ sines)
+    return lambda t: (
+        np.sin(np.outer(t, frequencies)) @ sines,
+        (np.cos(np.outer(t, frequencies)) * frequencies) @ sines,
+    )
 
 
 def varied(motion, wave, size):
@@ -125,7 +136,7 @@ def test_back_from_a_path_beside_it(two_halves, skew, seed):
     assert np.abs(found.shape(times) - motion.shape(times)).max() < 1e-7
 
 
-def test_a_field_that_overflows_is_told_without_a_warning():
+def test_a_field_that_overflows_is_reported_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(AccuracyNotReached, match="the extremal"):
@@ -143,7 +154,9 @@ def test_extremals_of_many_joints(case, rng):
     """From 20 pieces to the extremal; what the spline costs more falls as the sixth power of its pieces, or faster."""
     name, turn, cost, options = LARGE[case]
     body, target = sp.load_body(name), so3.exp(turn)
-    plans = [plan_reorientation(body, target, cost=cost, pieces=pieces, **options) for pieces in (20, 40)]
+    plans = [
+        plan_reorientation(body, target, cost=cost, search=Search(pieces=pieces), **options) for pieces in (20, 40)
+    ]
     if not options:
         assert all(within_limits(body, plan.path) for plan in plans)
     motion = shoot(body, plans[0].path, target, metric=cost)
@@ -164,7 +177,7 @@ def test_extremals_of_many_joints(case, rng):
 @pytest.mark.full
 def test_more_pieces_obey_wongs_equations_to_the_fourth_digit():
     body = sp.load_body("cat")
-    plan = plan_reorientation(body, so3.exp(np.radians(60.0) * X), cost="rate", pieces=80)
+    plan = plan_reorientation(body, so3.exp(np.radians(60.0) * X), cost="rate", search=Search(pieces=80))
     assert within_limits(body, plan.path)
     assert wong_residual(body, plan.path, metric="rate").residual < 1e-4
 
@@ -173,7 +186,7 @@ def test_more_pieces_obey_wongs_equations_to_the_fourth_digit():
 def test_an_extremal_of_light_joints_that_whirl():
     """In the kinetic metric the astronaut's shoulders and ankles go far for little: whole steps lead astray."""
     body, target = sp.load_body("astronaut"), so3.exp(np.radians(5.0) * Y)
-    plan = plan_reorientation(body, target, joint_limits=False, pieces=20)
+    plan = plan_reorientation(body, target, limits=Limits(joint_limits=False), search=Search(pieces=20))
     motion = shoot(body, plan.path, target)
     truth = pinocchio_motion("astronaut", body.joint_names, motion.path, np.zeros(3))
     assert apart(truth.attitude[-1], target) < 1e-8
@@ -182,7 +195,7 @@ def test_an_extremal_of_light_joints_that_whirl():
 
 
 class _AsSplined:
-    """A plan's path as MuJoCo's integration wants it: one time after another, with accelerations."""
+    """A plan's path as MuJoCo's integration needs it: one time after another, with accelerations."""
 
     def __init__(self, path):
         self.duration = path.duration
@@ -224,17 +237,16 @@ def test_the_astronaut_twists_in_a_somersault():
     momentum, duration = [0.0, 57.5, 0.0], 2.0
     plan = plan_reorientation(
         body,
+        Goal(somersaults=1, half_twists=2),
         momentum=momentum,
         duration=duration,
         start=start,
         end="free",
-        somersaults=1,
-        half_twists=2,
         joints=joints,
         cost="rate",
-        pieces=20,
+        search=Search(pieces=20),
     )
-    assert plan.miss < 1e-8
+    assert plan.goal_error < 1e-8
     assert plan.starts[0].converged
     times = np.linspace(0.0, duration, 401)
     shapes = plan.path.shape(times)
@@ -249,7 +261,14 @@ def test_the_astronaut_twists_in_a_somersault():
 def test_the_diver_twists_in_a_somersault():
     """The diver leaves upright, arms down, and moves nothing but them."""
     momentum = [0.0, 37.6, 0.0]
-    options = {"somersaults": 1, "half_twists": 2, "end": "free", "cost": "rate", "pieces": 20}
-    plan = plan_reorientation(sp.load_body("diver"), momentum=momentum, duration=1.5, **options)
-    assert plan.miss < 1e-8
+    plan = plan_reorientation(
+        sp.load_body("diver"),
+        Goal(somersaults=1, half_twists=2),
+        momentum=momentum,
+        duration=1.5,
+        end="free",
+        cost="rate",
+        search=Search(pieces=20),
+    )
+    assert plan.goal_error < 1e-8
     check_somersault_with_twist("diver", plan, momentum)

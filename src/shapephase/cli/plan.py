@@ -1,4 +1,4 @@
-"""`shapephase plan`: the joint motion that turns a body as asked."""
+"""`shapephase plan`: the joint motion that turns a body to a goal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ from .text import Outcome, check_writable, rotation_line
 if TYPE_CHECKING:
     from ..optimal_control.plan import Plan, Progress
 
+# Samples of the file written: at 1 s they are 0.5 ms apart, far below the pieces of a plan.
 _SAMPLES = 2001
+# The exit code of a program that Ctrl-C ended, 128 + SIGINT.
 _STOPPED = 130
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -48,9 +50,9 @@ def plan_command(
     html: Path | None = None,
     json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
 ) -> Outcome:
-    """Find the cheapest motion of the joints that turns a body as asked, and compute what it does.
+    """Find the cheapest motion of the joints that turns a body by a rotation, and compute the resulting motion.
 
-    Ctrl-C ends the search; the best motion so far is told and written, and the exit code is 130.
+    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130.
 
     Parameters
     ----------
@@ -81,30 +83,32 @@ def plan_command(
     json
         print JSON
     """
+    from ..optimal_control.plan_options import Goal, Search
     from ..optimal_control.planning import plan_reorientation
 
     check_writable(out, "--out", ".csv")
     check_writable(html, "--html", ".html")
     if (rotate is None) == (somersaults is None and half_twists is None):
-        raise ShapeError("what to do: give --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
+        raise ShapeError("give either --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
     with steps(12 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, isolate=True)
-        target = None if rotate is None else so3.exp(np.radians(rotate) * _axis(about))
+        goal = (
+            Goal(somersaults=somersaults, half_twists=half_twists)
+            if rotate is None
+            else Goal(rotation=so3.exp(np.radians(rotate) * _axis(about)))
+        )
         work.begin("searching")
         with _stoppable(work) as search:
             try:
                 found = plan_reorientation(
                     loaded,
-                    target,
+                    goal,
                     momentum=momentum,
                     duration=duration,
-                    somersaults=somersaults,
-                    half_twists=half_twists,
                     cost=cost,
-                    starts=starts,
-                    seed=seed,
-                    watch=search.watch,
+                    search=Search(starts=starts, seed=seed),
+                    iteration_callback=search.report,
                 )
             except PlanNotFound as failure:
                 if not search.stopped or failure.best is None:
@@ -112,7 +116,7 @@ def plan_command(
                 found = cast("Plan", failure.best)
                 warnings.warn(str(failure), stacklevel=2)
         if out is not None:
-            # So dense that a reader who joins the ends smoothly, as closed samples are read, changes next to nothing.
+            # Dense samples: a reader that joins the ends of a closed path smoothly then changes next to nothing.
             write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
         if html is not None:
             from ..plotting.report import write_report
@@ -124,7 +128,7 @@ def plan_command(
         _heading(loaded, found.path.duration, momentum),
         "",
         rotation_line("turned", turned),
-        f"{'off the goal':24}{found.miss:16.2e} rad",
+        f"{'off the goal':24}{found.goal_error:16.2e} rad",
         f"{'cost':24}{found.cost:16.9g}   {found.cost_name}",
         f"{'KKT residual':24}{found.kkt_residual:16.2e}",
         f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
@@ -134,7 +138,7 @@ def plan_command(
         "duration_s": found.path.duration,
         "momentum_kg_m2_s": list(momentum),
         "final_attitude_quat_xyzw": so3.quat_from_matrix(turned).tolist(),
-        "miss_rad": found.miss,
+        "miss_rad": found.goal_error,
         "cost": found.cost,
         "cost_name": found.cost_name,
         "kkt_residual": found.kkt_residual,
@@ -143,21 +147,21 @@ def plan_command(
     return Outcome("\n".join(lines), data, code=_STOPPED if search.stopped else 0)
 
 
-class _Search:
-    """A search on the terminal.
+class _InterruptibleSearch:
+    """A search on the terminal, which Ctrl-C ends after the iteration in progress.
 
     Attributes
     ----------
-    begun : whether there is something to keep
-    stopped : whether Ctrl-C was pressed since
+    begun : whether an iteration has been reported, so that there is something to keep
+    stopped : whether Ctrl-C has been pressed since
     """
 
     def __init__(self, work: Steps) -> None:
         self._work = work
         self.begun = self.stopped = False
 
-    def watch(self, now: Progress) -> bool:
-        """Shows where the search stands, and stops it when asked."""
+    def report(self, now: Progress) -> bool:
+        """Show the progress of the search; returns whether to stop it."""
         which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
         self._work.say(
             f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
@@ -174,9 +178,9 @@ class _Search:
 
 
 @contextmanager
-def _stoppable(work: Steps) -> Iterator[_Search]:
+def _stoppable(work: Steps) -> Iterator[_InterruptibleSearch]:
     """A search that Ctrl-C stops."""
-    search = _Search(work)
+    search = _InterruptibleSearch(work)
     if threading.current_thread() is not threading.main_thread():
         # Python hands Ctrl-C to the main thread alone.
         yield search

@@ -1,45 +1,34 @@
-from ._jacobi_fields import ConjugateTime, JacobiFields, conjugate_times, jacobi_fields, shoot
-from .extremals import (
-    Extremal,
-    Hamiltonian,
-    WongFit,
-    checked_metric,
-    extremal,
-    hamiltonian,
-    initial_state,
-    integrated,
-    natural_sizes,
-    wong_residual,
-)
+from ._hamiltonian import Hamiltonian, hamiltonian
+from ._jacobi_fields import ConjugateTime, JacobiFields, conjugate_times, jacobi_fields
+from ._path_cost import path_cost
+from ._shooting import shoot
+from ._wong_residual import WongFit, wong_residual
+from .extremals import Extremal, extremal
 from .plan import Plan, Progress, Start
-from .planning import path_cost, plan_reorientation
-from .symbolic import SymbolicBody, solved, symbolic_body
-from .task import Reorientation, reorientation
+from .plan_options import Goal, Limits, Search
+from .planning import plan_reorientation
+from .symbolic import SymbolicBody, symbolic_body
 
 __all__ = [
     "ConjugateTime",
     "Extremal",
+    "Goal",
     "Hamiltonian",
     "JacobiFields",
+    "Limits",
     "Plan",
     "Progress",
-    "Reorientation",
+    "Search",
     "Start",
     "SymbolicBody",
     "WongFit",
-    "checked_metric",
     "conjugate_times",
     "extremal",
     "hamiltonian",
-    "initial_state",
-    "integrated",
     "jacobi_fields",
-    "natural_sizes",
     "path_cost",
     "plan_reorientation",
-    "reorientation",
     "shoot",
-    "solved",
     "symbolic_body",
     "wong_residual",
 ]

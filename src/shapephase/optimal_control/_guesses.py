@@ -1,4 +1,4 @@
-"""Where the search for a plan starts: loops in the plane of shapes in which the body turns most."""
+"""Starting points of the search for a plan: loops in the plane of shapes in which the body turns most."""
 
 from __future__ import annotations
 
@@ -12,40 +12,56 @@ from ..deformation.deformation import articulated
 from ..errors import PlanNotFound, ShapePhaseError
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.connection import curvature, mechanical_connection
-from .spline_basis import SplineBasis
+from ._spline_basis import SplineBasis
 from .symbolic import symbolic_body
 from .task import Reorientation
 
+# Where guesses are sampled along [0, 1]: dense enough for two rounds of a loop on any spline.
 PLACES = np.linspace(0.0, 1.0, 101)
-_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)
-_PHASES = 6
+# Radii of the circles, relative to the one that turns far enough in a constant curvature: the curvature may be smaller
+# or larger away from the start.
+_RADIUS_FACTORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)
+# Directions in which a circle leaves the start: 60 degrees apart.
+_DIRECTIONS = 6
+# Rounds of a circle: two small ones may stay within limits that one large one would exceed.
+_ROUNDS = (1, 2)
+# Lengths of a straight motion to a free end, relative to the one that turns far enough to first order.
+_STRAIGHT_FACTORS = (0.5, 1.0)
+# Random loops tried for each one that is needed: some cannot be reconstructed.
 _ATTEMPTS = 10
-_TOLERANCE = 1e-4
-# Of a guess that turns the body less than this share of the way its price tells nothing.
+# Accuracy of the reconstruction [rad]: guesses are off by far more.
+_RECONSTRUCTION_TOLERANCE = 1e-4
+# A guess that turns the body by less than this share of the way is ranked as if by this share: its price diverges.
 _LEAST_SHARE = 1e-3
-# Loops in a plane of a flatter body turn it by less than rounding.
+# Curvature in units of the metric below which loops turn the body by less than rounding.
 _FLAT = 1e-9
+# Ridge on the kinetic metric, as a share of its mean eigenvalue, so that motions without energy have a finite length.
+_RIDGE = 1e-9
+# Singular values below this share of the largest are directions that the connection does not turn to.
+_RANK = 1e-8
+# Guesses closer than this are the same [rad or m]: clipping to the limits can make them equal.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A motion of the joints near the wanted one.
+    """A motion of the joints to start a search from.
 
     Attributes
     ----------
-    control : (size, m) control points
+    control : (k, m) control points
     motion : its reconstruction, roughly
-    miss : how far it is from the goal [rad]
-    price : its cost in the metric of the start, more where it turns only part of the way: what guesses are ranked by
+    goal_error : angle between its attitude at the end and the goal [rad]
+    price : its cost in the metric of the start, more where it turns only part of the way; guesses are ranked by it
     """
 
     control: Array
     motion: Motion
-    miss: float
+    goal_error: float
     price: float
 
     def quaternions(self, places: Array, turn: Array) -> Array:
-        """Attitudes at places of [0, 1], the miss `turn` taken off evenly: (N,) -> (N, 4), continuous."""
+        """Attitudes at places of [0, 1], the missing `turn` added steadily: (N,) -> (N, 4), continuous."""
         attitude = self.motion.attitude(places * self.motion.duration)
         quats = so3.quat_from_matrix(so3.exp(places[:, None] * turn) @ attitude)
         flips = np.where(np.sum(quats[1:] * quats[:-1], axis=1) < 0.0, -1.0, 1.0)
@@ -59,13 +75,13 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     The curvature F of the mechanical connection along the axis of the turn, in the kinetic metric, is an antisymmetric
     form; its largest singular value sigma belongs to the plane of shapes in which a small loop turns the body most for
     its length: a circle of radius rho turns it by pi rho^2 sigma. Circles of several sizes, in several directions from
-    the start, once or twice round, are tried by the integrator; those that come near the goal at
-    little cost come first.
+    the start, once or twice round, are tried by the integrator; those that come near the goal at little cost come
+    first.
 
     Raises
     ------
     PlanNotFound
-        If not one guess can be reconstructed.
+        If no guess can be reconstructed.
 
     Source: Montgomery 1990, isoholonomic problem; theory.md B6.
     """
@@ -83,7 +99,7 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
             found.append(guess)
     if not found:
         raise PlanNotFound(
-            f"not one guess of a motion of {task.body.name} could be reconstructed; change start or limits"
+            f"no guess of a motion of {task.body.name} could be reconstructed; change the start or the limits"
         )
     return found
 
@@ -91,9 +107,9 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
 def _circles(task: Reorientation) -> list[Array]:
     """Loops (N, m) over `PLACES` through the start."""
     loops = []
-    turn = task.turn()
+    turn = task.turn_to_goal()
     angle = float(np.linalg.norm(turn))
-    if angle == 0.0 or np.count_nonzero(task.moves) < 2:
+    if angle == 0.0 or np.count_nonzero(task.movable) < 2:
         return []
     # The plane is looked for at the start and half way to the middle of the limits: the start may be special.
     lower, upper = np.maximum(task.lower, task.start - np.pi), np.minimum(task.upper, task.start + np.pi)
@@ -103,11 +119,11 @@ def _circles(task: Reorientation) -> list[Array]:
         if plane is None:
             continue
         first, second, sigma = plane
-        for rounds in (1, 2):
-            for size in _SIZES:
-                radius = size * np.sqrt(angle / (np.pi * sigma * rounds))
+        for rounds in _ROUNDS:
+            for factor in _RADIUS_FACTORS:
+                radius = factor * np.sqrt(angle / (np.pi * sigma * rounds))
                 phase = 2.0 * np.pi * rounds * PLACES
-                for lean in 2.0 * np.pi * np.arange(_PHASES) / _PHASES:
+                for lean in 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS:
                     across = np.cos(phase + lean) - np.cos(lean)
                     along = np.sin(phase + lean) - np.sin(lean)
                     loops.append(task.start + radius * (across[:, None] * first + along[:, None] * second))
@@ -117,17 +133,17 @@ def _circles(task: Reorientation) -> list[Array]:
 def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
     """Two orthogonal directions of length 1 in the kinetic metric, and sigma, loops turning by +axis."""
     shape = task.shapes(coordinates)
-    moves = np.flatnonzero(task.moves)
-    form = task.ties.T @ (curvature(task.body, shape) @ axis) @ task.ties
-    metric = task.ties.T @ symbolic_body(task.body).shape_metric(shape).full() @ task.ties
+    moves = np.flatnonzero(task.movable)
+    form = task.coupling.T @ (curvature(task.body, shape) @ axis) @ task.coupling
+    metric = task.coupling.T @ symbolic_body(task.body).shape_metric(shape).full() @ task.coupling
     metric = metric[np.ix_(moves, moves)]
-    root = np.linalg.cholesky(metric + 1e-9 * np.trace(metric) / len(moves) * np.eye(len(moves)))
+    root = np.linalg.cholesky(metric + _RIDGE * np.trace(metric) / len(moves) * np.eye(len(moves)))
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(1j * inverse @ form[np.ix_(moves, moves)] @ inverse.T)
     sigma = float(values[-1])
     if sigma * np.linalg.norm(metric) <= _FLAT:
         return None
-    first, second = np.zeros((2, task.size))
+    first, second = np.zeros((2, task.dimension))
     first[moves] = np.sqrt(2.0) * inverse.T @ np.real(vectors[:, -1])
     second[moves] = np.sqrt(2.0) * inverse.T @ np.imag(vectors[:, -1])
     # A loop from `first` to `second` turns by -F(first, second): the plane's sense is chosen so that this is positive.
@@ -139,27 +155,28 @@ def _straight(task: Reorientation) -> list[Array]:
     ramp = PLACES[:, None]
     if task.end is not None:
         return [task.start + ramp * (task.end - task.start)] if np.any(task.end != task.start) else []
-    connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.ties
+    connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.coupling
     metric = start_metric(task)
-    needed = task.needed() @ -connection
-    cheap = np.linalg.solve(metric + 1e-9 * np.trace(metric) / len(metric) * np.eye(len(metric)), needed.T)
-    direction = cheap @ np.linalg.lstsq(needed @ cheap, task.needed() @ task.turn(), rcond=1e-8)[0]
-    return [task.start + size * ramp * direction for size in (0.5, 1.0)]
+    turning = task.constrained_directions() @ -connection
+    cheap = np.linalg.solve(metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric)), turning.T)
+    missing = task.constrained_directions() @ task.turn_to_goal()
+    direction = cheap @ np.linalg.lstsq(turning @ cheap, missing, rcond=_RANK)[0]
+    return [task.start + factor * ramp * direction for factor in _STRAIGHT_FACTORS]
 
 
 def _random(task: Reorientation, rng: np.random.Generator) -> Array:
     """A loop of two random harmonics through the start, as large as half the limits or one radian."""
     reach = np.minimum(0.5 * (task.upper - task.lower), 1.0)
     phase = 2.0 * np.pi * PLACES[:, None]
-    curve = np.zeros((len(PLACES), task.size))
+    curve = np.zeros((len(PLACES), task.dimension))
     for harmonic in (1, 2):
-        cosine, sine = rng.normal(size=(2, task.size)) * reach / harmonic
+        cosine, sine = rng.normal(size=(2, task.dimension)) * reach / harmonic
         curve += cosine * (np.cos(harmonic * phase) - 1.0) + sine * np.sin(harmonic * phase)
     return task.start + curve
 
 
 def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | None:
-    """A curve (101, m) at even places, taken within the limits and from start to end; None where it has no motion."""
+    """A curve (101, m) over `PLACES`, taken within the limits and from start to end; None where it has no motion."""
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
     control = basis.fitted(np.clip(curve, task.lower, task.upper), PLACES)
@@ -169,26 +186,26 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
     control = np.clip(control, task.lower, task.upper)
     path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
     try:
-        motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_TOLERANCE)
+        motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
     except ShapePhaseError:
         return None
-    miss = task.miss(motion.final_attitude)
+    goal_error = task.goal_error(motion.final_attitude)
     steps = np.diff(basis.matrix(PLACES) @ control, axis=0)
     length = np.sum((steps @ start_metric(task)) * steps)
-    whole = float(np.linalg.norm(task.turn()))
-    share = max(whole - miss, _LEAST_SHARE * whole) / whole if whole else 1.0
-    return Guess(control, motion, miss, float(length / share**2))
+    whole = float(np.linalg.norm(task.turn_to_goal()))
+    share = max(whole - goal_error, _LEAST_SHARE * whole) / whole if whole else 1.0
+    return Guess(control=control, motion=motion, goal_error=goal_error, price=float(length / share**2))
 
 
 def start_metric(task: Reorientation) -> Array:
     """The kinetic metric of the coordinates at the start: (m, m)."""
-    return task.ties.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.ties
+    return task.coupling.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.coupling
 
 
 def _different(tried: list[Guess]) -> list[Guess]:
-    """Without those that clipping made equal."""
+    """The guesses without those that clipping made equal."""
     kept: list[Guess] = []
     for guess in tried:
-        if all(np.abs(guess.control - other.control).max() > 1e-6 for other in kept):
+        if all(np.abs(guess.control - other.control).max() > _SAME for other in kept):
             kept.append(guess)
     return kept

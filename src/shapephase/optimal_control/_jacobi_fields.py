@@ -1,4 +1,4 @@
-"""How extremals spread: their Jacobi fields, conjugate times, and the extremal that meets an end by shooting."""
+"""Jacobi fields of extremals, which say how their ends move with the initial conditions, and conjugate times."""
 
 from __future__ import annotations
 
@@ -7,50 +7,57 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import positive_argument, tolerance_argument
 from ..arrays import Array
 from ..body.body import Body
-from ..errors import AccuracyNotReached, ShapeError
+from ..errors import ShapeError
 from ..integrator.casadi_calls import call_casadi
-from ..shape_space.connection import horizontal_lift, mechanical_connection
-from ..shape_space.shape_path import ShapePath
-from .extremals import Extremal, extremal, hamiltonian, initial_state, integrated, natural_sizes, wong_residual
+from ..shape_space.connection import mechanical_connection
+from ._hamiltonian import hamiltonian, initial_state, integrated, natural_scales
+from .extremals import Extremal
 
-_STEPS = 40
-# First to here by steps this accurate, which takes a fraction of the time.
-_NEAR, _ROUGH = 1e-6, 1e-8
-_DAMPING, _HOPELESS = 1e-5, 1e5
-_SYMMETRY = 10.0
-_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-# A trial that takes more evaluations than this has gone astray.
-_MOST = 20_000
-_NOTHING = 1e-9
-_ZERO = 1e-6
+# Times at which the fields are sampled for zeros: neighbouring conjugate times of a loop are a good part of it apart.
 _SCAN = 600
-_SPARSE = 10
-_BALANCING = 8
+# Every so many of those samples balance the basis.
+_BALANCING_STRIDE = 10
+# Rounds of balancing by rows and columns: it converges within a few.
+_BALANCING_ROUNDS = 8
+# Directions whose mean square effect, as singular value, is below this share of the largest have none.
+_NO_EFFECT = 1e-9
+# A singular value below this share of the largest over all times is a zero: refined zeros reach 1e-9 or less.
+_ZERO = 1e-6
+# Zeros closer than this share of the time looked through are the same one.
+_SAME_TIME = 1e-6
+# Newton steps to a zero, and the relative change of time at which they end.
+_REFINEMENTS = 8
+_REFINED = 1e-12
+# The interval of the difference quotient for a zero, as a share of the reach of the search; and the least such reach,
+# as a share of the sampling step, so that the quotient does not drown in rounding.
+_DIFFERENCE = 1e-3
+_LEAST_REACH = 1e-6
+# How far beyond its end an extremal is looked at unless told otherwise, so that a conjugate time at the end is seen.
+_BEYOND_END = 1.05
 
 
 @dataclass(frozen=True, eq=False)
 class JacobiFields:
-    """The extremals next to one, from the same start: how its end moves with the initial rate and the charge.
+    """Jacobi fields along an extremal that vanish at its start: how it moves with the initial rate and the charge.
 
     Attributes
     ----------
     duration : [s]
     n_shape : number of joints
-    momentum_sizes, charge_size : (n,), what the columns of `matrix` are per: a change of g rate and of the charge by
-        these
+    momentum_scales, charge_scale : (n,) and a number: units of g rate and of the charge that the columns of `matrix`
+        are per
     solution : times -> (2 n + 4 + (2 n + 3)(n + 3), N): the extremal, then the fields
     """
 
     duration: float
     n_shape: int
-    momentum_sizes: Array
-    charge_size: float
+    momentum_scales: Array
+    charge_scale: float
     solution: Callable[[Array], Array]
 
     def matrix(self, t: Array) -> Array:
@@ -89,10 +96,10 @@ def jacobi_fields(
     Raises AccuracyNotReached as `extremal`.
     """
     n, equations = body.n_shape, hamiltonian(body, metric)
-    momenta, of_charge = natural_sizes(body, equations, shape, rate, charge)
-    charges = np.concatenate([np.zeros((3, n)), of_charge * np.eye(3)], axis=1)
+    momenta, charge_scale = natural_scales(body, equations, shape, rate, charge)
+    charges = np.concatenate([np.zeros((3, n)), charge_scale * np.eye(3)], axis=1)
     fields = np.zeros((2 * n + 3, n + 3))
-    fields[n : 2 * n] = np.concatenate([np.diag(momenta), of_charge * mechanical_connection(body, shape).T], axis=1)
+    fields[n : 2 * n] = np.concatenate([np.diag(momenta), charge_scale * mechanical_connection(body, shape).T], axis=1)
 
     def field(now: Array) -> Any:
         state, spread = now[: 2 * n + 4], now[2 * n + 4 :].reshape(2 * n + 3, n + 3)
@@ -108,10 +115,16 @@ def jacobi_fields(
         return np.concatenate([flow, rates.ravel(), slopes[:n].ravel(), (-attitude @ slopes[2 * n :]).ravel()])
 
     rows = np.concatenate([np.ones(n), momenta, np.ones(3)])
-    size = np.concatenate([np.ones(n), momenta, np.ones(4), np.repeat(rows, n + 3)])
+    scale = np.concatenate([np.ones(n), momenta, np.ones(4), np.repeat(rows, n + 3)])
     start = np.concatenate([initial_state(equations, shape, rate, charge), fields.ravel()])
-    answer = integrated(field, duration, start, tolerance, size)
-    return JacobiFields(duration, n, momenta, of_charge, answer.sol)
+    answer = integrated(field, duration, start, tolerance, scale)
+    return JacobiFields(
+        duration=duration,
+        n_shape=n,
+        momentum_scales=momenta,
+        charge_scale=charge_scale,
+        solution=answer.sol,
+    )
 
 
 def conjugate_times(motion: Extremal, until: float | None = None, tolerance: float = 1e-11) -> list[ConjugateTime]:
@@ -124,7 +137,7 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     Parameters
     ----------
     motion : the extremal
-    until : [s]; None: 1.05 times its duration, so that its end is looked at too
+    until : [s]; None: 1.05 times its duration, so that its end is included
     tolerance : as for `extremal`
 
     Returns
@@ -142,15 +155,15 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     """
     if motion.energy == 0.0:
         raise ShapeError("an extremal at rest has no conjugate times; give it a rate")
-    span = 1.05 * motion.duration if until is None else positive_argument(until, "until")
+    span = _BEYOND_END * motion.duration if until is None else positive_argument(until, "until")
     start, rate = motion.shape(0.0), motion.rate(0.0)
     goal = tolerance_argument(tolerance)
     fields = jacobi_fields(motion.body, motion.metric, start, rate, motion.charge, span, goal)
     times = span * np.arange(1, _SCAN + 1) / _SCAN
     raw = fields.matrix(times)
     n = motion.body.n_shape
-    rows = np.repeat([_inverse_size(raw[:, :n]), _inverse_size(raw[:, n:])], [n, 3])
-    left, right = _balanced(rows[:, None] * raw[::_SPARSE])
+    rows = np.repeat([inverse_scale(raw[:, :n]), inverse_scale(raw[:, n:])], [n, 3])
+    left, right = _balanced(rows[:, None] * raw[::_BALANCING_STRIDE])
     left = left * rows
 
     def spread(t: Array) -> Array:
@@ -163,19 +176,19 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     for dip in dips:
         time = _refined(spread, float(times[dip]), span / _SCAN)
         small = np.linalg.svd(spread(np.array([time]))[0], compute_uv=False) < _ZERO * largest
-        if small.any() and not (found and abs(time - found[-1].time) < 1e-6 * span):
-            found.append(ConjugateTime(time, int(small.sum())))
+        if small.any() and not (found and abs(time - found[-1].time) < _SAME_TIME * span):
+            found.append(ConjugateTime(time=time, multiplicity=int(small.sum())))
     return found
 
 
 def _balanced(matrices: Array) -> tuple[Array, Array]:
-    """Changes of basis, left (k, m) and right (m, k), after which no direction is felt more than another.
+    """Changes of basis, left (k, m) and right (m, k), after which all directions have the same mean effect.
 
-    (N, m, m); what all of them map to nothing, or never reach, is left out. Without it a charge that is hardly felt
-    would hide the zeros of the others. By rows and columns in turn, as in Sinkhorn's scaling.
+    (N, m, m); what all of them map to zero, or never reach, is left out. Without this a charge of little effect would
+    hide the zeros of the others. By rows and columns in turn, as in Sinkhorn's scaling.
     """
     left = right = np.eye(matrices.shape[-1])
-    for _ in range(_BALANCING):
+    for _ in range(_BALANCING_ROUNDS):
         right = right @ _evened(left @ matrices @ right)
         left = _evened(so3.transpose(left @ matrices @ right)).T @ left
     return left, right
@@ -184,128 +197,28 @@ def _balanced(matrices: Array) -> tuple[Array, Array]:
 def _evened(matrices: Array) -> Array:
     """Columns after which the mean square of the matrices is the identity: (N, m, n) -> (n, k)."""
     _, values, rows = np.linalg.svd(matrices.reshape(-1, matrices.shape[-1]), full_matrices=False)
-    kept = values > _NOTHING * values[0]
+    kept = values > _NO_EFFECT * values[0]
     return rows[kept].T / values[kept] * np.sqrt(len(matrices))
 
 
 def _refined(spread: Callable[[Array], Array], time: float, step: float) -> float:
     """The time next to a dip of the least singular value at which it vanishes, or is least."""
     centre, reach = time, step
-    for _ in range(8):
+    for _ in range(_REFINEMENTS):
         left, values, right = np.linalg.svd(spread(np.array([time]))[0], full_matrices=False)
-        small = 1e-3 * reach
+        small = _DIFFERENCE * reach
         # The least singular value with its sign, along fixed vectors, passes through zero linearly.
         before, after = (left[:, -1] @ near @ right[-1] for near in spread(np.array([time - small, time + small])))
         slope = (after - before) / (2.0 * small)
         move = -values[-1] / slope if slope else 0.0
         time = float(np.clip(time + move, centre - step, centre + step))
-        if abs(move) < 1e-12 * centre:
+        if abs(move) < _REFINED * centre:
             break
-        reach = min(reach, max(abs(move), 1e-6 * step))
+        reach = min(reach, max(abs(move), _LEAST_REACH * step))
     return time
 
 
-def shoot(
-    body: Body,
-    path: ShapePath,
-    target: ArrayLike | None = None,
-    *,
-    metric: str = "kinetic",
-    tolerance: float = 1e-10,
-) -> Extremal:
-    """The extremal next to a nearly optimal path, with its start and end and the rotation asked for.
-
-    Newton's method on the initial rate and the charge, with steps shortened until the end comes nearer. Where a
-    symmetry of the body turns one solution into others the derivative is singular, and the damping, which falls with
-    the residual, leads to a nearest solution all the same (Yamashita and Fukushima 2001: quadratically).
-
-    Parameters
-    ----------
-    path : its start, end and duration are kept, the rate and charge of `wong_residual` are the first guess
-    target : (3, 3) rotation over the path at zero momentum; None: that of the path
-    metric : as for `extremal`
-    tolerance : of the end shape and the rotation [rad or m]
-
-    Raises
-    ------
-    AccuracyNotReached
-        If it does not converge: the message holds what is left. Plans of bodies of up to 36 joints are near enough
-        from 20 pieces on, where light joints do not whirl.
-    As `extremal` and `wong_residual`.
-    """
-    route = path.matched(body.joint_names, body.name)
-    goal = tolerance_argument(tolerance)
-    turned = horizontal_lift(body, route).end if target is None else so3.rotation_argument(target, "target")
-    if turned.shape != (3, 3):
-        raise ShapeError(f"target: one rotation (3, 3) is needed, got {turned.shape}")
-    start, end = route.shape(0.0), route.shape(route.duration)
-    n, fine = body.n_shape, max(1e-13, 0.01 * goal)
-    guess = wong_residual(body, route, metric=metric)
-    rate, charge = guess.rate, guess.charge
-    equations = hamiltonian(body, metric)
-    tensor = np.array(equations.metric(start))
-
-    def slopes(speed: Array, moment: Array, accuracy: float) -> Array:
-        fields = jacobi_fields(body, metric, start, speed, moment, route.duration, accuracy)
-        return fields.end()[2] / np.concatenate([fields.momentum_sizes, np.full(3, fields.charge_size)])
-
-    def missing(speed: Array, moment: Array, accuracy: float, most: int | None = None) -> Array:
-        state = initial_state(equations, start, speed, moment)
-        momenta, _ = natural_sizes(body, equations, start, speed, moment)
-        size = np.concatenate([np.ones(n), momenta, np.ones(4)])
-
-        def field(now: Array) -> Array:
-            return call_casadi(equations.field, 1, now, moment)[0][0]
-
-        last = integrated(field, route.duration, state, accuracy, size, most).y[:, -1]
-        attitude = so3.matrix_from_quat(so3.normalised(last[2 * n :]))
-        return np.concatenate([last[:n] - end, so3.log(attitude @ turned.T)])
-
-    def stepped(accuracy: float, damping: float) -> tuple[Array, Array, float] | None:
-        """Rate and charge from which the end is nearer, and the next damping; None if there are none."""
-        matrix = slopes(rate, charge, accuracy)
-        momenta, of_charge = natural_sizes(body, equations, start, rate, charge)
-        sizes = np.concatenate([momenta, np.full(3, of_charge)])
-        scaled = matrix * sizes
-        weights = np.repeat([_inverse_size(scaled[:n]), _inverse_size(scaled[n:])], [n, 3])
-        left, right = weights[:, None] * scaled, weights * gap
-        across, values, along = np.linalg.svd(left)
-        # The rest are symmetries, as far as the integration can tell: along them the extremal stays where the path is.
-        telling = values > _SYMMETRY * accuracy * values[0]
-        across, values, along = across[:, telling], values[telling], along[telling]
-        while damping < _HOPELESS:
-            share = values / (values**2 + damping * np.linalg.norm(right))
-            step = -sizes * (along.T @ (share * (across.T @ right)))
-            for share in _SHARES:
-                trial = rate + share * np.linalg.solve(tensor, step[:n]), charge + share * step[n:]
-                try:
-                    after = missing(*trial, accuracy, _MOST)
-                except AccuracyNotReached:
-                    continue
-                if np.linalg.norm(weights * after) < (1.0 - 0.1 * share) * np.linalg.norm(right):
-                    return *trial, damping / 4.0
-            damping *= 64.0
-        return None
-
-    gap = np.full(n + 3, np.inf)
-    for reach, accuracy in ((max(goal, _NEAR), max(fine, _ROUGH)), (goal, fine)):
-        damping = _DAMPING
-        for _ in range(_STEPS):
-            gap = missing(rate, charge, accuracy)
-            if np.linalg.norm(gap) <= reach:
-                break
-            better = stepped(accuracy, damping)
-            if better is None:
-                break
-            rate, charge, damping = better
-    if np.linalg.norm(gap) <= goal:
-        return extremal(body, start, rate, charge, route.duration, metric=metric, tolerance=fine)
-    raise AccuracyNotReached(
-        f"no extremal found next to the path: the end is {np.linalg.norm(gap):.3g} away, {goal:.3g} was asked; start "
-        "from a path nearer to the optimum (its wong_residual should be small; that of a plan falls with its pieces)"
-    )
-
-
-def _inverse_size(matrix: Array) -> float:
+def inverse_scale(matrix: Array) -> float:
+    """1 over the largest entry of a matrix; 1 for a zero matrix."""
     largest = float(np.abs(matrix).max())
     return 1.0 / largest if largest else 1.0

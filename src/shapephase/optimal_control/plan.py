@@ -12,15 +12,15 @@ from ..shape_space.shape_path import ShapePath
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a search stands after an iteration of the solver.
+    """The state of a search after an iteration of the solver.
 
     Attributes
     ----------
     stage : "guesses", each improved on a coarse spline, or "search"
     start, starts : which of how many, from 1
     iteration : of the solver, from 0
-    cost : so far [of the plan's cost]
-    infeasibility : the largest constraint violated so far, scaled: the equations of motion, the goal, the limits
+    cost : so far [unit of the plan's cost]
+    infeasibility : the largest violation of a constraint so far, scaled: the equations of motion, the goal, the limits
     """
 
     stage: str
@@ -33,23 +33,23 @@ class Progress:
 
 @dataclass(frozen=True)
 class Start:
-    """How one start of the search went.
+    """The result of one start of the search.
 
     Attributes
     ----------
-    status : the solver's word
+    status : the solver's message
     converged : whether it is a local optimum that reaches the goal
-    cost : at its end [of the plan's cost]
-    miss : how far its own attitude at the end is from the goal [rad]
-    kkt_residual, infeasibility : conditions of optimality and constraints left over, scaled
+    cost : at its end [unit of the plan's cost]
+    goal_error : angle between the solver's own attitude at the end and the goal [rad]
+    kkt_residual, infeasibility : remaining violation of the optimality conditions and of the constraints, scaled
     iterations : of the solver
-    seconds : it took
+    seconds : time it took
     """
 
     status: str
     converged: bool
     cost: float
-    miss: float
+    goal_error: float
     kkt_residual: float
     infeasibility: float
     iterations: int
@@ -58,24 +58,24 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A motion of the joints that turns a body as asked, and how it was found.
+    """A motion of the joints that turns a body to a goal, and how it was found.
 
     Attributes
     ----------
-    body : who turns
+    body : the body that turns
     path : of all its joints; a C2 spline with not-a-knot ends, also where it closes: a file of its samples is read back
-        as it was with `read_shape_path(..., periodic=False)`
+        unchanged with `read_shape_path(..., periodic=False)`
     motion : its reconstruction, to 1e-10 rad: independent of how the plan was found
     cost_name : "kinetic", "rate", "acceleration" or "time"
     cost : of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]
-    miss : angle between the reconstructed attitude at the end and the goal [rad]
-    transcription_gap : the same before the polish, which is how far the discretisation was wrong [rad]
-    polish_steps : Newton corrections of the path's coefficients that took it away
-    kkt_residual : of the discrete optimum before the polish, scaled
+    goal_error : angle between the reconstructed attitude at the end and the goal [rad]
+    transcription_gap : the same before the Newton corrections: the error of the discretisation [rad]
+    polish_steps : Newton corrections of the path's coefficients that removed it
+    kkt_residual : of the discrete optimum before the corrections, scaled
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
     method : that found it
     iterations : over all starts
-    seconds : over all
+    seconds : over all starts
     starts : one for each start, in their order
     """
 
@@ -84,7 +84,7 @@ class Plan:
     motion: Motion
     cost_name: str
     cost: float
-    miss: float
+    goal_error: float
     transcription_gap: float
     polish_steps: int
     kkt_residual: float

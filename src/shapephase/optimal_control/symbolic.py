@@ -22,7 +22,7 @@ _building = Lock()
 
 @dataclass(frozen=True, eq=False)
 class SymbolicBody:
-    """What a body's shape r (n,) determines, each a `casadi.Function` of r alone.
+    """Quantities that a body's shape r (n,) determines, each a `casadi.Function` of r alone.
 
     Called with symbols of CasADi's kind SX a function gives its expression, with MX one call in the larger graph, with
     numbers a DM. All are in base axes. Can be pickled, and each function has CasADi's own `serialize`. For numbers of
@@ -118,27 +118,27 @@ def symbolic_body(body: Body) -> SymbolicBody:
         return _built[body]
 
 
-def solved(matrix: Any, right: Any) -> Any:
+def solve_linear(matrix: Any, right: Any) -> Any:
     """matrix^-1 right in symbols, for a symmetric positive definite matrix: (m, m), (m, k) -> (m, k).
 
     By the factors L D L^T, entry by entry: backward stable, which the adjugate of a thin body's inertia is not.
     """
     import casadi
 
-    size = matrix.shape[0]
-    lower, pivots = np.empty((size, size), dtype=object), []
-    for column in range(size):
+    dimension = matrix.shape[0]
+    lower, pivots = np.empty((dimension, dimension), dtype=object), []
+    for column in range(dimension):
         known = sum(lower[column, k] ** 2 * pivots[k] for k in range(column))
         pivots.append(matrix[column, column] - known)
-        for row in range(column + 1, size):
+        for row in range(column + 1, dimension):
             known = sum(lower[row, k] * lower[column, k] * pivots[k] for k in range(column))
             lower[row, column] = (matrix[row, column] - known) / pivots[column]
     rows: list[Any] = []
-    for row in range(size):
+    for row in range(dimension):
         rows.append(right[row, :] - sum(lower[row, k] * rows[k] for k in range(row)))
     rows = [row / pivot for row, pivot in zip(rows, pivots, strict=True)]
-    for row in reversed(range(size)):
-        rows[row] = rows[row] - sum(lower[k, row] * rows[k] for k in range(row + 1, size))
+    for row in reversed(range(dimension)):
+        rows[row] = rows[row] - sum(lower[k, row] * rows[k] for k in range(row + 1, dimension))
     return casadi.vertcat(*rows)
 
 
@@ -163,7 +163,7 @@ def _symbolic(body: Body) -> SymbolicBody:
     full_angular = casadi.horzcat(none, *(angular - casadi.cross(centre, linear) for linear, angular in carried))
     fold = _constant(chain.matrix)
     linear, momentum_matrix = full_linear @ fold, full_angular @ fold
-    connection = solved(inertia, momentum_matrix)
+    connection = solve_linear(inertia, momentum_matrix)
     mass_matrix = fold.T @ _joint_mass_matrix(chain, speeds, carried) @ fold
     metric = mass_matrix - linear.T @ linear / masses[0] - momentum_matrix.T @ connection
     made = {
@@ -177,7 +177,7 @@ def _symbolic(body: Body) -> SymbolicBody:
         key: casadi.Function(key, [shape], [casadi.densify(casadi.cse(value))], ["shape"], [key])
         for key, value in made.items()
     }
-    return SymbolicBody(body.name, body.joint_names, *(functions[key] for key in QUANTITIES), chain=chain)
+    return SymbolicBody(name=body.name, joint_names=body.joint_names, chain=chain, **functions)
 
 
 def _constant(array: Array) -> Any:
@@ -215,7 +215,7 @@ def _rotation(axis: Array, angle: Any) -> Any:
 
 
 def _composites(chain: JointChain, frames: list[tuple[Any, Any]]) -> tuple[Array, list[Any], list[Any]]:
-    """Of each frame with all that hangs on it: mass, first moment and inertia about the base origin, base axes."""
+    """Of each frame with everything attached to it: mass, first moment and inertia about the base origin, base axes."""
     masses = chain.masses.copy()
     moments, tensors = [], []
     for (turn, place), mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True):
@@ -239,7 +239,7 @@ def _about(tensor: Any, moment: Any, point: Any) -> Any:
 
 
 def _joint_motion(chain: JointChain, number: int, frame: tuple[Any, Any]) -> tuple[Any, Any]:
-    """What a joint of unit rate makes all it carries do: angular velocity, and speed at the base origin, base axes."""
+    """Motion of all that a joint carries at unit rate: angular velocity, and velocity at the base origin, base axes."""
     import casadi
 
     turn, place = frame

@@ -1,4 +1,4 @@
-"""What a plan is asked for: the turn, the ends, the limits and the cost, checked once."""
+"""The problem that a plan solves: the turn, both end postures, the limits and the cost, checked once."""
 
 from __future__ import annotations
 
@@ -14,23 +14,30 @@ from ..arguments import positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from .plan_options import Goal, Limits, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "time")
-# Where a joint has no limit, a plan may still take it so far from its start [rad or m].
+
+# How far from its start a joint without limits may go [rad or m]: no plan goes 160 turns, and finite bounds keep the
+# guesses and the solver's interior point finite.
 _FARTHEST = 1e3
-_TIED = 1e-9
-_SQUARE = 1e-9
+# By how much an end posture may break a coupling between joints [rad or m]: rounding of what the user computed.
+_COUPLING_TOLERANCE = 1e-9
+# By how much an end posture may lie beyond a joint limit [rad or m]: rounding of degrees or of a file's digits.
+_LIMIT_TOLERANCE = 1e-9
+# Cosine of the angle between momentum and twist axis that still counts as a right angle: rounding of the user's axes.
+_RIGHT_ANGLE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Reorientation:
-    """A task of reorientation, in the m coordinates that are free: shape = ties @ coordinates + offset.
+    """A reorientation task in the m coordinates that are free: shape = coupling @ coordinates + offset.
 
     Attributes
     ----------
-    body : who turns
-    target : (3, 3) the attitude wanted at the end, from the identity at the start; None: `pointing` says it
-    pointing : (2, 3) a unit axis of the base and the inertial direction that it shall have at the end; None: `target`
+    body : the body that turns
+    target : (3, 3) attitude at the end, from the identity at the start; None: `pointing` determines it
+    pointing : (2, 3) a unit axis of the base and the inertial direction that it has to have at the end; None: `target`
     windings : (2,) somersault and twist, counted through the motion [rad]; None: not counted
     winding_axes : (3, 3) columns: the somersault axis, the tilt axis, the twist axis of the base
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
@@ -38,8 +45,8 @@ class Reorientation:
     start, end : (m,) coordinates; end None: free
     cost : one of `COSTS`
     lower, upper : (m,) limits of the coordinates [rad or m]
-    rates : (m,) limits of their rates [rad/s or m/s], infinite where there are none
-    ties, offset : (n, m) and (n,), each joint from the coordinates
+    rate_limit : (m,) limits of their rates [rad/s or m/s], infinite where there are none
+    coupling, offset : (n, m) and (n,), each joint from the coordinates
     """
 
     body: Body
@@ -54,30 +61,30 @@ class Reorientation:
     cost: str
     lower: Array
     upper: Array
-    rates: Array
-    ties: Array
+    rate_limit: Array
+    coupling: Array
     offset: Array
 
     def shapes(self, coordinates: Array) -> Array:
         """The shape at coordinates: (..., m) -> (..., n)."""
-        return coordinates @ self.ties.T + self.offset
+        return coordinates @ self.coupling.T + self.offset
 
     @property
-    def size(self) -> int:
+    def dimension(self) -> int:
         """m, the number of free coordinates."""
-        return self.ties.shape[1]
+        return self.coupling.shape[1]
 
     @property
     def rest_to_rest(self) -> bool:
-        """Whether the joints stand still at both ends: only the cost "acceleration" makes them."""
+        """Whether the joints are at rest at both ends: only the cost "acceleration" requires it."""
         return self.cost == "acceleration"
 
     @property
-    def moves(self) -> Mask:
+    def movable(self) -> Mask:
         """(m,) which coordinates can leave their start."""
         return self.upper > self.lower
 
-    def turn(self, attitude: Array | None = None) -> Array:
+    def turn_to_goal(self, attitude: Array | None = None) -> Array:
         """The shortest rotation vector that takes an attitude at the end to the goal: (3,), inertial axes [rad]."""
         end = np.eye(3) if attitude is None else attitude
         if self.target is not None:
@@ -85,20 +92,20 @@ class Reorientation:
         axis, direction = self.pointing_axes()
         return so3.log(so3.between(end @ axis, direction))
 
-    def miss(self, attitude: Array) -> float:
+    def goal_error(self, attitude: Array) -> float:
         """How far an attitude at the end is from the goal [rad]."""
-        return float(np.linalg.norm(self.turn(attitude)))
+        return float(np.linalg.norm(self.turn_to_goal(attitude)))
 
-    def needed(self) -> Array:
-        """Which rotation vectors at the end, inertial axes, the goal decides: (3, 3), or (2, 3) for an axis."""
+    def constrained_directions(self) -> Array:
+        """Rotation vectors at the end, inertial axes, that the goal determines: (3, 3), or (2, 3) for an axis."""
         if self.target is not None:
             return np.eye(3)
         _, direction = self.pointing_axes()
         first = so3.perpendicular(direction)
         return np.stack([first, so3.apply(so3.hat(direction), first)])
 
-    def wound(self, attitudes: Array) -> Array:
-        """Somersault and twist of attitudes (N, 3, 3) that follow each other closely, counted on from the first: (2,).
+    def counted_windings(self, attitudes: Array) -> Array:
+        """Somersault and twist of attitudes (N, 3, 3) that follow each other closely, unwrapped from the first: (2,).
 
         R = exp(somersault) exp(tilt) exp(twist) about the three axes; not defined where the tilt is a right angle.
         """
@@ -107,8 +114,8 @@ class Reorientation:
         twist = np.unwrap(np.arctan2(-seen[:, 0, 1], seen[:, 0, 0]))
         return np.array([somersault[-1] - somersault[0], twist[-1] - twist[0]])
 
-    def evenly_wound(self, places: Array) -> Array:
-        """Quaternions at places of [0, 1] of an even somersault with an even twist: (N,) -> (N, 4), continuous."""
+    def uniform_winding(self, places: Array) -> Array:
+        """Quaternions at places of [0, 1] of a steady somersault with a steady twist: (N,) -> (N, 4), continuous."""
         angles = np.zeros(2) if self.windings is None else self.windings
         turns = [
             so3.quat_from_rotation_vector(angle * places[:, None] * axis)
@@ -117,28 +124,24 @@ class Reorientation:
         return so3.quat_product(turns[0], turns[1])
 
     def pointing_axes(self) -> Array:
-        """The axis of the base and the direction it shall have: (2, 3). Of a task with an axis only."""
+        """The axis of the base and the direction it has to have: (2, 3). Only for a task with `pointing`."""
         return np.zeros((2, 3)) if self.pointing is None else self.pointing
 
 
 def reorientation(
     body: Body,
-    target: Any,
+    goal: Any,
     *,
-    momentum: ArrayLike,
-    duration: float,
-    start: ArrayLike | None,
-    end: Any,
-    cost: str,
-    joint_limits: bool,
-    rate_limits: ArrayLike | None,
-    joints: Sequence[str] | None,
-    symmetric: Mapping[str, tuple[str, float]] | None,
-    somersaults: float | None = None,
-    half_twists: float | None = None,
-    twist_axis: ArrayLike = (0.0, 0.0, 1.0),
+    momentum: ArrayLike = 0.0,
+    duration: float = 1.0,
+    start: ArrayLike | None = None,
+    end: Any = None,
+    cost: str = "kinetic",
+    joints: Sequence[str] | None = None,
+    symmetric: Mapping[str, tuple[str, float]] | None = None,
+    limits: Limits | None = None,
 ) -> Reorientation:
-    """The task of `plan_reorientation`'s arguments, which are explained there.
+    """The task that `plan_reorientation`'s arguments, which are explained there, describe.
 
     Raises
     ------
@@ -149,102 +152,85 @@ def reorientation(
         raise unknown_name("cost", cost, COSTS)
     if not body.n_shape:
         raise ShapeError(f"{body.name} has no joints: nothing can turn it but its momentum")
+    checked_goal, within = goal_argument(goal), Limits() if limits is None else limits
+    mu = _momentum(momentum)
+    windings, winding_axes = _windings(checked_goal, mu)
+    bounds = body.joint_limits if within.joint_limits else np.full((body.n_shape, 2), (-np.inf, np.inf))
+    first, last = _end_postures(body, bounds, start, end)
+    rates = _rate_limits(body, within.rate_limits)
+    if cost == "time" and not np.isfinite(rates).all():
+        raise TrajectoryError("cost='time' needs rate_limits for every joint: without them there is no least time")
+    moving = set(range(body.n_shape)) if joints is None else {body.joint_index(name) for name in joints}
+    fixed_joints = sorted(set(range(body.n_shape)) - moving)
+    coupling, leaders, factors = _coupling(body, symmetric or {}, fixed_joints)
+    offset = np.zeros(body.n_shape)
+    offset[fixed_joints] = first[fixed_joints]
+    for shape, name in ((first, "start"), (last, "end")):
+        if shape is not None:
+            _check_coupling(body, shape, coupling @ shape[leaders] + offset, name)
+    lower, upper, rate_limit = _coordinate_limits(coupling, factors, first[leaders], bounds, rates)
+    return Reorientation(
+        body=body,
+        target=_target(checked_goal, windings, winding_axes),
+        pointing=None if checked_goal.pointing is None else np.asarray(checked_goal.pointing),
+        windings=windings,
+        winding_axes=winding_axes,
+        momentum=mu,
+        duration=positive_argument(duration),
+        start=first[leaders],
+        end=None if last is None else last[leaders],
+        cost=cost,
+        lower=lower,
+        upper=upper,
+        rate_limit=rate_limit,
+        coupling=coupling,
+        offset=offset,
+    )
+
+
+def _momentum(momentum: ArrayLike) -> Array:
     mu = finite_array(momentum, "momentum", unit="kg m^2/s")
     if mu.shape != (3,) and not (mu.ndim == 0 and mu == 0.0):
         raise ShapeError(f"momentum: (3,) in inertial axes, or 0, is needed, got shape {mu.shape}")
-    spatial = np.zeros(3) if mu.ndim == 0 else mu
-    windings, axes = _windings(spatial, somersaults, half_twists, twist_axis)
-    if windings is None:
-        turned, pointing = _goal(target)
-    else:
-        if target is not None:
-            raise ShapeError("target: the somersaults and twists say it; leave it None")
-        turned, pointing = so3.exp(windings[0] * axes[:, 0]) @ so3.exp(windings[1] * axes[:, 2]), None
-    limits = body.joint_limits if joint_limits else np.full((body.n_shape, 2), (-np.inf, np.inf))
-    first = np.clip(np.zeros(body.n_shape), *limits.T) if start is None else _shape(body, start, "start")
-    free_end = isinstance(end, str)
-    if free_end and end != "free":
-        raise unknown_name("end", str(end), ("free", "a shape"))
-    last = first if end is None else None if free_end else _shape(body, end, "end")
-    for shape, name in ((first, "start"), (last, "end")):
-        if shape is not None:
-            _check_limits(body, shape, limits, name)
-    rates = np.full(body.n_shape, np.inf) if rate_limits is None else _rates(body, rate_limits)
-    if cost == "time" and not np.isfinite(rates).all():
-        raise TrajectoryError("cost='time' needs rate_limits for every joint: without them there is no least time")
-    still = [] if joints is None else sorted(set(range(body.n_shape)) - {body.joint_index(name) for name in joints})
-    ties, leaders, factors = _ties(body, symmetric or {}, still)
-    offset = np.zeros(body.n_shape)
-    offset[still] = first[still]
-    for shape, name in ((first, "start"), (last, "end")):
-        if shape is not None:
-            _check_tied(body, shape, ties @ shape[leaders] + offset, name)
-    least, most, pace = first[leaders] - _FARTHEST, first[leaders] + _FARTHEST, np.full(len(leaders), np.inf)
-    for joint in np.flatnonzero(ties.any(axis=1)):
-        column = int(np.argmax(ties[joint] != 0.0))
-        low, high = np.sort(limits[joint] / factors[joint])
-        least[column], most[column] = max(least[column], low), min(most[column], high)
-        pace[column] = min(pace[column], rates[joint] / abs(factors[joint]))
-    return Reorientation(
-        body,
-        turned,
-        pointing,
-        windings,
-        axes,
-        spatial,
-        positive_argument(duration),
-        first[leaders],
-        None if last is None else last[leaders],
-        cost,
-        least,
-        most,
-        pace,
-        ties,
-        offset,
-    )
+    return np.zeros(3) if mu.ndim == 0 else mu
 
 
-def _check_tied(body: Body, shape: Array, tied: Array, name: str) -> None:
-    gap = np.abs(tied - shape)
-    worst = int(np.argmax(gap))
-    if gap[worst] > _TIED:
-        raise TrajectoryError(
-            f"{name}: joint {body.joint_names[worst]} at {shape[worst]:.6g} must be at {tied[worst]:.6g}, where "
-            "the joints that it is tied to, or its own stillness, put it"
-        )
-
-
-def _windings(
-    momentum: Array, somersaults: float | None, half_twists: float | None, twist_axis: ArrayLike
-) -> tuple[Array | None, Array]:
+def _windings(goal: Goal, momentum: Array) -> tuple[Array | None, Array]:
     """The angles to be counted, and the axes of somersault, tilt and twist."""
-    if somersaults is None and half_twists is None:
+    if not goal.winds:
         return None, np.eye(3)
-    counts = finite_array([somersaults or 0.0, half_twists or 0.0], "somersaults, half_twists", (2,))
-    long = finite_array(twist_axis, "twist_axis", (3,))
-    sizes = np.linalg.norm(momentum), np.linalg.norm(long)
-    if min(sizes) == 0.0 or abs(momentum @ long) > _SQUARE * sizes[0] * sizes[1]:
+    counts = np.array([goal.somersaults or 0.0, goal.half_twists or 0.0])
+    twist_axis = np.asarray(goal.twist_axis)
+    magnitude, length = np.linalg.norm(momentum), np.linalg.norm(twist_axis)
+    if magnitude == 0.0 or abs(momentum @ twist_axis) > _RIGHT_ANGLE_TOLERANCE * magnitude * length:
         raise ShapeError(
             "somersaults: a momentum, the axis of the somersault, at right angles to twist_axis is needed, got "
-            f"{momentum} and {long}"
+            f"{momentum} and {twist_axis}"
         )
-    across, along = momentum / sizes[0], long / sizes[1]
+    across, along = momentum / magnitude, twist_axis / length
     return counts * [2.0 * np.pi, np.pi], np.stack([across, np.cross(along, across), along], axis=1)
 
 
-def _goal(target: Any) -> tuple[Array | None, Array | None]:
-    """The attitude, or the unit axis and direction, that the target names."""
-    goal = finite_array(target, "target")
-    if goal.shape == (3, 3):
-        return so3.rotation_argument(goal, "target"), None
-    if goal.shape == (2, 3):
-        sizes = np.linalg.norm(goal, axis=1)
-        if np.all(sizes > 0.0):
-            return None, goal / sizes[:, None]
-    raise ShapeError(
-        "target: a rotation (3, 3), or a pair (axis of the base, direction in inertial axes) of vectors that are not "
-        f"zero is needed, got shape {goal.shape}"
-    )
+def _target(goal: Goal, windings: Array | None, winding_axes: Array) -> Array | None:
+    """The attitude at the end; None where only an axis is given."""
+    if windings is not None:
+        return so3.exp(windings[0] * winding_axes[:, 0]) @ so3.exp(windings[1] * winding_axes[:, 2])
+    return None if goal.rotation is None else np.asarray(goal.rotation)
+
+
+def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) -> tuple[Array, Array | None]:
+    """The shapes at both ends, within the bounds (n, 2); None for a free end."""
+    first = np.clip(np.zeros(body.n_shape), *bounds.T) if start is None else _shape(body, start, "start")
+    if isinstance(end, str):
+        if end != "free":
+            raise unknown_name("end", end, ("free", "a shape"))
+        last = None
+    else:
+        last = first if end is None else _shape(body, end, "end")
+    for shape, name in ((first, "start"), (last, "end")):
+        if shape is not None:
+            _check_limits(body, shape, bounds, name)
+    return first, last
 
 
 def _shape(body: Body, value: ArrayLike, name: str) -> Array:
@@ -255,43 +241,72 @@ def _shape(body: Body, value: ArrayLike, name: str) -> Array:
     return shape
 
 
-def _check_limits(body: Body, shape: Array, limits: Array, name: str) -> None:
-    beyond = np.flatnonzero((shape < limits[:, 0] - 1e-9) | (shape > limits[:, 1] + 1e-9))
+def _check_limits(body: Body, shape: Array, bounds: Array, name: str) -> None:
+    beyond = np.flatnonzero((shape < bounds[:, 0] - _LIMIT_TOLERANCE) | (shape > bounds[:, 1] + _LIMIT_TOLERANCE))
     if len(beyond):
         joint = int(beyond[0])
         raise TrajectoryError(
             f"{name}: joint {body.joint_names[joint]} at {shape[joint]:.6g} is beyond its limits "
-            f"{limits[joint, 0]:.6g} ... {limits[joint, 1]:.6g}; choose another shape, or joint_limits=False"
+            f"{bounds[joint, 0]:.6g} ... {bounds[joint, 1]:.6g}; choose another shape, or joint_limits=False"
         )
 
 
-def _rates(body: Body, rate_limits: ArrayLike) -> Array:
-    rates = finite_array(rate_limits, "rate_limits", unit="rad/s or m/s")
-    if rates.shape not in ((), (body.n_shape,)) or np.any(rates <= 0.0):
+def _rate_limits(body: Body, rate_limits: ArrayLike | None) -> Array:
+    """One for each joint, infinite where there are none: (n,)."""
+    if rate_limits is None:
+        return np.full(body.n_shape, np.inf)
+    rates = np.asarray(rate_limits)
+    if rates.shape not in ((), (body.n_shape,)):
         raise ShapeError(
             f"rate_limits: one number above 0, or one for each of the {body.n_shape} joints, is needed, "
-            f"got {rate_limits!r}"
+            f"got {len(rates)} numbers"
         )
     return np.array(np.broadcast_to(rates, body.n_shape))
 
 
-def _ties(body: Body, symmetric: Mapping[str, tuple[str, float]], still: list[int]) -> tuple[Array, list[int], Array]:
+def _coupling(
+    body: Body, symmetric: Mapping[str, tuple[str, float]], fixed_joints: list[int]
+) -> tuple[Array, list[int], Array]:
     """Each joint from the free ones (n, m), which those are, and each joint's factor (n,)."""
-    led = {
+    followers = {
         body.joint_index(name): (body.joint_index(leader), float(factor))
         for name, (leader, factor) in symmetric.items()
     }
-    leaders = [joint for joint in range(body.n_shape) if joint not in led and joint not in still]
-    ties, factors = np.zeros((body.n_shape, len(leaders))), np.ones(body.n_shape)
+    leaders = [joint for joint in range(body.n_shape) if joint not in followers and joint not in fixed_joints]
+    coupling, factors = np.zeros((body.n_shape, len(leaders))), np.ones(body.n_shape)
     for column, joint in enumerate(leaders):
-        ties[joint, column] = 1.0
-    for joint, (leader, factor) in led.items():
-        if joint in still or leader not in leaders or factor == 0.0 or not np.isfinite(factor):
+        coupling[joint, column] = 1.0
+    for joint, (leader, factor) in followers.items():
+        if joint in fixed_joints or leader not in leaders or factor == 0.0 or not np.isfinite(factor):
             raise TrajectoryError(
                 f"symmetric: joint {body.joint_names[joint]} must be among the joints that move, and follow one of "
                 "them that follows no other, by a factor that is not 0"
             )
-        ties[joint, leaders.index(leader)], factors[joint] = factor, factor
+        coupling[joint, leaders.index(leader)], factors[joint] = factor, factor
     if not leaders:
         raise TrajectoryError("joints: at least one joint must move")
-    return ties, leaders, factors
+    return coupling, leaders, factors
+
+
+def _check_coupling(body: Body, shape: Array, coupled: Array, name: str) -> None:
+    gap = np.abs(coupled - shape)
+    worst = int(np.argmax(gap))
+    if gap[worst] > _COUPLING_TOLERANCE:
+        raise TrajectoryError(
+            f"{name}: joint {body.joint_names[worst]} at {shape[worst]:.6g} must be at {coupled[worst]:.6g}, where "
+            "the joint that it follows puts it, or where it is held fixed"
+        )
+
+
+def _coordinate_limits(
+    coupling: Array, factors: Array, start: Array, bounds: Array, rates: Array
+) -> tuple[Array, Array, Array]:
+    """Lower and upper limits and rate limits of the coordinates (m,): the tightest of all joints that follow each."""
+    lower, upper = start - _FARTHEST, start + _FARTHEST
+    rate_limit = np.full(len(start), np.inf)
+    for joint in np.flatnonzero(coupling.any(axis=1)):
+        column = int(np.argmax(coupling[joint] != 0.0))
+        low, high = np.sort(bounds[joint] / factors[joint])
+        lower[column], upper[column] = max(lower[column], low), min(upper[column], high)
+        rate_limit[column] = min(rate_limit[column], rates[joint] / abs(factors[joint]))
+    return lower, upper, rate_limit

@@ -1,4 +1,4 @@
-"""The splines that plans are made of: linear in their control points, which bound them."""
+"""The splines of plans: linear in their control points, which bound them."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..shape_space.shape_path import ShapePath
 
+# Cubic: twice differentiable, so that the acceleration cost is finite, and what `ShapePath.spline` reads back.
 _DEGREE = 3
 
 
@@ -17,8 +18,8 @@ _DEGREE = 3
 class SplineBasis:
     """C2 cubic splines on `pieces` equal pieces of [0, 1], with not-a-knot ends.
 
-    They are the very functions that `ShapePath.spline(..., periodic=False)` makes of their values at the ends of the
-    pieces. A spline lies between the least and the largest of its control points, its rate between those of the rate.
+    They are the functions that `ShapePath.spline(..., periodic=False)` makes of their values at the ends of the pieces.
+    A spline lies between the least and the largest of its control points, its rate between those of the rate.
 
     Attributes
     ----------
@@ -28,8 +29,8 @@ class SplineBasis:
     pieces: int
 
     @property
-    def size(self) -> int:
-        """The number of control points."""
+    def dimension(self) -> int:
+        """k, the number of control points, which is the dimension of the spline space."""
         return self.pieces + 1
 
     @cached_property
@@ -43,28 +44,28 @@ class SplineBasis:
         return np.concatenate([np.zeros(_DEGREE + 1), self.nodes[2:-2], np.ones(_DEGREE + 1)])
 
     def matrix(self, places: Array, order: int = 0) -> Array:
-        """What the control points weigh at places of [0, 1], or in a derivative there: (N,) -> (N, size)."""
+        """Values of the basis functions, or of a derivative by place, at places of [0, 1]: (N,) -> (N, k)."""
         from scipy.interpolate import BSpline
 
-        spline = BSpline(self.knots, np.eye(self.size), _DEGREE)
+        spline = BSpline(self.knots, np.eye(self.dimension), _DEGREE)
         return np.asarray(spline.derivative(order)(places) if order else spline(places))
 
     @cached_property
     def rate_control(self) -> Array:
-        """From control points to those of the derivative by place: (size - 1, size)."""
+        """From control points to those of the derivative by place: (k - 1, k)."""
         spread = self.knots[_DEGREE + 1 : -1] - self.knots[1 : -_DEGREE - 1]
-        return _DEGREE / spread[:, None] * np.diff(np.eye(self.size), axis=0)
+        return _DEGREE / spread[:, None] * np.diff(np.eye(self.dimension), axis=0)
 
     def fitted(self, values: Array, places: Array) -> Array:
-        """Control points of the spline with the ends of a curve and nearest to its values: (N, m) -> (size, m)."""
+        """Control points of the spline with the ends of a curve and nearest to its values: (N, m) -> (k, m)."""
         weights = self.matrix(places)
-        control = np.zeros((self.size, values.shape[1]))
+        control = np.zeros((self.dimension, values.shape[1]))
         control[[0, -1]] = values[[0, -1]]
         rest = values - weights @ control
         control[1:-1] = np.linalg.lstsq(weights[:, 1:-1], rest, rcond=None)[0]
         return control
 
     def path(self, control: Array, duration: float, joint_names: tuple[str, ...]) -> ShapePath:
-        """The spline as a path of the joints: control points (size, n)."""
+        """The spline as a path of the joints: control points (k, n)."""
         values = self.matrix(self.nodes) @ control
         return ShapePath.spline(self.nodes * duration, values, periodic=False, joint_names=joint_names)

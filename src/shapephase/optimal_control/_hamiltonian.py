@@ -1,0 +1,164 @@
+"""The equations of extremals in Hamilton's form, built once for a body, and their integration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from threading import Lock
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from ..arrays import Array
+from ..body.body import Body
+from ..errors import AccuracyNotReached, SingularInertiaError, unknown_name
+from ..integrator.casadi_calls import call_casadi
+from ..shape_space.connection import mechanical_connection
+from .symbolic import solve_linear, symbolic_body
+
+# Costs that are the integral of a metric, which is what the equations need.
+_COSTS = ("kinetic", "rate")
+# Least eigenvalue of the metric, each joint in its own unit, at which the rates are still determined: rounding of the
+# mass matrix is 1e-15, and the equations divide by it.
+_LEAST_METRIC = 1e-12
+# Evaluations after which an integration is given up: long motions take some thousands.
+_MOST = 200_000
+
+_built: WeakKeyDictionary[Body, dict[str, Hamiltonian]] = WeakKeyDictionary()
+_building = Lock()
+
+
+@dataclass(frozen=True, eq=False)
+class Hamiltonian:
+    """Wong's equations of a body in Hamilton's form, as CasADi functions; g is the metric of the cost.
+
+    They derive from L(r, u, l) = 1/2 u g u + l . A u, the Lagrangian of a charge l in base axes: its derivatives are
+    p' = dL/dr, p = dL/du and omega = -dL/dl. The state is (r, p, quaternion xyzw), l = R^T charge, and
+    H = 1/2 (p - A^T l) g^-1 (p - A^T l).
+
+    Attributes
+    ----------
+    field : state, charge -> rate of the state
+    energy : state, charge -> H
+    slopes : r, u, l -> gradient of L by all three, (2 n + 3,)
+    metric : r -> g
+    """
+
+    field: Any
+    energy: Any
+    slopes: Any
+    metric: Any
+
+    @cached_property
+    def second(self) -> Any:
+        """r, u, l -> second derivatives of L by all three, (2 n + 3, 2 n + 3); built when first needed."""
+        import casadi
+
+        parts = [casadi.SX.sym("x", self.slopes.numel_in(place)) for place in range(3)]
+        rows = casadi.jacobian(self.slopes(*parts), casadi.vertcat(*parts), {"symmetric": True})
+        return casadi.Function("second", parts, [casadi.densify(rows)])
+
+
+def hamiltonian(body: Body, metric: str) -> Hamiltonian:
+    """The equations of a body; built at the first call for it, kept as long as the body is. Raises UnknownNameError."""
+    if metric not in _COSTS:
+        raise unknown_name("metric", metric, _COSTS)
+    with _building:
+        of_body = _built.setdefault(body, {})
+        if metric not in of_body:
+            of_body[metric] = _hamiltonian(body, metric)
+        return of_body[metric]
+
+
+def initial_state(equations: Hamiltonian, shape: Array, rate: Array, charge: Array) -> Array:
+    """State at the start, where the base is at the identity: -> (2 n + 4,)."""
+    n = len(shape)
+    momentum = call_casadi(equations.slopes, 1, shape, rate, charge)[0][0, n : 2 * n]
+    return np.concatenate([shape, momentum, [0.0, 0.0, 0.0, 1.0]])
+
+
+def natural_scales(body: Body, equations: Hamiltonian, shape: Array, rate: Array, charge: Array) -> tuple[Array, float]:
+    """Typical magnitudes of an extremal's momenta (n,) and charge, whatever the units of the joints."""
+    metric = np.array(equations.metric(shape))
+    momenta = np.sqrt(np.diag(metric)) * (np.sqrt(rate @ metric @ rate) or 1.0)
+    felt = float(np.abs(mechanical_connection(body, shape)).max())
+    return momenta, max(float(np.linalg.norm(charge)), float(momenta.max()) / felt if felt else 0.0) or 1.0
+
+
+def integrated(
+    field: Callable[[Array], Array], span: float, state: Array, goal: float, scale: Array, most: int | None = None
+) -> Any:
+    """SciPy's solution with steps of relative accuracy `goal`, `scale` what is small for each entry, and dense output.
+
+    Raises AccuracyNotReached, also after more evaluations than `most`.
+    """
+    count, limit = 0, _MOST if most is None else most
+
+    def counted(time: float, now: Array) -> Array:
+        nonlocal count
+        count += 1
+        if count > limit:
+            raise AccuracyNotReached(
+                f"the extremal is at {time:.6g} s of {span:.6g} s after {limit} evaluations: its charge turns it too "
+                "fast, or it passes too near a shape in which a motion of the joints has no kinetic energy; take less "
+                "charge or a shorter motion, or loosen the tolerance"
+            )
+        return field(now)
+
+    # What overflows is rejected with its step.
+    with np.errstate(over="ignore", invalid="ignore"):
+        answer = solve_ivp(
+            counted, (0.0, span), state, method="DOP853", rtol=goal, atol=goal * scale, dense_output=True
+        )
+    if answer.status != 0:
+        raise AccuracyNotReached(
+            f"the extremal breaks down at {answer.t[-1]:.6g} s of {span:.6g} s ({answer.message}): a shape lies ahead "
+            "in which a motion of the joints has no kinetic energy; shorten the motion, or start elsewhere"
+        )
+    return answer
+
+
+def checked_metric(body: Body, equations: Hamiltonian, shapes: Array) -> Array:
+    """g of each shape, (N, n) -> (N, n, n). Raises SingularInertiaError where a motion of the joints has no energy."""
+    metrics = np.array([np.array(equations.metric(shape)) for shape in shapes])
+    unit = np.sqrt(np.maximum(np.diagonal(metrics, axis1=1, axis2=2), 0.0))
+    unit = np.where(unit > 0.0, unit, 1.0)
+    values, vectors = np.linalg.eigh(metrics / unit[:, None] / unit[:, :, None])
+    if not body.n_shape or values.min() <= _LEAST_METRIC:
+        worst = vectors[int(np.argmin(values[:, 0])), :, 0] if body.n_shape else np.zeros(0)
+        joint = body.joint_names[int(np.argmax(np.abs(worst)))] if body.n_shape else "none"
+        raise SingularInertiaError(
+            f"{body.name}: a motion of its joints (most of it joint {joint}) has no kinetic energy, so no extremal "
+            "determines its rate; give mass to what the joint moves, or leave it out"
+        )
+    return metrics
+
+
+def _hamiltonian(body: Body, cost: str) -> Hamiltonian:
+    import casadi
+
+    symbols, n = symbolic_body(body), body.n_shape
+    shape, rate, moment = (casadi.SX.sym(*what) for what in (("r", n), ("u", n), ("l", 3)))
+    metric = symbols.shape_metric if cost == "kinetic" else casadi.Function("rate", [shape], [casadi.SX.eye(n)])
+    lagrangian = 0.5 * rate.T @ metric(shape) @ rate + moment.T @ symbols.connection(shape) @ rate
+    gradient = casadi.gradient(casadi.cse(lagrangian), casadi.vertcat(shape, rate, moment))
+    slopes = casadi.Function("slopes", [shape, rate, moment], [casadi.densify(casadi.cse(gradient))])
+    state, charge = casadi.SX.sym("state", 2 * n + 4), casadi.SX.sym("charge", 3)
+    here, vector, scalar = state[:n], state[2 * n : 2 * n + 3], state[2 * n + 3]
+    across = casadi.cross(vector, charge)
+    turned_back = charge + 2.0 * (casadi.cross(vector, across) - scalar * across) / casadi.sumsqr(state[2 * n :])
+    kinetic = state[n : 2 * n] - symbols.connection(here).T @ turned_back
+    speed = solve_linear(metric(here), kinetic)
+    known = slopes(here, speed, turned_back)
+    omega = -known[2 * n :]
+    quaternion_rate = 0.5 * casadi.vertcat(scalar * omega + casadi.cross(vector, omega), -casadi.dot(vector, omega))
+    field = casadi.densify(casadi.cse(casadi.vertcat(speed, known[:n], quaternion_rate)))
+    return Hamiltonian(
+        field=casadi.Function("field", [state, charge], [field]),
+        energy=casadi.Function("energy", [state, charge], [0.5 * kinetic.T @ speed]),
+        slopes=slopes,
+        metric=metric,
+    )

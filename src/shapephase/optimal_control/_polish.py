@@ -1,0 +1,223 @@
+"""The exact derivative of the attitude at the end by the path, and the Newton corrections that use it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array, Mask
+from ..deformation.deformation import articulated
+from ..inertia_tensor import inverse_inertia
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.shape_path import ShapePath
+from ._gauss import gauss_tableau
+from ._spline_basis import SplineBasis
+from .task import Reorientation
+
+# Accuracy of the reconstruction that plans are judged by [rad]: well below what they have to reach.
+_RECONSTRUCTION_TOLERANCE = 1e-10
+# Goal error that counts as reached [rad]: a hundred times the reconstruction's.
+GOAL_TOLERANCE = 1e-8
+# Goal error at which Newton's method ends [rad]: its next step would be lost in the reconstruction's error.
+_CONVERGED = 5e-10
+# The most Newton steps: it converges quadratically, so more do not help.
+_STEPS = 8
+# Newton's method is not begun further from the goal [rad]: there the linear model says nothing.
+_TOO_FAR = 1.0
+# Gauss nodes of a piece, for the derivative of the end: beyond rounding for the cubic pieces of a plan.
+_NODES = 8
+# A coordinate or rate this close to its limit, relative to the range, is held where it is: an interior-point solution
+# ends a little inside its active limits.
+_ACTIVE = 1e-6
+# The least range of a coordinate, so that a coordinate without any does not divide by zero [rad or m].
+_LEAST_RANGE = 1e-300
+# Singular values of the correction's equations below this share of the largest come from held rates that depend on
+# each other, and are left out.
+_RANK = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class PolishedPath:
+    """A path corrected to reach the goal, as far as it could be.
+
+    Attributes
+    ----------
+    control : (k, m) control points
+    duration : [s]
+    path, motion : of all joints, and its reconstruction
+    first_goal_error, goal_error : before the corrections, and after them [rad]
+    steps : corrections made
+    """
+
+    control: Array
+    duration: float
+    path: ShapePath
+    motion: Motion
+    first_goal_error: float
+    goal_error: float
+    steps: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Iterate:
+    """A path of Newton's method, reconstructed."""
+
+    control: Array
+    duration: float
+    path: ShapePath
+    motion: Motion
+    goal_error: float
+
+
+def panel_nodes(basis: SplineBasis) -> tuple[Array, Array]:
+    """Gauss nodes of all pieces of [0, 1] and their weights: (N,), (N,)."""
+    inside, weights, _ = gauss_tableau(_NODES)
+    places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
+    return places, np.tile(weights, basis.pieces) / basis.pieces
+
+
+def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, motion: Motion) -> Array:
+    """The exact derivative of the attitude at the end by each control point: (3, k, m).
+
+    A change d of the control points turns the end to exp(hat(e)) R(T), e = sum of the entries times d, inertial axes.
+    With eta(t) the change of R(t) as a rotation vector, inertial axes,
+
+        eta' = R I^-1 R^T (mu x eta) - R I^-1 (J dr' + (dI/dr_k omega + dJ/dr_k r') dr_k).
+
+    Source: theory.md B2 varied; `holonomy_derivative` is the same for loops without momentum.
+    """
+    body, momentum = task.body, task.momentum
+    places, weights = panel_nodes(basis)
+    duration = motion.duration
+    times = np.minimum(places * duration, duration)
+    shapes, rates = path.curve(times)
+    attitude = motion.attitude(times)
+    inverse = inverse_inertia(body.locked_inertia(shapes), times)
+    matrix = body.momentum_matrix(shapes)
+    back = so3.apply(so3.transpose(attitude), np.broadcast_to(momentum, (len(times), 3)))
+    omega = so3.apply(inverse, back - so3.apply(matrix, rates))
+    gradient = np.swapaxes(body.angular_momentum_gradient(shapes, rates, omega), -1, -2)
+    spatial = -attitude @ inverse
+    if np.any(momentum):
+        generator = attitude @ inverse @ so3.transpose(attitude) @ so3.hat(momentum)
+        spatial = _transported(generator, basis, duration) @ spatial
+    by_shape = (spatial @ gradient @ task.coupling) * (weights * duration)[:, None, None]
+    by_rate = (spatial @ matrix @ task.coupling) * weights[:, None, None]
+    values, slopes = basis.matrix(places), basis.matrix(places, 1)
+    return np.einsum("nak,ns->ask", by_shape, values) + np.einsum("nak,ns->ask", by_rate, slopes)
+
+
+def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> PolishedPath:
+    """The nearest control points whose reconstructed motion reaches the goal, by Newton's method.
+
+    Nearest in the integral of the squared change of rates. Coordinates at their limits, and rates where the duration is
+    given, stay there; a path of least time is stretched instead by what its rates exceed their limits.
+
+    Raises
+    ------
+    AccuracyNotReached, SingularInertiaError
+        As `reconstruct`.
+    """
+    first = now = best = _reconstructed(task, basis, control, duration)
+    steps_to_best = 0
+    for step in range(1, _STEPS + 1):
+        if now.goal_error <= _CONVERGED or now.goal_error > _TOO_FAR:
+            break
+        directions = task.constrained_directions()
+        slopes = np.tensordot(directions, end_derivative(task, basis, now.path, now.motion), axes=1)
+        turn = directions @ task.turn_to_goal(now.motion.final_attitude)
+        corrected = _corrected(task, basis, now.control, now.duration, slopes.reshape(len(directions), -1), turn)
+        now = _reconstructed(task, basis, *corrected)
+        if now.goal_error < best.goal_error:
+            best, steps_to_best = now, step
+    return PolishedPath(
+        control=best.control,
+        duration=best.duration,
+        path=best.path,
+        motion=best.motion,
+        first_goal_error=first.goal_error,
+        goal_error=best.goal_error,
+        steps=steps_to_best,
+    )
+
+
+def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Iterate:
+    """The path of control points, and its motion."""
+    path = basis.path(task.shapes(control), duration, task.body.joint_names)
+    motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
+    return _Iterate(
+        control=control,
+        duration=duration,
+        path=path,
+        motion=motion,
+        goal_error=task.goal_error(motion.final_attitude),
+    )
+
+
+def _corrected(
+    task: Reorientation, basis: SplineBasis, control: Array, duration: float, slopes: Array, turn: Array
+) -> tuple[Array, float]:
+    """The least change of the control points that turns the end by `turn`, within the limits."""
+    free = _free(task, basis, control).ravel()
+    places, weights = panel_nodes(basis)
+    rates = basis.matrix(places, 1)
+    gram = (rates * weights[:, None]).T @ rates + np.eye(basis.dimension)
+    inverse = np.kron(np.linalg.inv(gram), np.eye(task.dimension))
+    rows, right = slopes, turn
+    if task.cost != "time":
+        held = _held_rates(task, basis, control, duration)
+        rows = np.concatenate([rows, held])
+        right = np.concatenate([turn, np.zeros(len(held))])
+    # The least change in the metric's norm: with C C^T its inverse, the shortest x of rows C x = right.
+    root = np.linalg.cholesky(inverse[np.ix_(free, free)])
+    change = np.zeros(control.size)
+    change[free] = root @ np.linalg.lstsq(rows[:, free] @ root, right, rcond=_RANK)[0]
+    moved = np.clip(control + change.reshape(control.shape), task.lower, task.upper)
+    if task.cost == "time":
+        duration = float(np.max(np.abs(basis.rate_control @ moved) / task.rate_limit))
+    return moved, duration
+
+
+def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
+    """(k, m) which control points may move: not those of the ends."""
+    free = np.tile(task.movable, (basis.dimension, 1))
+    fixed = [0, 1] if task.rest_to_rest else [0]
+    free[fixed] = False
+    if task.end is not None:
+        free[[basis.dimension - 1 - place for place in fixed]] = False
+    return free
+
+
+def _free(task: Reorientation, basis: SplineBasis, control: Array) -> Mask:
+    """(k, m) which of the movable ones are not at their limits either."""
+    reach = _ACTIVE * np.maximum(task.upper - task.lower, _LEAST_RANGE)
+    return movable_points(task, basis) & (control > task.lower + reach) & (control < task.upper - reach)
+
+
+def _held_rates(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> Array:
+    """Rows (j, k m) of the rates' control points that are at their limits."""
+    rates = basis.rate_control @ control / duration
+    where = np.argwhere(np.abs(rates) > task.rate_limit * (1.0 - _ACTIVE))
+    rows = np.zeros((len(where), basis.dimension, task.dimension))
+    for row, (point, coordinate) in enumerate(where):
+        rows[row, :, coordinate] = basis.rate_control[point]
+    return rows.reshape(len(where), control.size)
+
+
+def _transported(generator: Array, basis: SplineBasis, duration: float) -> Array:
+    """P(t) with P(T) = 1, P' = -P K, by collocation: K at the nodes of all pieces (N, 3, 3) -> P there (N, 3, 3)."""
+    _, weights, integrals = gauss_tableau(_NODES)
+    step = duration / basis.pieces
+    field = step * generator.reshape(basis.pieces, _NODES, 3, 3)
+    system = np.einsum("ij,pjab->piajb", integrals, field).reshape(basis.pieces, 3 * _NODES, 3 * _NODES)
+    fields = np.linalg.solve(np.eye(3 * _NODES) - system, np.tile(np.eye(3), (_NODES, 1)))
+    inner = fields.reshape(basis.pieces, _NODES, 3, 3)
+    whole = np.eye(3) + np.einsum("j,pjab,pjbc->pac", weights, field, inner)
+    transported = np.empty_like(inner)
+    to_end = np.eye(3)
+    for piece in reversed(range(basis.pieces)):
+        to_end = to_end @ whole[piece]
+        transported[piece] = to_end @ np.linalg.inv(inner[piece])
+    return transported.reshape(-1, 3, 3)

@@ -1,0 +1,78 @@
+"""Solvers observed from iteration to iteration: progress is reported, the best iterate is kept, a stop is passed on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+
+IterationCallback = Callable[[int, float, float], bool]
+"""Called after each iteration with its number, the cost and the largest constraint violation; True stops the solver."""
+
+# Constraint violation, scaled, up to which iterates are compared by cost: the Newton corrections remove this much.
+_FEASIBLE = 1e-3
+
+
+class BestIterate:
+    """The best of a solver's iterates so far.
+
+    Attributes
+    ----------
+    unknowns, cost, infeasibility : of the best iterate: the cheapest of the feasible ones, or else the least infeasible
+    iterations : number of iterates reported
+    stopped : whether the callback has stopped the solver
+    error : what the callback raised, Ctrl-C included, where it cannot pass through the solver
+    """
+
+    def __init__(self, callback: IterationCallback | None) -> None:
+        self._callback = callback
+        self.unknowns: Array = np.empty(0)
+        self.cost, self.infeasibility = np.inf, np.inf
+        self.iterations = 0
+        self.stopped = False
+        self.error: BaseException | None = None
+
+    def report(self, unknowns: Array, cost: float, infeasibility: float) -> bool:
+        """Take note of an iterate; returns whether to stop at it."""
+        better = (max(infeasibility, _FEASIBLE), cost) < (max(self.infeasibility, _FEASIBLE), self.cost)
+        if better or not len(self.unknowns):
+            self.unknowns, self.cost, self.infeasibility = unknowns, cost, infeasibility
+        self.stopped = self._callback is not None and self._callback(self.iterations, cost, infeasibility)
+        self.iterations += 1
+        return self.stopped
+
+
+def ipopt_callback(best: BestIterate, unknowns: int, low: Array, high: Array) -> Any:
+    """The `iteration_callback` of `casadi.nlpsol` with rows g between low and high."""
+    import casadi
+
+    class Report(casadi.Callback):
+        def __init__(self) -> None:
+            super().__init__()
+            self.construct("report")
+
+        def get_n_in(self) -> int:
+            return casadi.nlpsol_n_out()
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_sparsity_in(self, i: int) -> Any:
+            lengths = {"x": unknowns, "f": 1, "g": len(low), "lam_x": unknowns, "lam_g": len(low), "lam_p": 0}
+            return casadi.Sparsity.dense(lengths[casadi.nlpsol_out(i)], 1)
+
+        def eval(self, given: Any) -> list[int]:
+            try:
+                rows = np.array(given[2]).ravel()
+                violation = np.maximum(low - rows, rows - high).max(initial=0.0)
+                return [int(best.report(np.array(given[0]).ravel(), float(given[1]), float(violation)))]
+            except BaseException as error:
+                # CasADi wraps Ctrl-C where it comes while a matrix is converted.
+                wrapped = isinstance(error, SystemError) and error.__cause__ is not None
+                best.error = error.__cause__ if wrapped else error
+                return [1]
+
+    return Report()

@@ -1,0 +1,154 @@
+"""How far a joint path is from solving Wong's equations: the optimality check of a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..errors import AccuracyNotReached
+from ..integrator.casadi_calls import call_casadi
+from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
+from ..shape_space.shape_path import ShapePath
+from ._hamiltonian import Hamiltonian, checked_metric, hamiltonian
+
+# Gauss nodes and weights of a panel on [-1, 1]: the residual of a smooth path is then exact to rounding on few panels.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+# Panels between two breaks of a path, refined until the residual has converged.
+_PANELS = (2, 4, 8, 16, 32, 64)
+# Changes of the residual by this much plus this share of it count as converged: it is read as an order of magnitude.
+_CONVERGED = 1e-9
+_CONVERGED_SHARE = 1e-3
+# A combination of charges whose effect is below this share of all charges' is not felt by the motion, and set to 0.
+_LEAST_FELT = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class WongFit:
+    """The extremal that fits a path best, and how far the path is from solving Wong's equations.
+
+    Attributes
+    ----------
+    charge : (3,) that fits best, the shortest if several do, inertial axes with R(0) = 1 [J s, or rad/s for "rate"]
+    rate : (n,) at the start of that extremal [rad/s or m/s]
+    residual : root mean square, in the metric of the cost, of what is missing in p = p(0) + integral of dL/dr,
+        relative to that of the rate
+    """
+
+    charge: Array
+    rate: Array
+    residual: float
+
+
+def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> WongFit:
+    """How far a path of the joints, at zero momentum, is from an extremal: the optimality check of a plan.
+
+    Wong's equations are taken in integrated form (du Bois-Reymond), p = g r' + A^T l = p(0) + integral of dL/dr: so a
+    spline is judged by its rate, not by its acceleration, and a jump of the rate is an error like any other.
+
+    Parameters
+    ----------
+    path : open or closed; between its breaks smooth
+    metric : as for `extremal`
+
+    Raises
+    ------
+    UnknownNameError, TrajectoryError
+        For another metric; if the path has other joints than the body.
+    SingularInertiaError
+        As `extremal`, at any shape of the path.
+    AccuracyNotReached
+        If the path is too rough between its breaks for the integral to be found.
+
+    Source: as `extremal`.
+    """
+    route = path.matched(body.joint_names, body.name)
+    equations = hamiltonian(body, metric)
+    lift = horizontal_lift(body, route)
+    last: WongFit | None = None
+    for panels in _PANELS:
+        edges = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)])
+        fit = _fit(body, equations, route, lift.attitude, np.append(edges, route.duration))
+        if last is not None and abs(fit.residual - last.residual) <= _CONVERGED + _CONVERGED_SHARE * fit.residual:
+            return fit
+        last = fit
+    raise AccuracyNotReached(
+        "the residual of the path does not converge as it is sampled more densely; declare the times where its rate "
+        "jumps as breaks of the path"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _SampledEquations:
+    """The integrated equations at Gauss points, as columns: without charge, and by each component of the charge.
+
+    Attributes
+    ----------
+    missing : (N, n, 4) what is missing in p = p(0) + integral of dL/dr, in the metric of the cost, weighted
+    initial : (N, n, n) how it changes with p(0)
+    speed : norm of the rate in the same metric and weights
+    """
+
+    missing: Array
+    initial: Array
+    speed: float
+
+
+def _sampled(
+    body: Body, known: Hamiltonian, route: ShapePath, attitude: Callable[[Array], Array], edges: Array
+) -> _SampledEquations:
+    half = 0.5 * np.diff(edges)
+    times = (edges[:-1, None] + half[:, None] * (_NODES + 1.0)).ravel()
+    shapes, rates = route.curve(times)
+    n, uncharged = body.n_shape, np.zeros(3)
+    gradients = np.array(
+        [call_casadi(known.slopes, 1, *row, uncharged)[0][0] for row in zip(shapes, rates, strict=True)]
+    )
+    columns, by_shape = connection_slopes(body, shapes)
+    back = so3.transpose(attitude(times))
+    momenta = np.concatenate([gradients[:, n : 2 * n, None], columns @ back], axis=2)
+    forces = np.concatenate([gradients[:, :n, None], np.einsum("nija,nj->nia", by_shape, rates) @ back], axis=2)
+    panels = forces.reshape(len(half), len(_NODES), -1) * half[:, None, None]
+    before = np.cumsum(np.einsum("k,pkx->px", _WEIGHTS, panels), axis=0)
+    impulses = np.concatenate([np.zeros((1, before.shape[1])), before[:-1]])[:, None] + _INTEGRAL @ panels
+    root = np.linalg.cholesky(checked_metric(body, known, shapes))
+    weights = np.sqrt((half[:, None] * _WEIGHTS).ravel())[:, None, None]
+    return _SampledEquations(
+        missing=np.asarray(weights * np.linalg.solve(root, momenta - impulses.reshape(momenta.shape)), float),
+        initial=np.asarray(weights * np.linalg.inv(root), float),
+        speed=float(np.linalg.norm(weights * np.linalg.solve(root, momenta[:, :, :1]))),
+    )
+
+
+def _fit(body: Body, known: Hamiltonian, route: ShapePath, attitude: Callable[[Array], Array], edges: Array) -> WongFit:
+    """Charge and initial momentum by least squares."""
+    sampled = _sampled(body, known, route, attitude, edges)
+    missing = sampled.missing.reshape(-1, 4)
+    # p(0) is eliminated first: the part of a charge that only shifts p(0) has no effect.
+    initial, triangle = np.linalg.qr(sampled.initial.reshape(-1, body.n_shape))
+    left = missing - initial @ (initial.T @ missing)
+    felt, values, axes = np.linalg.svd(left[:, 1:], full_matrices=False)
+    kept = values > _LEAST_FELT * np.linalg.norm(missing[:, 1:])
+    charge = -axes[kept].T @ ((felt[:, kept].T @ left[:, 0]) / values[kept])
+    combined = np.append(1.0, charge)
+    residual = float(np.linalg.norm(left @ combined)) / sampled.speed if sampled.speed else 0.0
+    momentum = np.linalg.solve(triangle, initial.T @ (missing @ combined))
+    here = route.shape(0.0)
+    kinetic = momentum - mechanical_connection(body, here).T @ charge
+    rate = np.asarray(np.linalg.solve(np.array(known.metric(here)), kinetic), float)
+    return WongFit(charge=charge, rate=rate, residual=residual)
+
+
+def _integral() -> Array:
+    """The integral from -1 to each node of the polynomial through values at the nodes: (k, k)."""
+    units = np.eye(len(_NODES))
+    sums = np.polynomial.legendre.legval(_NODES, np.polynomial.legendre.legint(units, lbnd=-1.0))
+    return sums.T @ np.linalg.inv(np.polynomial.legendre.legvander(_NODES, len(_NODES) - 1))
+
+
+_INTEGRAL = _integral()
