@@ -120,7 +120,7 @@ def printed_body_momentum(angles, momenta):
 
 
 @CHARTS
-def test_j1_attitude_is_the_product_of_three_turns(chart):
+def test_attitude_is_the_product_of_three_turns_j1(chart):
     rng = np.random.default_rng(1)
     middle = np.array([*chart.node, 0.0])
     for phi, theta, psi in rng.uniform(-7.0, 7.0, (40, 3)):
@@ -131,13 +131,13 @@ def test_j1_attitude_is_the_product_of_three_turns(chart):
     assert np.abs(chart.attitude(angles) - scipy).max() < ROUNDING
 
 
-def test_j1_printed_matrix_is_the_transpose():
+def test_printed_matrix_is_the_transpose_j1():
     rng = np.random.default_rng(2)
     for angles in random_angles(rng, 30):
         assert np.abs(ZXZ.attitude(angles).T - printed_p_matrix(*angles)).max() < ROUNDING
 
 
-def test_m_e5_the_printed_attitude_contradicts_the_printed_velocities():
+def test_the_printed_attitude_contradicts_the_printed_velocities_m_e5():
     """(15.6.6) has [R] = P; with it Omega and omega of (15.7.1) are wrong, with R = P^T both are right."""
     rng = np.random.default_rng(3)
     step = 1e-6
@@ -155,7 +155,7 @@ def test_m_e5_the_printed_attitude_contradicts_the_printed_velocities():
 
 
 @CHARTS
-def test_j2_angular_velocities_are_the_derivative_of_the_attitude(chart):
+def test_angular_velocities_are_the_derivative_of_the_attitude_j2(chart):
     rng = np.random.default_rng(4)
     angles, rates = random_angles(rng, 50), rng.normal(size=(50, 3))
     q, dq, body, spatial = symbolic_velocities(chart)
@@ -169,7 +169,7 @@ def test_j2_angular_velocities_are_the_derivative_of_the_attitude(chart):
     assert np.abs(turned - spatial).max() < 5e-15
 
 
-def test_j2_printed_velocities():
+def test_printed_velocities_j2():
     rng = np.random.default_rng(5)
     for angles, rates in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
         assert np.abs(ZXZ.body_angular_velocity(angles, rates) - printed_body_velocity(angles, rates)).max() < 3e-15
@@ -178,7 +178,7 @@ def test_j2_printed_velocities():
 
 
 @CHARTS
-def test_j3_conjugate_momenta_are_derivatives_of_the_energy(chart):
+def test_conjugate_momenta_are_derivatives_of_the_energy_j3(chart):
     rng = np.random.default_rng(6)
     inertia = random_inertia(rng)
     angles, rates = random_angles(rng, 40), rng.normal(size=(40, 3))
@@ -189,7 +189,7 @@ def test_j3_conjugate_momenta_are_derivatives_of_the_energy(chart):
     assert np.abs(chart.conjugate_momenta(angles, momentum) - truth).max() < 1e-13
 
 
-def test_j3_printed_momenta():
+def test_printed_momenta_j3():
     rng = np.random.default_rng(7)
     i1, i2, i3 = moments = np.array([3.0, 2.0, 1.2])
     for angles, (dphi, dtheta, dpsi) in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
@@ -204,7 +204,7 @@ def test_j3_printed_momenta():
 
 
 @CHARTS
-def test_j3_momenta_are_components_of_the_angular_momentum(chart):
+def test_momenta_are_components_of_the_angular_momentum_j3(chart):
     """p_phi is along the inertial third axis, p_psi along the body's, p_theta along the line of nodes."""
     rng = np.random.default_rng(8)
     angles, momentum = random_angles(rng, 30), rng.normal(size=(30, 3))
@@ -221,14 +221,14 @@ def test_j3_momenta_are_components_of_the_angular_momentum(chart):
 
 
 @CHARTS
-def test_j4_body_momentum_is_the_inverse(chart):
+def test_body_momentum_is_the_inverse_j4(chart):
     rng = np.random.default_rng(9)
     angles, p = random_angles(rng, 60), rng.normal(size=(60, 3))
     back = chart.conjugate_momenta(angles, chart.body_momentum(angles, p))
     assert np.abs((back - p) * np.sin(angles[:, 1:2])).max() < 3e-15
 
 
-def test_j4_printed_body_momentum():
+def test_printed_body_momentum_j4():
     rng = np.random.default_rng(10)
     for angles, p in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
         error = np.abs(ZXZ.body_momentum(angles, p) - printed_body_momentum(angles, p)).max()
@@ -236,7 +236,7 @@ def test_j4_printed_body_momentum():
 
 
 @CHARTS
-def test_j5_kinetic_energy_three_ways(chart):
+def test_kinetic_energy_three_ways_j5(chart):
     rng = np.random.default_rng(11)
     inertia = random_inertia(rng)
     angles, rates = random_angles(rng, 40), rng.normal(size=(40, 3))
@@ -248,7 +248,7 @@ def test_j5_kinetic_energy_three_ways(chart):
     assert np.abs(0.5 * np.sum(p * rates, axis=-1) / direct - 1.0).max() < 1e-12
 
 
-def test_j5_printed_energy():
+def test_printed_energy_j5():
     rng = np.random.default_rng(12)
     moments = np.array([3.0, 2.0, 1.2])
     for angles, p in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
@@ -261,7 +261,7 @@ def test_j5_printed_energy():
 
 
 @CHARTS
-def test_j6_hamilton_equations_are_the_derivatives_of_the_energy(chart):
+def test_hamilton_equations_are_the_derivatives_of_the_energy_j6(chart):
     """The energy is built from R alone, as the inverse quadratic form of that in the rates."""
     rng = np.random.default_rng(13)
     inertia = random_inertia(rng)
@@ -279,7 +279,7 @@ def test_j6_hamilton_equations_are_the_derivatives_of_the_energy(chart):
 
 
 @CHARTS
-def test_j6_hamilton_equations_give_eulers_equations(chart):
+def test_hamilton_equations_give_eulers_equations_j6(chart):
     rng = np.random.default_rng(14)
     inertia = random_inertia(rng)
     angles, momenta = random_angles(rng, 60), rng.normal(size=(60, 3))
@@ -294,7 +294,7 @@ def test_j6_hamilton_equations_give_eulers_equations(chart):
 
 
 @CHARTS
-def test_j6_motion_in_the_chart_is_the_motion_of_attitude_and_momentum(chart):
+def test_motion_in_the_chart_is_the_motion_of_attitude_and_momentum_j6(chart):
     rng = np.random.default_rng(15)
     inertia = random_inertia(rng)
     start, momentum = np.array([0.3, 1.2, -0.4]), np.array([0.3, -0.5, 0.6])
@@ -317,7 +317,7 @@ def test_j6_motion_in_the_chart_is_the_motion_of_attitude_and_momentum(chart):
 
 
 @CHARTS
-def test_j7_canonical_bracket_becomes_minus_lie_poisson(chart):
+def test_canonical_bracket_becomes_minus_lie_poisson_j7(chart):
     """By CasADi: {F(Pi(q, p)), G(Pi(q, p))} with Pi from the inverse Legendre transform of R alone."""
     rng = np.random.default_rng(16)
     q, dq, body, _ = symbolic_velocities(chart)
@@ -337,7 +337,7 @@ def test_j7_canonical_bracket_becomes_minus_lie_poisson(chart):
 
 
 @CHARTS
-def test_j7_jacobian_takes_the_canonical_structure_to_hat_of_pi(chart):
+def test_jacobian_takes_the_canonical_structure_to_hat_of_pi_j7(chart):
     rng = np.random.default_rng(17)
     angles, momenta = random_angles(rng, 50), rng.normal(size=(50, 3))
     jacobian = chart.body_momentum_jacobian(angles, momenta)
@@ -349,7 +349,7 @@ def test_j7_jacobian_takes_the_canonical_structure_to_hat_of_pi(chart):
 
 
 @CHARTS
-def test_j7_jacobian_is_the_derivative(chart):
+def test_jacobian_is_the_derivative_j7(chart):
     rng = np.random.default_rng(18)
     q, dq, body, _ = symbolic_velocities(chart)
     p = ca.SX.sym("p", 3)
@@ -361,7 +361,7 @@ def test_j7_jacobian_is_the_derivative(chart):
 
 
 @CHARTS
-def test_j8_the_chart_is_a_bijection_inside_its_domain(chart):
+def test_the_chart_is_a_bijection_inside_its_domain_j8(chart):
     rng = np.random.default_rng(19)
     angles = random_angles(rng, 500)
     assert np.abs(chart.angles(chart.attitude(angles)) - angles).max() < 2e-14
@@ -376,7 +376,7 @@ def test_j8_the_chart_is_a_bijection_inside_its_domain(chart):
 
 @CHARTS
 @pytest.mark.parametrize("near", [1e-3, 1e-7, 1e-9, 1e-12, 3e-15])
-def test_j8_next_to_a_pole_the_attitude_is_kept(chart, near):
+def test_next_to_a_pole_the_attitude_is_kept_j8(chart, near):
     for theta in (near, np.pi - near):
         angles = np.array([0.7, theta, -1.9])
         attitude = chart.attitude(angles)
@@ -387,7 +387,7 @@ def test_j8_next_to_a_pole_the_attitude_is_kept(chart, near):
 
 
 @CHARTS
-def test_j8_at_a_pole_theta_is_exact_and_psi_zero(chart):
+def test_at_a_pole_theta_is_exact_and_psi_zero_j8(chart):
     rng = np.random.default_rng(21)
     middle = np.array([*chart.node, 0.0])
     for phi, psi in rng.uniform(-3.0, 3.0, (30, 2)):
@@ -403,7 +403,7 @@ def test_j8_at_a_pole_theta_is_exact_and_psi_zero(chart):
 
 @CHARTS
 @pytest.mark.parametrize("theta", [0.0, np.pi, -np.pi, 2 * np.pi, 1e-9, np.pi - 1e-9])
-def test_j8_poles_are_refused(chart, theta):
+def test_poles_are_refused_j8(chart, theta):
     angles, vector = np.array([[0.1, 1.0, 0.2], [0.1, theta, 0.2]]), np.ones(3)
     assert chart.is_regular(angles).tolist() == [True, False]
     for refused in (
@@ -423,7 +423,7 @@ def test_j8_poles_are_refused(chart, theta):
 
 
 @CHARTS
-def test_j8_volume_is_the_sine_of_theta(chart):
+def test_volume_is_the_sine_of_theta_j8(chart):
     angles = random_angles(np.random.default_rng(22), 30)
     for matrix in (chart.body_rate_matrix(angles), chart.spatial_rate_matrix(angles)):
         assert np.abs(np.abs(np.linalg.det(matrix)) - np.sin(angles[:, 1])).max() < 1e-15
@@ -477,7 +477,7 @@ def test_continuous_angles_that_start_or_stay_at_a_pole(chart):
     assert np.array_equal(batch[1], found)
 
 
-def test_j9_bonnards_precession_and_angles():
+def test_bonnards_precession_and_angles_j9():
     """(4) and the relations before it, with L along the inertial third axis, against the derivative of R."""
     rng = np.random.default_rng(23)
     inertia = np.diag([3.0, 2.0, 1.2])
@@ -500,7 +500,7 @@ def test_j9_bonnards_precession_and_angles():
     assert np.abs(first / precession_rate(momentum, velocity) - 1.0).max() < 1e-12
 
 
-def test_j9_proposition_6():
+def test_printed_brackets_of_proposition_6_j9():
     rng = np.random.default_rng(24)
     moments = np.array([3.0, 2.0, 1.2])
     for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):
@@ -511,7 +511,7 @@ def test_j9_proposition_6():
         assert abs(ZYZ.hamiltonian(np.diag(moments), angles, p) / (0.5 * np.sum(h * h / moments)) - 1.0) < 1e-13
 
 
-def test_b_e3_the_printed_sign_of_h3_is_wrong():
+def test_the_printed_sign_of_h3_is_wrong_b_e3():
     rng = np.random.default_rng(25)
     for momentum in rng.normal(size=(30, 3)):
         size = np.linalg.norm(momentum)
@@ -524,7 +524,7 @@ def test_b_e3_the_printed_sign_of_h3_is_wrong():
         assert np.abs(corrected - momentum).max() < 3e-15 * size
 
 
-def test_b_e4_the_last_andoyer_relation_is_that_of_phi_3():
+def test_the_last_andoyer_relation_is_that_of_phi_3_b_e4():
     """Printed for phi_2 and with arctan; it is right for phi_3 and with arctan2. l is the angle of H from axis 2."""
     rng = np.random.default_rng(26)
     printed_fails = arctan_fails = 0
@@ -551,7 +551,7 @@ def momentum_map_derivative(chart, angles, momenta):
 
 
 @CHARTS
-def test_j10_charts_pull_back_the_canonical_form(chart):
+def test_charts_pull_back_the_canonical_form_j10(chart):
     """On T*SO(3) in body axes: omega((a, x), (b, y)) = a.y - b.x + Pi.(a x b)."""
     rng = np.random.default_rng(27)
     for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):
@@ -563,7 +563,7 @@ def test_j10_charts_pull_back_the_canonical_form(chart):
 
 
 @pytest.mark.parametrize(("first", "second"), [(ZXZ, ZXZ), (ZXZ, ZYZ), (ZYZ, ZYZ)])
-def test_j10_changes_of_chart_and_axes_are_symplectic(first, second):
+def test_changes_of_chart_and_axes_are_symplectic_j10(first, second):
     """From one chart of R to the other of A R B, derivative by differences of sixth order."""
     rng = np.random.default_rng(28)
     inertial, body = Rotation.random(2, random_state=29).as_matrix()
@@ -589,7 +589,7 @@ def test_j10_changes_of_chart_and_axes_are_symplectic(first, second):
 
 
 @CHARTS
-def test_j10_the_flow_is_symplectic(chart):
+def test_the_flow_is_symplectic_j10(chart):
     """The derivative of the flow, from the variational equations by CasADi's Hessian of the energy."""
     inertia = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, -0.2], [0.1, -0.2, 1.0]])
     q, dq, body, _ = symbolic_velocities(chart)

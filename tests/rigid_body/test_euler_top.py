@@ -81,7 +81,7 @@ def top(request):
 
 
 @pytest.mark.parametrize("name", TOPS)
-def test_h1_h9_h10_momentum_and_attitude_against_integration(name):
+def test_momentum_and_attitude_against_integration_h1_h9_h10(name):
     top = TOPS[name]
     assert top.regime == REGIMES.get(name, top.regime)
     body = top.initial_attitude.T @ top.momentum
@@ -95,7 +95,7 @@ def test_h1_h9_h10_momentum_and_attitude_against_integration(name):
     assert np.abs(again[-1] - top.initial_attitude).max() < 3e-13 * slack
 
 
-def test_g1_g2_g3_g4_laws(top):
+def test_conservation_laws_g1_g2_g3_g4(top):
     """R Pi and the energy stay, Pi' = Pi x omega and R' = R hat(omega)."""
     times = np.linspace(-3.0, 8.0, 23)
     attitude, momentum, omega = top.attitude(times), top.body_momentum(times), top.angular_velocity(times)
@@ -147,7 +147,7 @@ REFERENCES = [
 
 
 @pytest.mark.parametrize(("moments", "magnitude", "a", "period", "phase", "area"), REFERENCES)
-def test_d17_reference_values(moments, magnitude, a, period, phase, area):
+def test_reference_values_d17(moments, magnitude, a, period, phase, area):
     top = EulerTop.principal(moments, with_energy(moments, magnitude, a))
     # The momentum given in doubles is off its energy by 1e-16, which 1 - a/I2 magnifies near the separatrix.
     slack = 1e-12 if a != 1.999 else 3e-12
@@ -159,7 +159,7 @@ def test_d17_reference_values(moments, magnitude, a, period, phase, area):
     assert top.long_axis_precession_per_period == top.precession_per_period
 
 
-def test_d12_phase_and_area_equal_those_of_the_split():
+def test_phase_and_area_equal_those_of_the_split_d12():
     rng = np.random.default_rng(15)
     for case in range(200):
         top = random_top(rng)
@@ -176,7 +176,7 @@ def test_d12_phase_and_area_equal_those_of_the_split():
         assert so3.angle(so3.transpose(split.total_rotation) @ turn) < 1e-10
 
 
-def test_h7_period_and_phase_close_the_motion(top):
+def test_period_and_phase_close_the_motion_h7(top):
     if not np.isfinite(top.period):
         assert top.rate == 0.0 or top.complement == 0.0
         return
@@ -221,7 +221,7 @@ def test_solid_angle_is_the_area_of_the_momentum_curve():
         assert abs(top.dynamic_phase - top.solid_angle - top.montgomery_phase) < 1e-14 * top.dynamic_phase
 
 
-def test_h2_axisymmetric_limit_is_elementary():
+def test_axisymmetric_limit_is_elementary_h2():
     """Circles of latitude: the body frame turns about its axis, the axis precesses at |Pi|/I_1 (M-E6)."""
     for moments, body in (((1.0, 1.0, 1.7), (0.8, -0.3, 0.9)), ((0.4, 1.0, 1.0), (0.8, -0.3, -0.9))):
         for gap in (0.0, 1e-15, 1e-12, 1e-9):
@@ -239,7 +239,7 @@ def test_h2_axisymmetric_limit_is_elementary():
             assert top.regime == ("circling" if gap else "axisymmetric")
 
 
-def test_h6_steady_rotations():
+def test_steady_rotations_h6():
     times = np.linspace(0.0, 30.0, 7)
     for axis in range(3):
         body = np.zeros(3)
@@ -256,7 +256,7 @@ def test_h6_steady_rotations():
 
 
 @pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
-def test_h5_m_e4_four_separatrices(signs):
+def test_four_separatrices_h5_m_e4(signs):
     """From a start whose D vanishes in doubles exactly; the four curves and the sign rule of M-E4."""
     moments = np.array([1.0, 1.5, 3.0])
     start = np.array([signs[0] * 0.5, 0.25, signs[1] * 0.5])
@@ -291,7 +291,7 @@ def test_h5_m_e4_four_separatrices(signs):
     assert np.abs(derivative * [1.0, -1.0, 1.0] - np.cross(wrong, wrong / moments)).max() > 0.05
 
 
-def test_h5_attitude_on_the_separatrix_by_quadrature():
+def test_attitude_on_the_separatrix_by_quadrature_h5():
     top = EulerTop.principal([1.0, 1.5, 3.0], [0.5, 0.25, 0.5])
     times = np.array([0.5, 3.0, 9.0])
     _, attitude = integrated(top.inertia, np.array([0.5, 0.25, 0.5]), times)
@@ -302,7 +302,7 @@ def test_h5_attitude_on_the_separatrix_by_quadrature():
 
 
 @pytest.mark.parametrize("moments", [(1.0, 2.0, 4.0), (1.0, 1.1, 4.0), (0.2, 3.0, 3.1)])
-def test_h11_continuous_up_to_the_separatrix_with_its_logarithm(moments):
+def test_continuous_up_to_the_separatrix_with_its_logarithm_h11(moments):
     i = np.array(moments)
     share = np.sqrt((1 / i[1] - 1 / i[2]) / (1 / i[0] - 1 / i[2]))
     rate = np.sqrt((1 / i[0] - 1 / i[1]) * (1 / i[1] - 1 / i[2]))
@@ -360,7 +360,7 @@ def test_separatrix_solid_angle_of_an_axisymmetric_body():
         assert all(separatrix_solid_angle(moments, other) == 0.0 for other in range(3) if other != axis)
 
 
-def test_h3_h4_m_e1_m_e2_m_e7_the_book_s_solution_with_its_letters():
+def test_the_book_s_solution_with_its_letters_h3_h4_m_e1_m_e2_m_e7():
     """I1 >= I2 >= I3 there: a > I2 never means our k = 3 but circles about the I = I1 axis."""
     i1, i2, i3 = 3.0, 2.0, 1.0
     for a in (1.3, 2.6):
@@ -395,7 +395,7 @@ def test_h3_h4_m_e1_m_e2_m_e7_the_book_s_solution_with_its_letters():
             assert abs(trough - delta) > 0.1
 
 
-def test_m_e3_the_order_of_the_amplitudes():
+def test_the_order_of_the_amplitudes_m_e3():
     """beta > alpha >= gamma always (a < I2); delta >= alpha, as scanned, fails for about half of all cases."""
     rng = np.random.default_rng(3)
     failures, count = 0, 0
@@ -410,7 +410,7 @@ def test_m_e3_the_order_of_the_amplitudes():
     assert 0.3 < failures / count < 0.7
 
 
-def test_h8_quadrature_of_the_middle_component():
+def test_quadrature_of_the_middle_component_h8():
     """(15.8.8): the time from Pi2 = 0 to y is an integral of 1/sqrt of two factors, alpha = beta where a = I2."""
     top = EulerTop.principal(MOMENTS, with_energy(MOMENTS, 1.7, 1.3))
     amplitude = top.magnitude * abs(top.orbit.amplitudes[1])
@@ -427,7 +427,7 @@ def test_h8_quadrature_of_the_middle_component():
     assert a * i2 * (a - i3) / (i2 - i3) == a * i2 * (i1 - a) / (i1 - i2)
 
 
-def test_h12_series_of_sn():
+def test_series_of_sn_h12():
     """sn u = u - (1 + m) u³/3! + (1 + 14 m + m²) u⁵/5! - ..., in Pi2 = ± A2 sn."""
     top = EulerTop.principal(MOMENTS, with_energy(MOMENTS, 1.7, 1.3))
     m, u = 1.0 - top.complement, 0.05
@@ -438,7 +438,7 @@ def test_h12_series_of_sn():
     assert abs(sn - series) < 62000 * u**11 / 39916800 + 8.0 * np.finfo(float).eps * u
 
 
-def test_h13_jacobi_functions_solve_euler_s_equations():
+def test_jacobi_functions_solve_euler_s_equations_h13():
     """sn' = cn dn, cn' = -sn dn, dn' = -m sn cn is Euler's system of a body with suitable moments."""
     top = EulerTop.principal(MOMENTS, with_energy(MOMENTS, 1.7, 2.6))
     orbit = top.orbit

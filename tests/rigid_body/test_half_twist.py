@@ -35,7 +35,7 @@ def exact_half_twist(moments, momentum):
         return float(2 * mpmath.ellipk(near / far) / (whole * mpmath.sqrt(q * s) * mpmath.sqrt(far)))
 
 
-def test_l4_half_twist_time_to_the_last_digits_however_near_the_separatrix():
+def test_half_twist_time_to_the_last_digits_however_near_the_separatrix_l4():
     rng = np.random.default_rng(10)
     for tilt in (1.0, 1e-2, 1e-5, 1e-8, 1e-11, 1e-16, 1e-25):
         for _ in range(5):
@@ -49,7 +49,7 @@ def test_l4_half_twist_time_to_the_last_digits_however_near_the_separatrix():
             assert twist.growth_rate == pytest.approx(unstable.eigenvalues[0].real, rel=1e-12)
 
 
-def test_l4_between_flips_the_intermediate_component_reverses_and_the_body_turns_over():
+def test_between_flips_the_intermediate_component_reverses_and_the_body_turns_over_l4():
     moments, tilt = np.array([1.0, 2.0, 3.0]), 1e-3
     twist = half_twist_from_tilt(moments, 1.7, tilt, 0.3)
     start = 1.7 * np.array([np.sin(tilt) * np.cos(0.3), np.cos(tilt), np.sin(tilt) * np.sin(0.3)])
@@ -79,7 +79,7 @@ def test_l4_between_flips_the_intermediate_component_reverses_and_the_body_turns
     assert upright == pytest.approx([-1.0, 1.0], abs=1e-5)
 
 
-def test_l4_the_logarithm_is_approached_and_exact_far_down():
+def test_the_logarithm_is_approached_and_exact_far_down_l4():
     moments = np.array([1.0, 1.4, 3.0])
     tilts = np.array([1e-1, 1e-2, 1e-3, 1e-4])
     twist = half_twist_from_tilt(moments, 2.0, tilts, 0.8)
@@ -93,7 +93,7 @@ def test_l4_the_logarithm_is_approached_and_exact_far_down():
     assert half_twist_from_tilt(moments[::-1], 2.0, 1e-3, 0.8).time == twist.time[2]
 
 
-def test_l4_where_nothing_flips_the_time_is_infinite():
+def test_where_nothing_flips_the_time_is_infinite_l4():
     moments = np.array([1.0, 2.0, 3.0])
     for momentum in ([0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]):
         assert half_twist(moments, momentum).time == np.inf

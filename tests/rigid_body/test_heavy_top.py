@@ -58,7 +58,7 @@ def symbolic_bracket(f, g, pi, gamma):
     return -ca.dot(pi, ca.cross(fp, gp)) - ca.dot(gamma, ca.cross(fp, gg) - ca.cross(gp, fg))
 
 
-def test_m1_equations_energy_and_casimirs():
+def test_equations_energy_and_casimirs_m1():
     rng = np.random.default_rng(1)
     for _ in range(20):
         top, momentum, gamma = random_top(rng), rng.normal(size=3), rng.normal(size=3)
@@ -81,7 +81,7 @@ def test_m1_equations_energy_and_casimirs():
         assert casimirs(momentum, gamma) == pytest.approx((momentum @ gamma, gamma @ gamma), rel=1e-14)
 
 
-def test_m2_the_semidirect_bracket_gives_the_equations_and_is_a_poisson_bracket():
+def test_the_semidirect_bracket_gives_the_equations_and_is_a_poisson_bracket_m2():
     rng = np.random.default_rng(2)
     pi, up = symbols()
     point = ca.vertcat(pi, up)
@@ -113,7 +113,7 @@ def test_m2_the_semidirect_bracket_gives_the_equations_and_is_a_poisson_bracket(
         assert np.concatenate(top.rates(momentum, gamma)) == pytest.approx(rates, abs=1e-12)
 
 
-def test_m1_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations():
+def test_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations_m1():
     rng = np.random.default_rng(3)
     times = np.linspace(0.0, 10.0, 333)
     for _ in range(3):
@@ -141,7 +141,7 @@ def test_m1_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations(
         assert np.abs(turn - motion.angular_velocity(middle)).max() < 1e-5
 
 
-def test_m1_the_error_estimate_is_honest():
+def test_the_error_estimate_is_honest_m1():
     rng = np.random.default_rng(4)
     for _ in range(3):
         top, momentum, gamma = random_top(rng), rng.normal(size=3) * 2.0, so3.normalised(rng.normal(size=3))
@@ -156,7 +156,7 @@ def test_m1_the_error_estimate_is_honest():
             assert motion.energy_drift > 0.1 * np.abs(energy - energy[0]).max() - 1e-14
 
 
-def test_m1_without_weight_the_spatial_momentum_stands_still():
+def test_without_weight_the_spatial_momentum_stands_still_m1():
     rng = np.random.default_rng(5)
     top = HeavyTop(random_top(rng).inertia, 0.0)
     momentum = rng.normal(size=3)
@@ -169,7 +169,7 @@ def test_m1_without_weight_the_spatial_momentum_stands_still():
     assert np.abs(motion.attitude(0.0) - attitude).max() < 16.0 * EPS
 
 
-def test_m1_hanging_at_rest_swings_like_a_plane_pendulum():
+def test_hanging_at_rest_swings_like_a_plane_pendulum_m1():
     # chi sideways, released at rest: theta'' = -(Mgl/I) sin(theta), by its quarter period from a right angle.
     top = HeavyTop(np.diag([2.0, 1.0, 1.5]), 3.0, [0.0, 1.0, 0.0])
     quarter = float(mpmath.ellipk(0.5)) * np.sqrt(2.0 / 3.0)
@@ -178,7 +178,7 @@ def test_m1_hanging_at_rest_swings_like_a_plane_pendulum():
     assert height == pytest.approx([0.0, -1.0, 0.0, 0.0], abs=1e-10)
 
 
-def test_m1_batches_are_what_their_members_are():
+def test_batches_are_what_their_members_are_m1():
     rng = np.random.default_rng(6)
     tops = [random_top(rng) for _ in range(3)]
     batch = HeavyTop(
@@ -201,7 +201,7 @@ def test_m1_batches_are_what_their_members_are():
         assert np.abs(batch.rates(momenta, gammas)[0][i, j] - tops[i].rates(momenta[j], gammas[i, j])[0]).max() < 1e-14
 
 
-def test_m10_energy_plus_half_gamma_squared_generates_the_same_motion():
+def test_energy_plus_half_gamma_squared_generates_the_same_motion_m10():
     rng = np.random.default_rng(13)
     for _ in range(10):
         top, momentum, gamma = random_top(rng), rng.normal(size=3), rng.normal(size=3)
@@ -217,7 +217,7 @@ def test_m10_energy_plus_half_gamma_squared_generates_the_same_motion():
         assert gradient.ravel() == pytest.approx(np.concatenate([omega, v]), abs=1e-13)
 
 
-def test_m10_euler_poincare_form():
+def test_euler_poincare_form_m10():
     rng = np.random.default_rng(14)
     for _ in range(10):
         top, momentum, gamma = random_top(rng), rng.normal(size=3), so3.normalised(rng.normal(size=3))

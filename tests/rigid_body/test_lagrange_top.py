@@ -53,7 +53,7 @@ def lifted(top, p, phi_dot, a, b, c, d):
     return at(hessian, point, value), at(gradient, point, value).ravel()
 
 
-def test_m4_first_variation_vanishes():
+def test_first_variation_vanishes_m4():
     rng = np.random.default_rng(8)
     for _ in range(20):
         top, p = random_lagrange(rng), rng.normal() * 3.0
@@ -68,7 +68,7 @@ def test_m4_first_variation_vanishes():
         assert (-e * p, 0.5 * e * p * p - 0.5 * top.mgl) == pytest.approx((sleep.phi_dot, sleep.phi_prime), rel=1e-12)
 
 
-def test_m5_second_variation_and_its_minors():
+def test_second_variation_and_its_minors_m5():
     rng = np.random.default_rng(9)
     for _ in range(20):
         top, p, phi_dot = random_lagrange(rng), rng.normal() * 3.0, rng.normal()
@@ -86,7 +86,7 @@ def test_m5_second_variation_and_its_minors():
         assert definite == np.all(sleep.minors > 0.0) == sleep.energy_casimir
 
 
-def test_m_e9_printed_entries_fail_and_the_corrected_ones_hold():
+def test_printed_entries_fail_and_the_corrected_ones_hold_m_e9():
     rng = np.random.default_rng(10)
     for _ in range(10):
         top, p, phi_dot = random_lagrange(rng), 2.0 + rng.uniform(), rng.normal()
@@ -99,7 +99,7 @@ def test_m_e9_printed_entries_fail_and_the_corrected_ones_hold():
         assert exact[5, 5] == pytest.approx(vertical + b + p * p * c + 2.0 * p * d, rel=1e-12)
 
 
-def test_m6_e_quadratic_and_the_threshold():
+def test_e_quadratic_and_the_threshold_m6():
     rng = np.random.default_rng(11)
     for _ in range(30):
         top = random_lagrange(rng)
@@ -131,7 +131,7 @@ def test_m6_e_quadratic_and_the_threshold():
     assert LagrangeTop(1.0, 3.0, -4.0).critical_momentum == 0.0
 
 
-def test_m7_linear_matrix_polynomial_discriminant_and_spectrum():
+def test_linear_matrix_polynomial_discriminant_and_spectrum_m7():
     rng = np.random.default_rng(12)
     for _ in range(40):
         top, p = random_lagrange(rng), rng.normal() * 4.0
@@ -166,7 +166,7 @@ def test_m7_linear_matrix_polynomial_discriminant_and_spectrum():
         assert spectrally_stable(moments, mgl, p) == (abs(p) >= top.critical_momentum)
 
 
-def test_m7_spectrum_to_the_last_digits_next_to_the_threshold_and_next_to_zero():
+def test_spectrum_to_the_last_digits_next_to_the_threshold_and_next_to_zero_m7():
     # A nearly flat disc, a last digit beside the threshold: the discriminant has its sign.
     for ratio in (1.9, 1.99, 1.9999, 2.0001):
         moments, threshold = np.array([1.3, 1.3, 1.3 * ratio]), 2.0 * np.sqrt(2.0 * 1.3)
@@ -186,7 +186,7 @@ def test_m7_spectrum_to_the_last_digits_next_to_the_threshold_and_next_to_zero()
         assert np.sort_complex(ours) == pytest.approx(np.sort_complex(squares), rel=1e-13, abs=0.0)
 
 
-def test_m_e10_the_discriminant_vanishes_for_a_flat_disc_and_the_spectrum_still_decides():
+def test_the_discriminant_vanishes_for_a_flat_disc_and_the_spectrum_still_decides_m_e10():
     moments, mgl = np.array([1.5, 1.5, 3.0]), 2.0
     threshold = 2.0 * np.sqrt(3.0)
     for p in threshold * np.array([0.3, 0.9, 1.1, 4.0]):
@@ -205,7 +205,7 @@ def test_m_e10_the_discriminant_vanishes_for_a_flat_disc_and_the_spectrum_still_
     assert not spectrally_stable([1.0, 1.0, 0.6], mgl, 0.0)
 
 
-def test_m8_energy_casimir_spectrum_and_simulation_agree():
+def test_energy_casimir_spectrum_and_simulation_agree_m8():
     chart = stability_chart(np.linspace(0.5, 2.0, 4), [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=80.0)
     assert np.array_equal(chart.simulation, chart.spectrum)
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
@@ -215,7 +215,7 @@ def test_m8_energy_casimir_spectrum_and_simulation_agree():
     assert np.abs(chart.largest_tilt[:, :4] - slow).max() < 1e-2
 
 
-def test_m8_simulation_finds_the_threshold_within_a_percent():
+def test_simulation_finds_the_threshold_within_a_percent_m8():
     ratios = [0.5, 1.0, 2.0]
     low, high = np.full(3, 1.0), np.full(3, 3.0)
     for duration in (40.0, 120.0):
@@ -229,14 +229,14 @@ def test_m8_simulation_finds_the_threshold_within_a_percent():
 
 
 @pytest.mark.full
-def test_m8_a_fine_chart():
+def test_a_fine_chart_m8():
     momenta = np.concatenate([np.linspace(0.1, 1.98, 30), np.linspace(2.02, 5.0, 30)])
     chart = stability_chart(np.linspace(0.2, 2.0, 10), momenta, duration=120.0)
     assert np.array_equal(chart.simulation, chart.spectrum)
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
 
 
-def test_m9_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_long():
+def test_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_long_m9():
     for eps, duration in ((1e-3, 20.0), (0.05, 150.0)):
         moments = np.array([1.0, 1.0 + eps, 0.6])
         top = HeavyTop(np.diag(moments), 1.0)
@@ -255,7 +255,7 @@ def test_m9_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_lo
                 assert 1e-9 < np.abs(momentum - p).max() < 1e-2
 
 
-def test_m9_linear_matrix_and_polynomial_of_asymmetric_tops():
+def test_linear_matrix_and_polynomial_of_asymmetric_tops_m9():
     rng = np.random.default_rng(15)
     for _ in range(30):
         moments, mgl, p = rng.uniform(0.4, 2.5, 3), rng.normal() * 3.0, rng.normal() * 4.0
@@ -273,7 +273,7 @@ def test_m9_linear_matrix_and_polynomial_of_asymmetric_tops():
             assert spectrally_stable(moments, mgl, p) == (values.real.max() < 1e-7)
 
 
-def test_m9_the_asymmetric_threshold_is_where_simulation_finds_it():
+def test_the_asymmetric_threshold_is_where_simulation_finds_it_m9():
     moments = np.array([1.0, 1.4, 0.6])
     spins = np.linspace(0.5, 5.0, 4001)
     stable = spectrally_stable(moments, 1.0, spins)

@@ -18,7 +18,7 @@ def random_lagrange(rng):
     return LagrangeTop(*rng.uniform(0.4, 2.5, 2), rng.uniform(0.5, 5.0))
 
 
-def test_m3_lagrange_top_keeps_its_axial_momentum_and_nutates_in_closed_form():
+def test_lagrange_top_keeps_its_axial_momentum_and_nutates_in_closed_form_m3():
     rng = np.random.default_rng(7)
     times = np.linspace(0.0, 9.0, 300)
     for _ in range(5):
@@ -33,7 +33,7 @@ def test_m3_lagrange_top_keeps_its_axial_momentum_and_nutates_in_closed_form():
         assert rise.third_root >= 1.0
 
 
-def test_m3_nutation_period_by_quadrature_and_released_from_a_cusp():
+def test_nutation_period_by_quadrature_and_released_from_a_cusp_m3():
     top = LagrangeTop(1.3, 0.7, 2.0)
     gamma = np.array([0.6, 0.0, 0.8])
     momentum = 4.0 * UP  # pi_z = 3.2, released with its axis at rest: the highest point, where u'^2 = 0.
@@ -53,7 +53,7 @@ def test_m3_nutation_period_by_quadrature_and_released_from_a_cusp():
     assert 2.0 * np.pi / fast.period == pytest.approx(40.0 / 1.3, rel=1e-2)
 
 
-def test_m3_nutation_where_the_axis_stands_or_creeps_up():
+def test_nutation_where_the_axis_stands_or_creeps_up_m3():
     top = LagrangeTop(1.3, 0.7, 2.0)
     for momentum, gamma in ((3.0, UP), (5.0, UP), (0.0, -UP)):
         still = nutation(top, momentum * UP, gamma)
@@ -72,7 +72,7 @@ def test_m3_nutation_where_the_axis_stands_or_creeps_up():
 
 
 @pytest.mark.parametrize("lean", [1e-3, 1e-6, 1e-9])
-def test_m3_period_next_to_the_upright_spin_of_a_slow_top_to_fifty_digits(lean):
+def test_period_next_to_the_upright_spin_of_a_slow_top_to_fifty_digits_m3(lean):
     # Twice close to a double root: the logarithm of a distance that is lost in 1 - cos(theta).
     gamma = np.array([lean, 0.0, np.sqrt(1.0 - lean * lean)])
     rise = nutation(LagrangeTop(1.3, 0.7, 2.0), 3.0 * UP, gamma)
@@ -89,7 +89,7 @@ def test_m3_period_next_to_the_upright_spin_of_a_slow_top_to_fifty_digits(lean):
         assert rise.complement == pytest.approx(float(1 - parameter), rel=1e-11)
 
 
-def test_m3_steady_precession_is_steady():
+def test_steady_precession_is_steady_m3():
     # I1 cos(theta) w^2 - p w + Mgl = 0 for the rate w of the slow precession.
     theta, p, i1, mgl = 0.7, 5.0, 1.3, 2.0
     w = (p - np.sqrt(p * p - 4.0 * i1 * np.cos(theta) * mgl)) / (2.0 * i1 * np.cos(theta))
@@ -109,7 +109,7 @@ STARTS = (
 
 
 @pytest.mark.parametrize(("momentum", "gamma"), STARTS)
-def test_m3_roots_of_the_cubic_to_fifty_digits(momentum, gamma):
+def test_roots_of_the_cubic_to_fifty_digits_m3(momentum, gamma):
     gamma = np.array([*gamma, np.sqrt(1.0 - np.sum(np.square(gamma)))])
     gamma /= np.linalg.norm(gamma)
     rise = nutation(LagrangeTop(1.3, 0.7, 2.0), momentum, gamma)

@@ -64,7 +64,7 @@ def exact_rate(moments, pi, matrix):
     return exact_cross(k, n)
 
 
-def test_m_e11_the_book_runs_backwards():
+def test_the_book_runs_backwards_m_e11():
     """In rational numbers: grad H x grad L, and grad K x grad N with ad - bc = 1, are minus Euler's equations."""
     moments, pi = [Fraction(1), Fraction(2), Fraction(7, 2)], [Fraction(3, 5), Fraction(-1, 3), Fraction(4, 7)]
     omega = [p / m for p, m in zip(pi, moments, strict=True)]
@@ -86,7 +86,7 @@ def test_m_e11_the_book_runs_backwards():
         assert np.abs(pair.rate(values) - np.array(euler_rate, dtype=float)).max() < 4.0 * EPS * largest
 
 
-def test_m_e11_the_printed_rates_of_theta_and_p_run_backwards():
+def test_the_printed_rates_of_theta_and_p_run_backwards_m_e11():
     rng = np.random.default_rng(1)
     pendulum = rigid_body_pendulum(ASCENDING)
     assert pendulum.axes == (0, 1, 2)
@@ -101,7 +101,7 @@ def test_m_e11_the_printed_rates_of_theta_and_p_run_backwards():
 
 
 @pytest.mark.parametrize("determinant", [1.0, -1.0])
-def test_n1_every_matrix_of_determinant_one_gives_eulers_equations(determinant):
+def test_every_matrix_of_determinant_one_gives_eulers_equations_n1(determinant):
     rng = np.random.default_rng(2)
     for _ in range(50):
         inertia, matrix = random_inertia(rng), random_matrix(rng, determinant)
@@ -117,7 +117,7 @@ def test_n1_every_matrix_of_determinant_one_gives_eulers_equations(determinant):
 
 
 @pytest.mark.parametrize("determinant", [1.0, -1.0])
-def test_n1_bracket_is_poisson_with_casimir_k_and_hamiltonian_n(determinant):
+def test_bracket_is_poisson_with_casimir_k_and_hamiltonian_n_n1(determinant):
     """By CasADi: F' = {F, N}, {F, K} = 0, Jacobi's identity with non-linear functions."""
     rng = np.random.default_rng(3)
     pi = ca.SX.sym("pi", 3)
@@ -140,7 +140,7 @@ def test_n1_bracket_is_poisson_with_casimir_k_and_hamiltonian_n(determinant):
         assert abs(pair.bracket(point, df, dn) - df @ np.cross(point, np.linalg.solve(inertia, point))) < 1e-12
 
 
-def test_n1_special_cases():
+def test_special_cases_of_the_matrix_n1():
     """All moments equal: K can be made zero; two equal: K of rank one; distinct: cylinders."""
     pair = nambu_pair(2.0 * np.eye(3), [[1.0, -0.5], [1.0, 0.5]])
     assert not pair.casimir.any()
@@ -152,7 +152,7 @@ def test_n1_special_cases():
     assert np.abs(pair.rate(pi) - euler(np.array([i1, i2, i2]), pi)).max() < 1e-14
 
 
-def test_n2_cylinders_of_the_book():
+def test_cylinders_of_the_book_n2():
     """(15.11.7) makes K free of Pi_3 and N free of Pi_1, with the coefficients of (15.11.8) and (15.11.9)."""
     for moments in ([1.0, 2.0, 3.0], [0.3, 0.7, 0.9], [1.0, 1.0 + 1e-9, 5.0]):
         i1, i2, i3 = moments
@@ -167,7 +167,7 @@ def test_n2_cylinders_of_the_book():
         assert abs(pair.hamiltonian[1, 1] - pendulum.inverse_square_k3) < 1e-14
 
 
-def test_n2_the_motion_stays_on_both_cylinders():
+def test_the_motion_stays_on_both_cylinders_n2():
     pi = np.array([0.4, -0.7, 0.5])
     pair = nambu_pair(np.diag(ASCENDING), cylinder_matrix(ASCENDING))
     k, n = pair.values(integrated(ASCENDING, pi, np.linspace(0.0, 30.0, 61)))
@@ -180,7 +180,7 @@ def test_n2_the_motion_stays_on_both_cylinders():
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n3_constants(order):
+def test_constants_of_the_cylinders_n3(order):
     moments = np.array([0.9, 1.4, 2.2])
     pendulum = rigid_body_pendulum(moments, order)
     i1, i2, i3 = moments[list(order)]
@@ -192,7 +192,7 @@ def test_n3_constants(order):
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n4_coordinates_and_their_inverse(order):
+def test_coordinates_and_their_inverse_n4(order):
     rng = np.random.default_rng(4)
     pendulum = rigid_body_pendulum(ASCENDING, order)
     pi = rng.normal(size=(6, 50, 3))
@@ -208,7 +208,7 @@ def test_n4_coordinates_and_their_inverse(order):
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n4_n_is_the_pendulums_energy(order):
+def test_n_is_the_pendulums_energy_n4(order):
     """N of the cylinders in the chosen order of axes, in exact arithmetic of its coefficients."""
     rng = np.random.default_rng(5)
     pendulum = rigid_body_pendulum(ASCENDING, order)
@@ -221,7 +221,7 @@ def test_n4_n_is_the_pendulums_energy(order):
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n5_bracket_of_angle_and_momentum(order):
+def test_bracket_of_angle_and_momentum_n5(order):
     """The bracket -+grad K.(grad theta x grad p) by CasADi, with the sign that makes N the Hamiltonian."""
     rng = np.random.default_rng(6)
     pendulum = rigid_body_pendulum(ASCENDING, order)
@@ -242,7 +242,7 @@ def test_n5_bracket_of_angle_and_momentum(order):
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n6_the_angle_obeys_the_pendulum_equation(order):
+def test_the_angle_obeys_the_pendulum_equation_n6(order):
     """By the chain rule through Euler's equations twice, with CasADi, for every order of the axes."""
     rng = np.random.default_rng(7)
     pendulum = rigid_body_pendulum(ASCENDING, order)
@@ -269,7 +269,7 @@ def regime_of(moments, pi):
 
 @pytest.mark.parametrize("order", [None, *ELLIPTIC_ORDERS])
 @pytest.mark.parametrize("moments", [[1.0, 2.0, 3.0], [1.0, 1.001, 4.0], [0.5, 2.0, 2.01]], ids=str)
-def test_n6_closed_solution_is_the_motion_of_the_body(moments, order):
+def test_closed_solution_is_the_motion_of_the_body_n6(moments, order):
     rng = np.random.default_rng(8)
     moments = np.array(moments)
     pendulum = rigid_body_pendulum(moments, order)
@@ -297,7 +297,7 @@ def test_n6_closed_solution_is_the_motion_of_the_body(moments, order):
     assert seen == {"libration", "rotation"}
 
 
-def test_n6_moments_in_any_order():
+def test_moments_in_any_order_n6():
     rng = np.random.default_rng(9)
     times = np.linspace(0.0, 10.0, 11)
     for order in ORDERS:
@@ -307,7 +307,7 @@ def test_n6_moments_in_any_order():
         assert np.abs(rigid_body_pendulum(moments).motion(pi).body_momentum(times) - truth).max() < 3e-12
 
 
-def test_n6_angle_and_period():
+def test_angle_and_period_n6():
     """Unwrapped theta has the rate p/(k1 k2); the period is that of Pi, and a quadrature."""
     pendulum = rigid_body_pendulum(ASCENDING)
     for pi, regime in (([0.9, 0.2, 0.4], "libration"), ([-0.1, 0.3, -0.9], "rotation")):
@@ -333,7 +333,7 @@ def test_n6_angle_and_period():
         assert abs(motion.modulus**2 + motion.complement - 1.0) < 1e-15
 
 
-def test_n6_separatrix():
+def test_closed_solution_on_the_separatrix_n6():
     """Moments (6, 3, 2), whose inverses go in steps of 1/6: the separatrix is at |Pi_1| = |Pi_3| exactly."""
     moments, times = np.array([6.0, 3.0, 2.0]), np.linspace(0.0, 5.0, 11)
     for order in ELLIPTIC_ORDERS:
@@ -382,7 +382,7 @@ def many_digits(moments, pi, times):
 
 
 @pytest.mark.parametrize("nudge", [1e-4, 1e-10, 1e-15, -1e-4, -1e-10, -1e-15])
-def test_n6_next_to_the_separatrix_against_seventy_digits(nudge):
+def test_next_to_the_separatrix_against_seventy_digits_n6(nudge):
     """Moments (6, 3, 2) have the separatrix at |Pi_1| = |Pi_3|; the flip takes a time of log(1/nudge)."""
     moments, times = np.array([6.0, 3.0, 2.0]), [3.0, 40.0, 180.0]
     pi = np.array([1.0 + nudge, 0.4, -1.0])
@@ -394,7 +394,7 @@ def test_n6_next_to_the_separatrix_against_seventy_digits(nudge):
 @pytest.mark.parametrize(
     "pi", [[1e-9, 1.0, 3e-9], [1e-9, -1.0, 1e-9], [0.0, 1.0, 1e-7], [1e-7, -1.0, 0.0], [1e-60, 1.0, 1e-30]]
 )
-def test_n6_next_to_the_unstable_equilibrium(pi):
+def test_next_to_the_unstable_equilibrium_n6(pi):
     moments = np.array([6.0, 3.0, 2.0])
     truth = many_digits(moments, pi, [60.0])
     for order in ELLIPTIC_ORDERS:
@@ -402,14 +402,14 @@ def test_n6_next_to_the_unstable_equilibrium(pi):
 
 
 @pytest.mark.parametrize("pi", [[1.0, 1e-12, 0.0], [1.0, 0.0, -1e-12], [-2.0, -3e-13, 1e-12]])
-def test_n6_next_to_a_stable_equilibrium_small_parts_keep_their_digits(pi):
+def test_next_to_a_stable_equilibrium_small_parts_keep_their_digits_n6(pi):
     moments = np.array([6.0, 3.0, 2.0])
     truth = many_digits(moments, pi, [7.0])
     motion = rigid_body_pendulum(moments, (0, 1, 2)).motion(pi)
     assert np.abs((motion.body_momentum([7.0]) - truth)[:, 1:]).max() < 1e-26
 
 
-def test_n6_two_moments_equal_is_a_uniform_turn():
+def test_two_moments_equal_is_a_uniform_turn_n6():
     for moments in ([2.0, 2.0, 3.0], [2.0, 2.0, 0.7], [1.0, 3.0, 3.0], [3.0, 1.0, 3.0]):
         pi = np.array([0.3, -0.8, 0.5])
         pendulum = rigid_body_pendulum(moments)
@@ -429,7 +429,7 @@ def test_n6_two_moments_equal_is_a_uniform_turn():
         assert {e.stability for e in pendulum.equilibria} == {"neutral"}
 
 
-def test_n6_corollary_momenta_are_covered_by_cylinders():
+def test_corollary_momenta_are_covered_by_cylinders_n6():
     """Every momentum off the third axis lies on one cylinder, and the phase portrait there is a pendulum's."""
     pendulum = rigid_body_pendulum(ASCENDING)
     pi = np.random.default_rng(10).normal(size=(1000, 3))
@@ -442,7 +442,7 @@ def test_n6_corollary_momenta_are_covered_by_cylinders():
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n7_half_turn_symmetry_equilibria_and_stability(order):
+def test_half_turn_symmetry_equilibria_and_stability_n7(order):
     """Stability by sign against the eigenvalues of Euler's equations linearised by CasADi."""
     pendulum = rigid_body_pendulum(ASCENDING, order)
     pi = ca.SX.sym("pi", 3)
@@ -468,7 +468,7 @@ def test_n7_half_turn_symmetry_equilibria_and_stability(order):
     assert np.abs(mirrored - pendulum.body_momentum(r, theta, p)).max() < 8.0 * EPS * r
 
 
-def test_n7_equilibria_stay():
+def test_equilibria_stay_n7():
     times = np.linspace(0.0, 100.0, 5)
     for order in ELLIPTIC_ORDERS:
         pendulum = rigid_body_pendulum(ASCENDING, order)
@@ -486,7 +486,7 @@ def test_n7_equilibria_stay():
                 assert abs(motion.period - 2.0 * np.pi / np.sqrt(frequency)) < 1e-13
 
 
-def test_n8_equilibria_along_the_third_axis_are_left_out_and_found_by_permuting():
+def test_equilibria_along_the_third_axis_are_left_out_and_found_by_permuting_n8():
     pi = np.array([0.0, 0.0, -2.0])
     pendulum = rigid_body_pendulum(ASCENDING)
     assert not euler(ASCENDING, pi).any()
@@ -539,7 +539,7 @@ FAMILY = [
 
 
 @pytest.mark.parametrize(("name", "moments", "matrix"), FAMILY)
-def test_n9_groups_by_the_signature_of_k(name, moments, matrix):
+def test_groups_by_the_signature_of_k_n9(name, moments, matrix):
     rng = np.random.default_rng(11)
     frame = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     for axes in (np.eye(3), frame):
@@ -559,7 +559,7 @@ def test_n9_groups_by_the_signature_of_k(name, moments, matrix):
             assert np.abs(action.T @ metric @ action - metric).max() < 1e-11 * np.abs(metric).max()
 
 
-def test_n9_structure_constants_of_the_known_algebras():
+def test_structure_constants_of_the_known_algebras_n9():
     """so(3) as the cross product; se(2): [e3, e1] = e2, [e3, e2] = -e1; Heisenberg: [e1, e2] = e3; of matrices."""
     c = structure_constants(np.eye(3))
     assert np.array_equal(np.einsum("ijk,i,j->k", c, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0])
@@ -586,7 +586,7 @@ def test_n9_structure_constants_of_the_known_algebras():
             assert np.array_equal(commutator, np.einsum("k,kab->ab", c[i, j], matrices))
 
 
-def test_n9_groups_of_turned_bodies_with_far_moments():
+def test_groups_of_turned_bodies_with_far_moments_n9():
     """The moments of a turned tensor have the rounding of the largest, which must not hide a zero."""
     rng = np.random.default_rng(18)
     for _ in range(50):
@@ -597,7 +597,7 @@ def test_n9_groups_of_turned_bodies_with_far_moments():
             assert nambu_pair(0.5 * (inertia + inertia.T), [[-moment, 1.0], [1.0, 0.0]]).group == name
 
 
-def test_n9_groups_over_the_whole_family():
+def test_groups_over_the_whole_family_n9():
     """b/a from -2 to 1: the signature of 1/I_i + b/a, counted directly."""
     for ratio in np.linspace(-2.0, 1.0, 61):
         signs = np.sign(np.round(1.0 / np.array([1.0, 2.0, 4.0]) + ratio, 12))
@@ -609,7 +609,7 @@ def test_n9_groups_over_the_whole_family():
 
 
 @pytest.mark.parametrize("order", ELLIPTIC_ORDERS)
-def test_n10_symplectic_form_of_the_leaf(order):
+def test_symplectic_form_of_the_leaf_n10(order):
     """The bracket of two functions on the leaf is the form on their fields; the form is area over |grad K|."""
     rng = np.random.default_rng(12)
     pendulum = rigid_body_pendulum(ASCENDING, order)
@@ -631,7 +631,7 @@ def test_n10_symplectic_form_of_the_leaf(order):
         assert abs(form - bracket) < 1e-14
 
 
-def test_n11_maxwell_bloch_is_pendulum_and_duffing():
+def test_maxwell_bloch_is_pendulum_and_duffing_n11():
     state = np.array([0.4, 0.9, -0.6])
     times = np.linspace(0.0, 12.0, 25)
     path = solve_ivp(lambda _, y: maxwell_bloch_rate(y), (0.0, 12.0), state, t_eval=times, **TOLERANCES).y.T
@@ -653,7 +653,7 @@ def test_n11_maxwell_bloch_is_pendulum_and_duffing():
     assert np.abs(oscillator.T - path[:, :2]).max() < 1e-11
 
 
-def test_n11_maxwell_bloch_has_the_same_family_of_gradients():
+def test_maxwell_bloch_has_the_same_family_of_gradients_n11():
     """Exact: the rate is the cross product of the gradients of any combinations of determinant 1."""
     rng = np.random.default_rng(13)
     x = ca.SX.sym("x", 3)
@@ -668,7 +668,7 @@ def test_n11_maxwell_bloch_has_the_same_family_of_gradients():
             assert np.abs(np.array([float(v) for v in values]) - maxwell_bloch_invariants(point)).max() < 1e-15
 
 
-def test_n11_each_momentum_component_obeys_a_duffing_equation():
+def test_each_momentum_component_obeys_a_duffing_equation_n11():
     """The rigid body's own: Pi_3'' is a cubic of Pi_3 with coefficients from K and N."""
     i1, i2, i3 = ASCENDING
     pi = ca.SX.sym("pi", 3)
@@ -683,7 +683,7 @@ def test_n11_each_momentum_component_obeys_a_duffing_equation():
         assert abs(cubic - float(second(point))) < 1e-13
 
 
-def test_n12_andoyer_equations_are_eulers():
+def test_andoyer_equations_are_eulers_n12():
     rng = np.random.default_rng(15)
     moments = np.array([3.0, 2.0, 1.0])
     pendulum = andoyer_pendulum(moments)
@@ -712,7 +712,7 @@ def test_n12_andoyer_equations_are_eulers():
         assert np.abs(eigenvalues**2 - expected).max() < 1e-14
 
 
-def test_n12_symmetries_and_types_of_trajectories():
+def test_symmetries_and_types_of_trajectories_n12():
     """y -> -y, p_y -> -p_y, y -> y + pi; oscillating about pi/2, rotating, separatrix by integration of (8)."""
     rng = np.random.default_rng(16)
     pendulum = andoyer_pendulum([3.0, 2.0, 1.0])
@@ -735,7 +735,7 @@ def test_n12_symmetries_and_types_of_trajectories():
     assert pendulum.trajectory_type([0.0, -1.0, 0.0]) == pendulum.trajectory_type([2.0, 0.0, 0.0]) == "equilibrium"
 
 
-def test_n12_separatrices_are_planes():
+def test_separatrices_are_planes_n12():
     """H_3 = +-sqrt((B - A)/(C - B)) H_1 at p = sqrt(I_2) for 2h = 1, joining y = 0 and y = pi."""
     moments = np.array([6.0, 3.0, 2.0])
     pendulum = andoyer_pendulum(moments)
@@ -769,7 +769,7 @@ def test_andoyer_equations_are_eulers_for_moments_in_any_order(order):
 
 
 @pytest.mark.parametrize("order", ORDERS, ids=str)
-def test_n12_closed_solution_for_y(order):
+def test_closed_solution_for_y_n12(order):
     moments = np.array([3.0, 2.0, 1.0])[order]
     pendulum = andoyer_pendulum(moments)
     times = np.linspace(0.0, 20.0, 81)

@@ -104,7 +104,7 @@ def chords(curve, start, end):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_i5_polhode_and_herpolhode_are_the_integrated_rates(name):
+def test_polhode_and_herpolhode_are_the_integrated_rates_i5(name):
     times, attitudes, rates = integrated(name)
     poinsot = Poinsot(top_of(name))
     assert poinsot.polhode(times) == pytest.approx(rates, abs=3e-11)
@@ -112,7 +112,7 @@ def test_i5_polhode_and_herpolhode_are_the_integrated_rates(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_i1_i2_the_herpolhode_lies_in_the_invariable_plane(name):
+def test_the_herpolhode_lies_in_the_invariable_plane_i1_i2(name):
     poinsot, momentum, energy = Poinsot(top_of(name)), top_of(name).momentum, twice_energy(name)
     herpolhode = poinsot.herpolhode(np.linspace(-30.0, 30.0, 200))
     assert herpolhode @ momentum == pytest.approx(np.full(200, energy), rel=1e-13)
@@ -122,7 +122,7 @@ def test_i1_i2_the_herpolhode_lies_in_the_invariable_plane(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_i3_the_ellipsoid_touches_two_planes_at_plus_and_minus_omega(name):
+def test_the_ellipsoid_touches_two_planes_at_plus_and_minus_omega_i3(name):
     times, attitudes, rates = integrated(name)
     top, poinsot, energy = top_of(name), Poinsot(top_of(name)), twice_energy(name)
     spatial = attitudes @ top.inertia @ np.swapaxes(attitudes, -1, -2)
@@ -144,7 +144,7 @@ def test_i3_the_ellipsoid_touches_two_planes_at_plus_and_minus_omega(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_i4_the_material_point_in_contact_stands_still(name):
+def test_the_material_point_in_contact_stands_still_i4(name):
     poinsot = Poinsot(top_of(name))
     times = np.linspace(-7.0, 9.0, 50)
     assert poinsot.slip(times) == pytest.approx(np.zeros((50, 3)), abs=1e-14)
@@ -159,7 +159,7 @@ def test_i4_the_material_point_in_contact_stands_still(name):
 
 
 @pytest.mark.parametrize("name", ROLLING)
-def test_i4_polhode_and_herpolhode_have_equal_lengths(name):
+def test_polhode_and_herpolhode_have_equal_lengths_i4(name):
     poinsot = Poinsot(top_of(name))
     start, end = -0.3, min(0.45 * poinsot.top.period, 10.0)
     truth = chords(poinsot.polhode, start, end)
@@ -170,7 +170,7 @@ def test_i4_polhode_and_herpolhode_have_equal_lengths(name):
     assert poinsot.polhode_length(start, start) == 0.0
 
 
-def test_i4_length_of_a_polhode_with_nearly_a_corner():
+def test_length_of_a_polhode_with_nearly_a_corner_i4():
     """Moments far apart, as no body has them: the quadrature of SciPy along the body's own axes, in pieces."""
     top = EulerTop.principal((0.008304, 0.0155, 42.15), (1.363, -0.796, 0.043))
 
@@ -185,7 +185,7 @@ def test_i4_length_of_a_polhode_with_nearly_a_corner():
 
 
 @pytest.mark.parametrize("name", PERIODIC)
-def test_i4_length_over_many_periods(name):
+def test_length_over_many_periods_i4(name):
     poinsot, period = Poinsot(top_of(name)), top_of(name).period
     whole = chords(poinsot.polhode, 0.1, 0.1 + period)
     assert poinsot.length_per_period == pytest.approx(whole, rel=1e-9)
@@ -195,7 +195,7 @@ def test_i4_length_over_many_periods(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_i5_herpolhode_in_polar_form(name):
+def test_herpolhode_in_polar_form_i5(name):
     times, attitudes, rates = integrated(name)
     poinsot = Poinsot(top_of(name))
     first, second = poinsot.plane_axes
@@ -210,7 +210,7 @@ def test_i5_herpolhode_in_polar_form(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_i5_polar_form_is_that_of_the_attitude_over_hundreds_of_periods(name):
+def test_polar_form_is_that_of_the_attitude_over_hundreds_of_periods_i5(name):
     poinsot = Poinsot(top_of(name))
     times = np.linspace(-300.0, 300.0, 999) * min(poinsot.top.period, 1.0)
     radius, angle = poinsot.herpolhode_radius(times), poinsot.herpolhode_angle(times)
@@ -223,7 +223,7 @@ def test_i5_polar_form_is_that_of_the_attitude_over_hundreds_of_periods(name):
 
 
 @pytest.mark.parametrize("name", TWO_CIRCLES)
-def test_i5_the_herpolhode_touches_both_circles_of_its_annulus(name):
+def test_the_herpolhode_touches_both_circles_of_its_annulus_i5(name):
     poinsot = Poinsot(top_of(name))
     inner, outer = poinsot.annulus
     times = np.linspace(0.0, poinsot.top.period, 20001)
@@ -240,7 +240,7 @@ def test_i5_the_herpolhode_touches_both_circles_of_its_annulus(name):
 
 
 @pytest.mark.parametrize("offset", [1e-3, -1e-3, 1e-7, -1e-7, 2e-14, -2e-14])
-def test_i5_the_inner_circle_keeps_its_digits_next_to_the_separatrix(offset):
+def test_the_inner_circle_keeps_its_digits_next_to_the_separatrix_i5(offset):
     moments, momentum = SEPARATRIX
     momentum = (momentum[0], momentum[1], momentum[2] + offset)
     inner, outer = Poinsot(EulerTop.principal(moments, momentum)).annulus
@@ -260,7 +260,7 @@ def test_i5_the_inner_circle_keeps_its_digits_next_to_the_separatrix(offset):
 
 
 @pytest.mark.parametrize("name", PERIODIC)
-def test_i5_angle_per_period_is_the_integral_of_the_rate(name):
+def test_angle_per_period_is_the_integral_of_the_rate_i5(name):
     """Of the angle's rate mu.(w x w')/(|mu| r²), w' = I^-1 (Pi x Omega), by quadrature."""
     top, poinsot = top_of(name), Poinsot(top_of(name))
     inverse = np.linalg.inv(top.inertia)
@@ -282,7 +282,7 @@ def test_i5_angle_per_period_is_the_integral_of_the_rate(name):
         assert half == pytest.approx(0.5 * poinsot.angle_per_period, abs=1e-12)
 
 
-def test_i5_reference_value():
+def test_reference_value_i5():
     """theory.md, section 6: I = (3, 2, 1), |Pi| = 1.7, a = 1.3."""
     square, double_energy = 1.7**2, 1.7**2 / 1.3
     third = (double_energy - square / 3.0) / (1.0 - 1.0 / 3.0)
@@ -291,7 +291,7 @@ def test_i5_reference_value():
 
 
 @pytest.mark.parametrize("name", PERIODIC)
-def test_i5_two_frequencies(name):
+def test_two_frequencies_i5(name):
     """In axes that turn at the second, the herpolhode has the period of the first."""
     times, attitudes, rates = integrated(name)
     poinsot = Poinsot(top_of(name))
@@ -305,7 +305,7 @@ def test_i5_two_frequencies(name):
 
 
 @pytest.mark.parametrize(("turns", "lobes"), [(2, 3), (3, 5), (4, 7), (7, 10)])
-def test_i5_a_rational_ratio_closes_the_curve(turns, lobes):
+def test_a_rational_ratio_closes_the_curve_i5(turns, lobes):
     def poinsot_of(third):
         return Poinsot(EulerTop.principal((1.0, 2.0, 2.5), (1.0, 0.0, third)))
 
@@ -327,7 +327,7 @@ def test_i5_a_rational_ratio_closes_the_curve(turns, lobes):
         assert np.abs(apart).max() > 1e-3
 
 
-def test_i5_closure_is_the_first_within_the_tolerance():
+def test_closure_is_the_first_within_the_tolerance_i5():
     random = np.random.default_rng(11)
     for _ in range(40):
         top = EulerTop.principal(np.exp(random.uniform(-1.0, 1.0, 3)), random.normal(size=3))
@@ -345,7 +345,7 @@ def test_i5_closure_is_the_first_within_the_tolerance():
 
 
 @pytest.mark.parametrize("name", ["oblate", "prolate"])
-def test_i5_the_herpolhode_of_an_axisymmetric_body_is_a_circle(name):
+def test_the_herpolhode_of_an_axisymmetric_body_is_a_circle_i5(name):
     poinsot = Poinsot(top_of(name))
     inner, outer = poinsot.annulus
     assert inner == outer > 0.0
@@ -356,7 +356,7 @@ def test_i5_the_herpolhode_of_an_axisymmetric_body_is_a_circle(name):
     assert poinsot.closure() == Closure(turns=1, lobes=0, gap=0.0)
 
 
-def test_i5_on_the_separatrix_the_herpolhode_spirals_in():
+def test_on_the_separatrix_the_herpolhode_spirals_in_i5():
     top = top_of("separatrix")
     poinsot = Poinsot(top)
     inner, outer = poinsot.annulus
@@ -380,7 +380,7 @@ def test_i5_on_the_separatrix_the_herpolhode_spirals_in():
         assert 0.5 * near.length_per_period == pytest.approx(poinsot.length_per_period, rel=1e-6)
 
 
-def test_i5_where_the_separatrix_underflows_nothing_is_nan():
+def test_where_the_separatrix_underflows_nothing_is_nan_i5():
     poinsot = Poinsot(top_of("separatrix"))
     times = np.array([-1e6, -1e5, -1e4, 1e4, 1e5, 1e6])
     radius, angle = poinsot.herpolhode_radius(times), poinsot.herpolhode_angle(times)
@@ -396,7 +396,7 @@ def test_i5_where_the_separatrix_underflows_nothing_is_nan():
 
 
 @pytest.mark.parametrize("name", POINTS)
-def test_i5_a_steady_rotation_is_a_point(name):
+def test_a_steady_rotation_is_a_point_i5(name):
     top = EulerTop.principal(*POINTS[name], Rotation.from_rotvec([0.1, 0.5, 2.0]).as_matrix())
     poinsot = Poinsot(top)
     times = np.linspace(-3.0, 5.0, 9)
@@ -420,7 +420,7 @@ def test_i5_a_steady_rotation_is_a_point(name):
 
 
 @pytest.mark.parametrize("size", [1e-60, 1e-139])
-def test_i5_right_next_to_a_steady_rotation(size):
+def test_right_next_to_a_steady_rotation_i5(size):
     """Radius and angle are those of the small ellipse: Pi' = Pi x Omega, linear in the deviation."""
     poinsot = Poinsot(EulerTop.principal((1.0, 2.0, 3.0), (size, 0.0, 1.0)))
     inner, outer = poinsot.annulus
@@ -433,7 +433,7 @@ def test_i5_right_next_to_a_steady_rotation(size):
     assert poinsot.herpolhode_angle(quarter) == pytest.approx(0.25 * poinsot.angle_per_period, rel=1e-13)
 
 
-def test_i5_right_next_to_a_steady_rotation_of_a_nearly_spherical_body():
+def test_right_next_to_a_steady_rotation_of_a_nearly_spherical_body_i5():
     """The deviation's square would be below the least number with all its digits."""
     moments = (1.0 - 2.0**-53, 1.0, 1.0 + 2.0**-52)
     first, second = Poinsot(EulerTop.principal(moments, (2.1e-140, 0.0, 1.0))).plane_axes
@@ -486,7 +486,7 @@ SYMMETRIC = {
 
 @pytest.mark.parametrize("name", SYMMETRIC)
 @pytest.mark.parametrize("turned", [False, True])
-def test_h2_cones_roll_on_each_other(name, turned):
+def test_cones_roll_on_each_other_h2(name, turned):
     moments, momentum, index = SYMMETRIC[name]
     top = EulerTop.principal(moments, momentum, TILT)
     if turned:
@@ -530,7 +530,7 @@ def test_h2_cones_roll_on_each_other(name, turned):
 
 
 @pytest.mark.parametrize("symmetry", [0.5, 3.0])
-def test_h2_cones_of_steady_rotations(symmetry):
+def test_cones_of_steady_rotations_h2(symmetry):
     along = cones(EulerTop.principal((1.0, 1.0, symmetry), (0.0, 0.0, -2.0)))
     assert (along.body_half_angle, along.space_half_angle) == (0.0, 0.0)
     assert along.spin_rate == pytest.approx(2.0 * (1.0 - 1.0 / symmetry))
@@ -539,7 +539,7 @@ def test_h2_cones_of_steady_rotations(symmetry):
     assert (across.space_half_angle, across.spin_rate, across.precession_rate) == (0.0, 0.0, 1.0)
 
 
-def test_h2_moments_equal_to_rounding_count_as_equal():
+def test_moments_equal_to_rounding_count_as_equal_h2():
     momentum = (0.3, 0.5, 0.8)
     equal, nearly = (cones(EulerTop.principal((1.0, second, 2.0), momentum)) for second in (1.0, 1.0 + 1e-14))
     assert nearly.body_half_angle == pytest.approx(equal.body_half_angle, abs=1e-13)
@@ -548,7 +548,7 @@ def test_h2_moments_equal_to_rounding_count_as_equal():
         cones(EulerTop.principal((1.0, 1.0 + 1e-9, 2.0), momentum))
 
 
-def test_m_e6_cone_formulas_as_restored():
+def test_cone_formulas_as_restored_m_e6():
     """The scan loses the indices and a square; a3 = 0 for a1, a2 and I1 for I3 are its other readings, and fail."""
     random = np.random.default_rng(3)
     for _ in range(20):

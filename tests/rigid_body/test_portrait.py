@@ -29,7 +29,7 @@ def linearised(moments, direction):
 
 
 @pytest.mark.parametrize("moments", ORDERS)
-def test_g8_six_equilibria_and_their_kinds(moments):
+def test_six_equilibria_and_their_kinds_g8(moments):
     found = equilibria(moments)
     assert len(found) == 6
     assert {tuple(e.direction) for e in found} == {tuple(s * v) for v in np.eye(3) for s in (1.0, -1.0)}
@@ -52,13 +52,13 @@ def test_g8_six_equilibria_and_their_kinds(moments):
         ((2.0, 2.0, 2.0), ["degenerate"] * 6),
     ],
 )
-def test_g8_equal_moments_have_circles_of_equilibria(moments, kinds):
+def test_equal_moments_have_circles_of_equilibria_g8(moments, kinds):
     assert [e.kind for e in equilibria(moments)] == kinds
     assert all(e.rate == 0.0 for e in equilibria(moments) if e.kind == "degenerate")
 
 
 @pytest.mark.parametrize("moments", ORDERS)
-def test_g8_four_heteroclinics_join_the_saddles_along_the_motion(moments):
+def test_four_heteroclinics_join_the_saddles_along_the_motion_g8(moments):
     curves = heteroclinics(moments, 61)
     assert curves.shape == (4, 61, 3)
     middle = int(np.argsort(moments)[1])
@@ -78,7 +78,7 @@ def test_g8_four_heteroclinics_join_the_saddles_along_the_motion(moments):
 
 
 @pytest.mark.parametrize("moments", ORDERS)
-def test_g8_a_solution_runs_along_the_heteroclinic(moments):
+def test_a_solution_runs_along_the_heteroclinic_g8(moments):
     middle = int(np.argsort(moments)[1])
     end_time = 7.0 / next(e.rate for e in equilibria(moments) if e.kind == "saddle")
     for curve in heteroclinics(moments, 5):
@@ -92,7 +92,7 @@ def test_g8_a_solution_runs_along_the_heteroclinic(moments):
 
 
 @pytest.mark.parametrize("moments", ORDERS)
-def test_g8_polhodes_lie_on_sphere_and_ellipsoid_and_run_along_the_motion(moments):
+def test_polhodes_lie_on_sphere_and_ellipsoid_and_run_along_the_motion_g8(moments):
     low, middle, high = 0.5 / np.sort(moments)[::-1]
     levels = np.array(
         [low + 1e-9, 0.5 * (low + middle), middle * (1 - 1e-9), middle * (1 + 1e-9), 0.5 * (middle + high)]
@@ -115,7 +115,7 @@ def test_g8_polhodes_lie_on_sphere_and_ellipsoid_and_run_along_the_motion(moment
 
 
 @pytest.mark.parametrize("moments", ORDERS[:3])
-def test_g8_a_polhode_is_an_orbit(moments):
+def test_a_polhode_is_an_orbit_g8(moments):
     """Integrated from one of its points, Euler's equations stay on the curve and come round."""
     level = 0.3 * 0.5 / max(moments) + 0.7 * 0.5 / np.sort(moments)[1]
     curve = polhodes(moments, level, 20001)[0, 1]
@@ -126,7 +126,7 @@ def test_g8_a_polhode_is_an_orbit(moments):
     assert reached.max() < 0.3
 
 
-def test_g8_polhodes_at_the_ends_are_points_and_at_the_middle_the_separatrices():
+def test_polhodes_at_the_ends_are_points_and_at_the_middle_the_separatrices_g8():
     moments = (2.0, 1.0, 4.0)
     ends = polhodes(moments, [0.125, 0.5], 9)
     assert ends[0, 0] == pytest.approx(np.tile([0.0, 0.0, 1.0], (9, 1)), abs=1e-15)
@@ -140,7 +140,7 @@ def test_g8_polhodes_at_the_ends_are_points_and_at_the_middle_the_separatrices()
 
 
 @pytest.mark.parametrize("moments", [(1.0, 1.0, 2.0), (2.0, 2.0, 1.0), (1.0, 3.0, 1.0), (3.0, 1.0, 3.0)])
-def test_g8_polhodes_of_an_axisymmetric_body_are_circles_of_latitude(moments):
+def test_polhodes_of_an_axisymmetric_body_are_circles_of_latitude_g8(moments):
     axis = next(i for i in range(3) if moments.count(moments[i]) == 1)
     levels = np.linspace(0.5 / max(moments), 0.5 / min(moments), 7)
     curves = polhodes(moments, levels, 37)
@@ -150,7 +150,7 @@ def test_g8_polhodes_of_an_axisymmetric_body_are_circles_of_latitude(moments):
         heteroclinics(moments)
 
 
-def test_g8_energies_outside_by_rounding_are_points():
+def test_energies_outside_by_rounding_are_points_g8():
     moments = (0.7, 1.1, 1.3)
     ends = [0.5 / 1.3 * (1.0 - 1e-13), 0.5 / 0.7 * (1.0 + 1e-13)]
     curves = polhodes(moments, ends, 9)

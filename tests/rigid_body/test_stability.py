@@ -52,7 +52,7 @@ def with_attitude(moments):
     return rates
 
 
-def test_l1_energy_casimir_first_and_second_variation_are_derivatives_of_energy_and_phi():
+def test_energy_casimir_first_and_second_variation_are_derivatives_of_energy_and_phi_l1():
     pi = ca.SX.sym("pi", 3)
     for inertia, magnitude in random_tops(20, 1):
         for steady in steady_rotations(inertia, magnitude):
@@ -71,7 +71,7 @@ def test_l1_energy_casimir_first_and_second_variation_are_derivatives_of_energy_
             assert steady.casimir(values) == pytest.approx(written, rel=1e-14)
 
 
-def test_l1_definite_where_the_moment_is_extreme_and_named_so():
+def test_definite_where_the_moment_is_extreme_and_named_so_l1():
     for inertia, magnitude in random_tops(40, 2):
         smallest, intermediate, largest = steady_rotations(inertia, magnitude)
         assert np.linalg.eigvalsh(largest.second_variation).min() > 0.0
@@ -83,7 +83,7 @@ def test_l1_definite_where_the_moment_is_extreme_and_named_so():
         assert np.sign([smallest.curvature, largest.curvature]).tolist() == [-1.0, 1.0]
 
 
-def test_l1_one_casimir_cannot_serve_both_stable_axes():
+def test_one_casimir_cannot_serve_both_stable_axes_l1():
     # The book's Phi = -x/I1 + (x - 1/2)^2 for |Pi| = 1: definite about the largest moment, not about the smallest.
     pi, unit = ca.SX.sym("pi", 3), np.array([1.0, 0.0, 0.0])
     x = 0.5 * ca.sumsqr(pi)
@@ -95,7 +95,7 @@ def test_l1_one_casimir_cannot_serve_both_stable_axes():
             assert np.sign(steady_rotation(np.diag(moments), unit).curvature) == sign
 
 
-def test_l2_linearisation_and_eigenvalues():
+def test_linearisation_and_eigenvalues_l2():
     pi = ca.SX.sym("pi", 3)
     for inertia, magnitude in random_tops(30, 3):
         jacobian = ca.jacobian(euler_field(inertia, pi), pi)
@@ -113,7 +113,7 @@ def test_l2_linearisation_and_eigenvalues():
             assert np.abs(ours**2 - np.mean(numeric**2)).max() < 1e-12 * scale**2
 
 
-def test_l2_the_printed_eigenvalues_about_axis_one():
+def test_the_printed_eigenvalues_about_axis_one_l2():
     rng = np.random.default_rng(4)
     for _ in range(50):
         i1, i2, i3 = np.exp(rng.uniform(-1.0, 1.0, 3))
@@ -122,7 +122,7 @@ def test_l2_the_printed_eigenvalues_about_axis_one():
         assert ours == pytest.approx([printed, -printed], rel=1e-13)
 
 
-def test_l3_stability_theorem_energy_casimir_spectrum_and_simulation_agree_over_a_thousand_bodies():
+def test_stability_theorem_energy_casimir_spectrum_and_simulation_agree_over_a_thousand_bodies_l3():
     rng = np.random.default_rng(5)
     gaps = np.exp(rng.uniform(np.log(0.05), 0.0, (1000, 2)))
     moments = np.cumprod(np.column_stack([np.exp(rng.uniform(-1.0, 1.0, 1000)), np.exp(gaps)]), axis=-1)
@@ -167,7 +167,7 @@ def test_l3_stability_theorem_energy_casimir_spectrum_and_simulation_agree_over_
                 assert farthest[row, column] < 1.05 * first[row, column] * np.sqrt(gaps.max() / gaps.min())
 
 
-def test_l5_second_variation_on_the_momentum_sphere():
+def test_second_variation_on_the_momentum_sphere_l5():
     u = ca.SX.sym("u", 2)
     for inertia, magnitude in random_tops(20, 6):
         for index, steady in enumerate(reversed(steady_rotations(inertia, magnitude))):
@@ -187,13 +187,13 @@ def test_l5_second_variation_on_the_momentum_sphere():
             assert steady.eigenvalues[0] ** 2 == pytest.approx(-(magnitude**2) * np.linalg.det(exact), rel=1e-9)
 
 
-def test_l5_indices_of_the_six_equilibria_sum_to_the_euler_characteristic():
+def test_indices_of_the_six_equilibria_sum_to_the_euler_characteristic_l5():
     for inertia, magnitude in random_tops(10, 7):
         momenta = [sign * s.momentum for s in steady_rotations(inertia, magnitude) for sign in (1.0, -1.0)]
         assert sum((-1) ** steady_rotation(inertia, momentum).index for momentum in momenta) == 2
 
 
-def test_l6_after_a_period_of_the_momentum_the_body_has_turned_by_the_phase():
+def test_after_a_period_of_the_momentum_the_body_has_turned_by_the_phase_l6():
     for moments, momentum in (([3.0, 2.0, 1.0], [0.3, 0.4, 1.2]), ([3.0, 2.0, 1.0], [1.2, 0.4, 0.3])):
         moments, momentum = np.array(moments), np.array(momentum)
         top = EulerTop.principal(moments, momentum)
@@ -209,7 +209,7 @@ def test_l6_after_a_period_of_the_momentum_the_body_has_turned_by_the_phase():
         )
 
 
-def test_l6_the_phase_of_small_loops_is_the_steady_rate_over_the_eigenvalue():
+def test_the_phase_of_small_loops_is_the_steady_rate_over_the_eigenvalue_l6():
     rng = np.random.default_rng(8)
     for _ in range(10):
         moments = np.array([1.0, 1.6, 2.6]) * np.exp(rng.uniform(-0.15, 0.15, 3))
@@ -221,7 +221,7 @@ def test_l6_the_phase_of_small_loops_is_the_steady_rate_over_the_eigenvalue():
             assert abs(so3.wrap(phase - limit)) < 1e-7
 
 
-def test_m_e12_stable_axes_go_by_moment_and_the_largest_belongs_to_the_shortest_edge():
+def test_stable_axes_go_by_moment_and_the_largest_belongs_to_the_shortest_edge_m_e12():
     edges = np.array([3.0, 2.0, 0.5])
     inertia = np.diag((np.sum(edges**2) - edges**2) / 12.0)
     smallest, intermediate, largest = steady_rotations(inertia)
@@ -236,7 +236,7 @@ def test_m_e12_stable_axes_go_by_moment_and_the_largest_belongs_to_the_shortest_
 
 
 @pytest.mark.parametrize("symmetry", [0, 2])
-def test_m_e13_equal_moments_are_stable_modulo_the_circle_of_equilibria(symmetry):
+def test_equal_moments_are_stable_modulo_the_circle_of_equilibria_m_e13(symmetry):
     # Printed: the two extreme axes are stable. With a tie a neighbour of one of them drifts away for good.
     moments = np.array([2.0, 2.0, 2.0])
     moments[symmetry] = 3.0 if symmetry == 2 else 1.0
@@ -257,7 +257,7 @@ def test_m_e13_equal_moments_are_stable_modulo_the_circle_of_equilibria(symmetry
     assert steady_rotation(np.diag(moments), slanted).verdict == "stable modulo the circle of equilibria"
 
 
-def test_m_e13_ties_of_turned_tensors_and_of_spheres():
+def test_ties_of_turned_tensors_and_of_spheres_m_e13():
     rng = np.random.default_rng(9)
     for moments in ([1.0, 1.0, 2.0], [1.0, 2.0, 2.0]):
         verdicts = {s.verdict for s in steady_rotations(turned(moments, rng))}

@@ -133,7 +133,7 @@ def test_killing_form_of_sl2r_and_of_the_others():
     assert all(algebra.is_unimodular for algebra in ALGEBRAS)
 
 
-def test_m2_se3_dual_carries_the_heavy_top_bracket(rng):
+def test_se3_dual_carries_the_heavy_top_bracket_m2(rng):
     # {F, G} = -Pi.(F_Pi x G_Pi) - Gamma.(F_Pi x G_Gamma - G_Pi x F_Gamma), and with it the heavy top's equations.
     pi, gamma, f_pi, f_gamma, g_pi, g_gamma = rng.normal(size=(6, 20, 3))
     known = -np.sum(pi * np.cross(f_pi, g_pi), -1)
@@ -148,7 +148,7 @@ def test_m2_se3_dual_carries_the_heavy_top_bracket(rng):
     np.testing.assert_allclose(hamiltonian_vector_field(gradient, mu, se3()), top, atol=1e-13, rtol=0)
 
 
-def test_b_e2_commutators_have_the_opposite_sign_to_the_printed_ones():
+def test_commutators_have_the_opposite_sign_to_the_printed_ones_b_e2():
     one, two, three = so3().matrix_basis
     printed = ((one, two, -three), (one, three, two), (two, three, -one))
     for a, b, said in printed:
@@ -222,7 +222,7 @@ def test_what_is_not_of_the_algebra_is_refused():
 
 
 @each_algebra
-def test_g5_body_and_space_trivialisations(algebra, rng):
+def test_body_and_space_trivialisations_g5(algebra, rng):
     g = group_exponential(algebra, 0.7 * rng.normal(size=(4, algebra.dimension)))
     np.testing.assert_allclose(g[0], expm(algebra.matrix(algebra.coordinates(logm(g[0])))), atol=1e-10, rtol=0)
     a = rng.normal(size=(4, algebra.dimension))
@@ -259,7 +259,7 @@ def test_adjoint_action_is_a_homomorphism_with_ad_as_its_rate(algebra, rng):
     np.testing.assert_allclose(coadjoint_action(algebra, g), np.linalg.inv(turned).T, atol=1e-12, rtol=0)
 
 
-def test_g5_spatial_momentum_of_so3_is_the_turned_one(rng):
+def test_spatial_momentum_of_so3_is_the_turned_one_g5(rng):
     rotation = rotations.exp(rng.normal(size=3))
     # Sums of products of two entries of a rotation, known to a unit or two of rounding each.
     rounding = 8.0 * np.finfo(float).eps
@@ -295,7 +295,7 @@ def raw_euler(moments, pi, times):
     return run.y[:3].T, run.y[3:].T.reshape(-1, 3, 3)
 
 
-def test_g7_on_so3_it_is_the_free_rigid_body():
+def test_euler_poincare_on_so3_is_the_free_rigid_body_g7():
     moments, pi, times = np.array([3.0, 2.0, 1.0]), np.array([0.4, 1.5, -0.7]), np.linspace(0.0, 10.0, 21)
     momentum, attitude = raw_euler(moments, pi, times)
     motion = euler_poincare_motion(so3(), np.diag(moments), pi, times)
@@ -308,7 +308,7 @@ def test_g7_on_so3_it_is_the_free_rigid_body():
     np.testing.assert_allclose(adjoint_action(su2(), covered.attitude), attitude, atol=1e-11, rtol=0)
 
 
-def test_g7_a_batch_and_a_later_start_give_the_same_motions(rng):
+def test_a_batch_and_a_later_start_give_the_same_motions_g7(rng):
     inertia, momenta = inertia_of(so3(), rng), rng.normal(size=(2, 2, 3))
     motion = euler_poincare_motion(so3(), inertia, momenta, np.linspace(1.0, 4.0, 4))
     assert motion.momentum.shape == (2, 2, 4, 3)
@@ -320,7 +320,7 @@ def test_g7_a_batch_and_a_later_start_give_the_same_motions(rng):
 
 
 @each_algebra
-def test_g7_energy_and_space_momentum_are_constant_and_attitude_follows(algebra, rng):
+def test_energy_and_space_momentum_are_constant_and_attitude_follows_g7(algebra, rng):
     motion = euler_poincare_motion(algebra, inertia_of(algebra, rng), rng.normal(size=algebra.dimension), [0, 0.7, 2.0])
     np.testing.assert_allclose(motion.energy, motion.energy[0], rtol=3e-13)
     np.testing.assert_allclose(
@@ -335,7 +335,7 @@ def test_g7_energy_and_space_momentum_are_constant_and_attitude_follows(algebra,
     np.testing.assert_allclose(by_matrices, np.broadcast_to(motion.momentum[0], by_matrices.shape), atol=1e-12, rtol=0)
 
 
-def test_g7_on_se3_the_centre_of_mass_moves_straight_and_the_rest_turns_as_on_so3(rng):
+def test_on_se3_the_centre_of_mass_moves_straight_and_the_rest_turns_as_on_so3_g7(rng):
     masses, positions = rng.uniform(0.5, 2.0, 6), rng.normal(size=(6, 3))
     twist, times = np.array([0.8, -0.3, 1.1, 0.2, 0.5, -0.4]), np.linspace(0.0, 6.0, 13)
     operator = se3_inertia(masses, positions)
@@ -351,7 +351,7 @@ def test_g7_on_se3_the_centre_of_mass_moves_straight_and_the_rest_turns_as_on_so
     np.testing.assert_allclose(body.momentum(motion.momentum), alone.momentum, atol=1e-11, rtol=0)
 
 
-def test_g7_structure_constants_alone_are_enough(rng):
+def test_structure_constants_alone_are_enough_g7(rng):
     known = sl2r()
     abstract, inertia, mu = LieAlgebra(known.structure), inertia_of(known, rng), rng.normal(size=3)
     motion = euler_poincare_motion(abstract, inertia, mu, [0.0, 1.0, 2.0])
@@ -383,7 +383,7 @@ def test_motions_that_run_away_and_wrong_operators_are_refused():
 # The rigid body in n dimensions
 
 
-def test_g7_three_dimensional_case_is_the_usual_inertia(rng):
+def test_three_dimensional_case_is_the_usual_inertia_g7(rng):
     inertia = inertia_of(so3(), rng)
     j = second_moment(inertia)
     j += (1.0 - np.linalg.eigvalsh(j)[0]) * np.eye(3)
@@ -391,7 +391,7 @@ def test_g7_three_dimensional_case_is_the_usual_inertia(rng):
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
-def test_g7_n_dimensional_rigid_body_keeps_all_its_integrals(n, rng):
+def test_n_dimensional_rigid_body_keeps_all_its_integrals_g7(n, rng):
     root = rng.normal(size=(n, n)) / n
     j, algebra = root @ root.T + 0.5 * np.eye(n), so(n)
     m = algebra.matrix(rng.normal(size=algebra.dimension))
@@ -421,7 +421,7 @@ def test_g7_n_dimensional_rigid_body_keeps_all_its_integrals(n, rng):
     np.testing.assert_allclose(in_space, np.broadcast_to(m, in_space.shape), atol=1e-11, rtol=0)
 
 
-def test_g7_manakov_coefficients_are_the_traces(rng):
+def test_manakov_coefficients_are_the_traces_g7(rng):
     root = rng.normal(size=(4, 4))
     j, m = root @ root.T, so(4).matrix(rng.normal(size=(3, 6)))
     for power, shift in product((1, 2, 3, 5), (-0.7, 0.0, 1.3)):
@@ -431,7 +431,7 @@ def test_g7_manakov_coefficients_are_the_traces(rng):
     np.testing.assert_allclose(momentum_traces(m)[:, 1], np.trace(m @ m @ m @ m, axis1=-2, axis2=-1), rtol=1e-13)
 
 
-def test_g7_manakov_is_conserved_only_with_the_square_of_j(rng):
+def test_manakov_is_conserved_only_with_the_square_of_j_g7(rng):
     # d/dt tr (M + lambda S)^3 at lambda^1 is 3 tr([M, Omega] (M S + S M)): zero for S = J^2, not for S = J.
     j, m = np.diag([1.0, 2.0, 3.5, 5.0]), so(4).matrix(5.0 * rng.normal(size=6))
     rate = n_dimensional_rate(j, m)
@@ -439,7 +439,7 @@ def test_g7_manakov_is_conserved_only_with_the_square_of_j(rng):
     assert abs(np.trace(rate @ (m @ j + j @ m))) > 0.1
 
 
-def test_g7_pfaffian_squares_to_the_determinant_and_is_constant(rng):
+def test_pfaffian_squares_to_the_determinant_and_is_constant_g7(rng):
     for n in (2, 4, 6, 8):
         m = so(n).matrix(rng.normal(size=(5, n * (n - 1) // 2)))
         np.testing.assert_allclose(pfaffian(m) ** 2, np.linalg.det(m), rtol=1e-10)
@@ -480,7 +480,7 @@ def rolling(algebra, rng, nodes=41, duration=1.5):
 
 
 @rolling_algebra
-def test_i6_a_spatial_velocity_stays_in_the_invariable_hyperplane(algebra, rng):
+def test_spatial_velocity_stays_in_the_invariable_hyperplane_i6a(algebra, rng):
     motion = rolling(algebra, rng)
     # xi_s through the group's matrices, and the plane through xi(0) with the conormal mu(0), by hand.
     g = motion.attitude
@@ -494,7 +494,7 @@ def test_i6_a_spatial_velocity_stays_in_the_invariable_hyperplane(algebra, rng):
 
 
 @rolling_algebra
-def test_i6_b_moved_energy_quadric_is_tangent_to_the_hyperplane_there(algebra, rng):
+def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6b(algebra, rng):
     motion = rolling(algebra, rng)
     contact = rolling_contact(motion)
     np.testing.assert_allclose(contact.quadric_offset, 0.0, atol=1e-11, rtol=0)
@@ -515,7 +515,7 @@ def test_i6_b_moved_energy_quadric_is_tangent_to_the_hyperplane_there(algebra, r
 
 
 @rolling_algebra
-def test_i6_c_it_rolls_without_slipping(algebra, rng):
+def test_the_energy_quadric_rolls_without_slipping_i6c(algebra, rng):
     motion = rolling(algebra, rng)
     contact = rolling_contact(motion)
     np.testing.assert_allclose(contact.contact_velocity, 0.0, atol=1e-12, rtol=0)
@@ -546,7 +546,7 @@ def chebyshev_slope(times):
     return matrix - np.diag(matrix.sum(axis=1))
 
 
-def test_i6_in_so3_it_is_poinsots_theorem(rng):
+def test_rolling_in_so3_is_poinsots_theorem_i6(rng):
     motion = rolling(so3(), rng)
     contact = rolling_contact(motion)
     plane = contact.hyperplane
@@ -562,7 +562,7 @@ def test_i6_in_so3_it_is_poinsots_theorem(rng):
     np.testing.assert_allclose(conormal, rotation @ motion.inertia @ rotation.T @ contact.point[9], atol=1e-12, rtol=0)
 
 
-def test_i6_holds_for_an_indefinite_operator_and_a_batch(rng):
+def test_rolling_holds_for_an_indefinite_operator_and_a_batch_i6(rng):
     algebra = sl2r()
     inertia = np.diag([1.0, -2.0, 0.7])
     motion = euler_poincare_motion(algebra, inertia, 0.3 * rng.normal(size=(4, 3)), [0.0, 0.3, 0.6])

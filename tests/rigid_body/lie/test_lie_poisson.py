@@ -135,7 +135,7 @@ def rational_point(d, rng):
 
 
 @each_algebra
-def test_k1_jacobi_identity_and_leibniz_rule_are_exact_for_polynomials(algebra, rng):
+def test_jacobi_identity_and_leibniz_rule_are_exact_for_polynomials_k1(algebra, rng):
     for _ in range(3):
         f, g, h = random_polynomials(algebra.dimension, rng, 3)
         nested = (
@@ -149,7 +149,7 @@ def test_k1_jacobi_identity_and_leibniz_rule_are_exact_for_polynomials(algebra, 
 
 
 @each_algebra
-def test_k1_bracket_and_its_gradient_are_those_of_exact_arithmetic(algebra, rng):
+def test_bracket_and_its_gradient_are_those_of_exact_arithmetic_k1(algebra, rng):
     f, g, h = random_polynomials(algebra.dimension, rng, 3)
     for _ in range(4):
         point = rational_point(algebra.dimension, rng)
@@ -167,7 +167,7 @@ def test_k1_bracket_and_its_gradient_are_those_of_exact_arithmetic(algebra, rng)
 
 
 @each_algebra
-def test_k1_jacobi_identity_of_the_computed_bracket(algebra, rng):
+def test_jacobi_identity_of_the_computed_bracket_k1(algebra, rng):
     for _ in range(5):
         point = rational_point(algebra.dimension, rng)
         mu = np.array([float(x) for x in point])
@@ -179,7 +179,7 @@ def test_k1_jacobi_identity_of_the_computed_bracket(algebra, rng):
         assert abs(sum(terms)) <= 1e-12 * max(1.0, *np.abs(terms))
 
 
-def test_k1_so3_bracket_proved_with_symbols():
+def test_so3_bracket_proved_with_symbols_k1():
     # For three quadratics whose coefficients are symbols. (For all functions it follows from the coordinates, whose
     # identity is that of the structure constants, exact in test_lie_algebra.)
     pi = casadi.SX.sym("pi", 3)
@@ -206,7 +206,7 @@ def test_k1_so3_bracket_proved_with_symbols():
         assert lie_poisson_bracket(df, dg, numbers[0].ravel()) == fg
 
 
-def test_k1_gradients_may_be_callables_and_batches(rng):
+def test_gradients_may_be_callables_and_batches_k1(rng):
     pi = rng.normal(size=(4, 5, 3))
     linear, axis = rng.normal(size=3), np.array([0.0, 0.0, 1.0])
     by_call = lie_poisson_bracket(lambda p: angular_velocity(INERTIA, p), linear, pi)
@@ -230,7 +230,7 @@ def test_k1_gradients_may_be_callables_and_batches(rng):
 # G1, G2: Euler's equations and the Casimirs
 
 
-def test_g1_bracket_with_the_energy_gives_eulers_equations(rng):
+def test_bracket_with_the_energy_gives_eulers_equations_g1(rng):
     pi = rng.normal(size=(50, 3))
     moments = np.array([3.0, 2.0, 1.0])
     omega = pi / moments
@@ -255,7 +255,7 @@ def test_g1_bracket_with_the_energy_gives_eulers_equations(rng):
 
 
 @each_algebra
-def test_g1_bracket_is_the_rate_of_functions_along_a_motion(algebra, rng):
+def test_bracket_is_the_rate_of_functions_along_a_motion_g1(algebra, rng):
     # F(T) - F(0) is the integral of {F, H} along the motion, by Gauss's formula of 24 nodes.
     d = algebra.dimension
     f = 0.3 * rng.normal(size=(d, d))
@@ -269,7 +269,7 @@ def test_g1_bracket_is_the_rate_of_functions_along_a_motion(algebra, rng):
     assert 0.5 * weights @ rate[1:-1] == pytest.approx(values[-1] - values[0], abs=1e-10)
 
 
-def test_g1_motion_is_that_of_the_raw_equations():
+def test_motion_is_that_of_the_raw_equations_g1():
     times, start = np.linspace(0.0, 20.0, 41), np.array([0.3, 1.2, -0.8])
     raw = solve_ivp(
         lambda _, p: np.cross(p, np.linalg.solve(INERTIA, p)), (0, 20), start, "DOP853", times, rtol=1e-13, atol=1e-14
@@ -282,7 +282,7 @@ def test_g1_motion_is_that_of_the_raw_equations():
     )
 
 
-def test_g2_casimirs_of_so3_are_functions_of_the_length(rng):
+def test_casimirs_of_so3_are_functions_of_the_length_g2(rng):
     pi = rng.normal(size=(30, 3))
     half = 0.5 * np.sum(pi**2, axis=-1, keepdims=True)
     for slope in (1.0, 2.0 * half, np.cos(half), np.exp(-half)):
@@ -316,7 +316,7 @@ def test_g2_casimirs_of_so3_are_functions_of_the_length(rng):
     ],
     ids=lambda x: getattr(x, "name", None),
 )
-def test_g2_casimirs_found_from_structure_constants_are_the_known_ones(algebra, linear, quadratic, rng):
+def test_casimirs_found_from_structure_constants_are_the_known_ones_g2(algebra, linear, quadratic, rng):
     lines, forms = linear_casimirs(algebra), quadratic_casimirs(algebra)
     assert len(lines) == linear
     assert forms.shape == (len(quadratic), algebra.dimension, algebra.dimension)
@@ -333,7 +333,7 @@ def test_g2_casimirs_found_from_structure_constants_are_the_known_ones(algebra, 
         np.testing.assert_allclose(basis.T @ (basis @ flat), flat, atol=1e-13, rtol=0)
 
 
-def test_g2_casimirs_of_a_large_algebra_and_an_empty_batch():
+def test_casimirs_of_a_large_algebra_and_an_empty_batch_g2():
     assert len(quadratic_casimirs(so(7))) == 1
     assert lie_poisson_motion(lambda p: p, np.zeros((0, 3)), [0.0, 1.0]).shape == (0, 2, 3)
     np.testing.assert_array_equal(lie_poisson_motion(lambda p: p, np.zeros(3), [0.0, 1.0]), 0.0)
@@ -342,7 +342,7 @@ def test_g2_casimirs_of_a_large_algebra_and_an_empty_batch():
 # K2: the leaves
 
 
-def test_k2_sphere_carries_minus_the_area_form(rng):
+def test_sphere_carries_minus_the_area_form_k2(rng):
     pi, dh, df, w = rng.normal(size=(4, 40, 3))
     length = np.linalg.norm(pi, axis=-1)
     v = np.cross(pi, w)
@@ -363,7 +363,7 @@ def test_k2_sphere_carries_minus_the_area_form(rng):
     np.testing.assert_allclose(sphere_area_form(pi, across, np.cross(pi, across) / length[:, None]), 1.0, rtol=1e-13)
 
 
-def test_k2_area_of_the_whole_sphere():
+def test_area_of_the_whole_sphere_k2():
     theta, weights = np.polynomial.legendre.leggauss(20)
     theta = 0.5 * np.pi * (theta + 1.0)
     radius, phi = 1.7, 0.4
@@ -378,7 +378,7 @@ def test_k2_area_of_the_whole_sphere():
 
 
 @each_algebra
-def test_k2_orbit_form_on_any_algebra(algebra, rng):
+def test_orbit_form_on_any_algebra_k2(algebra, rng):
     mu, a, b = rng.normal(size=(3, 10, algebra.dimension))
     u, v = algebra.coad(a, mu), algebra.coad(b, mu)
     form = coadjoint_orbit_form(u, v, mu, algebra)
@@ -389,7 +389,7 @@ def test_k2_orbit_form_on_any_algebra(algebra, rng):
         np.testing.assert_allclose(form, sphere_symplectic_form(mu, u, v), atol=1e-11, rtol=0)
 
 
-def test_k2_what_is_not_tangent_or_no_sphere_is_refused():
+def test_what_is_not_tangent_or_no_sphere_is_refused_k2():
     with pytest.raises(ShapeError, match="not tangent"):
         coadjoint_orbit_form([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0])
     with pytest.raises(ShapeError, match="radius 0"):
@@ -419,7 +419,7 @@ def moving(rng, count=5):
     return attitude, attitude @ rotations.hat(omega), omega
 
 
-def test_a12_three_velocities_are_the_rates_of_positions(particles, rng):
+def test_three_velocities_are_the_rates_of_positions_a12(particles, rng):
     _, positions = particles
     turn, omega = rng.normal(size=3), rng.normal(size=3)
     attitude = rotations.exp(turn)
@@ -444,7 +444,7 @@ def test_a12_three_velocities_are_the_rates_of_positions(particles, rng):
     np.testing.assert_allclose(convective_velocity(attitude, rate, positions), material @ attitude, atol=1e-14, rtol=0)
 
 
-def test_a12_three_lagrangians_are_equal(particles, rng):
+def test_three_lagrangians_are_equal_a12(particles, rng):
     masses, positions = particles
     attitude, rate, omega = moving(rng)
     by_hand = 0.5 * np.array([sum(m * np.sum((r @ x) ** 2) for m, x in zip(masses, positions)) for r in rate])
@@ -458,7 +458,7 @@ def test_a12_three_lagrangians_are_equal(particles, rng):
         np.testing.assert_allclose(value, by_hand, rtol=1e-13)
 
 
-def test_a13_the_lagrangian_is_left_invariant_and_not_right_invariant(particles, rng):
+def test_the_lagrangian_is_left_invariant_and_not_right_invariant_a13(particles, rng):
     masses, positions = particles
     attitude, rate, _ = moving(rng)
     turn = rotations.exp(rng.normal(size=3))
@@ -468,7 +468,7 @@ def test_a13_the_lagrangian_is_left_invariant_and_not_right_invariant(particles,
     assert np.abs(material_lagrangian(masses, positions, rate @ turn) / value - 1.0).max() > 0.01
 
 
-def test_a14_inner_product_inertia_and_legendre_transform(particles, rng):
+def test_inner_product_inertia_and_legendre_transform_a14(particles, rng):
     masses, positions = particles
     a, b = rng.normal(size=(2, 6, 3))
     inertia = mass_inertia(masses, positions)
@@ -489,7 +489,7 @@ def test_a14_inner_product_inertia_and_legendre_transform(particles, rng):
     np.testing.assert_allclose(slope, momentum[0], atol=1e-12, rtol=0)
 
 
-def test_a15_translations_reduce_out(particles, rng):
+def test_translations_reduce_out_a15(particles, rng):
     masses, positions = particles
     body = reduce_translations(masses, positions)
     np.testing.assert_allclose(masses @ body.positions, 0.0, atol=1e-14, rtol=0)
@@ -511,7 +511,7 @@ def test_a15_translations_reduce_out(particles, rng):
     np.testing.assert_allclose(of_centre + kinetic_energy(body.inertia, reduced), energy, rtol=1e-13)
 
 
-def test_a15_reduction_is_a_poisson_map(particles, rng):
+def test_reduction_is_a_poisson_map_a15(particles, rng):
     body = reduce_translations(*particles)
     both, df, dg = rng.normal(size=(20, 6)), rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
 
@@ -529,7 +529,7 @@ def test_a15_reduction_is_a_poisson_map(particles, rng):
     )
 
 
-def test_g3_spatial_momentum_is_turned_and_constant(particles, rng):
+def test_spatial_momentum_is_turned_and_constant_g3(particles, rng):
     masses, positions = particles
     attitude, rate, omega = moving(rng)
     expected = (attitude @ legendre_transform(masses, positions, omega)[..., None])[..., 0]
@@ -550,7 +550,7 @@ def test_g3_spatial_momentum_is_turned_and_constant(particles, rng):
     np.testing.assert_allclose(along, np.broadcast_to(along[0], along.shape), atol=1e-10, rtol=0)
 
 
-def test_g4_angular_velocities_in_body_and_space(rng):
+def test_angular_velocities_in_body_and_space_g4(rng):
     attitude, rate, omega = moving(rng)
     np.testing.assert_allclose(body_angular_velocity(attitude, rate), omega, atol=1e-14, rtol=0)
     in_space = spatial_angular_velocity(attitude, rate)
@@ -587,7 +587,7 @@ def spinors(rng, *shape):
     return rng.normal(size=(*shape, 2)) + 1j * rng.normal(size=(*shape, 2))
 
 
-def test_g6_momentum_map_written_out(rng):
+def test_momentum_map_written_out_g6(rng):
     z = spinors(rng, 9)
     first, second = np.moveaxis(z, -1, 0)
     product_ = first.conj() * second
@@ -613,7 +613,7 @@ def su2_element(half_turn):
     return np.cos(length) * np.eye(2) - 1j * np.sin(length) * sigma, half_turn
 
 
-def test_g6_momentum_map_is_poisson_proved_with_symbols():
+def test_momentum_map_is_poisson_proved_with_symbols_g6():
     # {Pi_i o J, Pi_j o J} = -eps_ijk Pi_k o J, a polynomial identity of degree 2, checked on integers without rounding.
     q, p = casadi.SX.sym("q", 2), casadi.SX.sym("p", 2)
     cross = [q[0] * q[1] + p[0] * p[1], q[0] * p[1] - p[0] * q[1]]
@@ -634,7 +634,7 @@ def test_g6_momentum_map_is_poisson_proved_with_symbols():
         np.testing.assert_array_equal(4.0 * cayley_klein_momentum(z), np.array(momentum).ravel())
 
 
-def test_g6_poisson_map_for_any_functions(rng):
+def test_poisson_map_for_any_functions_g6(rng):
     z, df, dg = spinors(rng, 20), rng.normal(size=(20, 3)), rng.normal(size=(20, 3))
     pulled = cayley_klein_bracket(cayley_klein_gradient(df, z), cayley_klein_gradient(dg, z))
     np.testing.assert_allclose(pulled, lie_poisson_bracket(df, dg, cayley_klein_momentum(z)), atol=1e-12, rtol=0)
@@ -645,7 +645,7 @@ def test_g6_poisson_map_for_any_functions(rng):
         np.testing.assert_allclose(np.sum(slope * df, axis=-1), expected, atol=1e-12, rtol=0)
 
 
-def test_g6_collective_hamiltonian_gives_eulers_equations(rng):
+def test_collective_hamiltonian_gives_eulers_equations_g6(rng):
     z = spinors(rng, 12)
     pi, rate = cayley_klein_momentum(z), cayley_klein_equations(INERTIA, z)
     step = 1e-3
@@ -659,7 +659,7 @@ def test_g6_collective_hamiltonian_gives_eulers_equations(rng):
     np.testing.assert_allclose(rate, gradient.imag - 1j * gradient.real, atol=1e-13, rtol=0)
 
 
-def test_g6_flow_on_c2_covers_the_rigid_body_with_its_attitude(rng):
+def test_flow_on_c2_covers_the_rigid_body_with_its_attitude_g6(rng):
     z, times = spinors(rng), np.linspace(0.0, 12.0, 25)
     path = cayley_klein_motion(INERTIA, z, times)
     start = cayley_klein_momentum(z)
@@ -677,7 +677,7 @@ def test_g6_flow_on_c2_covers_the_rigid_body_with_its_attitude(rng):
     np.testing.assert_allclose(batch[1], 1j * path, atol=1e-12, rtol=0)
 
 
-def test_g6_spinor_over_a_momentum(rng):
+def test_spinor_over_a_momentum_g6(rng):
     pi = np.concatenate([rng.normal(size=(20, 3)), 2.0 * np.eye(3), -np.eye(3), np.zeros((1, 3)), [[1e-9, 0, 1.0]]])
     # Square roots, a division and products of numbers up to the largest momentum: eight units of rounding of that.
     rounding = 8.0 * np.finfo(float).eps * np.linalg.norm(pi, axis=1).max()
@@ -698,7 +698,7 @@ def test_g6_spinor_over_a_momentum(rng):
 # K3: a moment in a magnetic field
 
 
-def test_k3_precession_is_hamiltonian_with_energy_m_dot_b(rng):
+def test_precession_is_hamiltonian_with_energy_m_dot_b_k3(rng):
     moment, field = rng.normal(size=(2, 15, 3))
     np.testing.assert_array_equal(magnetic_precession_rate(moment, field), np.cross(moment, field))
     np.testing.assert_allclose(hamiltonian_vector_field(field, moment), np.cross(moment, field), atol=1e-15, rtol=0)
@@ -709,7 +709,7 @@ def test_k3_precession_is_hamiltonian_with_energy_m_dot_b(rng):
     np.testing.assert_allclose(difference, field @ shift, atol=1e-13, rtol=0)
 
 
-def test_k3_closed_form_solves_the_equation(rng):
+def test_closed_form_solves_the_equation_k3(rng):
     moment, field, times = rng.normal(size=3), rng.normal(size=3), np.linspace(0.0, 8.0, 17)
     run = solve_ivp(lambda _, m: np.cross(m, field), (0, 8), moment, "DOP853", times, rtol=1e-13, atol=1e-14)
     np.testing.assert_allclose(magnetic_precession(moment, field, times), run.y.T, atol=1e-12, rtol=0)
@@ -717,7 +717,7 @@ def test_k3_closed_form_solves_the_equation(rng):
     np.testing.assert_allclose(lie_poisson_motion(lambda m: 0 * m + field, moment, times), run.y.T, atol=1e-12, rtol=0)
 
 
-def test_k3_equilibria_are_two_stable_centres(rng):
+def test_equilibria_are_two_stable_centres_k3(rng):
     field = np.array([0.3, -1.2, 0.8])
     strength = np.linalg.norm(field)
     pair = magnetic_equilibria(2.5, field)
@@ -747,7 +747,7 @@ def test_k3_equilibria_are_two_stable_centres(rng):
 # K4: double-bracket dissipation
 
 
-def test_k4_a_spheres_are_kept(rng):
+def test_spheres_are_kept_k4a(rng):
     pi, times = rng.normal(size=(6, 3)), np.linspace(0.0, 20.0, 41)
     np.testing.assert_allclose(
         np.sum(pi * double_bracket_equations(INERTIA, pi, 0.8), axis=-1), 0.0, atol=1e-14, rtol=0
@@ -758,7 +758,7 @@ def test_k4_a_spheres_are_kept(rng):
     )
 
 
-def test_k4_b_energy_falls_everywhere_but_at_equilibria(rng):
+def test_energy_falls_everywhere_but_at_equilibria_k4b(rng):
     pi, times = 2.0 * rotations.normalised(rng.normal(size=(6, 3))), np.linspace(0.0, 80.0, 81)
     rate = np.sum(angular_velocity(INERTIA, pi) * double_bracket_equations(INERTIA, pi, 0.8), axis=-1)
     np.testing.assert_allclose(rate, -dissipated_power(INERTIA, pi, 0.8), rtol=1e-12)
@@ -774,7 +774,7 @@ def test_k4_b_energy_falls_everywhere_but_at_equilibria(rng):
     assert np.all(np.diff(driven, axis=-1) > -1e-14)
 
 
-def test_k4_energy_balance_along_a_motion():
+def test_energy_balance_along_a_motion_k4():
     nodes, weights = np.polynomial.legendre.leggauss(30)
     times = np.concatenate([[0.0], nodes + 1.0, [2.0]])
     motion = double_bracket_motion(INERTIA, [0.5, -1.0, 1.3], 0.6, times)
@@ -787,7 +787,7 @@ def test_k4_energy_balance_along_a_motion():
     np.testing.assert_allclose(motion, raw.y.T, atol=1e-12, rtol=0)
 
 
-def test_k4_c_equations_are_the_sum_of_the_two_brackets(rng):
+def test_equations_are_the_sum_of_the_two_brackets_k4c(rng):
     pi, df = rng.normal(size=(2, 30, 3))
     omega = angular_velocity(INERTIA, pi)
     rate = np.sum(df * double_bracket_equations(INERTIA, pi, 0.37), axis=-1)
@@ -804,7 +804,7 @@ def test_k4_c_equations_are_the_sum_of_the_two_brackets(rng):
     np.testing.assert_allclose(by_call, symmetric_bracket(omega, df, pi, 0.37), atol=1e-15, rtol=0)
 
 
-def test_m_e8_printed_symmetric_bracket_has_the_wrong_sign(rng):
+def test_printed_symmetric_bracket_has_the_wrong_sign_m_e8(rng):
     pi, df = rng.normal(size=(2, 30, 3))
     omega = pi @ np.linalg.inv(INERTIA)
     alpha = 0.37
