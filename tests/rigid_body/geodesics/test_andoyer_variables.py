@@ -44,7 +44,7 @@ def random_euler(rng, count):
     return angles, rng.normal(size=(count, 3))
 
 
-def test_r1_the_complete_relations_with_euler_angles():
+def test_the_complete_relations_with_euler_angles_r1():
     """Bonnard et al., section 3.4, with the last for phi_3; ZXZ differs by quarter turns of phi and psi."""
     angles, momenta = random_euler(np.random.default_rng(1), 400)
     v = andoyer_from_euler(angles, momenta)
@@ -65,7 +65,7 @@ def test_r1_the_complete_relations_with_euler_angles():
 
 
 @CHARTS
-def test_r1_euler_angles_come_back(chart):
+def test_euler_angles_come_back_r1(chart):
     angles, momenta = random_euler(np.random.default_rng(2), 500)
     back, back_momenta = andoyer_from_euler(angles, momenta, chart).euler_angles(chart)
     momentum = chart.body_momentum(angles, momenta)
@@ -76,7 +76,7 @@ def test_r1_euler_angles_come_back(chart):
     assert np.all(np.abs(back_momenta - momenta) < 4.0 * tolerance * size[:, None])
 
 
-def test_b_e4_the_last_relation_is_for_phi_3_and_with_atan2():
+def test_the_last_relation_is_for_phi_3_and_with_atan2_b_e4():
     angles, momenta = random_euler(np.random.default_rng(3), 100)
     v = andoyer_from_euler(angles, momenta)
     (_, phi2, phi3), (p1, p2, p3) = angles.T, momenta.T
@@ -88,7 +88,7 @@ def test_b_e4_the_last_relation_is_for_phi_3_and_with_atan2():
     assert 25 < np.sum(wrong > 3.0) < 75
 
 
-def test_b_e3_h3_is_plus_the_size_times_the_cosine():
+def test_is_plus_the_size_times_the_cosine_b_e3_h3():
     """With the momentum along the inertial third axis L = G cos(phi_2), where the paper prints a minus sign."""
     rng = np.random.default_rng(4)
     attitude = random_attitudes(rng, 50)
@@ -99,7 +99,7 @@ def test_b_e3_h3_is_plus_the_size_times_the_cosine():
     assert np.all(np.abs(v.axial + 1.7 * cosine) > 1e-3)
 
 
-def test_r1_definition_as_a_product_of_turns():
+def test_definition_as_a_product_of_turns_r1():
     rng = np.random.default_rng(5)
     attitude, momentum = random_attitudes(rng, 300), rng.normal(size=(300, 3))
     v = andoyer_variables(attitude, momentum)
@@ -126,7 +126,7 @@ def near_singular_states(rng, count):
     return attitude, momentum
 
 
-def test_r1_round_trip_of_ten_thousand_states():
+def test_round_trip_of_ten_thousand_states_r1():
     attitude, momentum = near_singular_states(np.random.default_rng(6), 10_000)
     v = andoyer_variables(attitude, momentum)
     spatial = so3.apply(attitude, momentum)
@@ -146,7 +146,7 @@ def test_r1_round_trip_of_ten_thousand_states():
     assert v.is_regular[6_700:].all()
 
 
-def test_r1_singular_cases_keep_the_attitude():
+def test_singular_cases_keep_the_attitude_r1():
     """Along the body's third axis l = 0, along the inertial one k = 0, and g takes the whole turn."""
     turn = about_third(0.7)
     tip = np.diag([1.0, -1.0, -1.0])
@@ -192,7 +192,7 @@ def symplectic_defect(chart, angles, momenta):
 
 
 @CHARTS
-def test_r1_the_map_is_canonical(chart):
+def test_the_map_is_canonical_r1(chart):
     rng = np.random.default_rng(8)
     tried = 0
     for angles, momenta in zip(*random_euler(rng, 200), strict=True):
@@ -205,7 +205,7 @@ def test_r1_the_map_is_canonical(chart):
     assert tried > 30
 
 
-def test_r1_hamiltonian_in_principal_axes_and_any_other():
+def test_hamiltonian_in_principal_axes_and_any_other_r1():
     """Bonnard et al. (5), and Pi.I^-1 Pi/2."""
     rng = np.random.default_rng(9)
     attitude, momentum = random_attitudes(rng, 100), rng.normal(size=(100, 3))
@@ -218,7 +218,7 @@ def test_r1_hamiltonian_in_principal_axes_and_any_other():
     assert np.abs(v.hamiltonian(TENSOR) - energy).max() < 1e-13
 
 
-def test_r1_rates_are_those_of_the_motion():
+def test_rates_are_those_of_the_motion_r1():
     """Along an integrated body of any inertia, and by the derivatives of the Hamiltonian."""
     top = EulerTop(TENSOR, [0.4, -0.7, 1.1], so3.exp(np.array([0.3, 1.0, -0.4])))
     step = 1e-2
@@ -232,7 +232,7 @@ def test_r1_rates_are_those_of_the_motion():
     assert np.ptp(around.k) < 1e-14
 
 
-def test_n12_rates_are_those_of_the_pendulum():
+def test_rates_are_those_of_the_pendulum_n12():
     """Bonnard et al. (8); the momentum along axis 3 included, where both are regular."""
     rng = np.random.default_rng(10)
     attitude, momentum = random_attitudes(rng, 60), rng.normal(size=(60, 3))
@@ -249,7 +249,7 @@ def test_n12_rates_are_those_of_the_pendulum():
 
 
 @pytest.mark.parametrize("start", [(0.6, 0.3, 1.5), (0.6, 0.2, -1.5), (1.5, 0.3, 0.6), (-1.5, 0.3, -0.6)])
-def test_n12_l_librates_or_turns_as_proposition_7_says(start):
+def test_l_librates_or_turns_as_proposition_7_says_n12(start):
     """Rotating: l gains a turn in a period; oscillating: it comes back, about pi/2 modulo pi."""
     top = EulerTop.principal(MOMENTS, start, so3.exp(np.array([0.3, 0.2, 0.5])))
     v = andoyer_motion(top, np.linspace(0.0, top.period, 41))
@@ -261,7 +261,7 @@ def test_n12_l_librates_or_turns_as_proposition_7_says(start):
 
 
 @pytest.mark.parametrize("start", [(0.6, 0.3, 1.5), (0.6, 0.2, -1.5), (1.5, 0.3, 0.6), (-1.5, 0.3, -0.6)])
-def test_r1_g_gains_the_montgomery_phase(start):
+def test_g_gains_the_montgomery_phase_r1(start):
     top = EulerTop.principal(MOMENTS, start, so3.exp(np.array([-0.3, 1.2, 0.5])))
     v = andoyer_motion(top, np.array([0.0, 0.4, 1.0]) * top.period)
     gain = v.g[-1] - v.g[0]
@@ -272,7 +272,7 @@ def test_r1_g_gains_the_montgomery_phase(start):
     assert np.ptp(v.k) == 0.0
 
 
-def test_r1_samples_far_apart_are_followed():
+def test_samples_far_apart_are_followed_r1():
     top = EulerTop(TENSOR, [0.4, -0.7, 1.1])
     dense = andoyer_motion(top, np.linspace(0.0, 40.0, 401))
     sparse = andoyer_motion(top, np.linspace(0.0, 40.0, 21))
@@ -299,7 +299,7 @@ def deforming_body():
     return sp.prescribed(inertia, internal, 3.0)
 
 
-def test_r1_a_deforming_body_turns_about_its_momentum_by_the_gain_of_g():
+def test_a_deforming_body_turns_about_its_momentum_by_the_gain_of_g_r1():
     deformation = deforming_body()
     orbits = sp.closed_orbits(deformation, 1.5)
     assert orbits
@@ -332,7 +332,7 @@ class Turned:
         return self.motion.body_momentum(t)
 
 
-def test_r1_many_motions_at_once():
+def test_many_motions_at_once_r1():
     """The leading axes of a motion of many momenta come first."""
     momenta = np.array([[0.3, 0.2, 1.1], [1.0, -0.4, 0.2]])
     motions = sp.reconstruct(sp.rigid(TENSOR, 5.0), momenta)
@@ -345,7 +345,7 @@ def test_r1_many_motions_at_once():
             assert np.abs(getattr(together, name)[row] - getattr(alone, name)).max() < 1e-7
 
 
-def test_r1_motions_start_between_minus_and_plus_a_half_turn():
+def test_motions_start_between_minus_and_plus_a_half_turn_r1():
     rng = np.random.default_rng(11)
     for attitude, momentum in zip(random_attitudes(rng, 40), rng.normal(size=(40, 3)), strict=True):
         top = EulerTop(TENSOR, momentum, attitude)

@@ -55,7 +55,7 @@ def all_ways(pair, q, on_su2=False, samples=200):
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=IDS)
-def test_q6_conjugate_times_are_those_of_the_search(pair):
+def test_conjugate_times_are_those_of_the_search_q6(pair):
     metric, start = unit_momenta(pair, 1, 60)
     start = np.concatenate([start, metric.unit_speed([[1.0, 0.0, 0.0], [0.3, 0.0, 1e-9], [1e-3, 0.0, 1.0]])])
     expected = metric.conjugate_time(start)
@@ -65,7 +65,7 @@ def test_q6_conjugate_times_are_those_of_the_search(pair):
 
 
 @pytest.mark.parametrize("pair", [(1.0, 0.2), (1.0, 3.0), (1.0, np.inf)])
-def test_q6_the_printed_equation_of_the_conjugate_times(pair):
+def test_the_printed_equation_of_the_conjugate_times_q6(pair):
     metric, start = unit_momenta(pair, 2, 30)
     eta = pair[0] / pair[1] - 1.0
     axial = start[:, 2] / np.linalg.norm(start, axis=-1)
@@ -89,7 +89,7 @@ def test_q6_the_printed_equation_of_the_conjugate_times(pair):
 
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
-def test_q6_cut_times_against_all_geodesics(pair):
+def test_cut_times_against_all_geodesics_q6(pair):
     metric, start = unit_momenta(pair, 4, 6)
     cut = axisymmetric_metric(*pair).cut_time(start)
     assert np.all(cut <= metric.conjugate_time(start) * (1.0 + 1e-12))
@@ -103,7 +103,7 @@ def test_q6_cut_times_against_all_geodesics(pair):
 
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
-def test_q6_cut_times_on_su2_against_all_geodesics(pair):
+def test_cut_times_on_su2_against_all_geodesics_q6(pair):
     _, start = unit_momenta(pair, 5, 6)
     closed = axisymmetric_metric(*pair)
     cut = closed.cut_time_on_su2(start)
@@ -118,7 +118,7 @@ def test_q6_cut_times_on_su2_against_all_geodesics(pair):
             assert abs(length - part * cut[k]) < 1e-11 if shortest else length < part * cut[k] - 1e-9
 
 
-def test_q6_q0_vanishes_at_the_cut_or_tau_is_pi():
+def test_q0_vanishes_at_the_cut_or_tau_is_pi_q6():
     for pair in PAIRS:
         metric, start = unit_momenta(pair, 6, 50)
         closed = axisymmetric_metric(*pair)
@@ -139,7 +139,7 @@ def test_q6_q0_vanishes_at_the_cut_or_tau_is_pi():
 
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
-def test_q6_distances_against_all_geodesics(pair):
+def test_distances_against_all_geodesics_q6(pair):
     closed = axisymmetric_metric(*pair)
     attitudes = Rotation.random(12, random_state=7).as_matrix()
     distance = closed.distance(attitudes)
@@ -153,7 +153,7 @@ def test_q6_distances_against_all_geodesics(pair):
 
 
 @pytest.mark.parametrize("pair", PAIRS, ids=IDS)
-def test_q6_a_geodesic_before_its_cut_is_found_again(pair):
+def test_a_geodesic_before_its_cut_is_found_again_q6(pair):
     metric, start = unit_momenta(pair, 8, 200)
     closed = axisymmetric_metric(*pair)
     time = np.random.default_rng(9).uniform(0.001, 0.999, 200) * closed.cut_time(start)
@@ -165,7 +165,7 @@ def test_q6_a_geodesic_before_its_cut_is_found_again(pair):
 
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
-def test_q6_the_diameter_is_the_largest_distance(pair):
+def test_the_diameter_is_the_largest_distance_q6(pair):
     closed = axisymmetric_metric(*pair)
 
     def nearness(x):
@@ -183,7 +183,7 @@ def test_q6_the_diameter_is_the_largest_distance(pair):
 
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
-def test_q6_distance_to_turns_about_the_axis(pair):
+def test_distance_to_turns_about_the_axis_q6(pair):
     closed = axisymmetric_metric(*pair)
     alpha = np.linspace(0.01, np.pi, 12)
     turns = so3.exp(alpha[:, None] * np.array([0.0, 0.0, 1.0]))
@@ -199,7 +199,7 @@ def test_q6_distance_to_turns_about_the_axis(pair):
     np.testing.assert_allclose(metric.attitude(closed.shortest_momentum(turns)), turns, rtol=0, atol=1e-12)
 
 
-def test_q5_sub_riemannian_distance_to_turns_about_the_axis_is_a_limit():
+def test_sub_riemannian_distance_to_turns_about_the_axis_is_a_limit_q5():
     alpha = np.linspace(0.05, np.pi, 9)
     closed = axisymmetric_metric(1.0, np.inf)
     expected = np.sqrt(alpha * (4.0 * np.pi - alpha))

@@ -25,7 +25,7 @@ def axial_form(moments):
 
 
 @pytest.mark.parametrize("moments", AXISYMMETRIC, ids=str)
-def test_q6_a_geodesic_before_its_cut_is_found_again_and_certified(moments):
+def test_a_geodesic_before_its_cut_is_found_again_and_certified_q6(moments):
     metric = left_invariant_metric(moments)
     closed, columns = axial_form(moments)
     rng = np.random.default_rng(1)
@@ -40,7 +40,7 @@ def test_q6_a_geodesic_before_its_cut_is_found_again_and_certified(moments):
 
 
 @pytest.mark.parametrize("moments", AXISYMMETRIC[:3], ids=str)
-def test_q6_past_the_cut_a_shorter_way_is_found(moments):
+def test_past_the_cut_a_shorter_way_is_found_q6(moments):
     metric = left_invariant_metric(moments)
     closed, columns = axial_form(moments)
     start = metric.unit_speed([0.4, -0.7, 0.5])
@@ -55,7 +55,7 @@ def test_q6_past_the_cut_a_shorter_way_is_found(moments):
 @pytest.mark.parametrize(
     "moments", [TRIAXIAL[0], pytest.param(TRIAXIAL[1], marks=pytest.mark.full), TRIAXIAL[2]], ids=str
 )
-def test_q6_a_geodesic_before_its_conjugate_time_is_found_again(moments):
+def test_a_geodesic_before_its_conjugate_time_is_found_again_q6(moments):
     metric = left_invariant_metric(moments)
     rng = np.random.default_rng(2)
     for part in (0.1, 0.3):
@@ -74,7 +74,7 @@ def test_q6_a_geodesic_before_its_conjugate_time_is_found_again(moments):
         assert metric.conjugate_time(found.momentum) >= 1.0 - 1e-9
 
 
-def test_q6_distances_agree_with_the_closed_form():
+def test_distances_agree_with_the_closed_form_q6():
     for moments in AXISYMMETRIC[:4]:
         metric = left_invariant_metric(moments)
         closed, columns = axial_form(moments)
@@ -86,7 +86,7 @@ def test_q6_distances_agree_with_the_closed_form():
             assert abs(found.upper_bound - expected) < 1e-11
 
 
-def test_q6_the_sub_riemannian_distance_to_turns_about_the_forbidden_axis():
+def test_the_sub_riemannian_distance_to_turns_about_the_forbidden_axis_q6():
     # These ends are conjugate and cut at once.
     metric = left_invariant_metric([1.0, 1.0, np.inf])
     for alpha in (0.1, 2.5, np.pi):
@@ -96,7 +96,7 @@ def test_q6_the_sub_riemannian_distance_to_turns_about_the_forbidden_axis():
 
 
 @pytest.mark.parametrize("moments", [pytest.param(TRIAXIAL[1], marks=pytest.mark.full), TRIAXIAL[2]], ids=str)
-def test_q6_distances_are_a_metric_between_their_bounds(moments):
+def test_distances_are_a_metric_between_their_bounds_q6(moments):
     attitudes = Rotation.random(2, random_state=4).as_matrix()
     metric = left_invariant_metric(moments)
     found = [shortest_geodesic(metric, attitude) for attitude in attitudes]
@@ -112,7 +112,7 @@ def test_q6_distances_are_a_metric_between_their_bounds(moments):
     assert abs(twice.length - np.sqrt(2.0) * found[1].length) < 1e-10
 
 
-def test_q5_distances_converge_as_the_inverse_of_the_moment():
+def test_distances_converge_as_the_inverse_of_the_moment_q5():
     # d^2/2 is the least action, so that its derivative by 1/I_1 is minus half the integral of Pi_1^2 along the way.
     limit = left_invariant_metric([np.inf, 2.0, 1.0])
     start = limit.unit_speed([0.8, 0.9, -0.6])

@@ -77,7 +77,7 @@ def conjugate_by_mpmath(aspect, p, order):
     return psi, longitude(psi, p)
 
 
-def test_p1_coefficients_and_the_polar_form():
+def test_coefficients_and_the_polar_form_p1():
     for aspect in ASPECTS:
         surface = ellipsoid(aspect)
         colatitude = np.array([0.0, 0.2, 0.9, np.pi / 2, 2.5, np.pi])
@@ -100,7 +100,7 @@ def test_p1_coefficients_and_the_polar_form():
         np.testing.assert_allclose(surface.metric(latitude), second[1:5], rtol=0, atol=1e-12)
 
 
-def test_p1_the_surface_of_the_coefficients_alone_is_the_same():
+def test_the_surface_of_the_coefficients_alone_is_the_same_p1():
     p = np.array([1e-3, 0.01, 0.3, 0.6, 0.9, 1.0])
     for aspect in (0.1, 0.6, 1.5, 6.0):
         closed, found = ellipsoid(aspect), by_coefficients(aspect)
@@ -114,7 +114,7 @@ def test_p1_the_surface_of_the_coefficients_alone_is_the_same():
         np.testing.assert_allclose(other.points.time, one.points.time, rtol=1e-11)
 
 
-def test_p1_any_radius_and_poles_that_are_tips():
+def test_any_radius_and_poles_that_are_tips_p1():
     p = np.array([0.01, 0.3, 0.9])
     closed, found = ellipsoid(0.6, 2.5), by_coefficients(0.6, 2.5)
     np.testing.assert_allclose(found.first_return(2.5 * p), closed.first_return(2.5 * p), rtol=1e-13)
@@ -128,7 +128,7 @@ def test_p1_any_radius_and_poles_that_are_tips():
     np.testing.assert_allclose(locus.points.time, conjugate_points(unit, locus.points.direction).time, rtol=1e-11)
 
 
-def test_p2_period_in_closed_form():
+def test_period_in_closed_form_p2():
     p = np.array([0.0, 0.1, 0.5, 0.99, 1.0])
     for aspect in ASPECTS:
         np.testing.assert_allclose(ellipsoid_period(aspect, p), ellipsoid(aspect).period(p), rtol=3e-14)
@@ -139,7 +139,7 @@ def test_p2_period_in_closed_form():
                 assert float(value) == pytest.approx(float(exact), rel=1e-14)
 
 
-def test_p2_values_against_mpmath():
+def test_values_against_mpmath_p2():
     """T, R and R' to 1e-12 at 25 random ellipsoids and momenta."""
     rng = np.random.default_rng(2013)
     with mp.workdps(30):
@@ -151,7 +151,7 @@ def test_p2_values_against_mpmath():
             assert float(surface.first_return(p)) == pytest.approx(float(turn), rel=1e-12)
 
 
-def test_p2_rates_against_mpmath():
+def test_rates_against_mpmath_p2():
     """R' and R'' of the closed form, and R' = T'/(2p), by derivatives at 40 digits: to 1e-12."""
     rng = np.random.default_rng(41)
     with mp.workdps(40):
@@ -175,7 +175,7 @@ def test_p2_rates_against_mpmath():
             assert float(surface.period_second_rate(p)) == pytest.approx(float(period_second), rel=1e-10)
 
 
-def test_p3_oblate_reference_values():
+def test_oblate_reference_values_p3():
     """theory.md section 6, to all printed digits."""
     half = ellipsoid(0.5)
     assert f"{float(half.first_return(1e-13)):.10f}" == f"{np.pi:.10f}"
@@ -188,7 +188,7 @@ def test_p3_oblate_reference_values():
         assert f"{found:.5f}" == f"{value:.5f}"
 
 
-def test_p3_oblate_first_return_falls_from_pi_to_pi_epsilon():
+def test_oblate_first_return_falls_from_pi_to_pi_epsilon_p3():
     for aspect in (0.02, 0.3, 0.6, 0.99):
         surface = ellipsoid(aspect)
         values = surface.first_return(np.linspace(0.0, 1.0, 101))
@@ -202,7 +202,7 @@ def test_p3_oblate_first_return_falls_from_pi_to_pi_epsilon():
         assert float(surface.curvature(surface.reach)) == pytest.approx(aspect**2, rel=1e-10)
 
 
-def test_p3_the_caustic_is_an_astroid_with_cusps_on_the_axes():
+def test_the_caustic_is_an_astroid_with_cusps_on_the_axes_p3():
     surface = ellipsoid(0.6)
     locus = conjugate_locus(surface, 400)
     assert locus.cusps == 4
@@ -222,7 +222,7 @@ def test_p3_the_caustic_is_an_astroid_with_cusps_on_the_axes():
     assert errors[0] / errors[1] == pytest.approx(100.0, rel=0.1)
 
 
-def test_p4_prolate_first_return_rises_from_pi():
+def test_prolate_first_return_rises_from_pi_p4():
     surface = ellipsoid(1.5)
     assert f"{float(surface.first_return(0.3)):.4f}" == "3.6592"
     assert f"{float(surface.first_return(1.0)):.4f}" == "4.7124"
@@ -239,7 +239,7 @@ def test_p4_prolate_first_return_rises_from_pi():
         assert (first.height > 0.0).all()
 
 
-def test_p5_round_sphere():
+def test_the_round_sphere_has_one_period_and_one_conjugate_point_p5():
     surface = ellipsoid(1.0, 2.5)
     p = 2.5 * np.array([0.0, 0.2, 0.9, 1.0])
     np.testing.assert_allclose(surface.period(p), 5.0 * np.pi, rtol=1e-14)
@@ -265,7 +265,7 @@ def test_p5_round_sphere():
     np.testing.assert_allclose(np.sin(latitude / 2.5), circle[:, 2], atol=1e-14)
 
 
-def test_p6_cut_loci():
+def test_cut_loci_of_ellipsoids_p6():
     oblate = cut_locus(ellipsoid(0.5))
     assert (oblate.kind, oblate.latitudes) == ("parallel", (0.0, 0.0))
     np.testing.assert_allclose(oblate.longitudes, (0.5 * np.pi, 1.5 * np.pi), atol=1e-13)
@@ -277,7 +277,7 @@ def test_p6_cut_loci():
 
 
 @pytest.mark.parametrize(("flattening", "start"), [(1 / 50, 0.0), (1 / 298, 30.0), (-1 / 50, -20.0)])
-def test_p6_cut_times_against_geographiclib(flattening, start):
+def test_cut_times_against_geographiclib_p6(flattening, start):
     """GeographicLib's inverse problem: the distance to the point at the cut time is that time, beyond it is less."""
     aspect, model = 1.0 - flattening, Geodesic(1.0, flattening)
     surface = ellipsoid(aspect)
@@ -301,7 +301,7 @@ def latitude_of(surface, aspect, degrees):
 
 @pytest.mark.parametrize("flattening", [1 / 298, 1 / 50, -1 / 50])
 @pytest.mark.parametrize("start", [0.0, 35.0])
-def test_o12_conjugate_times_against_geographiclib(flattening, start):
+def test_conjugate_times_against_geographiclib_o12(flattening, start):
     aspect, model = 1.0 - flattening, Geodesic(1.0, flattening)
     surface = ellipsoid(aspect)
     latitude = latitude_of(surface, aspect, start)
@@ -323,7 +323,7 @@ def test_o12_conjugate_times_against_geographiclib(flattening, start):
 
 
 @pytest.mark.parametrize(("aspect", "p", "order"), [(0.6, 0.3, 2), (1.5, 0.6, 1)])
-def test_o12_conjugate_points_against_mpmath(aspect, p, order):
+def test_conjugate_points_against_mpmath_o12(aspect, p, order):
     """The envelope of d theta/dp = 0 at fixed latitude, by quadratures and differences at 25 digits, to 1e-12."""
     with mp.workdps(25):
         psi, longitude = conjugate_by_mpmath(aspect, p, order)
@@ -332,7 +332,7 @@ def test_o12_conjugate_points_against_mpmath(aspect, p, order):
     assert float(point.longitude) == pytest.approx(float(longitude), abs=1e-12)
 
 
-def test_b_e6_the_period_integrand_has_the_square_of_the_sine():
+def test_the_period_integrand_has_the_square_of_the_sine_b_e6():
     """Printed: sin^2(psi_1^2); T is right with sin^2(psi_1)."""
     aspect, p = 0.6, 0.5
     psi = np.arccos(p)
@@ -348,7 +348,7 @@ def test_b_e6_the_period_integrand_has_the_square_of_the_sine():
     assert abs(period(np.sin(psi**2) ** 2) - true) > 0.04
 
 
-def test_b_e9_the_period_of_oblate_ellipsoids_is_concave_and_the_combined_quantity_decides():
+def test_the_period_of_oblate_ellipsoids_is_concave_and_the_combined_quantity_decides_b_e9():
     """Printed: T' < 0 < T''. T'' and R'' are negative, so proposition 3 does not apply; yet the branch has no cusp."""
     p = np.linspace(0.02, 0.999, 60)
     for aspect in (0.1, 0.3, 0.6, 0.9, 0.999):

@@ -63,25 +63,25 @@ def variational(moments, momentum, end):
     return at
 
 
-def test_q1_the_controls_maximise_the_pseudo_hamiltonian():
+@pytest.mark.parametrize("name", ["triaxial", "unsorted", "sub-Riemannian about 2"])
+def test_the_controls_maximise_the_pseudo_hamiltonian_q1(name):
     rng = np.random.default_rng(1)
-    for name in ("triaxial", "unsorted", "sub-Riemannian about 2"):
-        moments = np.array(METRICS[name])
-        metric = left_invariant_metric(moments)
-        pi = rng.normal(size=(50, 3))
-        u = metric.angular_velocity(pi)
-        np.testing.assert_allclose(u, pi / moments, rtol=1e-15)
-        best = metric.pseudo_hamiltonian(pi, u)
-        np.testing.assert_allclose(best, metric.hamiltonian(pi), rtol=0, atol=1e-14)
-        np.testing.assert_allclose(best, 0.5 * np.sum(pi**2 / moments, axis=-1), rtol=0, atol=1e-14)
-        step = rng.normal(size=(50, 3)) * np.isfinite(moments)
-        weights = np.where(np.isfinite(moments), moments, 0.0)
-        lost = 0.5 * np.sum(weights * step**2, axis=-1)
-        np.testing.assert_allclose(metric.pseudo_hamiltonian(pi, u + step), best - lost, rtol=0, atol=1e-13)
+    moments = np.array(METRICS[name])
+    metric = left_invariant_metric(moments)
+    pi = rng.normal(size=(50, 3))
+    u = metric.angular_velocity(pi)
+    np.testing.assert_allclose(u, pi / moments, rtol=1e-15)
+    best = metric.pseudo_hamiltonian(pi, u)
+    np.testing.assert_allclose(best, metric.hamiltonian(pi), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(best, 0.5 * np.sum(pi**2 / moments, axis=-1), rtol=0, atol=1e-14)
+    step = rng.normal(size=(50, 3)) * np.isfinite(moments)
+    weights = np.where(np.isfinite(moments), moments, 0.0)
+    lost = 0.5 * np.sum(weights * step**2, axis=-1)
+    np.testing.assert_allclose(metric.pseudo_hamiltonian(pi, u + step), best - lost, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_q1_q2_geodesics_solve_the_extremal_equations(name):
+def test_geodesics_solve_the_extremal_equations_q1_q2(name):
     rng = np.random.default_rng(2)
     metric = left_invariant_metric(METRICS[name])
     for _ in range(3):
@@ -92,7 +92,7 @@ def test_q1_q2_geodesics_solve_the_extremal_equations(name):
         np.testing.assert_allclose(metric.body_momentum(start, t), [at(s)[1] for s in t], rtol=0, atol=1e-11)
 
 
-def test_q2_eulers_equation_componentwise():
+def test_eulers_equation_componentwise_q2():
     rng = np.random.default_rng(3)
     metric = left_invariant_metric(TRIAXIAL)
     h = rng.normal(size=(20, 3))
@@ -105,7 +105,7 @@ def test_q2_eulers_equation_componentwise():
     np.testing.assert_allclose(metric.momentum_rate(h), np.transpose(printed), rtol=0, atol=1e-15)
 
 
-def test_b_e2_the_commutators_are_printed_with_the_wrong_sign():
+def test_the_commutators_are_printed_with_the_wrong_sign_b_e2():
     for a, b, c in ((A1, A2, A3), (A2, A3, A1), (A3, A1, A2)):
         np.testing.assert_array_equal(a @ b - b @ a, c)
         assert np.abs((a @ b - b @ a) + c).max() == 2.0
@@ -116,7 +116,7 @@ def test_b_e2_the_commutators_are_printed_with_the_wrong_sign():
     np.testing.assert_allclose(metric.momentum_rate(h), lift @ (h / TRIAXIAL), rtol=0, atol=1e-15)
 
 
-def test_q3_times_are_quadratures_of_the_two_integrals():
+def test_times_are_quadratures_of_the_two_integrals_q3():
     # Pi_2'^2 = (1/I_1 - 1/I_3)^2 Pi_1^2 Pi_3^2, both squares linear in Pi_2^2 by H and |Pi|.
     start, t = np.array([1.0, 0.2, 0.9]), 0.6
     for moments in (TRIAXIAL, np.array(METRICS["sub-Riemannian"])):
@@ -134,15 +134,15 @@ def test_q3_times_are_quadratures_of_the_two_integrals():
         assert abs(quad(slowness, start[1], end, epsabs=1e-13)[0] - t) < 1e-12
 
 
-def test_q4_momentum_in_inertial_axes_and_the_hamiltonian_are_conserved():
+@pytest.mark.parametrize("name", METRICS)
+def test_momentum_in_inertial_axes_and_the_hamiltonian_are_conserved_q4(name):
     rng = np.random.default_rng(4)
-    for name, moments in METRICS.items():
-        metric = left_invariant_metric(moments)
-        start = metric.unit_speed(rng.normal(size=(20, 3)))
-        t = rng.uniform(-20.0, 20.0, 20)
-        at = metric.body_momentum(start, t)
-        np.testing.assert_allclose(so3.apply(metric.attitude(start, t), at), start, atol=1e-12, err_msg=name)
-        np.testing.assert_allclose(metric.hamiltonian(at), 0.5, rtol=0, atol=1e-11, err_msg=name)
+    metric = left_invariant_metric(METRICS[name])
+    start = metric.unit_speed(rng.normal(size=(20, 3)))
+    t = rng.uniform(-20.0, 20.0, 20)
+    at = metric.body_momentum(start, t)
+    np.testing.assert_allclose(so3.apply(metric.attitude(start, t), at), start, atol=1e-12)
+    np.testing.assert_allclose(metric.hamiltonian(at), 0.5, rtol=0, atol=1e-11)
     # The lift of A_i R is one component of R Pi.
     attitude, pi = metric.attitude(start[0], 1.3), metric.body_momentum(start[0], 1.3)
     lifts = [so3.vee(attitude.T @ generator @ attitude) @ pi for generator in (A1, A2, A3)]
@@ -165,7 +165,7 @@ def test_geodesics_are_the_motions_of_the_euler_top():
 
 
 @pytest.mark.parametrize("moments", list(itertools.permutations((0.2, 0.47, 0.8))), ids=str)
-def test_q2_next_to_the_unstable_axis_with_one_component_zero(moments):
+def test_next_to_the_unstable_axis_with_one_component_zero_q2(moments):
     """P and Q of the closed form are equal there when rounded; which axis is circled is decided by their difference."""
     metric = left_invariant_metric(moments)
     for momentum in itertools.permutations((1.0, 1e-9, 0.0)):
@@ -181,7 +181,7 @@ def test_moments_and_axes_ascend_and_are_those_given():
         assert np.linalg.det(metric.axes) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_q5_the_sub_riemannian_closed_form_is_a_top_turned_back_about_its_momentum():
+def test_the_sub_riemannian_closed_form_is_a_top_turned_back_about_its_momentum_q5():
     # With a + c in place of a the attitude turns by c t more about Pi, in inertial axes.
     rng = np.random.default_rng(6)
     moments = np.array(METRICS["sub-Riemannian"])
@@ -193,7 +193,7 @@ def test_q5_the_sub_riemannian_closed_form_is_a_top_turned_back_about_its_moment
         np.testing.assert_allclose(metric.attitude(start, t), back @ top.attitude(t), rtol=0, atol=1e-12)
 
 
-def test_q5_one_parameter_is_left_in_the_sub_riemannian_case():
+def test_one_parameter_is_left_in_the_sub_riemannian_case_q5():
     # k^2 = I_2/I_3: multiplying both moments by a number only multiplies the momenta.
     start, t = np.array([0.7, -0.4, 1.1]), 1.7
     once, thrice = left_invariant_metric([np.inf, 2.0, 1.0]), left_invariant_metric([np.inf, 6.0, 3.0])
@@ -202,7 +202,7 @@ def test_q5_one_parameter_is_left_in_the_sub_riemannian_case():
     assert not left_invariant_metric(TRIAXIAL).is_sub_riemannian
 
 
-def test_q5_the_riemannian_case_converges_as_the_inverse_of_the_moment():
+def test_the_riemannian_case_converges_as_the_inverse_of_the_moment_q5():
     # The equations are linear in 1/I_1, so attitudes and conjugate times converge at the rate one; the slope of the
     # attitude is the integral of Jacobi's inhomogeneous equation.
     start = np.array([0.9, 0.5, -0.8])
@@ -232,7 +232,7 @@ def test_q5_the_riemannian_case_converges_as_the_inverse_of_the_moment():
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_q6_the_differential_solves_the_variational_equation(name):
+def test_the_differential_solves_the_variational_equation_q6(name):
     rng = np.random.default_rng(7)
     metric = left_invariant_metric(METRICS[name])
     for _ in range(2):
@@ -245,7 +245,7 @@ def test_q6_the_differential_solves_the_variational_equation(name):
             )
 
 
-def test_q6_the_differential_at_special_momenta():
+def test_the_differential_at_special_momenta_q6():
     # At rest, along axes, on the separatrix, next to it and next to the unstable axis; t from tiny to long.
     a, b, c = inverse(TRIAXIAL)
     special = [
@@ -268,7 +268,7 @@ def test_q6_the_differential_at_special_momenta():
     np.testing.assert_array_equal(metric.differential(np.ones(3), 0.0), np.zeros((3, 3)))
 
 
-def test_q6_small_turns_keep_their_digits():
+def test_small_turns_keep_their_digits_q6():
     # Both sides of the switch from the integral to the difference, against 40 digits of the Taylor series.
     mpmath.mp.dps = 40
     a = [mpmath.mpf(1) / 3, mpmath.mpf(1) / 2, mpmath.mpf(1)]
@@ -298,7 +298,7 @@ def test_q6_small_turns_keep_their_digits():
 
 
 @pytest.mark.parametrize("name", [name for name in METRICS if name != "round"])
-def test_q6_conjugate_times_are_zeros_of_the_variational_determinant(name):
+def test_conjugate_times_are_zeros_of_the_variational_determinant_q6(name):
     rng = np.random.default_rng(8)
     metric = left_invariant_metric(METRICS[name])
     for _ in range(2):
@@ -318,7 +318,7 @@ def test_q6_conjugate_times_are_zeros_of_the_variational_determinant(name):
         assert times[2] > times[1]
 
 
-def test_q6_conjugate_times_of_steady_rotations():
+def test_conjugate_times_of_steady_rotations_q6():
     # About axis k the linear flow is a turn by a_k t of the exponential of a constant matrix.
     a = inverse(TRIAXIAL)
     metric = left_invariant_metric(TRIAXIAL)
@@ -339,7 +339,7 @@ def test_q6_conjugate_times_of_steady_rotations():
             assert min(determinant(t) for t in grid) > 0.0
 
 
-def test_q6_double_conjugate_points_count_twice():
+def test_double_conjugate_points_count_twice_q6():
     # The round metric: every geodesic meets two fields' zeros at each whole turn.
     rng = np.random.default_rng(9)
     metric = left_invariant_metric([2.0, 2.0, 2.0])
@@ -355,7 +355,7 @@ def test_q6_double_conjugate_points_count_twice():
     assert abs(second - 2.0 * np.pi) < 1e-12
 
 
-def test_q6_conjugate_times_scale_and_are_symmetric():
+def test_conjugate_times_scale_and_are_symmetric_q6():
     rng = np.random.default_rng(10)
     metric = left_invariant_metric(TRIAXIAL)
     start = rng.normal(size=(40, 3))
@@ -373,7 +373,7 @@ def test_q6_conjugate_times_scale_and_are_symmetric():
     np.testing.assert_allclose(turned.conjugate_locus(start @ turn.T), turn @ locus @ turn.T, rtol=0, atol=1e-10)
 
 
-def test_q6_the_conjugate_locus_is_a_critical_value_of_the_exponential_map():
+def test_the_conjugate_locus_is_a_critical_value_of_the_exponential_map_q6():
     rng = np.random.default_rng(11)
     for name in ("triaxial", "sub-Riemannian", "flat"):
         metric = left_invariant_metric(METRICS[name])
@@ -389,17 +389,17 @@ def test_q6_the_conjugate_locus_is_a_critical_value_of_the_exponential_map():
         np.testing.assert_array_equal(locus, metric.attitude(start, time))
 
 
-def test_q6_gauss_lemma():
+@pytest.mark.parametrize("name", METRICS)
+def test_gauss_lemma_holds_q6(name):
     # Pi . Z dPi = t u . dPi.
     rng = np.random.default_rng(12)
-    for moments in METRICS.values():
-        metric = left_invariant_metric(moments)
-        start, t = rng.normal(size=(20, 3)), rng.uniform(0.1, 6.0, 20)
-        projected = np.einsum("ni,nij->nj", metric.body_momentum(start, t), metric.differential(start, t))
-        np.testing.assert_allclose(projected, t[:, None] * metric.angular_velocity(start), rtol=0, atol=1e-10)
+    metric = left_invariant_metric(METRICS[name])
+    start, t = rng.normal(size=(20, 3)), rng.uniform(0.1, 6.0, 20)
+    projected = np.einsum("ni,nij->nj", metric.body_momentum(start, t), metric.differential(start, t))
+    np.testing.assert_allclose(projected, t[:, None] * metric.angular_velocity(start), rtol=0, atol=1e-10)
 
 
-def test_q7_serret_andoyer_conjugate_points_are_not_those_on_so3():
+def test_serret_andoyer_conjugate_points_are_not_those_on_so3_q7():
     # theory.md section 6: p, phi_1c, theta_1c of the Serret-Andoyer metric of I = (3, 2, 1), from the equator.
     table = [
         (1.70, -0.094594, 3.565678),
@@ -444,7 +444,7 @@ def test_q7_serret_andoyer_conjugate_points_are_not_those_on_so3():
         assert values[2] / values[0] > 1e-3
 
 
-def test_q8_the_fibre_is_lagrangian_in_andoyer_variables():
+def test_the_fibre_is_lagrangian_in_andoyer_variables_q8():
     # sum dG^dg + dK^dk + dL^dl vanishes on the momenta at one attitude, but not on all of the phase space.
     mpmath.mp.dps = 40
     angles = [mpmath.mpf("0.4"), mpmath.mpf("1.1"), mpmath.mpf("-0.7")]
@@ -547,7 +547,7 @@ def test_momenta_refused():
         metric.differential([1.0, 0.3, 0.2], 1e9)
 
 
-def test_q6_very_unequal_moments():
+def test_very_unequal_moments_q6():
     # Steady about the axis of the second moment, where the flow is a constant matrix.
     for moments in ([1.0, 1e3, 20.0], [np.inf, 1.0, 1e-2], [1e4, 1.0, 1e-2]):
         metric = left_invariant_metric(moments)
@@ -567,7 +567,7 @@ def test_no_conjugate_time_is_an_error(monkeypatch):
 
 
 @pytest.mark.parametrize(("part", "saddle"), [(0.9, False), (0.99, False), (1.01, True), (1.1, True)])
-def test_q6_geodesics_are_minima_of_the_length_up_to_the_conjugate_time(part, saddle):
+def test_geodesics_are_minima_of_the_length_up_to_the_conjugate_time_q6(part, saddle):
     # Of curves of two geodesics with the same ends, by where they meet off the middle: Morse's index.
     metric = left_invariant_metric(TRIAXIAL)
     start = metric.unit_speed([0.3, 0.8, -0.5])

@@ -1,4 +1,7 @@
-"""The Serret-Andoyer metric, its geodesics and conjugate points: theory.md R2 to R13, R15, errata of Bonnard et al."""
+"""The Serret-Andoyer metric, its geodesics and conjugate points: theory.md R2 to R13, R15, errata of Bonnard et al.
+
+Symbols here are those of the paper, I_1 > I_2 > I_3 and A < B < C; in the library I_1 < I_2 < I_3 and a_3, a_2, a_1.
+"""
 
 from __future__ import annotations
 
@@ -112,7 +115,7 @@ class Exact:
         return [mp.quad(lambda angle, j=j: integrand(angle, j), [mp.mpf(y), mp.pi / 2]) for j in powers]
 
 
-def test_r2_the_metric_is_that_of_the_energy():
+def test_the_metric_is_that_of_the_energy_r2():
     """(5), (6), (7): the energy is half the inverse metric applied to (p_x, p_y), and that of the body."""
     rng = np.random.default_rng(1)
     attitude = so3.matrix_from_quat(so3.normalised(rng.normal(size=(50, 4))))
@@ -126,7 +129,7 @@ def test_r2_the_metric_is_that_of_the_energy():
     assert np.abs(0.5 * (v.total**2 / across + v.axial**2 / along) - energy).max() < 1e-14
 
 
-def test_b_e1_the_metric_of_the_introduction_is_half_of_7():
+def test_the_metric_of_the_introduction_is_half_of_7_b_e1():
     y = np.linspace(0.0, 3.0, 13)
     z = 2.0 * METRIC.w(y)
     across, along = METRIC.coefficients(y)
@@ -136,7 +139,7 @@ def test_b_e1_the_metric_of_the_introduction_is_half_of_7():
     assert np.abs(wrong / METRIC.energy(y, 1.3, 0.4) - 2.0).max() < 1e-14
 
 
-def test_r3_equilibria_and_separatrix_planes():
+def test_equilibria_and_separatrix_planes_r3():
     """lambda^2 = (B - A)(C - B) G^2 at y = 0, -(B - A)(C - A) G^2 at pi/2; H_3 = +-sqrt((B - A)/(C - B)) H_1."""
     a, b, c = 1.0 / MOMENTS
 
@@ -165,7 +168,7 @@ def test_r3_equilibria_and_separatrix_planes():
     assert np.abs(p_y + slope * across * np.sin(y)).max() < 1e-14
 
 
-def test_r4_polar_form():
+def test_the_polar_form_is_that_of_the_integral_along_a_meridian_r4():
     """(9), proposition 8; the coordinate phi by the integral along a meridian."""
     a, b, c = 1.0 / MOMENTS
     assert METRIC.alpha == pytest.approx(np.sqrt(2.0 / 3.0), abs=1e-15)
@@ -189,7 +192,7 @@ def test_r4_polar_form():
     assert np.abs(slopes @ WEIGHTS / h - second).max() < 1e-11
 
 
-def test_b_e5_y_falls_as_phi_grows_and_the_root_has_k_squared():
+def test_y_falls_as_phi_grows_and_the_root_has_k_squared_b_e5():
     phi = np.linspace(0.1, 2.0, 20)
     h = 1e-2
     slope = METRIC.y_of_phi(phi[:, None] + h * OFFSETS) @ WEIGHTS / h
@@ -206,7 +209,7 @@ def test_b_e5_y_falls_as_phi_grows_and_the_root_has_k_squared():
     assert abs(integral(rest) - METRIC.alpha * 1.1) > 1e-2
 
 
-def test_r5_lemma_4_1():
+def test_the_potential_rises_from_the_equator_to_the_crest_lemma_4_1_r5():
     """The potential is even, of period 2 K/alpha, rises from A p^2 at 0 to B p^2 at K/alpha."""
     rng = np.random.default_rng(2)
     for moments in random_moments(rng, 40):
@@ -222,7 +225,7 @@ def test_r5_lemma_4_1():
         assert np.abs(metric.potential(family.amplitude, family.p_theta) - 1.0).max() < 1e-13
 
 
-def test_r6_classes():
+def test_classes_change_at_the_roots_of_the_moments_r6():
     root = np.sqrt(MOMENTS)
     names = METRIC.geodesics([0.0, 0.99, -1.01, 1.41, 1.42, -1.73, root[0]]).trajectory_class
     expected = ["extended"] * 2 + ["rotating"] * 2 + ["oscillating"] * 2
@@ -240,7 +243,7 @@ def test_r6_classes():
 
 
 @pytest.mark.parametrize("start", [(1.5, 0.0, 0.6), (0.6, 0.0, 1.5), (1.5, 0.0, -0.6), (0.3, 0.0, -1.5)])
-def test_r6_free_bodies_run_along_geodesics(start):
+def test_free_bodies_run_along_geodesics_r6(start):
     """l is y and g is theta, at p_theta = G/sqrt(2 E), of the mirror image where L > 0."""
     top = EulerTop.principal(MOMENTS, start, so3.exp(np.array([0.3, 0.2, 0.5])))
     speed = np.sqrt(2.0 * top.energy)
@@ -282,7 +285,7 @@ CASES = [("r7_oscillating", p) for p in (1.7, 1.5, -1.43)] + [
 
 
 @pytest.mark.parametrize(("name", "p"), CASES)
-def test_r7_r8_r9_closed_forms_against_integration(name, p):
+def test_closed_forms_against_integration_r7_r8_r9(name, p):
     family = METRIC.geodesics(p)
     assert (family.trajectory_class == "oscillating") == name.startswith("r7")
     times, (phi, p_phi, theta, field, _, y) = integrated(p, 25.0)
@@ -296,7 +299,7 @@ def test_r7_r8_r9_closed_forms_against_integration(name, p):
     assert np.abs(family.theta(-times) + family.theta(times)).max() < 1e-14
 
 
-def test_r7_r8_r9_other_bodies():
+def test_closed_forms_of_other_bodies_r7_r8_r9():
     rng = np.random.default_rng(3)
     for moments in random_moments(rng, 6):
         metric = serret_andoyer_metric(moments)
@@ -315,7 +318,7 @@ def small_steps(top):
 
 
 @pytest.mark.parametrize("away", [1e-2, 1e-5, 1e-9, 1e-13, -1e-2, -1e-5, -1e-9, -1e-13])
-def test_r8_theta_near_the_separatrix(away):
+def test_theta_near_the_separatrix_r8(away):
     """Time and theta at given y by integrals along a meridian, to 30 digits; up to the turning point."""
     p = float(np.sqrt(2.0) * (1.0 + away))
     family = METRIC.geodesics(p)
@@ -332,7 +335,7 @@ def test_r8_theta_near_the_separatrix(away):
         assert abs(float(family.y(float(time)) - y)) < min(bound, 1e-12)
 
 
-def test_r8_theta_on_the_separatrix():
+def test_theta_on_the_separatrix_r8():
     """sin-Gordon-like: sin am = tanh; time and theta by their integrals in p = sqrt(I_2) exactly."""
     path = METRIC.separatrix()
     exact = Exact(MOMENTS, 1)
@@ -370,7 +373,7 @@ def printed_theta(moments, p, t, with_start):
     return p * (a * t + (b - a) * (t / lam + (-lam - mu) / lam**2 * integral))
 
 
-def test_b_e7_b_e8_the_printed_theta():
+def test_the_printed_theta_is_off_by_a_constant_b_e7_b_e8():
     """(20) holds with Pi(psi_0) taken off and a complex a; dropped, theta is shifted by a constant."""
     with mp.workdps(17):
         right = [complex(printed_theta(MOMENTS, 1.5, t, True)) for t in (0.7, 9.0)]
@@ -386,7 +389,7 @@ def test_b_e7_b_e8_the_printed_theta():
 
 
 @pytest.mark.parametrize("p", [1.3, 1.1, 0.8, 0.3])
-def test_b_e11_the_rotating_case(p):
+def test_the_rotating_case_by_its_own_substitution_b_e11(p):
     """Y by the substitution of theory.md B-E11, on both sides of p = sqrt(I_3), and the equation of eta'."""
     exact = Exact(MOMENTS, p)
     y1, y2 = exact.roots(exact.p)
@@ -409,7 +412,7 @@ def test_b_e11_the_rotating_case(p):
         assert np.cos(family.y(t)) ** 2 == pytest.approx(float(height), abs=1e-14)
 
 
-def test_b_e6_equation_10_is_for_the_big_y():
+def test_equation_10_is_for_the_big_y_b_e6():
     """dY/dt, not dy/dt, is the root of the quartic."""
     family, t, h = METRIC.geodesics(1.5), np.array([0.3, 0.5, 1.0]), 1e-2
     y1, y2 = (float(root) for root in Exact(MOMENTS, 1.5).roots(mp.mpf(1.5)))
@@ -421,7 +424,7 @@ def test_b_e6_equation_10_is_for_the_big_y():
     assert np.all(y < 0.5 * np.pi)
 
 
-def test_r10_gauss_curvature():
+def test_gauss_curvature_of_the_polar_form_r10():
     """-(sqrt m)''/sqrt m, and the polynomial in z of lemma 4.2."""
     assert METRIC.gauss_curvature([0.0, METRIC.crest]) == pytest.approx([1.0 / 3.0, -1.0 / 6.0], abs=1e-15)
     rng = np.random.default_rng(4)
@@ -441,7 +444,7 @@ def test_r10_gauss_curvature():
         assert np.abs(curvature - total * (z - low) * (z - high) / z**2).max() < 10.0 * scale
 
 
-def test_r10_lemma_4_2_over_200_bodies():
+def test_lemma_4_2_over_200_bodies_r10():
     """The largest curvature, (B - A)(C - A)/A, is on the equator; the least at z = 2 B only if 2 I_2 >= I_1 + I_3."""
     inner = 0
     for moments in random_moments(np.random.default_rng(5), 200):
@@ -470,7 +473,7 @@ def test_r10_lemma_4_2_over_200_bodies():
     assert 20 < inner < 180
 
 
-def test_r11_r12_the_reference_table():
+def test_the_reference_table_r11_r12():
     p, period, first_return, phi, theta = TABLE.T
     family = METRIC.geodesics(p)
     points = family.conjugate_points()
@@ -482,7 +485,7 @@ def test_r11_r12_the_reference_table():
 
 
 @pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.full)])
-def test_r11_r12_two_hundred_values_against_mpmath(count):
+def test_two_hundred_values_against_mpmath_r11_r12(count):
     """T and R by other Legendre forms, the conjugate points by integrals along meridians, all to 30 digits."""
     rng = np.random.default_rng(6)
     bodies = random_moments(rng, count)
@@ -510,7 +513,7 @@ def test_r11_r12_two_hundred_values_against_mpmath(count):
 
 
 @pytest.mark.parametrize("p", [1.3, 0.7, float(np.sqrt(2.0) * (1.0 - 1e-9))])
-def test_r9_passing_the_crest(p):
+def test_rotating_geodesics_pass_the_crest_r9(p):
     """At odd quarters of the period, to the last digits around them, phi is the same multiple of K/alpha."""
     family = METRIC.geodesics(p)
     odd = np.array([-5.0, -1.0, 1.0, 3.0, 7.0])[:, None]
@@ -529,7 +532,7 @@ def extreme_case(rng, kind):
     return np.array([i1, i2, i3]), float(np.sqrt(low + (high - low) * (part if rng.uniform() < 0.5 else 1.0 - part)))
 
 
-def test_r12_conjugate_points_of_extreme_bodies():
+def test_conjugate_points_of_extreme_bodies_r12():
     """To rounding of the point itself, from next to the cusp to next to the separatrix."""
     rng = np.random.default_rng(9)
     tried = 0
@@ -556,7 +559,7 @@ def test_r12_conjugate_points_of_extreme_bodies():
 
 
 @pytest.mark.parametrize("kind", range(3))
-def test_r7_r8_r9_extreme_bodies(kind):
+def test_closed_forms_of_extreme_bodies_r7_r8_r9(kind):
     """phi and theta at exactly known times, by integrals in an angle that is regular at the turning point."""
     rng = np.random.default_rng(10 + kind)
     for _ in range(6):
@@ -583,7 +586,7 @@ def test_r7_r8_r9_extreme_bodies(kind):
             assert abs(float(family.theta(float(time)) - p * weighted)) < 4e-15 * (1 + float(p * b * time))
 
 
-def test_r11_derivative_of_the_return_is_that_of_the_period():
+def test_derivative_of_the_return_is_that_of_the_period_r11():
     """Lemma 2.8, R' = T'/(2 p), each by differences of its own closed form; and R''."""
     rng = np.random.default_rng(7)
     for moments in random_moments(rng, 50):
@@ -598,7 +601,7 @@ def test_r11_derivative_of_the_return_is_that_of_the_period():
         assert around.first_return_slope @ WEIGHTS / h == pytest.approx(here.first_return_bend, rel=1e-9)
 
 
-def test_r11_proposition_9_and_b_e10_over_200_bodies():
+def test_proposition_9_and_b_e10_over_200_bodies_r11():
     """On I_2 < p^2 < I_1 the first return decreases and is convex."""
     rng = np.random.default_rng(8)
     for moments in random_moments(rng, 200):
@@ -616,7 +619,7 @@ def test_r11_proposition_9_and_b_e10_over_200_bodies():
         assert not serret_andoyer_metric(moments).geodesics(np.sqrt(i2) * 0.999).is_oscillating
 
 
-def test_r12_conjugate_points_are_zeros_of_the_jacobi_field():
+def test_conjugate_points_are_zeros_of_the_jacobi_field_r12():
     for p in (1.7, 1.5, -1.45):
         family = METRIC.geodesics(p)
         for order in (1, 2, 3):
@@ -633,7 +636,7 @@ def test_r12_conjugate_points_are_zeros_of_the_jacobi_field():
             )
 
 
-def test_r12_the_locus_is_the_envelope_of_the_geodesics():
+def test_the_locus_is_the_envelope_of_the_geodesics_r12():
     """Neighbouring geodesics cross next to it: the crossing of p - h and p + h is off by h^2."""
     p, h = 1.55, 1e-3
     points = METRIC.geodesics(p).conjugate_points()
@@ -652,7 +655,7 @@ def test_r12_the_locus_is_the_envelope_of_the_geodesics():
     assert found == pytest.approx([points.phi, points.theta], abs=1e-7)
 
 
-def test_r12_r14_two_symmetric_branches_a_cusp_and_the_asymptote():
+def test_two_symmetric_branches_a_cusp_and_the_asymptote_r12_r14():
     """From a horizontal cusp on the equator to the parallel phi = -K/alpha; the mirror image is conjugate too."""
     root = np.sqrt(3.0)
     end = METRIC.geodesics(root).conjugate_points()
@@ -676,7 +679,7 @@ def test_r12_r14_two_symmetric_branches_a_cusp_and_the_asymptote():
     assert np.array_equal(mirrored.phi, points.phi)
 
 
-def test_r13_no_conjugate_points_on_rotating_geodesics():
+def test_no_conjugate_points_on_rotating_geodesics_r13():
     """The Jacobi field never comes back to zero, in closed form and integrated."""
     p = np.array([0.0, 0.4, 0.99, 1.0, 1.2, 1.4, 1.414])
     family = METRIC.geodesics(p[:, None])
@@ -692,7 +695,7 @@ def test_r13_no_conjugate_points_on_rotating_geodesics():
         METRIC.separatrix().conjugate_points()
 
 
-def test_b_e12_the_metric_is_singular_in_the_sub_riemannian_limit():
+def test_the_metric_is_singular_in_the_sub_riemannian_limit_b_e12():
     """I_1 -> infinity: the curvature of the equator and m(0) grow without bound."""
     for i1 in (1e2, 1e4, 1e6):
         metric = serret_andoyer_metric([i1, 2.0, 1.0])
@@ -722,7 +725,7 @@ def action_by_quadrature(total, energy):
 
 
 @pytest.mark.parametrize("start", STATES)
-def test_r15_actions_by_quadrature_and_frequencies_by_their_derivatives(start):
+def test_actions_by_quadrature_and_frequencies_by_their_derivatives_r15(start):
     """dJ/dE = 1/own_rate, dJ/dG = -precession_rate/own_rate."""
     v = andoyer_variables(so3.exp(np.array([0.3, 0.2, 0.5])), start)
     s = sadov_variables(MOMENTS, v)
@@ -739,7 +742,7 @@ def test_r15_actions_by_quadrature_and_frequencies_by_their_derivatives(start):
 
 
 @pytest.mark.parametrize("start", STATES)
-def test_r15_angles_advance_evenly(start):
+def test_angles_advance_evenly_r15(start):
     top = EulerTop.principal(MOMENTS, start, so3.exp(np.array([0.3, 0.2, 0.5])))
     times = np.linspace(0.0, 60.0, 121)
     s = sadov_variables(MOMENTS, andoyer_variables(top.attitude(times), top.body_momentum(times)))
@@ -753,7 +756,7 @@ def test_r15_angles_advance_evenly(start):
 
 
 @pytest.mark.parametrize("start", STATES)
-def test_r15_the_variables_are_canonical(start):
+def test_the_variables_are_canonical_r15(start):
     v = andoyer_variables(so3.exp(np.array([0.3, 0.2, 0.5])), start)
     point, h = np.array([v.g, v.l, v.total, v.axial]), 1e-3
     shifted = point + h * OFFSETS[:, None, None] * np.eye(4)
@@ -767,7 +770,7 @@ def test_r15_the_variables_are_canonical(start):
     assert np.abs(jacobian.T @ form @ jacobian - form).max() < 1e-10
 
 
-def test_r15_limits_of_the_action():
+def test_limits_of_the_action_r15():
     """0 along axis 1, G along axis 3, and on the separatrix the same from both sides."""
     zero = np.zeros(())
     for momentum, action in (((1.3, 0.0, 0.0), 0.0), ((-1.3, 0.0, 0.0), 0.0), ((0.0, 0.0, -1.3), 1.3)):

@@ -120,7 +120,7 @@ def unit_ellipsoid_stretch(aspect):
     return stretch
 
 
-def test_o1_extremals_solve_hamiltons_equations(case):
+def test_extremals_solve_hamiltons_equations_o1(case):
     surface = case.surface()
     for p in case.momenta:
         times = np.linspace(0.3, 1.7 * float(surface.period(p)), 13)
@@ -131,7 +131,7 @@ def test_o1_extremals_solve_hamiltons_equations(case):
         np.testing.assert_allclose(slope, raw[2], rtol=0, atol=2e-11)
 
 
-def test_o1_extremals_from_any_latitude_in_any_direction(case):
+def test_extremals_from_any_latitude_in_any_direction_o1(case):
     surface = case.surface()
     start = 0.3 * case.reach
     m = float(case.metric(np.asarray(start))[0])
@@ -148,7 +148,7 @@ def test_o1_extremals_from_any_latitude_in_any_direction(case):
         np.testing.assert_allclose(np.stack([d_phi, d_theta]) / scale, raw[3:5], rtol=0, atol=3e-10)
 
 
-def test_o2_clairaut_parallels_and_meridians(case):
+def test_clairaut_parallels_and_meridians_o2(case):
     surface = case.surface()
     p = np.array(case.momenta)
     times = np.linspace(0.0, 5.0, 21)
@@ -167,7 +167,7 @@ def test_o2_clairaut_parallels_and_meridians(case):
     assert longitude.shape == (len(p), len(times))
 
 
-def test_o2_a_meridian_runs_over_both_poles():
+def test_a_meridian_runs_over_both_poles_o2():
     surface = ellipsoid(0.7)
     times = np.linspace(0.1, 0.9, 5) * float(surface.period(0.0))
     latitude, longitude, _ = extremal(surface, 0.5 * np.pi).state(times)
@@ -177,7 +177,7 @@ def test_o2_a_meridian_runs_over_both_poles():
     np.testing.assert_allclose(longitude, np.pi * np.round(times / (2 * quarter)), atol=1e-14)
 
 
-def test_o3_potential_and_turning_points(case):
+def test_potential_and_turning_points_o3(case):
     surface = case.surface()
     for p in case.momenta:
         top = brentq(lambda x, p=p: float(case.metric(np.asarray(x))[0]) - p * p, 0.0, case.reach, xtol=1e-15)
@@ -190,7 +190,7 @@ def test_o3_potential_and_turning_points(case):
         )
 
 
-def test_o4_assumptions_are_checked(case):
+def test_assumptions_are_checked_o4(case):
     found = assumptions(lambda x: case.metric(x)[:2], case.reach)
     assert found.equator_is_parallel
     assert found.is_symmetric
@@ -200,7 +200,7 @@ def test_o4_assumptions_are_checked(case):
     assert case.surface().is_greatest_curvature_on_equator() == greatest
 
 
-def test_o4_metrics_that_break_an_assumption_are_refused():
+def test_metrics_that_break_an_assumption_are_refused_o4():
     tilted = assumptions(lambda x: (np.cos(x - 0.1) ** 2, -np.sin(2 * x - 0.2)), 1.0)
     assert not tilted.equator_is_parallel
     assert not tilted.is_symmetric
@@ -222,7 +222,7 @@ def test_o4_metrics_that_break_an_assumption_are_refused():
         surface_of_metric(lambda x: (1 - x**2 + np.abs(x) ** 3 / 9, -2 * x + x * np.abs(x) / 3), 0.8)
 
 
-def test_o5_jacobi_fields_by_two_routes_and_the_raw_equations(case):
+def test_jacobi_fields_by_two_routes_and_the_raw_equations_o5(case):
     surface = case.surface()
     for p in case.momenta:
         angle = float(surface.direction_of(p))
@@ -237,7 +237,7 @@ def test_o5_jacobi_fields_by_two_routes_and_the_raw_equations(case):
         np.testing.assert_allclose(d_theta / scale, raw[4], rtol=0, atol=1e-10 * np.abs(raw[4]).max())
 
 
-def test_o5_poincare_field_and_homogeneity(case):
+def test_poincare_field_and_homogeneity_o5(case):
     surface = case.surface()
     p = case.momenta[1]
     times = np.array([0.7, 2.9])
@@ -253,7 +253,7 @@ def test_o5_poincare_field_and_homogeneity(case):
     np.testing.assert_allclose(by_theta, (ahead[1] - behind[1]) / (2 * h), atol=1e-8)
 
 
-def test_o6_vertical_field_is_normal_to_the_extremal(case):
+def test_vertical_field_is_normal_to_the_extremal_o6(case):
     surface = case.surface()
     for p in case.momenta:
         path = extremal(surface, surface.direction_of(p))
@@ -263,7 +263,7 @@ def test_o6_vertical_field_is_normal_to_the_extremal(case):
         np.testing.assert_allclose(slope * d_phi + p * d_theta, 0.0, atol=1e-13 * np.abs(d_phi).max())
 
 
-def test_o7_no_conjugate_time_before_the_turning_point(case):
+def test_no_conjugate_time_before_the_turning_point_o7(case):
     surface = case.surface()
     p = np.array(case.momenta)
     fraction = np.linspace(0.01, 1.0, 30)
@@ -273,7 +273,7 @@ def test_o7_no_conjugate_time_before_the_turning_point(case):
     assert (conjugate_points_of_momentum(surface, p).time > surface.period(p) / 4.0).all()
 
 
-def test_o8_period_and_first_return_against_quadrature(case):
+def test_period_and_first_return_against_quadrature_o8(case):
     surface = case.surface()
     for p in case.momenta:
         top = brentq(lambda x, p=p: float(case.metric(np.asarray(x))[0]) - p * p, 0.0, case.reach, xtol=1e-15)
@@ -295,7 +295,7 @@ def test_o8_period_and_first_return_against_quadrature(case):
         np.testing.assert_allclose(raw[1], float(surface.first_return(p)) * np.array([1.0, 2.0]), rtol=1e-11)
 
 
-def test_o8_reference_values_of_the_andoyer_metric():
+def test_reference_values_of_the_andoyer_metric_o8():
     """theory.md section 6, to all printed digits."""
     surface = CASES["andoyer"].surface()
     table = {
@@ -317,7 +317,7 @@ def test_o8_reference_values_of_the_andoyer_metric():
     assert float(surface.curvature(surface.reach)) == pytest.approx(-1 / 6, abs=1e-9)
 
 
-def test_o8_the_stretch_of_the_andoyer_metric_in_closed_form_gives_the_same():
+def test_the_stretch_of_the_andoyer_metric_in_closed_form_gives_the_same_o8():
     a, b, c = ANDOYER
 
     def stretch(square, rest):
@@ -337,7 +337,7 @@ def test_o8_the_stretch_of_the_andoyer_metric_in_closed_form_gives_the_same():
     np.testing.assert_allclose(table.first_return_second_rate(p), closed.first_return_second_rate(p), rtol=1e-7)
 
 
-def test_o9_tame_flows_and_proposition_2(case):
+def test_tame_flows_and_proposition_2_o9(case):
     surface = case.surface()
     kinds = {"andoyer": "decreasing", "torus": "decreasing", "boundary": "decreasing", "bulged": "neither"}
     name = next(n for n, c in CASES.items() if c is case)
@@ -356,13 +356,13 @@ def curvature_of(metric, phi):
     return (m1**2 - 2.0 * m * m2) / (4.0 * m**2)
 
 
-def test_o10_gauss_curvature(case):
+def test_gauss_curvature_of_surfaces_o10(case):
     surface = case.surface()
     phi = case.reach * np.array([0.0, 1e-3, 0.1, -0.4, 0.7, 0.9])
     np.testing.assert_allclose(surface.curvature(phi), curvature_of(case.metric, phi), rtol=0, atol=2e-11)
 
 
-def test_o11_first_conjugate_point_of_the_equator_is_a_cusp(case):
+def test_first_conjugate_point_of_the_equator_is_a_cusp_o11(case):
     surface = case.surface()
     curvature = float(curvature_of(case.metric, 0.0))
     times = [float(conjugate_points(surface, 0.0, i).time) for i in (1, 2, 3)]
@@ -379,7 +379,7 @@ def test_o11_first_conjugate_point_of_the_equator_is_a_cusp(case):
         assert points.time.argmin() == 30
 
 
-def test_o11_the_injectivity_radius_is_the_first_conjugate_time_on_the_equator():
+def test_the_injectivity_radius_is_the_first_conjugate_time_on_the_equator_o11():
     for aspect in (0.3, 0.9):
         times = cut_time(ellipsoid(aspect), np.linspace(-np.pi / 2, np.pi / 2, 101))
         assert times.argmin() == 50
@@ -421,7 +421,7 @@ def envelope_latitude(case, p, order):
     ("name", "p", "order"),
     [("andoyer", 1.6, 1), ("torus", 2.0, 1), pytest.param("torus", 2.3, 2, marks=pytest.mark.full)],
 )
-def test_o12_conjugate_points_by_three_routes(name, p, order):
+def test_conjugate_points_by_three_routes_o12(name, p, order):
     case = CASES[name]
     surface = case.surface()
     point = conjugate_points_of_momentum(surface, p, order)
@@ -442,7 +442,7 @@ def test_o12_conjugate_points_by_three_routes(name, p, order):
     assert found == pytest.approx(float(point.latitude), abs=1e-7)
 
 
-def test_o12_general_points_and_orders_against_the_raw_equations(case):
+def test_general_points_and_orders_against_the_raw_equations_o12(case):
     surface = case.surface()
     start = 0.35 * case.reach
     m = float(case.metric(np.asarray(start))[0])
@@ -462,7 +462,7 @@ def test_o12_general_points_and_orders_against_the_raw_equations(case):
         assert brentq(raw, time - 0.01, time + 0.01, xtol=1e-13) == pytest.approx(time, abs=1e-10)
 
 
-def test_o12_from_a_turning_point_the_next_turning_points_are_conjugate(case):
+def test_from_a_turning_point_the_next_turning_points_are_conjugate_o12(case):
     surface = case.surface()
     latitude = 0.4 * case.reach
     p = float(surface.momentum_of(0.0, latitude))
@@ -473,7 +473,7 @@ def test_o12_from_a_turning_point_the_next_turning_points_are_conjugate(case):
         assert float(point.latitude) == pytest.approx((-1) ** order * latitude, abs=1e-12)
 
 
-def test_o13_derivative_of_the_conjugate_latitude(case):
+def test_derivative_of_the_conjugate_latitude_o13(case):
     """phi_1c' = (R'' + integral of f_pp)/f_p, each by itself."""
     surface = case.surface()
     h = 1e-4
@@ -496,7 +496,7 @@ def test_o13_derivative_of_the_conjugate_latitude(case):
         assert float(conjugate_height_rate(surface, p, 2)) == pytest.approx(combined, rel=1e-8)
 
 
-def test_o13_proposition_3_no_cusp_on_a_branch_where_the_first_return_is_convex():
+def test_proposition_3_no_cusp_on_a_branch_where_the_first_return_is_convex_o13():
     surface = CASES["andoyer"].surface()
     p = np.sqrt(np.linspace(2.01, 2.999, 200))
     assert (surface.first_return_second_rate(p) > 0.0).all()
@@ -507,7 +507,7 @@ def test_o13_proposition_3_no_cusp_on_a_branch_where_the_first_return_is_convex(
     assert locus.cusps == 2
 
 
-def test_o14_rates_of_the_first_return_and_of_the_period(case):
+def test_rates_of_the_first_return_and_of_the_period_o14(case):
     surface = case.surface()
     p = np.array(case.momenta)
     h = 2e-3
@@ -523,7 +523,7 @@ def test_o14_rates_of_the_first_return_and_of_the_period(case):
         np.testing.assert_allclose(slope, rate, rtol=2e-5, atol=1e-9)
 
 
-def test_o14_r_rate_is_half_the_period_rate_over_p_in_high_precision():
+def test_r_rate_is_half_the_period_rate_over_p_in_high_precision_o14():
     """Lemma 2.8 by mpmath's derivatives of quadratures of the torus, to 1e-10 and far below."""
     surface = CASES["torus"].surface()
     with mp.workdps(40):
@@ -560,7 +560,7 @@ def reversals(surface, order, latitude):
 @pytest.mark.parametrize("aspect", [0.6, 0.9, 1.3])
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("latitude", [0.0, 0.4])
-def test_o15_four_cusps_of_every_caustic(aspect, order, latitude):
+def test_four_cusps_of_every_caustic_o15(aspect, order, latitude):
     surface = ellipsoid(aspect)
     locus = conjugate_locus(surface, 360, order, latitude)
     assert locus.cusps == 4
@@ -569,7 +569,7 @@ def test_o15_four_cusps_of_every_caustic(aspect, order, latitude):
 
 
 @pytest.mark.parametrize("latitude", [0.0, -0.3])
-def test_o15_the_sampled_locus_is_that_of_its_directions(case, latitude):
+def test_the_sampled_locus_is_that_of_its_directions_o15(case, latitude):
     surface = case.surface()
     locus = conjugate_locus(surface, 24, 2, latitude)
     assert (np.diff(locus.points.direction) > 0.0).all()
@@ -580,7 +580,7 @@ def test_o15_the_sampled_locus_is_that_of_its_directions(case, latitude):
     np.testing.assert_allclose(locus.time_rate, rate, rtol=1e-7, atol=1e-8)
 
 
-def test_o15_eight_cusps_where_the_curvature_is_not_monotone_and_the_rate_of_the_time():
+def test_eight_cusps_where_the_curvature_is_not_monotone_and_the_rate_of_the_time_o15():
     surface = CASES["bulged"].surface()
     angles = np.array([-2.6, -1.1, 0.3, 1.0, 2.2])
     assert conjugate_locus(surface, 200).cusps == reversals(surface, 1, 0.0) == 8
@@ -593,7 +593,7 @@ def test_o15_eight_cusps_where_the_curvature_is_not_monotone_and_the_rate_of_the
             np.testing.assert_allclose(rate, slope, rtol=0, atol=1e-9)
 
 
-def test_o16_cut_locus_is_an_arc_of_the_opposite_parallel_or_meridian():
+def test_cut_locus_is_an_arc_of_the_opposite_parallel_or_meridian_o16():
     oblate, prolate, sphere = ellipsoid(0.7), ellipsoid(1.4), ellipsoid(1.0)
     for latitude in (0.0, 0.5):
         arc = cut_locus(oblate, latitude)
@@ -616,7 +616,7 @@ def test_o16_cut_locus_is_an_arc_of_the_opposite_parallel_or_meridian():
 
 
 @pytest.mark.parametrize("aspect", [0.7, 1.4])
-def test_o16_at_the_cut_time_the_mirror_image_arrives_and_no_shorter_way_exists(aspect):
+def test_at_the_cut_time_the_mirror_image_arrives_and_no_shorter_way_exists_o16(aspect):
     surface = ellipsoid(aspect)
     latitude = 0.3
     angles = np.array([0.2, 0.9, 1.4, -0.5, 2.1])
@@ -638,7 +638,7 @@ def test_o16_at_the_cut_time_the_mirror_image_arrives_and_no_shorter_way_exists(
         assert distance.min() > 0.015 * time
 
 
-def test_o16_cut_times_end_in_the_conjugate_time_at_the_ends_of_the_arc():
+def test_cut_times_end_in_the_conjugate_time_at_the_ends_of_the_arc_o16():
     for aspect, tips in ((0.7, (0.0, np.pi)), (1.4, (0.5 * np.pi, -0.5 * np.pi))):
         surface = ellipsoid(aspect)
         np.testing.assert_allclose(
