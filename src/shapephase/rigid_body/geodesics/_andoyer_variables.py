@@ -1,18 +1,18 @@
 """Andoyer's variables (g, k, l, G, K, L) of a turning body, to and from attitude and momentum and Euler angles.
 
-G is the size of the angular momentum mu, K its component along the inertial third axis, L along the body's third axis.
-With cos I = K/G and cos J = L/G the attitude, body to inertial axes, is
+G is the magnitude of the angular momentum mu, K its component along the inertial third axis, L that along the body's
+third axis. With cos I = K/G and cos J = L/G the attitude, body to inertial axes, is
 
     R = R_z(k + pi) R_x(I) R_z(g) R_x(J) R_z(l),
 
 so that Pi = (sqrt(G^2 - L^2) sin l, sqrt(G^2 - L^2) cos l, L), and mu has the azimuth k + pi/2. g, k, l are conjugate
 to G, K, L: the six are canonical on the cotangent bundle of SO(3). k is that of Bonnard et al.; Deprit's h is k + pi.
-The third axes matter: `attitude` may be turned by constant rotations on both sides before it comes here.
+For other third axes, multiply the attitude by constant rotations first.
 
 Singular are L = G and L = -G, where only g + l or g - l is determined, and K = G and K = -G, where only g + k or
-g - k is. There l, or k, is 0 and g takes the whole turn. Next to them the variables are coordinates that lose digits:
-attitudes come back from them to rounding times G/sqrt(G^2 - L^2) and G/sqrt(G^2 - K^2). What is not defined there
-(the rates of a body whose third axis is not principal) is refused, as is a momentum that is zero.
+g - k is. There l, or k, is set to 0 and g is the whole turn. Next to them the variables lose digits: attitudes are
+recovered to rounding times G/sqrt(G^2 - L^2) and G/sqrt(G^2 - K^2). The rates of a body whose third axis is not
+principal, undefined there, raise an error, and so does a zero momentum.
 
 Source: Bonnard, Cots and Shcherbakova 2013, section 3.4, with theory.md B-E3, B-E4; theory.md R1.
 """
@@ -33,13 +33,19 @@ from ...inertia_tensor import inverse_inertia
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
 _NEAREST = 1e-8
+"""sqrt(G^2 - L^2)/G; half of the digits of l are left there, and L rounds to G soon after."""
 _LARGEST_TURN = 1.0
-_STILL = 1e-9
+"""[rad] From one sample to the next: far from half a turn, where a turn's sense is lost."""
+_NO_TURN = 1e-9
+"""[rad] Turns of a body at rest, which do not become less with the step."""
 _MOST_SAMPLES = 200_000
+"""About 30 MB of attitudes; or eight times the samples asked for, if that is more."""
+_REFINEMENT_RATIO = 0.7
+"""Half the step turns by half; more than this share is a turn that was missed by whole turns."""
 
 
 class TurningBody(Protocol):
-    """What has an attitude and a body momentum at given times: an `EulerTop`, the `Motion` of `reconstruct`."""
+    """Anything with an attitude and a body momentum at given times: an `EulerTop`, the `Motion` of `reconstruct`."""
 
     def attitude(self, t: Array, /) -> Array:
         """R(t), body to inertial axes: (N,) -> (..., N, 3, 3)."""
@@ -91,7 +97,7 @@ class AndoyerVariables:
 
     @property
     def is_regular(self) -> Mask:
-        """Whether they are coordinates there: the parts of the momentum across both third axes are above 1e-8 of G."""
+        """Whether they are regular: the parts of the momentum across both third axes are above 1e-8 of G."""
         return (self._across > _NEAREST * self.total) & (self._level > _NEAREST * self.total)
 
     @property
@@ -210,7 +216,7 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
     Raises
     ------
     ShapeError
-        If an argument is no rotation or no finite vector, or a momentum is zero.
+        If an argument is not a rotation or not a finite vector, or a momentum is zero.
     """
     rotation = so3.rotation_argument(attitude, "attitude")
     momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
@@ -228,11 +234,18 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
     inward = _body_frame(np.arctan2(across, momentum[..., 2]), inner)
     middle = so3.transpose(_vertical_frame(azimuth, tilt)) @ rotation @ so3.transpose(inward)
     turn = np.arctan2(middle[..., 1, 0] - middle[..., 0, 1], middle[..., 0, 0] + middle[..., 1, 1])
-    # G was rounded in other axes; next to G its difference to L is what counts.
-    size = np.abs(momentum[..., 2])
-    axial = np.where(size > across, total - across**2 / (total + size), size)
+    # G was rounded in inertial axes; next to the pole G - |L| has to keep its digits.
+    magnitude = np.abs(momentum[..., 2])
+    axial = np.where(magnitude > across, total - across**2 / (total + magnitude), magnitude)
     axial = np.copysign(axial, momentum[..., 2])
-    return AndoyerVariables(so3.wrap(turn), so3.wrap(azimuth), so3.wrap(inner), total, vertical, axial)
+    return AndoyerVariables(
+        g=so3.wrap(turn),
+        k=so3.wrap(azimuth),
+        l=so3.wrap(inner),
+        total=total,
+        vertical=vertical,
+        axial=axial,
+    )
 
 
 def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart = ZYZ) -> AndoyerVariables:
@@ -243,7 +256,7 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
     ChartPoleError
         Within 1e-8 of a pole of the chart.
     ShapeError
-        If an argument is no finite vector, or a momentum is zero.
+        If an argument is not a finite vector, or a momentum is zero.
 
     Source: as `AndoyerVariables.euler_angles`.
     """
@@ -253,14 +266,14 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
 def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     """Andoyer's variables along a motion without torque, g and l unwrapped: times (N,) -> (..., N) each.
 
-    From (-pi, pi] at the first time. What g gains while Pi comes back, beside the turns of l, is the Montgomery phase:
-    if l gains 2 pi n, the body has turned about mu by the gain of g. Past L = G only g + l, past L = -G only g - l is
-    followed well, and g and l may gain half turns there that leave the attitude as it is. Between the times given the
-    motion is looked at more often, until it turns by less than a radian from one look to the next.
+    In (-pi, pi] at the first time. When Pi has returned and l has gained 2 pi n, the gain of g is the angle by which
+    the body has turned about mu, from which the Montgomery phase follows. Past L = G only g + l, past L = -G only g - l
+    is followed reliably, and g and l may gain half turns there that leave the attitude unchanged. Between the times
+    given the motion is sampled more densely, until it turns by less than a radian from one sample to the next.
 
     Parameters
     ----------
-    motion : has `attitude(t)` and `body_momentum(t)`: an `EulerTop`, a `Motion` (of a deforming body, too)
+    motion : with `attitude(t)` and `body_momentum(t)`: an `EulerTop`, or a `Motion`, also of a deforming body
     t : (N,) times in order, forward or backward; between two of them the body turns less than a few turns [s]
 
     Raises
@@ -289,11 +302,18 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     start = angles[..., :1, :]
     angles = angles + (so3.wrap(start) - start)
     axial = np.clip(momentum[..., 2], -total, total)
-    return AndoyerVariables(angles[..., 0], so3.wrap(azimuth), angles[..., 2], total, vertical, axial)
+    return AndoyerVariables(
+        g=angles[..., 0],
+        k=so3.wrap(azimuth),
+        l=angles[..., 2],
+        total=total,
+        vertical=vertical,
+        axial=axial,
+    )
 
 
 def _close_samples(motion: TurningBody, times: Array) -> tuple[Array, Array]:
-    """Times among which those given stand at even distance, and attitudes, close together at two levels."""
+    """Times, evenly spaced between those given, and attitudes there, close together on this grid and the one before."""
     steps, before, parts = np.diff(times), np.inf, 1
     while True:
         inner = times[:-1, None] + steps[:, None] * (np.arange(parts) / parts)
@@ -301,8 +321,8 @@ def _close_samples(motion: TurningBody, times: Array) -> tuple[Array, Array]:
         attitudes = motion.attitude(dense)
         turned = so3.angle(so3.transpose(attitudes[..., :-1, :, :]) @ attitudes[..., 1:, :, :])
         largest = float(np.max(turned, initial=0.0))
-        # Half the step, half the turn: whole turns from one sample to the next would look like none.
-        if before < _LARGEST_TURN and largest < 0.7 * before + _STILL:
+        # One grid is not enough: whole turns from one sample to the next would look like none.
+        if before < _LARGEST_TURN and largest < _REFINEMENT_RATIO * before + _NO_TURN:
             return dense, attitudes
         before = largest
         if dense.size > max(_MOST_SAMPLES, 8 * times.size):

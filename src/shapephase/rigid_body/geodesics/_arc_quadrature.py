@@ -1,9 +1,9 @@
 """Integrals along extremals of a surface of revolution in their phase, see `surface_of_revolution`.
 
-The integrands are smooth in the phase; what may be sharp is next to the equator, where D has singularities at
-negative Y, and next to the turning point, where they sit just beyond the reach. Panels of Gauss and Legendre's rule are
-graded towards both, geometrically: then the error is that of one panel, whatever the distance. Next to the turning
-point the complement of the phase is the variable, of which the cosine keeps its digits.
+The integrands are smooth in the phase. They may change fast next to the equator, where D has singularities at negative
+Y, and next to the turning point, beyond which it has others. Panels of the Gauss-Legendre rule are graded
+geometrically towards both, so that the error is that of one panel, however near a singularity is. Next to the turning
+point the complement of the phase is the variable, so that the cosine of the phase keeps its digits.
 """
 
 from __future__ import annotations
@@ -20,12 +20,20 @@ Triple = tuple[Array, Array, Array]
 Stretch = Callable[[Array, Array], Triple]
 """Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each."""
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_RULE = np.polynomial.legendre.leggauss(16)
+_NODES = _RULE[0]
+"""(16,) in [-1, 1]: right to rounding on panels that are as long as their distance to a singularity."""
+_WEIGHTS = _RULE[1]
 _NEAR_POLE = 1e-4
-"""Nearer, (D(Y) - D(1))/(1 - Y) is taken by the derivatives of D."""
-
+"""1 - Y; nearer, the difference D(Y) - D(1) loses four digits, and the series by D' and D'' is right to rounding."""
+_BEND_WIDTH = 0.02
+"""1 - Y, in units of |D'/D''| at the pole, up to which that series holds."""
+_NOT_ZERO = 1e-30
+"""Least q and depth - q of the grading: beyond that many halvings nothing changes."""
+_MOST_SPLITS = 7
+"""Parts of each panel; a metric that needs more is too rough."""
 _SETTLED = np.array([2e-13, 2e-13, 2e-12, 1e-8])
-"""Change that is no more than rounding: of D itself, and of derivatives that may come from a table of D."""
+"""Relative changes that are rounding: of integrals of D, and of its derivatives, which may come from a table of D."""
 
 
 class Arcs(NamedTuple):
@@ -36,7 +44,7 @@ class Arcs(NamedTuple):
     longitude: Array
     """theta [rad]."""
     bend: Array
-    """2 integral D'(Y) sin^2(chi) d chi; how time and longitude answer to the Clairaut constant."""
+    """2 integral D'(Y) sin^2(chi) d chi, its end value gives the derivatives by Clairaut's constant."""
 
 
 def quadrature(
@@ -44,12 +52,12 @@ def quadrature(
 ) -> tuple[Array, Array, Array, Array]:
     """Integrals from 0 to chi of D, D/(1 - Y), 2 D' sin^2 and 2 D'' sin^4: (N,) x 3 -> (N,) x 4.
 
-    With chi in [-pi/2, pi/2], Y = q sin^2(chi), `room` = depth - q. For an end at a pole the second is of
-    (D(Y) - D(1))/(1 - Y), whose missing part is elementary.
+    With chi in [-pi/2, pi/2], Y = q sin^2(chi), `room` = depth - q. If the reach is a pole the second is of
+    (D(Y) - D(1))/(1 - Y); the integral of the rest is elementary.
     """
     pole = stretch(np.ones(1), np.zeros(1)) if end == "pole" else None
-    size = np.abs(chi)
-    total = np.zeros((4, size.size))
+    angles = np.abs(chi)
+    total = np.zeros((4, angles.size))
 
     def add(active: Mask, start: Array, stop: Array, from_turning: bool) -> None:
         half = 0.5 * (stop - start)
@@ -63,15 +71,15 @@ def quadrature(
     equator_levels = 2 * (splits - 1)
     edges = _divided(quarter * 0.5 ** np.arange(equator_levels, -1, -1.0), splits)
     for low, high in pairwise(edges.tolist()):
-        active = size > low
+        active = angles > low
         if active.any():
             start = np.full(int(active.sum()), low)
-            add(active, start, np.minimum(size[active], high), from_turning=False)
-    levels = np.full(size.shape, equator_levels)
+            add(active, start, np.minimum(angles[active], high), from_turning=False)
+    levels = np.full(angles.shape, equator_levels)
     if end != "pole":
-        width = np.sqrt(np.maximum(room, 1e-30) / np.maximum(q, 1e-30))
+        width = np.sqrt(np.maximum(room, _NOT_ZERO) / np.maximum(q, _NOT_ZERO))
         levels = np.maximum(levels, np.ceil(np.log2(quarter / np.minimum(width, quarter))).astype(int) + 1)
-    remaining = np.maximum(0.5 * np.pi - size, 0.0)
+    remaining = np.maximum(0.5 * np.pi - angles, 0.0)
     for level in range(int(levels.max()) + 1):
         last = levels == level
         top = quarter * 0.5**level
@@ -87,22 +95,22 @@ def quadrature(
 
 
 def graded_rule(splits: int) -> tuple[Array, Array]:
-    """Nodes and weights (M,) on [0, 1] for what may be sharp next to 0, as fine as `quadrature` with these splits."""
+    """Nodes and weights (M,) on [0, 1], graded towards 0, as fine as those of `quadrature` with these splits."""
     edges = _divided(0.5 ** np.arange(2 * splits - 1, -1, -1.0), splits)
     half = 0.5 * np.diff(edges)[:, None]
     return (edges[:-1, None] + half * (1.0 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
 
 
 def folded_cosine(angle: Array) -> Array:
-    """cos in [-pi/2, pi/2], exactly 0 at the ends as rounded, so that a turning point is one."""
+    """cos in [-pi/2, pi/2], exactly 0 at the rounded ends, which stand for turning points."""
     return np.where(np.abs(angle) >= 0.5 * np.pi, 0.0, np.cos(angle))
 
 
 def settled_splits(stretch: Stretch, depth: float, end: str) -> int | None:
-    """The least number of splits of the panels with which finer ones make no difference; None if there is none."""
+    """The least number of parts of each panel at which the integrals have converged; None if there is none."""
     q = depth * np.array([0.02, 0.2, 0.5, 0.8, 0.95, 0.999])
     before = None
-    for splits in range(1, 8):
+    for splits in range(1, _MOST_SPLITS + 1):
         found = np.stack(quadrature(stretch, depth, end, q, depth - q, np.full(q.shape, 0.5 * np.pi), splits))
         if before is not None:
             change = np.abs(found - before) / (np.abs(found) + np.abs(found[0]))
@@ -120,8 +128,8 @@ def _integrands(
     if pole is None:
         angle = value / ((1.0 - depth) + rest)
     else:
-        # Where D bends sharply at the pole its series is good for less.
-        bending = 0.02 * abs(float(pole[2][0])) / max(abs(float(pole[1][0])), 1e-300)
+        # Where D bends sharply at the pole the series holds less far.
+        bending = _BEND_WIDTH * abs(float(pole[2][0])) / max(abs(float(pole[1][0])), 1e-300)
         near = rest * max(1.0, bending) < _NEAR_POLE
         # Less the mean of D' from here to the pole, by the trapezoidal rule corrected at both ends.
         mean = 0.5 * (slope + pole[1]) + rest / 12.0 * (second - pole[2])
@@ -130,7 +138,7 @@ def _integrands(
 
 
 def _divided(edges: Array, splits: int) -> Array:
-    """0 and ascending edges, every interval in equal parts."""
+    """0 and ascending edges, with every interval between them in equal parts."""
     whole = np.concatenate([[0.0], edges])
     parts = whole[:-1, None] + np.diff(whole)[:, None] * (np.arange(splits) / splits)
     return np.append(parts.ravel(), whole[-1])

@@ -18,9 +18,14 @@ from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
 from .surface_of_revolution import SurfaceOfRevolution
 
-_ORDERS = 1000
-_STILL = 1e-11
-"""Conjugate times that change by less with the direction, in parts of the time, do not change."""
+_HIGHEST_ORDER = 1000
+"""Beyond, the rounding of the period, times the order, is what the conjugate time is good for."""
+_CONSTANT_TIME = 1e-11
+"""Rates of the conjugate time by the direction [1/rad], in parts of the time, that are rounding."""
+_LEAST_DIRECTIONS = 8
+"""Two in each quadrant, the least that show the four cusps of a generic locus."""
+_BAND_MARGIN = 1e-6
+"""In parts of the widest angle of oscillating extremals, at which conjugate points are infinitely far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +90,7 @@ def conjugate_points_of_momentum(surface: SurfaceOfRevolution, momentum: ArrayLi
     """
     _check_order(order)
     p, q, room = surface.parameters(momentum)
-    start = Start(p, q, room, np.zeros(p.shape), np.ones(p.shape))
+    start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
     return _points(surface, np.asarray(surface.direction_of(p)), start, order)[0]
 
 
@@ -101,12 +106,13 @@ def conjugate_locus(
     order : from 1
     latitude : of the point
 
-    A cusp is where the conjugate time is extremal in the direction; two between neighbouring directions are missed.
+    A cusp is where the conjugate time is extremal as the direction varies; two of them between neighbouring directions
+    are missed.
 
     Raises
     ------
     ShapeError
-        As `conjugate_points`; or if fewer than 8 directions are asked for.
+        As `conjugate_points`; or for fewer than 8 directions.
     """
     _check_order(order)
     if isinstance(directions, int | np.integer):
@@ -125,13 +131,13 @@ def conjugate_locus(
             raise ShapeError("directions: expected how many, or ascending angles (N,)")
         points, rate = _points_and_rate(surface, chosen, order, latitude)
         band, closed = np.zeros(len(rate), dtype=int), False
-    signs = np.sign(np.where(np.abs(rate) < _STILL * points.time, 0.0, rate))
+    signs = np.sign(np.where(np.abs(rate) < _CONSTANT_TIME * points.time, 0.0, rate))
     moving = np.flatnonzero(signs)
     ahead = np.roll(moving, -1)
     change = (signs[moving] != signs[ahead]) & (band[moving] == band[ahead]) & (closed | (ahead > moving))
     here, there = points.direction[moving[change]], points.direction[ahead[change]]
     there = np.where(there < here, there + 2.0 * np.pi, there)
-    return ConjugateLocus(int(order), points, rate, 0.5 * (here + there))
+    return ConjugateLocus(order=int(order), points=points, time_rate=rate, cusp_directions=0.5 * (here + there))
 
 
 def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, order: int = 1) -> Array:
@@ -145,7 +151,7 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     ShapeError
         If p is that of the equator, where it is infinite, or of no oscillating extremal.
 
-    Source: Bonnard et al., before proposition 3, where R'' > 0 is asked for; theory.md B-E9, O13.
+    Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
     """
     _check_order(order)
     p, q, room = surface.parameters(momentum)
@@ -153,7 +159,7 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
         raise ShapeError(
             f"momentum: below sqrt(m(0)) = {surface.greatest_momentum:.17g}, at which the rate is infinite"
         )
-    start = Start(p, q, room, np.zeros(p.shape), np.ones(p.shape))
+    start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
     points, ends = _points(surface, np.asarray(surface.direction_of(p)), start, order)
     xi = points.phase - order * np.pi
     value, slope, _ = stretch_at(surface, q, room, xi)
@@ -199,13 +205,13 @@ def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int
     height = (-1.0) ** order * start.side * np.sqrt(q) * np.sin(xi)
     top = np.sqrt(surface.depth)
     points = ConjugatePoints(
-        angle,
-        p,
-        end.time - begin.time,
-        np.asarray(surface.latitude(np.clip(height, -top, top))),
-        end.longitude - begin.longitude,
-        height,
-        xi + order * np.pi,
+        direction=angle,
+        momentum=p,
+        time=end.time - begin.time,
+        latitude=np.asarray(surface.latitude(np.clip(height, -top, top))),
+        longitude=end.longitude - begin.longitude,
+        height=height,
+        phase=xi + order * np.pi,
     )
     return points, _Ends(begin, quarter, end)
 
@@ -235,9 +241,9 @@ def _whole_bend_rate(surface: SurfaceOfRevolution, q: Array, room: Array) -> Arr
 
 
 def _eastward(surface: SurfaceOfRevolution, count: int, latitude: float) -> Array:
-    """Half of so many directions of oscillating extremals: those to the east, none along an axis of symmetry."""
-    if count < 8:
-        raise ShapeError(f"directions: at least 8 are needed to see the locus, got {count}")
+    """The eastward half of `count` directions of oscillating extremals, none of them along an axis of symmetry."""
+    if count < _LEAST_DIRECTIONS:
+        raise ShapeError(f"directions: at least {_LEAST_DIRECTIONS} are needed to see the locus, got {count}")
     half = (count + 1) // 2
     if half % 2:
         half += 1
@@ -245,7 +251,7 @@ def _eastward(surface: SurfaceOfRevolution, count: int, latitude: float) -> Arra
 
 
 def _mirrored(points: ConjugatePoints, turn: float, changing: tuple[str, ...]) -> ConjugatePoints:
-    """Extremals in ascending directions and their mirror images, in directions `turn` less theirs, in one."""
+    """Conjugate points in ascending directions with their mirror images, in directions `turn` less theirs."""
     images = {name: (-values if name in changing else values)[::-1] for name, values in vars(points).items()}
     images["direction"] = turn - points.direction[::-1]
     pairs = [(images, vars(points)), (vars(points), images)][turn > 0.0]
@@ -253,15 +259,15 @@ def _mirrored(points: ConjugatePoints, turn: float, changing: tuple[str, ...]) -
 
 
 def _widest(surface: SurfaceOfRevolution, latitude: float) -> float:
-    """The greatest angle to the parallels of extremals that still oscillate, less a little where there are others."""
+    """The largest angle to the parallels of extremals that oscillate, less a margin where steeper ones do not."""
     if surface.has_smooth_poles:
         return 0.5 * np.pi
     here = float(np.sqrt(surface.metric(latitude)))
     if here <= surface.least_momentum:
         raise ShapeError(f"latitude: {latitude!r} is at the surface's end, from where no extremal oscillates")
-    return float(np.arccos(surface.least_momentum / here)) * (1.0 - 1e-6)
+    return float(np.arccos(surface.least_momentum / here)) * (1.0 - _BAND_MARGIN)
 
 
 def _check_order(order: int) -> None:
-    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= _ORDERS:
-        raise ShapeError(f"order: expected a whole number from 1 to {_ORDERS}, got {order!r}")
+    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= _HIGHEST_ORDER:
+        raise ShapeError(f"order: expected a whole number from 1 to {_HIGHEST_ORDER}, got {order!r}")

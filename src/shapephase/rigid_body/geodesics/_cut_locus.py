@@ -22,6 +22,11 @@ from ._conjugate_locus import conjugate_points
 from ._extremal import start_of
 from .surface_of_revolution import SurfaceOfRevolution
 
+_MERIDIAN = 1e-9
+"""In parts of the largest p: below, the longitude jumps at the pole within the rounding of the phase."""
+_POLE_MARGIN = 1e-12
+"""Of |y|, which is 1 at the pole, where the direction of an extremal is not defined."""
+
 
 @dataclass(frozen=True)
 class CutLocus:
@@ -47,16 +52,16 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     kind = _kind(surface, latitude)
     phi = float(latitude)
     if kind == "point":
-        return CutLocus(kind, (-phi, -phi), (np.pi, np.pi))
+        return CutLocus(kind=kind, latitudes=(-phi, -phi), longitudes=(np.pi, np.pi))
     if kind == "parallel":
         end = float(conjugate_points(surface, 0.0, 1, latitude).longitude)
-        return CutLocus(kind, (-phi, -phi), (end, 2.0 * np.pi - end))
+        return CutLocus(kind=kind, latitudes=(-phi, -phi), longitudes=(end, 2.0 * np.pi - end))
     ends = np.sort(conjugate_points(surface, np.array([0.5, -0.5]) * np.pi, 1, latitude).latitude)
-    return CutLocus(kind, (float(ends[0]), float(ends[1])), (np.pi, np.pi))
+    return CutLocus(kind=kind, latitudes=(float(ends[0]), float(ends[1])), longitudes=(np.pi, np.pi))
 
 
 def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Array:
-    """How long extremals from a latitude in directions (...) [rad] are the shortest way: (...) -> (...) [length].
+    """The length up to which extremals from a latitude in directions (...) [rad] are shortest: (...) -> (...).
 
     Until they meet their mirror image: at the opposite parallel, after half a period, or at the opposite meridian.
 
@@ -71,28 +76,28 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     if kind != "meridian":
         return np.asarray(0.5 * surface.period(start.momentum))[()]
     p, q, room, first = (np.ravel(a) for a in (start.momentum, start.q, start.room, start.phase))
-    size = np.abs(p)
-    begin = surface.trusted_arcs(size, q, room, first)
+    magnitude = np.abs(p)
+    begin = surface.trusted_arcs(magnitude, q, room, first)
     # Next to a meridian the longitude jumps at the pole, and the conjugate point is the limit of the meeting points.
-    straight = size <= 1e-9 * surface.greatest_momentum
+    straight = magnitude <= _MERIDIAN * surface.greatest_momentum
 
     def step(chi: Array) -> tuple[Array, Array]:
-        gained = surface.trusted_arcs(size, q, room, chi).longitude - begin.longitude - np.pi
+        gained = surface.trusted_arcs(magnitude, q, room, chi).longitude - begin.longitude - np.pi
         square = q * np.sin(chi) ** 2
         value, _, _ = surface.stretch(square, surface.depth - square)
-        rate = size / surface.equator * value / np.maximum(1.0 - square, np.finfo(float).tiny)
+        rate = magnitude / surface.equator * value / np.maximum(1.0 - square, np.finfo(float).tiny)
         return gained, chi - gained / np.maximum(rate, np.finfo(float).tiny)
 
     chi = root(step, first + 0.9 * np.pi, first, first + np.pi)
-    time = surface.trusted_arcs(size, q, room, chi).time - begin.time
+    time = surface.trusted_arcs(magnitude, q, room, chi).time - begin.time
     conjugate = np.ravel(conjugate_points(surface, angle, 1, latitude).time)
     return np.where(straight, conjugate, time).reshape(angle.shape)[()]
 
 
 def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
     if not surface.has_smooth_poles:
-        raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this surface ends at a {surface.end}")
-    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - 1e-12:
+        raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this one ends at a {surface.end}")
+    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - _POLE_MARGIN:
         raise ShapeError(f"latitude: one number between the poles is needed, got {latitude!r}")
     trend = surface.curvature_trend()
     if trend == "neither":

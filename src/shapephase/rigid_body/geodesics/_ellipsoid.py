@@ -22,7 +22,9 @@ from ...errors import ShapeError
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
-_ASPECTS = (1e-3, 1e3)
+_LEAST_ASPECT = 1e-3
+"""Far beyond any body of use, and its square, of which the closed forms are made, keeps ten digits beside 1."""
+_LARGEST_ASPECT = 1e3
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,11 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
     Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
     """
     epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
-    if not _ASPECTS[0] <= epsilon <= _ASPECTS[1]:
+    if not _LEAST_ASPECT <= epsilon <= _LARGEST_ASPECT:
         raise ShapeError(f"aspect: polar over equatorial axis must be between 0.001 and 1000, got {epsilon!r}")
     if not radius > 0.0:
         raise ShapeError(f"equatorial_radius: must be positive, got {radius!r}")
-    stretch = EllipsoidStretch(epsilon, radius)
+    stretch = EllipsoidStretch(aspect=epsilon, radius=radius)
     return surface_of_stretch(stretch, radius**2, 1.0, "pole", stretch.arcs)
 
 
@@ -108,7 +110,7 @@ def ellipsoid_period(aspect: float, momentum: ArrayLike) -> Array:
     epsilon = _number(aspect, "aspect")
     p = finite_array(momentum, "momentum")
     if np.any(np.abs(p) > 1.0):
-        raise ShapeError("momentum: on a unit equator Clairaut's constant is at most 1 in size")
+        raise ShapeError("momentum: on a unit equator the absolute value of Clairaut's constant is at most 1")
     alpha2 = epsilon**2 * p * p + (1.0 - p) * (1.0 + p)
     if epsilon <= 1.0:
         return 4.0 * np.sqrt(alpha2) * elliptic.complete_e(np.minimum(epsilon**2 / alpha2, 1.0))
@@ -119,13 +121,13 @@ def astroid(aspect: float, direction: ArrayLike) -> tuple[Array, Array]:
     """Parametric latitude and longitude of a nearly round ellipsoid's caustic: (...) -> (...), (...).
 
     (-pi f sin^3, pi - pi f cos^3) of the direction at the start, east to north [rad], with f = 1 - epsilon: an astroid
-    with its centre opposite to the start on the equator. It is what `conjugate_locus` tends to as f -> 0.
+    with its centre opposite to the start on the equator. It is the limit of `conjugate_locus` as f -> 0.
 
     Source: the formulae of `surface_of_revolution` to first order in f; theory.md P3.
     """
     angle = finite_array(direction, "direction", unit="rad")
-    size = np.pi * (1.0 - _number(aspect, "aspect"))
-    return -size * np.sin(angle) ** 3, np.pi - size * np.cos(angle) ** 3
+    radius = np.pi * (1.0 - _number(aspect, "aspect"))
+    return -radius * np.sin(angle) ** 3, np.pi - radius * np.cos(angle) ** 3
 
 
 def _number(value: float, name: str) -> float:

@@ -14,6 +14,11 @@ from ...roots import ROUNDING, root
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
+_RELATIVE_TOLERANCE = 3e-14
+"""Just above the least that SciPy accepts: the integration is there to check the closed form."""
+_ABSOLUTE_TOLERANCE = 1e-15
+"""[rad, or length of a field that starts with slope 1]"""
+
 
 @dataclass(frozen=True, eq=False)
 class Start:
@@ -113,7 +118,7 @@ class Extremal:
         return field * p / distance, -field * slope / distance
 
     def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
-        """J_2 = t dq/dt, of phi and theta: how the end moves with the size of the initial momentum, at times t.
+        """J_2 = t dq/dt, of phi and theta: how the end moves with the magnitude of the initial momentum, at times t.
 
         Source: Bonnard et al., section 2.2.
         """
@@ -137,7 +142,7 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     ShapeError
         If a direction leads out of the band of extremals that oscillate about the equator within the chart.
     """
-    return Extremal(surface, start_of(surface, direction, latitude))
+    return Extremal(surface=surface, start=start_of(surface, direction, latitude))
 
 
 def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Start:
@@ -154,7 +159,7 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     room = np.maximum(cosine * cosine * rest - (1.0 - surface.depth), 0.0)
     side = np.where(sine < 0.0, -1.0, 1.0)
     phase = np.arctan2(side * y, np.abs(sine) * np.sqrt(rest))
-    return Start(p, q, room, phase, side)
+    return Start(momentum=p, q=q, room=room, phase=phase, side=side)
 
 
 def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array) -> tuple[Array, Array, Array]:
@@ -171,7 +176,7 @@ def variational_jacobi_field(
 ) -> Array:
     """`Extremal.jacobi_field` of one direction by integration of Jacobi's equation j'' + G j = 0: (N,) -> (N,).
 
-    The phase is integrated along, by d chi/dt = 1/D, so that turning points are no obstacle. Times ascend, from 0 on.
+    The phase is integrated with it, by d chi/dt = 1/D, so that turning points are regular. Times ascend, from 0 on.
 
     Raises
     ------
@@ -192,7 +197,9 @@ def variational_jacobi_field(
 
     state = [float(start.phase), 0.0, 1.0]
     span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
-    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=3e-14, atol=1e-15)
+    solution = solve_ivp(
+        rate, span, state, method="DOP853", t_eval=t, rtol=_RELATIVE_TOLERANCE, atol=_ABSOLUTE_TOLERANCE
+    )
     if not solution.success:
         raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
     return solution.y[1]
@@ -203,5 +210,5 @@ def _fields(start: Start) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def _spread(values: Array, times: Array) -> Array:
-    """The directions' axes first, then room for those of the times."""
+    """The directions' axes, followed by one of length 1 for each axis of the times."""
     return np.reshape(values, np.shape(values) + (1,) * np.ndim(times))

@@ -1,6 +1,7 @@
 """The metric of an axisymmetric body on SO(3) in closed form: conjugate times, cut times, diameter, distances.
 
-Moments (I_1, I_1, I_3), I_3 infinite for the sub-Riemannian metric. With eta = I_1/I_3 − 1 >= −1, p_3 the axial part of
+Moments (I_1, I_1, I_3) about axes named by the symmetry, the third the axis of symmetry, whichever moment is larger;
+I_3 is infinite for the sub-Riemannian metric. With eta = I_1/I_3 − 1 >= −1, p_3 the axial part of
 the momentum's direction, tau = t |Pi|/(2 I_1) and beta = eta p_3 tau, the geodesic in quaternions is
 
     q_0 + i q_3 = exp(i beta) (cos tau + i p_3 sin tau),   |q_1 + i q_2| = sqrt(1 − p_3²) sin tau.
@@ -23,8 +24,7 @@ from scipy.optimize import brentq
 from ... import so3
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-
-_HALVINGS = 60
+from ...roots import root
 
 
 @dataclass(frozen=True)
@@ -66,21 +66,25 @@ class AxisymmetricMetric:
         Raises
         ------
         ShapeError
-            If a momentum is no three finite numbers, or nothing moves with it; so do all methods.
+            If a momentum is not three finite numbers, or nothing moves with it; so do all methods.
         """
         axial, unit_time = self._direction(momentum)
         if self.eta <= 0.0:
             return np.pi * unit_time
         kappa = self.eta * (1.0 - axial) * (1.0 + axial) / (1.0 + self.eta * axial**2)
-        # Newton from above on a convex function of pi − tau.
-        rest = np.arctan(np.pi * kappa)
-        for _ in range(_HALVINGS):
-            slope = 1.0 + kappa / (1.0 + (kappa * (np.pi - rest)) ** 2)
-            rest = rest - (rest - np.arctan(kappa * (np.pi - rest))) / slope
+        flat = np.ravel(kappa)
+
+        def step(rest: Array) -> tuple[Array, Array]:
+            """In pi − tau, of which the equation is increasing and convex."""
+            value = rest - np.arctan(flat * (np.pi - rest))
+            return value, rest - value / (1.0 + flat / (1.0 + (flat * (np.pi - rest)) ** 2))
+
+        start = np.arctan(np.pi * flat)
+        rest = root(step, start, np.zeros_like(flat), start).reshape(np.shape(kappa))
         return (np.pi - rest) * unit_time
 
     def cut_time(self, momentum: ArrayLike) -> Array:
-        """When a geodesic stops to be the shortest: (..., 3) -> (...) [s].
+        """When a geodesic stops being the shortest: (..., 3) -> (...) [s].
 
         tau = pi or the first zero of q_0, whichever comes first.
         """
@@ -100,7 +104,7 @@ class AxisymmetricMetric:
     def distance_to_turn(self, angle: ArrayLike) -> Array:
         """The distance to a turn about the axis of symmetry by any angle [rad]: (...) -> (...).
 
-        With alpha in [0, pi] what the angle is up to whole turns and sign: sqrt(I_3) alpha straight about the axis;
+        With alpha in [0, pi] the angle but for whole turns and sign: sqrt(I_3) alpha straight about the axis;
         from alpha = 2 pi (1 + eta) on, where eta < 0, by the geodesics with tau = pi,
         2 pi sqrt(I_1 (1 + (1 − alpha/(2 pi))²/eta)). Sub-Riemannian: sqrt(I_1 alpha (4 pi − alpha)).
         """
@@ -133,7 +137,7 @@ class AxisymmetricMetric:
         """The momentum whose geodesic comes to the attitude at t = 1 by the shortest way: (..., 3, 3) -> (..., 3).
 
         The attitude leaves one unknown, the angle nu of cos tau + i p_3 sin tau, and before the cut the angle nu + beta
-        of q_0 + i q_3 passes each value once. On the cut one of several shortest ways is taken.
+        of q_0 + i q_3 takes each value once. On the cut one of several shortest ways is chosen.
 
         Raises
         ------
@@ -164,7 +168,7 @@ class AxisymmetricMetric:
             angle = float(brentq(lambda nu: way(nu, side)[2] - target, 0.0, quarter, xtol=1e-300, rtol=1e-15))  # type: ignore[arg-type]
         sine, turn, _ = way(angle, side)
         tau = float(np.arctan2(sine, side * along * np.cos(angle)))
-        # tau near pi has not the digits of its sine.
+        # tau near pi has fewer digits than its sine.
         flat = tau / sine * so3.apply(so3.exp(np.array([0.0, 0.0, sign * self.eta * turn])), quat[:3])
         return 2.0 * self.equatorial * np.array([flat[0], flat[1], sign * turn])
 
@@ -183,34 +187,39 @@ class AxisymmetricMetric:
         q_0 is proportional to the cosine of tau + arctan(p_3 tan beta), q_3/p_3 to the sine of
         tau + arctan(tan beta/p_3), both angles followed along tau from 0; they grow.
         """
-        axial = np.abs(axial)
+        shape, axial = np.shape(axial), np.ravel(np.abs(axial))
         target = np.pi if on_su2 else 0.5 * np.pi
-        lower, upper = np.zeros(np.shape(axial)), np.full(np.shape(axial), np.pi)
-        for _ in range(_HALVINGS):
-            tau = 0.5 * (lower + upper)
+
+        def step(tau: Array) -> tuple[Array, Array]:
             beta = self.eta * axial * tau
             sine, cosine = np.sin(beta), np.cos(beta)
             if on_su2:
                 # sin(beta)/p_3, finite at p_3 = 0.
-                slope = self.eta * tau * np.sinc(beta / np.pi)
-                lead = np.arctan2((1.0 - axial) * slope * cosine, cosine**2 + sine * slope)
+                ratio = self.eta * tau * np.sinc(beta / np.pi)
+                lead = np.arctan2((1.0 - axial) * ratio * cosine, cosine**2 + sine * ratio)
+                rate = 1.0 + self.eta / (cosine**2 + ratio**2)
             else:
+                denominator = cosine**2 + axial**2 * sine**2
                 lead = np.arctan2((axial - 1.0) * sine * cosine, cosine**2 + axial * sine**2)
-            early = tau + beta + lead < target
-            lower, upper = np.where(early, tau, lower), np.where(early, upper, tau)
-        return upper[()]
+                rate = 1.0 + self.eta * axial**2 / np.maximum(denominator, np.finfo(float).tiny)
+            value = tau + beta + lead - target
+            # Where the angle stands still the bracket is halved, as this step leaves it.
+            return value, tau - value / np.maximum(rate, np.finfo(float).tiny)
+
+        latest = np.full(axial.shape, np.pi)
+        return root(step, latest, np.zeros(axial.shape), latest).reshape(shape)[()]
 
     def _direction(self, momentum: ArrayLike) -> tuple[Array, Array]:
-        """p_3, and the time in which tau grows by 1."""
+        """p_3, and the time in which tau grows by 1 [s]."""
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-        size = np.linalg.norm(pi, axis=-1)
-        flat = np.hypot(pi[..., 0], pi[..., 1])
-        if np.any(flat == 0.0 if np.isinf(self.axial) else size == 0.0):
+        magnitude = np.linalg.norm(pi, axis=-1)
+        across = np.hypot(pi[..., 0], pi[..., 1])
+        if np.any(across == 0.0 if np.isinf(self.axial) else magnitude == 0.0):
             raise ShapeError(
                 "momentum: nothing moves with zero momentum"
                 + (", nor with one along the axis, the forbidden direction" if np.isinf(self.axial) else "")
             )
-        return pi[..., 2] / size, 2.0 * self.equatorial / size
+        return pi[..., 2] / magnitude, 2.0 * self.equatorial / magnitude
 
 
 def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
@@ -234,4 +243,4 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
         raise ShapeError(
             f"moments: the equatorial must be finite and above 0, the axial one above 0 or inf; got {first}, {third}"
         )
-    return AxisymmetricMetric(first, third)
+    return AxisymmetricMetric(equatorial=first, axial=third)

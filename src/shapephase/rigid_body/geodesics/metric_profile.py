@@ -1,4 +1,4 @@
-"""A surface of revolution from its metric F_1(x) dx^2 + F_2(x) d theta^2, given by functions: the polar form found.
+"""A surface of revolution from its metric F_1(x) dx^2 + F_2(x) d theta^2, given by functions.
 
 x is any coordinate along the meridians, 0 on the equator; with F_1 = 1 it is the latitude phi and F_2 is m. The
 stretch D (see `surface_of_revolution`) is tabulated once, by Chebyshev polynomials on panels that are halved until they
@@ -26,12 +26,35 @@ Meridian = Callable[[Array], Array]
 """x (N,) -> F_1 > 0 (N,)."""
 
 _DEGREE = 24
+"""Of the polynomial on a panel: high enough for few panels, low enough for derivatives that keep their digits."""
 _HALVINGS = 14
+"""Of the panels: a metric that needs more is too rough, or given with noise."""
 _SETTLED = 1.5e-15
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+"""Last coefficients, in parts of the largest value, that are rounding; about seven eps."""
+_MOST_FORGIVEN = 20.0 * _SETTLED
+"""The same on the finest panels, where the noise of the functions given is all that is left."""
+_TRIMMED = 4e-16
+"""Coefficients, in parts of the largest value, that are dropped at the end of a series: two eps."""
+_RULE = np.polynomial.legendre.leggauss(32)
+_NODES = _RULE[0]
+"""(32,) in [-1, 1]: with few panels right to rounding for F_2' that a polynomial of `_DEGREE` holds."""
+_WEIGHTS = _RULE[1]
+_MOST_PANELS = 64
+"""Of the integral of F_2': enough for metrics that `_DEGREE` and `_HALVINGS` can resolve."""
+_DROP_SETTLED = 1e-14
+"""Change of Y, in [0, 1], with the number of panels that is rounding."""
+_DROP_ERROR = 1e-11
+"""Difference of Y by F_2 and by the integral of F_2' above which the derivative is wrong."""
 _SAMPLES = 257
+"""Of each function, by which the assumptions are judged."""
+_ROUNDING = 1e-12
+"""In parts of the largest value: differences of F_1, F_2 and slopes that are rounding."""
+_SLOPE_ROUNDING = 1e-10
+"""The same for F_2' on both sides of the equator, which a caller may have by differences."""
+_FLAT = 1e-9
+"""In parts of the largest |F_2'|: smaller slopes at the reach are those of a parallel."""
 _NEAREST = 1e-60
-"""D at a parallel itself is infinite; so near to it the curvature has its limit."""
+"""Least depth - Y: at a parallel D is infinite, while so near to it the curvature has reached its limit."""
 
 
 @dataclass(frozen=True)
@@ -103,19 +126,19 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
         raise ShapeError("F_1 and F_2 must be positive from the equator to the reach, not counting a pole there")
     steepness = np.abs(north_slope).max()
     end = "boundary"
-    if north[-1] <= 1e-12 * scale:
+    if north[-1] <= _ROUNDING * scale:
         end = "pole"
-    elif abs(north_slope[-1]) <= 1e-9 * steepness:
+    elif abs(north_slope[-1]) <= _FLAT * steepness:
         end = "parallel"
     return Assumptions(
-        bool(abs(north_slope[0]) <= 1e-12 * steepness),
-        bool(
-            np.abs(north - south).max() <= 1e-12 * scale
-            and np.abs(north_slope + south_slope).max() <= 1e-10 * steepness
-            and np.abs(along - back).max() <= 1e-12 * along.max()
+        equator_is_parallel=bool(abs(north_slope[0]) <= _ROUNDING * steepness),
+        is_symmetric=bool(
+            np.abs(north - south).max() <= _ROUNDING * scale
+            and np.abs(north_slope + south_slope).max() <= _SLOPE_ROUNDING * steepness
+            and np.abs(along - back).max() <= _ROUNDING * along.max()
         ),
-        bool((north_slope[1:-1] < 0.0).all()),
-        end,
+        falls_to_reach=bool((north_slope[1:-1] < 0.0).all()),
+        end=end,
     )
 
 
@@ -131,8 +154,8 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
     Raises
     ------
     ShapeError
-        If the metric breaks an assumption: its equator no parallel, not symmetric, F_2 not falling to the reach; or the
-        derivative is not that of F_2.
+        If the metric breaks an assumption: its equator is no geodesic, it is not symmetric, or F_2 does not fall to the
+        reach; or if the derivative is not that of F_2.
     AccuracyNotReached
         If the metric is too rough to be tabulated to rounding.
 
@@ -165,14 +188,14 @@ class _Sampler:
         truth = 1.0 - middle / self.equator
         self.panels = 1
         last = self.drop(np.zeros_like(x), x)
-        while self.panels < 64:
+        while self.panels < _MOST_PANELS:
             self.panels *= 2
             finer = self.drop(np.zeros_like(x), x)
-            settled = np.abs(finer - last).max() <= 1e-14
+            settled = np.abs(finer - last).max() <= _DROP_SETTLED
             last = finer
             if settled:
                 break
-        if np.abs(last - truth).max() > 1e-11:
+        if np.abs(last - truth).max() > _DROP_ERROR:
             at = x[int(np.abs(last - truth).argmax())]
             raise ShapeError(
                 f"profile: the derivative given is not that of F_2, or F_2 is too rough, up to x = {at:.6g}"
@@ -218,8 +241,8 @@ class _Sampler:
             samples = self.tabulated(square, rest)
             coefficients = np.asarray(dct(samples[::-1], type=2)) / (_DEGREE + 1)
             coefficients[0] *= 0.5
-            # Ever finer panels forgive more, as the functions given may have a last digit that is noise.
-            forgiven = min(_SETTLED * 1.5 ** np.log2(1.0 / (high - low)), 20.0 * _SETTLED)
+            # Finer panels tolerate more, as the last digit of the functions given may be noise.
+            forgiven = min(_SETTLED * 1.5 ** np.log2(1.0 / (high - low)), _MOST_FORGIVEN)
             if np.abs(coefficients[-3:]).max() > forgiven * np.abs(samples).max():
                 if high - low < 0.5**_HALVINGS:
                     raise AccuracyNotReached(
@@ -230,14 +253,14 @@ class _Sampler:
                 # The half next to the reach first, so that edges ascend in depth - Y.
                 waiting += [(low, middle), (middle, high)]
                 continue
-            # What is left at the end is rounding, which every derivative would magnify.
-            coefficients = chebyshev.chebtrim(coefficients, 4e-16 * np.abs(samples).max())
+            # The last ones are rounding, which every derivative would magnify.
+            coefficients = chebyshev.chebtrim(coefficients, _TRIMMED * np.abs(samples).max())
             coefficients = np.pad(coefficients, (0, max(0, 3 - len(coefficients))))
             scale = 2.0 / (self.depth * (high - low))
             first, second = (chebyshev.chebder(coefficients, order) * scale**order for order in (1, 2))
             series.append(np.stack([coefficients, np.pad(first, (0, 1)), np.pad(second, (0, 2))]))
             edges.append(self.depth * (1.0 - low))
-        return TabulatedStretch(np.array(edges), tuple(series), self.end == "parallel")
+        return TabulatedStretch(edges=np.array(edges), series=tuple(series), has_root=self.end == "parallel")
 
 
 def _values(profile: Profile, x: Array) -> tuple[Array, Array]:

@@ -33,27 +33,39 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arrays import Array, Mask, finite_array
+from ...arrays import Array, finite_array
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, root
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
+from ._checks import check_entries
 
 ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]
 """p >= 0, q, depth - q and phases in [-pi/2, pi/2], all (N,) -> `Arcs`: what `quadrature` finds by nodes."""
 
 _ENDS = ("pole", "parallel", "boundary")
-_EDGE = 1e-9
-"""Next to a parallel that extremals approach without end, p must stay this far away, in parts of p."""
+_SEPARATRIX_MARGIN = 1e-9
+"""In parts of p: nearer to that of a parallel, which extremals approach without end, results lose half their digits."""
 _NEAREST = 1e-60
-"""At a parallel the stretch is infinite; so near to it the curvature has its limit."""
+"""Least depth - Y: at a parallel the stretch is infinite, while so near to it the curvature has reached its limit."""
+_REACH_ROUNDING = 1e-12
+"""In parts of the reach: so much further latitudes are taken for the reach."""
+_TIP_SLOPE_ERROR = 1e-9
+"""Poles whose slope of sqrt(m) is 1 but for so much are smooth; tabulated metrics are not known better."""
+_SAMPLES = 65
+"""Values of p, or of y, by which the trends of the first return and of the curvature are judged."""
+_CONSTANT_RETURN = 1e-11
+"""Rates of the first return, in parts of reach/m(0), that are rounding."""
+_CONSTANT_CURVATURE = 1e-10
+"""Range of the curvature, in parts of its largest value, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceOfRevolution:
     """A surface d phi^2 + m(phi) d theta^2 by its stretch; made by `surface_of_stretch` and the functions that call it.
 
-    Lengths are in the unit of phi. Extremals oscillate about the equator when their Clairaut constant p, in size, is
-    between `least_momentum` and `greatest_momentum`; these, and the meridians p = 0 over smooth poles, are treated.
+    Lengths are in the unit of phi. Extremals oscillate about the equator if the absolute value of their Clairaut
+    constant p is between `least_momentum` and `greatest_momentum`; these are covered, and the meridians p = 0 over
+    smooth poles.
     Results are right to a few units of rounding, magnified by 1/(p/`least_momentum` - 1) before a parallel.
     """
 
@@ -77,7 +89,7 @@ class SurfaceOfRevolution:
 
     @property
     def least_momentum(self) -> float:
-        """sqrt(m(reach)); from here on down extremals leave the chart, or pass beyond the parallel at its end."""
+        """sqrt(m(reach)); below it extremals leave the chart, or pass the parallel at its end."""
         return float(np.sqrt(self.equator * (1.0 - self.depth)))
 
     @property
@@ -87,32 +99,34 @@ class SurfaceOfRevolution:
 
     @property
     def has_smooth_poles(self) -> bool:
-        """Whether it closes to a smooth sphere: two poles without a cone's tip, where sqrt(m) has the slope 1."""
+        """Whether it closes to a smooth sphere: sqrt(m) has the slope 1 at its poles, which are no tips of cones."""
         if self.end != "pole":
             return False
         stretch, _, _ = self.stretch(np.ones(1), np.zeros(1))
-        return bool(abs(stretch[0] / self.greatest_momentum - 1.0) < 1e-9)
+        return bool(abs(stretch[0] / self.greatest_momentum - 1.0) < _TIP_SLOPE_ERROR)
 
     def height(self, latitude: ArrayLike) -> Array:
         """y of latitudes phi: (...) -> (...). Raises ShapeError beyond the reach."""
         phi = finite_array(latitude, "latitude")
         reach = self.reach
-        _refuse(np.abs(phi) > reach * (1.0 + 1e-12), phi, "latitude", f"the surface reaches to {reach:.17g}")
-        size = np.minimum(np.abs(phi), reach).ravel()
+        beyond = np.abs(phi) > reach * (1.0 + _REACH_ROUNDING)
+        check_entries(beyond, phi, "latitude", f"the surface reaches to {reach:.17g}")
+        distance = np.minimum(np.abs(phi), reach).ravel()
         top = np.sqrt(self.depth)
 
         def step(angle: Array) -> tuple[Array, Array]:
             value, slope = self._meridian(angle)
-            return value - size, angle - (value - size) / slope
+            return value - distance, angle - (value - distance) / slope
 
-        angle = root(step, 0.5 * np.pi * size / reach, np.zeros_like(size), np.full_like(size, 0.5 * np.pi), ROUNDING)
+        low, high = np.zeros_like(distance), np.full_like(distance, 0.5 * np.pi)
+        angle = root(step, 0.5 * np.pi * distance / reach, low, high, ROUNDING)
         return np.copysign(top * np.sin(angle).reshape(phi.shape), phi)[()]
 
     def latitude(self, height: ArrayLike) -> Array:
         """phi of y in [-sqrt(depth), sqrt(depth)], the arc length along a meridian: (...) -> (...)."""
         y = finite_array(height, "height")
         top = np.sqrt(self.depth)
-        _refuse(np.abs(y) > top * (1.0 + 1e-15), y, "height", f"the surface reaches to {top:.17g}")
+        check_entries(np.abs(y) > top * (1.0 + 1e-15), y, "height", f"the surface reaches to {top:.17g}")
         value, _ = self._meridian(np.arcsin(np.clip(np.abs(y) / top, 0.0, 1.0)).ravel())
         return np.copysign(value.reshape(y.shape), y)[()]
 
@@ -154,15 +168,19 @@ class SurfaceOfRevolution:
         """
         p = finite_array(momentum, "momentum")
         top, low = self.greatest_momentum, self.least_momentum
-        size = np.abs(p)
-        _refuse(size > top * (1.0 + 4e-16), p, "momentum", f"at most sqrt(m(0)) = {top:.17g} in size")
-        size = np.minimum(size, top)
+        magnitude = np.abs(p)
+        # sqrt(m(0)) as rounded by a caller may be too large by its last digit.
+        check_entries(magnitude > top * (1.0 + 4e-16), p, "momentum", f"|p| is at most sqrt(m(0)) = {top:.17g}")
+        magnitude = np.minimum(magnitude, top)
         if self.end == "pole":
-            _refuse((size == 0.0) & (not self.has_smooth_poles), p, "momentum", "no extremal passes a cone's tip")
+            over_tip = (magnitude == 0.0) & (not self.has_smooth_poles)
+            check_entries(over_tip, p, "momentum", "no extremal passes a cone's tip")
         else:
-            least = low * (1.0 + _EDGE) if self.end == "parallel" else low
-            _refuse(size < least, p, "momentum", f"extremals oscillate above {low:.17g}, the p of the {self.end}")
-        return p, (top - size) * (top + size) / self.equator, (size - low) * (size + low) / self.equator
+            least = low * (1.0 + _SEPARATRIX_MARGIN) if self.end == "parallel" else low
+            requirement = f"extremals oscillate above {low:.17g}, the p of the {self.end}"
+            check_entries(magnitude < least, p, "momentum", requirement)
+        q = (top - magnitude) * (top + magnitude) / self.equator
+        return p, q, (magnitude - low) * (magnitude + low) / self.equator
 
     def arcs(self, momentum: ArrayLike, phase: ArrayLike) -> Arcs:
         """Time, longitude and bend from the equator to a phase: (...), (...) [rad] -> `Arcs`.
@@ -180,13 +198,13 @@ class SurfaceOfRevolution:
         return self.trusted_arcs(p, q, room, chi)
 
     def trusted_arcs(self, p: Array, q: Array, room: Array, chi: Array) -> Arcs:
-        """`arcs` by p, q and depth - q, all of one shape, not checked."""
+        """`arcs` by p, q and depth - q, all of one shape; not checked."""
         turns = np.rint(chi / np.pi)
         rest = self._folded(p, q, room, chi - turns * np.pi)
         if not turns.any():
             return rest
-        whole = self._folded(p, q, room, np.full(chi.shape, 0.5 * np.pi))
-        return Arcs(*(part + 2.0 * turns * quarter for part, quarter in zip(rest, whole)))
+        quarter = self._folded(p, q, room, np.full(chi.shape, 0.5 * np.pi))
+        return Arcs(*(part + 2.0 * turns * whole for part, whole in zip(rest, quarter)))
 
     def _folded(self, p: Array, q: Array, room: Array, chi: Array) -> Arcs:
         flat = [np.ravel(a) for a in (np.abs(p), q, room, chi)]
@@ -196,13 +214,13 @@ class SurfaceOfRevolution:
 
     def _by_quadrature(self, p: Array, q: Array, room: Array, chi: Array) -> Arcs:
         time, angle, bend, _ = quadrature(self.stretch, self.depth, self.end, q, room, chi, self.splits)
-        root_m = self.greatest_momentum
+        greatest = self.greatest_momentum
         if self.end == "pole":
             tip, _, _ = self.stretch(np.ones(1), np.zeros(1))
-            peak = tip[0] * np.arctan2(p / root_m * np.sin(chi), folded_cosine(chi))
+            peak = tip[0] * np.arctan2(p / greatest * np.sin(chi), folded_cosine(chi))
         else:
             peak = np.zeros(())
-        return Arcs(time, (peak + p / root_m * angle) / root_m, bend)
+        return Arcs(time, (peak + p / greatest * angle) / greatest, bend)
 
     def _meridian(self, angle: Array) -> tuple[Array, Array]:
         """phi where y = sqrt(depth) sin(angle), angles (N,) in [0, pi/2], and its derivative by the angle."""
@@ -260,11 +278,12 @@ class SurfaceOfRevolution:
     def tameness(self) -> str:
         """How the first return changes with p > 0: "decreasing" (tame), "increasing", "constant" or "neither".
 
-        By its derivative at 65 values of p. Tame extremals have no conjugate point before they return to the equator.
+        By its derivative at 65 values of p. Tame extremals, as the paper calls them, have no conjugate point before
+        they return to the equator.
         Source: Bonnard et al., definition 2.5 and proposition 2.
         """
         rate = self.first_return_rate(self._sampled_momenta())
-        if np.abs(rate).max() <= 1e-11 * self.reach / self.equator:
+        if np.abs(rate).max() <= _CONSTANT_RETURN * self.reach / self.equator:
             return "constant"
         return "decreasing" if rate.max() < 0.0 else "increasing" if rate.min() > 0.0 else "neither"
 
@@ -277,16 +296,16 @@ class SurfaceOfRevolution:
         """How the curvature goes from the equator to the reach: "decreasing", "increasing", "constant" or "neither"."""
         curvature = self.curvature_at_height(self._sampled_heights())
         change = np.diff(curvature)
-        if np.ptp(curvature) <= 1e-10 * np.abs(curvature).max():
+        if np.ptp(curvature) <= _CONSTANT_CURVATURE * np.abs(curvature).max():
             return "constant"
         return "decreasing" if change.max() < 0.0 else "increasing" if change.min() > 0.0 else "neither"
 
     def _sampled_momenta(self) -> Array:
-        square = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, 66) / 66)
+        square = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, _SAMPLES + 1) / (_SAMPLES + 1))
         return np.sqrt(self.equator * (1.0 - self.depth * square))
 
     def _sampled_heights(self) -> Array:
-        return np.sqrt(self.depth * (0.5 - 0.5 * np.cos(np.pi * np.arange(65) / 65)))
+        return np.sqrt(self.depth * (0.5 - 0.5 * np.cos(np.pi * np.arange(_SAMPLES) / _SAMPLES)))
 
 
 def surface_of_stretch(
@@ -323,12 +342,13 @@ def surface_of_stretch(
     splits = settled_splits(stretch, float(depth), end)
     if splits is None:
         raise AccuracyNotReached("the metric is too rough: its integrals along extremals do not settle")
-    surface = SurfaceOfRevolution(float(equator), float(depth), end, stretch, closed_arcs, splits)
+    surface = SurfaceOfRevolution(
+        equator=float(equator),
+        depth=float(depth),
+        end=end,
+        stretch=stretch,
+        closed_arcs=closed_arcs,
+        splits=splits,
+    )
     finer = replace(surface, splits=splits + 1)
     return surface if abs(surface.reach - finer.reach) <= 1e-13 * finer.reach else finer
-
-
-def _refuse(bad: Mask, values: Array, name: str, wanted: str) -> None:
-    if np.any(bad):
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise ShapeError(f"{name}: entry {list(where)} is {values[where]:.17g}; {wanted}")
