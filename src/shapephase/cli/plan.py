@@ -123,28 +123,36 @@ def plan_command(
 
             title = f"{loaded.name} turns itself"
             write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
-    turned = found.motion.final_attitude
-    lines = [
-        _heading(loaded, found.path.duration, momentum),
-        "",
-        rotation_line("turned", turned),
-        f"{'off the goal':24}{found.goal_error:16.2e} rad",
-        f"{'cost':24}{found.cost:16.9g}   {found.cost_name}",
-        f"{'KKT residual':24}{found.kkt_residual:16.2e}",
-        f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
-    ]
-    data = {
-        "body": loaded.name,
+    text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
+    return Outcome(text, data, code=_STOPPED if search.stopped else 0)
+
+
+def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
+    return "\n".join(
+        [
+            _heading(body, found.path.duration, momentum),
+            "",
+            rotation_line("turned", found.motion.final_attitude),
+            f"{'off the goal':24}{found.goal_error:16.2e} rad",
+            f"{'cost':24}{found.cost:16.9g}   {found.cost_name}",
+            f"{'KKT residual':24}{found.kkt_residual:16.2e}",
+            f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
+        ]
+    )
+
+
+def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict[str, object]:
+    return {
+        "body": body.name,
         "duration_s": found.path.duration,
         "momentum_kg_m2_s": list(momentum),
-        "final_attitude_quat_xyzw": so3.quat_from_matrix(turned).tolist(),
+        "final_attitude_quat_xyzw": so3.quat_from_matrix(found.motion.final_attitude).tolist(),
         "miss_rad": found.goal_error,
         "cost": found.cost,
         "cost_name": found.cost_name,
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
     }
-    return Outcome("\n".join(lines), data, code=_STOPPED if search.stopped else 0)
 
 
 class _InterruptibleSearch:

@@ -24,7 +24,7 @@ _COSTS = ("kinetic", "rate")
 # Least eigenvalue of the metric, each joint in its own unit, at which the rates are still determined: rounding of the
 # mass matrix is 1e-15, and the equations divide by it.
 _LEAST_METRIC = 1e-12
-# Evaluations after which an integration is given up: long motions take some thousands.
+# Evaluations after which an integration is given up: a charge that turns the motion too fast would take forever.
 _MOST = 200_000
 
 _built: WeakKeyDictionary[Body, dict[str, Hamiltonian]] = WeakKeyDictionary()

@@ -22,22 +22,23 @@ from .extremals import Extremal
 _SCAN = 600
 # Every so many of those samples balance the basis.
 _BALANCING_STRIDE = 10
-# Rounds of balancing by rows and columns: it converges within a few.
+# Rounds of balancing, by rows and columns in turn: a fixed number, as an approximate balance is enough.
 _BALANCING_ROUNDS = 8
 # Directions whose mean square effect, as singular value, is below this share of the largest have none.
 _NO_EFFECT = 1e-9
-# A singular value below this share of the largest over all times is a zero: refined zeros reach 1e-9 or less.
+# A singular value below this share of the largest over all times is a zero: well above the accuracy of the fields.
 _ZERO = 1e-6
 # Zeros closer than this share of the time looked through are the same one.
 _SAME_TIME = 1e-6
-# Newton steps to a zero, and the relative change of time at which they end.
+# The most Newton steps to a zero: from a sample they converge quadratically.
 _REFINEMENTS = 8
+# Relative change of time at which they end: the accuracy of the fields allows no more.
 _REFINED = 1e-12
-# The interval of the difference quotient for a zero, as a share of the reach of the search; and the least such reach,
-# as a share of the sampling step, so that the quotient does not drown in rounding.
+# Interval of the difference quotient, as a share of the distance that the zero may still move: small against it.
 _DIFFERENCE = 1e-3
+# The least such distance, as a share of the sampling step, so that the quotient is not lost in rounding.
 _LEAST_REACH = 1e-6
-# How far beyond its end an extremal is looked at unless told otherwise, so that a conjugate time at the end is seen.
+# By default an extremal is examined this far beyond its end, so that a conjugate time at the end is found.
 _BEYOND_END = 1.05
 
 

@@ -26,7 +26,7 @@ _CONVERGED = 5e-10
 _STEPS = 8
 # Newton's method is not begun further from the goal [rad]: there the linear model says nothing.
 _TOO_FAR = 1.0
-# Gauss nodes of a piece, for the derivative of the end: beyond rounding for the cubic pieces of a plan.
+# Gauss nodes of a piece, for the derivative of the end: of order sixteen, so that the quadrature does not limit it.
 _NODES = 8
 # A coordinate or rate this close to its limit, relative to the range, is held where it is: an interior-point solution
 # ends a little inside its active limits.

@@ -22,23 +22,28 @@ from .extremals import Extremal, extremal
 
 # The most Newton steps at each accuracy: damped steps along a weakly curved valley converge slowly.
 _STEPS = 40
-# Newton's method first comes this near [rad or m] by integrations this accurate, which takes a fraction of the time.
+# Gap that Newton's method first has to reach [rad or m], by rough integrations, which take a fraction of the time.
 _ROUGH_GAP = 1e-6
+# Relative accuracy of those integrations: a hundredth of the gap.
 _ROUGH_ACCURACY = 1e-8
-# The tightest accuracy of an integration, a hundred times rounding.
+# The tightest accuracy of an integration, some hundred times rounding.
 _FINEST_ACCURACY = 1e-13
 # Accuracy of the integrations as a share of the gap that is to be reached.
 _ACCURACY_SHARE = 0.01
-# Damping, relative to the gap, of the first step; what a step that helps divides it by, and one that does not
-# multiplies it by; and the damping at which the steps are too short to go on.
+# Damping of the first step, relative to the gap: nearly a plain Newton step, as the path is nearly optimal.
 _FIRST_DAMPING = 1e-5
+# A step that helps divides the damping by this.
 _RELAXATION = 4.0
+# A step that does not help multiplies it by this: in few trials to where the linear model holds.
 _TIGHTENING = 64.0
+# Damping at which the steps are too short to go on.
 _LAST_DAMPING = 1e5
-# Singular values below this many times the integration's accuracy belong to symmetries, as far as can be told.
+# Singular values, relative to the largest, below this many times the integration's accuracy count as zero: they belong
+# to symmetries.
 _SYMMETRY = 10.0
-# Shares of a step that are tried, and the least decrease of the gap for each share.
+# Shares of a step that are tried before the damping rises.
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
+# The least relative decrease of the gap by a whole step, as in Armijo's rule; shares of a step have to give that share.
 _DECREASE = 0.1
 # Evaluations after which a trial is given up: its extremal whirls, and its end says nothing.
 _MOST_EVALUATIONS = 20_000

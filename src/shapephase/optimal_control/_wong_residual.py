@@ -17,12 +17,14 @@ from ..shape_space.connection import connection_slopes, horizontal_lift, mechani
 from ..shape_space.shape_path import ShapePath
 from ._hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
-# Gauss nodes and weights of a panel on [-1, 1]: the residual of a smooth path is then exact to rounding on few panels.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+# Gauss nodes of a panel: the residual of a smooth path is then exact to rounding on few panels.
+_STAGES = 12
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_STAGES)
 # Panels between two breaks of a path, refined until the residual has converged.
 _PANELS = (2, 4, 8, 16, 32, 64)
-# Changes of the residual by this much plus this share of it count as converged: it is read as an order of magnitude.
+# A residual that changes by this much has converged: the attitude along the path is no more accurate.
 _CONVERGED = 1e-9
+# So has one that changes by this share of itself: it is read as an order of magnitude.
 _CONVERGED_SHARE = 1e-3
 # A combination of charges whose effect is below this share of all charges' is not felt by the motion, and set to 0.
 _LEAST_FELT = 1e-9

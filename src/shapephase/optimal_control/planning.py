@@ -40,11 +40,13 @@ _LIMIT_SLACK = 1e-7
 _WINDING_TOLERANCE = 0.1
 # Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
 _WINDING_SAMPLES = 50
-# The coarse search that ranks the guesses: pieces of its spline, the fewest guesses, the most iterations and the
-# tolerance of each. It has to find the right valley, not the optimum.
+# Pieces of the coarse search that ranks the guesses: enough for a loop to bend, a fraction of the cost of the fine one.
 _COARSE_PIECES = 10
+# The fewest guesses that it ranks, so that a single start is the best of several.
 _COARSE_GUESSES = 8
+# The most iterations for each: a guess that needs more is not a good start.
 _COARSE_ITERATIONS = 60
+# Its accuracy, scaled: it has to find the right basin, not the optimum.
 _COARSE_TOLERANCE = 1e-5
 
 
@@ -245,7 +247,7 @@ def _local_search(
         polished = polish(task, basis, solution.control, solution.duration)
         cost = _cost(task, basis, polished)
     except ShapePhaseError:
-        # A try whose path has no motion is ranked last and told by the solver's own numbers.
+        # The path cannot be reconstructed: the attempt is ranked last, and only the solver's own numbers describe it.
         polished, cost = None, np.inf
     reaches_goal = (
         polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
