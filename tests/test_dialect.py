@@ -13,10 +13,8 @@ NOT_YET = {
     "body",
     "cli",
     "deformation",
-    "optimal_control",
     "phases",
     "plotting",
-    "rigid_body",
     "shape_space",
 }
 
