@@ -19,7 +19,9 @@ from ._hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
 # Gauss nodes of a panel: the residual of a smooth path is then exact to rounding on few panels.
 _STAGES = 12
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_STAGES)
+_GAUSS = np.polynomial.legendre.leggauss(_STAGES)
+_NODES = _GAUSS[0]
+_WEIGHTS = _GAUSS[1]
 # Panels between two breaks of a path, refined until the residual has converged.
 _PANELS = (2, 4, 8, 16, 32, 64)
 # A residual that changes by this much has converged: the attitude along the path is no more accurate.
