@@ -76,8 +76,8 @@ def plot_conjugate_locus(
         for column in range(theta.shape[1]):
             ax.plot(theta[:, column], side * phi[:, column], label=label, **_FAINT)
             label = "_"
-    for side, look, name in ((1.0, SERIES[0], "upward start"), (-1.0, SERIES[1], "downward start")):
-        ax.plot(locus.theta, side * locus.phi, label=f"locus, {name}", **look)
+    for side, style, name in ((1.0, SERIES[0], "upward start"), (-1.0, SERIES[1], "downward start")):
+        ax.plot(locus.theta, side * locus.phi, label=f"locus, {name}", **style)
     label = "φ = −K/α, K/α"
     for side in (-1.0, 1.0):
         ax.axhline(side * metric.crest, color=BLACK, linewidth=0.8, linestyle=(0, (2, 2)), label=label)
@@ -178,15 +178,15 @@ def plot_caustic(
     vectors = so3.log(metric.conjugate_locus(metric.unit_speed(velocities @ metric.axes.T), order))
     meshes = _meshes(vectors)
     space.add_collection3d(Poly3DCollection(meshes, facecolor=SKY, edgecolor=BLUE, linewidth=0.2, alpha=0.3))
-    size = min(np.pi, max(1.1 * float(np.linalg.norm(vectors, axis=-1).max()), 1e-3))
-    if size == np.pi:
+    extent = min(np.pi, max(1.1 * float(np.linalg.norm(vectors, axis=-1).max()), 1e-3))
+    if extent == np.pi:
         turn = np.linspace(0.0, 2.0 * np.pi, 121)
         for axis in range(3):
             space.plot(
                 *np.pi * np.roll([np.cos(turn), np.sin(turn), 0.0 * turn], axis, axis=0), color=GREY, linewidth=0.5
             )
     space.plot([0.0], [0.0], [0.0], linestyle="none", marker="*", markersize=7.0, color=BLACK, label="identity")
-    space.set(xlim=(-size, size), ylim=(-size, size), zlim=(-size, size))
+    space.set(xlim=(-extent, extent), ylim=(-extent, extent), zlim=(-extent, extent))
     space.set_box_aspect((1.0, 1.0, 1.0), zoom=0.78)
     space.view_init(*view)
     space.locator_params(nbins=5)

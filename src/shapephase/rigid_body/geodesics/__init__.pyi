@@ -1,5 +1,5 @@
 from ._andoyer_variables import AndoyerVariables, TurningBody, andoyer_from_euler, andoyer_motion, andoyer_variables
-from ._arc_quadrature import Arcs, Stretch
+from ._arc_quadrature import Arcs
 from ._conjugate_locus import (
     ConjugateLocus,
     ConjugatePoints,
@@ -22,17 +22,16 @@ from ._serret_andoyer_constants import (
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .distance import ShortestGeodesic, shortest_geodesic
 from .left_invariant import LeftInvariantMetric, left_invariant_metric
-from .metric_profile import Assumptions, Meridian, Profile, TabulatedStretch, assumptions, surface_of_metric
+from .metric_profile import Assumptions, TabulatedStretch, assumptions, surface_of_metric
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
 from .serret_andoyer_geodesics import EquatorialConjugatePoints, GeodesicFamily
-from .surface_of_revolution import ClosedArcs, SurfaceOfRevolution, surface_of_stretch
+from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 __all__ = [
     "AndoyerVariables",
     "Arcs",
     "Assumptions",
     "AxisymmetricMetric",
-    "ClosedArcs",
     "ConjugateLocus",
     "ConjugatePoints",
     "CutLocus",
@@ -43,13 +42,10 @@ __all__ = [
     "GeodesicConstants",
     "GeodesicFamily",
     "LeftInvariantMetric",
-    "Meridian",
-    "Profile",
     "SadovVariables",
     "SerretAndoyerMetric",
     "ShortestGeodesic",
     "Start",
-    "Stretch",
     "SurfaceOfRevolution",
     "TabulatedStretch",
     "TurningBody",

@@ -33,13 +33,13 @@ from ...inertia_tensor import inverse_inertia
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
 _NEAREST = 1e-8
-"""sqrt(G^2 - L^2)/G; half of the digits of l are left there, and L rounds to G soon after."""
+"""sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the part of the momentum across the axis is lost."""
 _LARGEST_TURN = 1.0
 """[rad] From one sample to the next: far from half a turn, where a turn's sense is lost."""
 _NO_TURN = 1e-9
 """[rad] Turns of a body at rest, which do not become less with the step."""
 _MOST_SAMPLES = 200_000
-"""About 30 MB of attitudes; or eight times the samples asked for, if that is more."""
+"""14 MB of attitudes; or eight times the number of times given, if that is more."""
 _REFINEMENT_RATIO = 0.7
 """Half the step turns by half; more than this share is a turn that was missed by whole turns."""
 

@@ -27,7 +27,7 @@ _WEIGHTS = _RULE[1]
 _NEAR_POLE = 1e-4
 """1 - Y; nearer, the difference D(Y) - D(1) loses four digits, and the series by D' and D'' is right to rounding."""
 _BEND_WIDTH = 0.02
-"""1 - Y, in units of |D'/D''| at the pole, up to which that series holds."""
+"""Weight of |D''/D'| at the pole: where D bends sharply the series holds less far, to 1 - Y = 0.005 |D'/D''|."""
 _NOT_ZERO = 1e-30
 """Least q and depth - q of the grading: beyond that many halvings nothing changes."""
 _MOST_SPLITS = 7

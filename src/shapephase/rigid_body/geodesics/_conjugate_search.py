@@ -25,7 +25,7 @@ _TURN = 2.0 * np.pi
 _STEP_SAFETY = 0.9
 """A step is so much of the shortest time in which the angles' sum could grow by a whole turn, and a turn be missed."""
 _STEPS_EACH = 10_000
-"""Steps for each order: moments (3, 2, 1) need about ten, only moments some thousandfold apart need more than this."""
+"""Steps for each order: moments (3, 2, 1) need about ten, only moments five thousandfold apart need more."""
 _SLACK = 1e-6
 """[rad] By so much rounding may set the angles' sum back; far below the growth in a step."""
 _EPS = float(np.finfo(float).eps)

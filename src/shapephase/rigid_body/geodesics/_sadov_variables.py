@@ -8,7 +8,7 @@ g, l and L here belong to axes whose third is that of the smallest moment, I_1, 
 I_3 (`SerretAndoyerMetric.andoyer_axes`); the papers number these moments in descending order. J does not depend on the
 sense of the motion; it grows from 0, with the momentum along the axis of I_3, to G, along that of I_1. Where the
 momentum circles the axis of I_3 or its opposite, angles count from l = pi/2 or -pi/2, L > 0; where it circles that of
-I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it goes with l.
+I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it follows from l.
 
 Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
 speed by homogeneity: the action and the rates are sqrt(2 E) times theirs.

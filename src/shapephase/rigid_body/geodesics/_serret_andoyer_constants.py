@@ -75,7 +75,7 @@ class GeodesicConstants:
 
     @property
     def oscillating(self) -> Mask:
-        """Whether they return to the equator, which is one of them."""
+        """Whether they return to the equator; the equator itself counts as one of them."""
         return self.kind >= GeodesicClass.OSCILLATING
 
 
