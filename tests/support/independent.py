@@ -8,7 +8,7 @@ Both carry a quaternion of their own through SciPy's DOP853 at rtol = 1e-12. The
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -17,6 +17,8 @@ from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
+from numpy.linalg import norm
+from numpy.polynomial.legendre import leggauss, legint, legval, legvander
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
@@ -27,6 +29,10 @@ from support.places import ROBOTS
 
 Array = NDArray[np.float64]
 RTOL = 1e-12
+# Of a panel of `collocated_attitude`: a method of order 28.
+_GAUSS_POINTS = 14
+# Each gains more than a digit.
+_MOST_ITERATIONS = 60
 
 # A momentum for each body [kg m^2/s] that turns it by about a turn in the two seconds of `random_loop`.
 BODIES = {
@@ -166,6 +172,18 @@ class FreeFloating:
 
     def rates(self, quat_xyzw: Array, shape: Array, rate: Array, momentum: Array) -> tuple[Array, Array]:
         """I^-1 Pi and I^-1 L_o, base axes [rad/s], from the momentum map at this attitude."""
+        self._move(quat_xyzw, shape, rate)
+        both = np.stack([momentum, self.data.hg.angular], axis=-1)
+        solved = np.linalg.solve(self.data.Ag[3:, 3:6], both)
+        return solved[:, 0], solved[:, 1]
+
+    def inverse_and_drift(self, shape: Array, rate: Array) -> tuple[Array, Array]:
+        """I^-1 and I^-1 L_o, base axes, which do not depend on the attitude."""
+        self._move(np.array([0.0, 0.0, 0.0, 1.0]), shape, rate)
+        inverse = np.linalg.inv(self.data.Ag[3:, 3:6])
+        return inverse, inverse @ self.data.hg.angular
+
+    def _move(self, quat_xyzw: Array, shape: Array, rate: Array) -> None:
         q = np.zeros(self.model.nq)
         q[3:7] = quat_xyzw
         q[self.position] = np.where(self.endless, np.cos(shape), shape)
@@ -173,9 +191,6 @@ class FreeFloating:
         v = np.zeros(self.model.nv)
         v[self.velocity] = rate
         pin.ccrba(self.model, self.data, q, v)
-        both = np.stack([momentum, self.data.hg.angular], axis=-1)
-        solved = np.linalg.solve(self.data.Ag[3:, 3:6], both)
-        return solved[:, 0], solved[:, 1]
 
 
 @dataclass(frozen=True)
@@ -257,6 +272,93 @@ def pinocchio_motion(
         {"base": float(y[19]), "horizontal": float(y[20])},
         solid_angle,
         gap,
+    )
+
+
+@dataclass(frozen=True)
+class CollocatedAttitude:
+    """Attitudes (N, 3, 3) and how uncertain they are [rad]."""
+
+    attitude: Array
+    uncertainty: float
+
+
+def collocated_attitude(
+    name: str,
+    joint_names: Sequence[str],
+    at: Callable[[Array], tuple[Array, Array]],
+    momentum: ArrayLike,
+    attitude: Array,
+    times: Array,
+) -> CollocatedAttitude:
+    """The attitude by Gauss collocation on Pinocchio's momentum, at times among which all breaks are.
+
+    I and L_o are Pinocchio's at the Gauss points themselves, nothing is interpolated; the implicit equations of each
+    panel are iterated to rounding. All is done twice, the second time on panels half as long, whose answer is returned;
+    how far the two are apart is how uncertain the first is, let alone the second.
+
+    Parameters
+    ----------
+    at : times (N,) -> joint coordinates and rates (N, n) each
+    """
+    body = FreeFloating(name, joint_names)
+    coarse, fine = (_collocated(body, at, np.asarray(momentum), attitude, times, parts) for parts in (1, 2))
+    return CollocatedAttitude(fine, apart(coarse, fine))
+
+
+def _collocated(
+    body: FreeFloating,
+    at: Callable[[Array], tuple[Array, Array]],
+    momentum: Array,
+    attitude: Array,
+    times: Array,
+    parts: int,
+) -> Array:
+    gauss, _ = leggauss(_GAUSS_POINTS)
+    # Integrals of the Lagrange polynomials from the panel's start to each Gauss point, and to the end.
+    primitives = legint(np.eye(_GAUSS_POINTS), lbnd=-1.0)
+    values_to_series = np.linalg.inv(legvander(gauss, _GAUSS_POINTS - 1))
+    integrals = legval(np.append(gauss, 1.0), primitives).T @ values_to_series
+    quat = Rotation.from_matrix(attitude).as_quat()
+    quats = [quat]
+    for left, right in pairwise(times):
+        shapes, speeds = at(np.linspace(left, right, 5)[1:-1])
+        around = [body.inverse_and_drift(shape, speed) for shape, speed in zip(shapes, speeds)]
+        fastest = max(norm(inverse, 2) * norm(momentum) + norm(drift) for inverse, drift in around)
+        # A panel turns the body by one radian at most, or a little more.
+        count = parts * max(2, int(np.ceil((right - left) * fastest)))
+        edges = np.linspace(left, right, count + 1)
+        half = 0.5 * (right - left) / count
+        nodes = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * gauss).ravel()
+        shapes, speeds = at(nodes)
+        sampled = [body.inverse_and_drift(shape, speed) for shape, speed in zip(shapes, speeds)]
+        inverses = np.array([inverse for inverse, _ in sampled]).reshape(count, _GAUSS_POINTS, 3, 3)
+        drifts = np.array([drift for _, drift in sampled]).reshape(count, _GAUSS_POINTS, 3)
+        for inverse, drift in zip(inverses, drifts):
+            stages = np.repeat(quat[None], _GAUSS_POINTS, axis=0)
+            for _ in range(_MOST_ITERATIONS):
+                slopes = half * _quaternion_rate(stages, inverse, drift, momentum)
+                moved = quat + integrals[:-1] @ slopes
+                change = np.abs(moved - stages).max()
+                stages = moved
+                if change < 4e-16:
+                    break
+            quat = quat + integrals[-1] @ (half * _quaternion_rate(stages, inverse, drift, momentum))
+            quat = quat / norm(quat)
+        quats.append(quat)
+    return Rotation.from_quat(np.array(quats)).as_matrix()
+
+
+def _quaternion_rate(quats: Array, inverse: Array, drift: Array, momentum: Array) -> Array:
+    """q' of R' = R hat(omega), omega = I^-1 R^T mu - I^-1 L_o, xyzw: (s, 4), (s, 3, 3), (s, 3) -> (s, 4)."""
+    x, y, z, w = quats.T
+    a, b, c = momentum
+    # R^T mu by the quaternion: t = 2 mu x v, R^T mu = mu + w t + t x v.
+    p, q, r = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    seen = np.stack([a + w * p + q * z - r * y, b + w * q + r * x - p * z, c + w * r + p * y - q * x], axis=1)
+    i, j, k = ((inverse @ seen[:, :, None])[:, :, 0] - drift).T
+    return 0.5 * np.stack(
+        [w * i + y * k - z * j, w * j + z * i - x * k, w * k + x * j - y * i, -(x * i + y * j + z * k)], axis=1
     )
 
 
