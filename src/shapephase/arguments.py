@@ -23,6 +23,9 @@ _ASYMMETRY = 1e-9
 # The least ratio of two principal moments: below it the inverse has no correct digits left.
 _LEAST_MOMENT_RATIO = 1e-12
 
+_IDENTITY = np.eye(3)
+_IDENTITY.flags.writeable = False
+
 
 def times_argument(t: ArrayLike, duration: float) -> Array:
     """A user's times, checked to lie in [0, duration] (to rounding): (...) -> (...) [s]. Raises TrajectoryError."""
@@ -150,6 +153,24 @@ def vector_argument(value: ArrayLike, name: str, length: int = 3, unit: str = ""
     if vector.ndim != 1:
         raise ShapeError(f"{name}: one vector ({length},) is needed, got {vector.shape}")
     return vector
+
+
+def initial_state_arguments(momentum: ArrayLike, attitude: ArrayLike | None) -> tuple[Array, Array]:
+    """A user's momenta and attitudes at the start, broadcast: batch + (3,) [kg m^2/s], batch + (3, 3).
+
+    Without an attitude it is the identity. Raises ShapeError.
+    """
+    spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
+    if attitude is None:
+        return spatial, np.broadcast_to(_IDENTITY, (*spatial.shape[:-1], 3, 3)) if spatial.ndim > 1 else _IDENTITY
+    start = so3.rotation_argument(attitude, "attitude")
+    try:
+        batch = np.broadcast_shapes(spatial.shape[:-1], start.shape[:-2])
+    except ValueError:
+        raise ShapeError(
+            f"momentum {spatial.shape} and attitude {start.shape}: their leading axes must broadcast"
+        ) from None
+    return np.broadcast_to(spatial, (*batch, 3)), np.broadcast_to(start, (*batch, 3, 3))
 
 
 def body_momentum_argument(momentum: ArrayLike, attitude: ArrayLike | None) -> Array:

@@ -22,22 +22,9 @@ from ..integrator.sampling import sampler
 from .deformation import Deformation
 from .principal_frame import Frames, principal_frames
 
-GAUGES = ("horizontal", "base", "principal", "mean_body")
-
 _LINK = "link:"
 _LIFT_TOLERANCE = 1e-12
 _PIECES, _DEGREE, _SHORTEST = 4, 16, 1e-4
-
-
-def named_frames(deformation: Deformation, name: str) -> Frames:
-    """U(t) and its body rates of a gauge that is neither the base nor the horizontal one. Raises as `named_gauge`."""
-    if name == "principal":
-        return principal_frames(deformation)
-    if name == "mean_body":
-        return mean_body_frames(deformation)
-    if name.startswith(_LINK):
-        return link_frames(deformation, name.removeprefix(_LINK))
-    raise unknown_name("gauge", name, (*GAUGES, f"{_LINK}NAME"))
 
 
 def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> Frames:
@@ -229,3 +216,17 @@ def _check_unbroken(frames: Frames, deformation: Deformation, reference: float) 
         order = np.argsort(np.concatenate([times, middles]), kind="stable")
         times = np.concatenate([times, middles])[order]
         turned = np.concatenate([turned, frames(middles)[0]])[order]
+
+
+# A gauge that follows from the deformation alone is one line here.
+_NAMED: dict[str, Callable[[Deformation], Frames]] = {"principal": principal_frames, "mean_body": mean_body_frames}
+GAUGES = ("horizontal", "base", *_NAMED)
+
+
+def named_frames(deformation: Deformation, name: str) -> Frames:
+    """U(t) and its body rates of a gauge that is neither the base nor the horizontal one. Raises as `named_gauge`."""
+    if name.startswith(_LINK):
+        return link_frames(deformation, name.removeprefix(_LINK))
+    if name not in _NAMED:
+        raise unknown_name("gauge", name, (*GAUGES, f"{_LINK}NAME"))
+    return _NAMED[name](deformation)

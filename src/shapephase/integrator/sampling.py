@@ -95,3 +95,21 @@ class LoopSampler:
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
         return self._sampler.interpolant()
+
+
+class FinishedSampler:
+    """A finished interpolant in the place of a sampler: nothing is evaluated again."""
+
+    def __init__(self, interpolant: Interpolant) -> None:
+        self._interpolant = interpolant
+
+    def refine(self, momentum: float, tolerance: float) -> None:
+        """Nothing: what is there was sampled as finely as its own tolerance demanded."""
+
+    def error(self, momentum: float) -> float:  # noqa: ARG002
+        """Zero: it is part of the error of what the samples were taken for."""
+        return 0.0
+
+    def interpolant(self) -> Interpolant:
+        """As `Sampler.interpolant`."""
+        return self._interpolant

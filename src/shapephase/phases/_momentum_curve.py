@@ -12,8 +12,6 @@ from .. import so3, sphere
 from ..arrays import Array
 from ..deformation.frames import Frames, frames_argument, lift_frames, named_frames
 from ..errors import GaugeError
-from ..integrator.integrate import SteppedRotation, stepped_rotation
-from ..integrator.interpolant import Interpolant
 from ..reconstruction.reconstruction import Motion
 
 _MOST_STEPS = 20_000
@@ -76,27 +74,24 @@ class MomentumCurve:
         return attitude if self.frames is None else attitude @ so3.transpose(self.frames(times)[0])
 
 
-def momentum_curve(
-    motion: Motion, gauge: Gauge, lift: SteppedRotation | None = None, times: Array | None = None
-) -> MomentumCurve:
+def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> MomentumCurve:
     """The curve of a motion in a gauge, cut at the integrator's steps and at `times` too.
 
     Parameters
     ----------
     gauge : a name of `GAUGES`, "link:NAME", or a function as for `in_gauge`
-    lift : of the motion, where it is at hand
 
     Raises
     ------
     UnknownNameError, GaugeError, ShapeError
         For a gauge that does not exist.
     """
-    frames, follows = _frames(motion, gauge, lift)
+    frames, follows = _frames(motion, gauge)
     spatial = motion.momentum.reshape(-1, 3)
-    size = np.linalg.norm(spatial, axis=-1)
-    still = size == 0.0
-    # Without momentum any axis serves: what hangs on it is set to zero.
-    axis = np.where(still[:, None], [0.0, 0.0, 1.0], spatial) / np.where(still, 1.0, size)[:, None]
+    magnitude = np.linalg.norm(spatial, axis=-1)
+    without = magnitude == 0.0
+    # Without momentum any axis serves: what depends on it is set to zero.
+    axis = np.where(without[:, None], [0.0, 0.0, 1.0], spatial) / np.where(without, 1.0, magnitude)[:, None]
     edges = motion.solution.times
 
     def curve(at: Array) -> tuple[Array, Array]:
@@ -104,7 +99,7 @@ def momentum_curve(
         start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
         direction = so3.apply(so3.transpose(motion.solution.rotation(at)), start[:, None, :])
         inverse, drift = motion.interpolant.inverse_and_drift(at)
-        rate = so3.apply(inverse, size[:, None, None] * direction) - drift
+        rate = so3.apply(inverse, magnitude[:, None, None] * direction) - drift
         if frames is None:
             return direction, rate
         turn, spin = frames(at)
@@ -117,40 +112,28 @@ def momentum_curve(
     if times is not None:
         edges = np.union1d(edges, times)
         edges, found = _clear(curve, edges, references)
-    return MomentumCurve(motion, frames, axis, edges, *found, references)
+    dynamic, slivers, corners = found
+    return MomentumCurve(
+        motion=motion,
+        frames=frames,
+        axis=axis,
+        edges=edges,
+        dynamic=dynamic,
+        slivers=slivers,
+        corners=corners,
+        references=references,
+    )
 
 
-def horizontal_lift_of(motion: Motion) -> SteppedRotation:
-    """The lift of a motion's deformation, on the samples that the motion already has."""
-    return stepped_rotation(_Resolved(motion.interpolant), np.zeros((1, 3)), min(motion.tolerance, 1e-11))
-
-
-def _frames(motion: Motion, gauge: Gauge, lift: SteppedRotation | None) -> tuple[Frames | None, bool]:
+def _frames(motion: Motion, gauge: Gauge) -> tuple[Frames | None, bool]:
     """The frames of a gauge, and whether the integrator's steps are short enough for them."""
-    deformation = motion.deformation
     if not isinstance(gauge, str):
-        return frames_argument(gauge, deformation.breaks), False
+        return frames_argument(gauge, motion.deformation.breaks), False
     if gauge == "base":
         return None, True
     if gauge == "horizontal":
-        return lift_frames(lift or horizontal_lift_of(motion)), True
-    return named_frames(deformation, gauge), False
-
-
-class _Resolved:
-    """A finished interpolant in the place of a sampler: nothing is evaluated again."""
-
-    def __init__(self, interpolant: Interpolant) -> None:
-        self._interpolant = interpolant
-
-    def refine(self, momentum: float, tolerance: float) -> None:
-        """Nothing: the motion has already been sampled as finely as its own tolerance asked."""
-
-    def interpolant(self) -> Interpolant:
-        return self._interpolant
-
-    def error(self, momentum: float) -> float:  # noqa: ARG002
-        return 0.0
+        return lift_frames(motion.horizontal_lift), True
+    return named_frames(motion.deformation, gauge), False
 
 
 def _by_step(curve: sphere.Curve, edges: Array) -> tuple[Array, Array, Array]:

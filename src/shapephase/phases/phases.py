@@ -13,7 +13,7 @@ from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
-from ._momentum_curve import Gauge, horizontal_lift_of, momentum_curve
+from ._momentum_curve import Gauge, momentum_curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +86,9 @@ def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
     start = motion.initial_attitude.reshape(-1, 3, 3)
     duration = motion.duration
     closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
-    lift = horizontal_lift_of(motion)
-    curve = momentum_curve(motion, gauge, lift)
+    curve = momentum_curve(motion, gauge)
     has_phase = curve.has_phase
-    carried = start @ lift.end[0] @ closure
+    carried = start @ motion.horizontal_lift.end[0] @ closure
     holonomy = carried @ so3.transpose(start)
     end = motion.final_attitude.reshape(-1, 3, 3)
     total = end @ closure @ so3.transpose(start)

@@ -10,7 +10,7 @@ from .. import so3, sphere
 from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..phases._momentum_curve import Gauge, MomentumCurve, horizontal_lift_of, momentum_curve
+from ..phases._momentum_curve import Gauge, MomentumCurve, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
@@ -143,14 +143,13 @@ def plot_fixed_points(
 
 def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
     """Cut so finely that what a chord cuts off is thinner than a line."""
-    lift = horizontal_lift_of(motion) if gauge == "horizontal" else None
-    curve = momentum_curve(motion, gauge, lift, times=subdivided(motion.solution.times, 4))
+    curve = momentum_curve(motion, gauge, times=subdivided(motion.solution.times, 4))
     bend = so3.angle_between(curve.corners[0, :-1], curve.corners[0, 1:])
     parts = np.clip(np.ceil(bend / _BEND), 1, _MOST_PARTS).astype(int)
     step = np.repeat(np.arange(len(parts)), parts)
     within = np.arange(len(step)) - np.repeat(np.cumsum(parts) - parts, parts)
     times = curve.edges[step] + np.diff(curve.edges)[step] * within / parts[step]
-    return momentum_curve(motion, gauge, lift, times=times)
+    return momentum_curve(motion, gauge, times=times)
 
 
 def _portrait(drawn: SphereAxes, inertia: Array) -> None:

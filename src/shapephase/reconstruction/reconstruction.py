@@ -3,54 +3,32 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import times_argument, tolerance_argument
+from ..arguments import initial_state_arguments, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
-from ..deformation.descriptions import RigidDescription
-from ..errors import AccuracyNotReached, ShapeError, unknown_name
+from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.dop853 import dop853_rotation
 from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.interpolant import Interpolant
-from .closed_form import rigid_rotation
+from ..integrator.sampling import FinishedSampler
+from ._solvers import METHODS, SOLVERS, Solution
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
 
-_IDENTITY = np.eye(3)
-_IDENTITY.flags.writeable = False
-METHODS = ("auto", "collocation", "closed_form", "dop853")
+_LIFT_TOLERANCE = 1e-11
+"""[rad]; the lift is on given samples and costs little, so that its own error never matters."""
 _COLUMNS = (
     "time",
     *("qx", "qy", "qz", "qw"),
     *("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s"),
     *("base_x_m", "base_y_m", "base_z_m"),
 )
-
-
-class Solution(Protocol):
-    """S(t), the attitude relative to the start, for a batch."""
-
-    @property
-    def times(self) -> Array:
-        """(K + 1,) times between which the solution is smooth and turns little [s]."""
-        ...
-
-    @property
-    def error_estimate(self) -> Array:
-        """(B,) [rad]."""
-        ...
-
-    def rotation(self, t: Array, /) -> Array:
-        """(N,) -> (B, N, 3, 3)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +59,7 @@ class Motion:
     deformation : what moved
     momentum : batch + (3,), about the centre of mass, inertial axes [kg m^2/s]
     initial_attitude : batch + (3, 3), base axes to inertial axes
-    tolerance : the one asked for [rad]
+    tolerance : the one requested [rad]
     method : the one used
     evaluations : how often the locked inertia and internal momentum were computed
     solution : S(t), the attitude relative to the start: attitude(t) = initial_attitude S(t)
@@ -181,25 +159,43 @@ class Motion:
         size = np.linalg.norm(pi, axis=-1).max() + np.linalg.norm(internal, axis=-1).max() + 1e-300
         return (np.linalg.norm(defect, axis=-1).max(axis=-1) / size).reshape(self.batch)[()]
 
+    @cached_property
+    def _stepped(self) -> SteppedRotation:
+        """The motion on an interpolant; for another method that interpolant's steps hold the method's rotations."""
+        if isinstance(self.solution, SteppedRotation):
+            return self.solution
+        start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
+        stepped = stepped_rotation(self.deformation.sampler(), start, self.tolerance)
+        return stepped.with_rotations(self.solution.rotation(stepped.times), self.solution.error_estimate)
+
+    @cached_property
+    def horizontal_lift(self) -> SteppedRotation:
+        """How the shape motion alone would turn the base, on the samples that the motion already has.
+
+        Integrated once, when it is first needed; every split and every gauge shares it.
+        """
+        tolerance = min(self.tolerance, _LIFT_TOLERANCE)
+        return stepped_rotation(FinishedSampler(self.interpolant), np.zeros((1, 3)), tolerance)
+
     @property
     def interpolant(self) -> Interpolant:
         """I^-1 and I^-1 L_o as the integrator saw them."""
-        return _stepped(self).interpolant
+        return self._stepped.interpolant
 
     @property
     def amplification(self) -> Array:
         """The largest growth of a small error of the attitude from one time to a later one: batch."""
-        return _stepped(self).amplification.reshape(self.batch)[()]
+        return self._stepped.amplification.reshape(self.batch)[()]
 
     @property
     def propagator(self) -> Array:
         """`sensitivity.by_attitude` to a few thousandths, at no cost: batch + (3, 3)."""
-        return _stepped(self).propagator.reshape(*self.batch, 3, 3)
+        return self._stepped.propagator.reshape(*self.batch, 3, 3)
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""
-        stepped = _stepped(self)
+        stepped = self._stepped
         slope = stepped.momentum_slope
         start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
         attitude = so3.transpose(stepped.end) + slope @ so3.hat(start)
@@ -215,7 +211,7 @@ class Motion:
         Source: Cabrera 2006, equation (12); theory.md B9.
         """
         times = times_argument(t, self.duration)
-        return _stepped(self).dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
+        return self._stepped.dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def solid_angle(self, t: ArrayLike) -> Array:
         """The signed area that Pi has gone round from 0 to t, closed by the great circle, seen from the base frame.
@@ -228,18 +224,18 @@ class Motion:
         Source: theory.md D; numerics.md section 3.
         """
         times = times_argument(t, self.duration)
-        return _stepped(self).solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
+        return self._stepped.solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
         record = MotionRecord(
-            self.deformation,
-            self.momentum,
-            self.initial_attitude,
-            self.tolerance,
-            self.method,
-            self.evaluations,
-            _stepped(self),
+            deformation=self.deformation,
+            momentum=self.momentum,
+            initial_attitude=self.initial_attitude,
+            tolerance=self.tolerance,
+            method=self.method,
+            evaluations=self.evaluations,
+            solution=self._stepped,
         )
         write_motion_record(record, path)
 
@@ -316,24 +312,21 @@ def reconstruct(
 
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
     """
-    if method not in METHODS:
+    if method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     goal = tolerance_argument(tolerance)
-    spatial, start = _broadcast(momentum, attitude)
+    spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
-    at_start = at_start.reshape(-1, 3)
-    if method == "closed_form":
-        if not isinstance(deformation.description, RigidDescription):
-            others = [name for name in METHODS if name != method]
-            raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", method, others)
-        exact = rigid_rotation(deformation.description.tensor, at_start, deformation.duration, goal)
-        return Motion(deformation, spatial, start, goal, method, 1, exact)
-    if method == "dop853":
-        solution = _dop853(deformation, at_start, goal)
-        return Motion(deformation, spatial, start, goal, method, solution.evaluations, solution)
-    solution = stepped_rotation(deformation.sampler(), at_start, goal)
-    evaluations = solution.interpolant.evaluations
-    return Motion(deformation, spatial, start, goal, "collocation", evaluations, solution)
+    solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal)
+    return Motion(
+        deformation=deformation,
+        momentum=spatial,
+        initial_attitude=start,
+        tolerance=goal,
+        method="collocation" if method == "auto" else method,
+        evaluations=evaluations,
+        solution=solution,
+    )
 
 
 def load_motion(path: str | os.PathLike[str]) -> Motion:
@@ -369,66 +362,3 @@ def momentum_from_rate(
     inertia, internal = deformation.inertia(0.0), deformation.internal_momentum(0.0)
     body = so3.apply(inertia, omega) + internal
     return body if attitude is None else so3.apply(so3.rotation_argument(attitude, "attitude"), body)
-
-
-@dataclass(frozen=True, eq=False)
-class _Dop853Solution:
-    dense: tuple[Callable[[Array], Array], ...]
-    times: Array
-    error_estimate: Array
-    evaluations: int
-
-    def rotation(self, t: Array) -> Array:
-        return np.stack([so3.matrix_from_quat(one(t)) for one in self.dense])
-
-
-def _dop853(deformation: Deformation, at_start: Array, tolerance: float) -> _Dop853Solution:
-    """Two runs for each start, one ten times as tight; their difference bounds the error of the looser one."""
-    dense, estimates, evaluations = [], [], 0
-    rtol = max(0.01 * tolerance, 1e-12)
-    pieces = max(2, 64 // (len(deformation.breaks) - 1))
-    times = np.unique(
-        np.concatenate(
-            [np.linspace(a, b, pieces) for a, b in zip(deformation.breaks[:-1], deformation.breaks[1:], strict=True)]
-        )
-    )
-    for start in at_start:
-        loose, first = dop853_rotation(deformation.description.sample, deformation.breaks, start, rtol)
-        tight, second = dop853_rotation(deformation.description.sample, deformation.breaks, start, 0.1 * rtol)
-        between = times[:-1] + 0.37 * np.diff(times)
-        there = np.concatenate([times, between])
-        gap = so3.angle(so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there)))
-        dense.append(tight)
-        estimates.append(float(gap.max()) + 1e-13)
-        evaluations += first + second
-    worst = max(estimates)
-    if worst > tolerance:
-        raise AccuracyNotReached(
-            f"DOP853 reached {worst:.3g} rad where {tolerance:.3g} was asked; loosen the tolerance or use "
-            "method='collocation'"
-        )
-    return _Dop853Solution(tuple(dense), times, np.array(estimates), evaluations)
-
-
-def _stepped(motion: Motion) -> SteppedRotation:
-    """The motion on an interpolant; for another method that interpolant's steps hold the method's rotations."""
-    solution = motion.solution
-    if isinstance(solution, SteppedRotation):
-        return solution
-    start = so3.apply(so3.transpose(motion._flat_attitude), motion.momentum.reshape(-1, 3))
-    stepped = stepped_rotation(motion.deformation.sampler(), start, motion.tolerance)
-    return stepped.with_rotations(solution.rotation(stepped.times), solution.error_estimate)
-
-
-def _broadcast(momentum: ArrayLike, attitude: ArrayLike | None) -> tuple[Array, Array]:
-    spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
-    if attitude is None:
-        return spatial, np.broadcast_to(_IDENTITY, (*spatial.shape[:-1], 3, 3)) if spatial.ndim > 1 else _IDENTITY
-    start = so3.rotation_argument(attitude, "attitude")
-    try:
-        batch = np.broadcast_shapes(spatial.shape[:-1], start.shape[:-2])
-    except ValueError:
-        raise ShapeError(
-            f"momentum {spatial.shape} and attitude {start.shape}: their leading axes must broadcast"
-        ) from None
-    return np.broadcast_to(spatial, (*batch, 3)), np.broadcast_to(start, (*batch, 3, 3))

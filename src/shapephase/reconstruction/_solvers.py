@@ -1,0 +1,172 @@
+"""The ways to the attitude: collocation on an interpolant, the closed form of a rigid body, and SciPy's DOP853."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..deformation.deformation import Deformation
+from ..deformation.descriptions import RigidDescription
+from ..errors import AccuracyNotReached, unknown_name
+from ..integrator.dop853 import dop853_rotation
+from ..integrator.integrate import stepped_rotation
+from ..rigid_body.euler_top import EulerTop
+
+_ROUNDING = 8.0 * float(np.finfo(float).eps)
+"""[rad] of one radian turned: the few operations that an angle goes through."""
+_TURN_OF_A_STEP = 0.3
+"""[rad]; quadrature by the step is exact to rounding for turns this short."""
+_MOST_STEPS = 10_000_000
+"""More would fill the memory of a workstation."""
+_LEAST_RTOL = 1e-12
+"""SciPy's DOP853 gains nothing from a tighter relative tolerance."""
+
+
+class Solution(Protocol):
+    """S(t), the attitude relative to the start, for a batch."""
+
+    @property
+    def times(self) -> Array:
+        """(K + 1,) times between which the solution is smooth and turns little [s]."""
+        ...
+
+    @property
+    def error_estimate(self) -> Array:
+        """(B,) [rad]."""
+        ...
+
+    def rotation(self, t: Array, /) -> Array:
+        """(N,) -> (B, N, 3, 3)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class RigidRotation:
+    """S(t), the attitude relative to the start, of a batch of free rigid bodies.
+
+    Attributes
+    ----------
+    tops : one for each motion of the batch
+    duration : [s]
+    turn : the most that a body may turn in it [rad]
+    error_estimate : (B,) rounding, and what it grows to near a separatrix [rad]
+    """
+
+    tops: tuple[EulerTop, ...]
+    duration: float
+    turn: float
+    error_estimate: Array
+
+    @property
+    def times(self) -> Array:
+        """(K + 1,) between which no body turns by more than 0.3 rad [s]. Raises AccuracyNotReached for 1e7 or more."""
+        if self.turn > _MOST_STEPS * _TURN_OF_A_STEP:
+            raise AccuracyNotReached(
+                f"{self.turn:.3g} rad in one motion are too many to be followed step by step; shorten the motion"
+            )
+        return np.linspace(0.0, self.duration, 2 + int(self.turn / _TURN_OF_A_STEP))
+
+    def rotation(self, t: Array) -> Array:
+        """(N,) -> (B, N, 3, 3)."""
+        return np.array([top.attitude(t) for top in self.tops]).reshape(len(self.tops), len(t), 3, 3)
+
+
+def rigid_rotation(inertia: Array, momentum: Array, duration: float, tolerance: float) -> RigidRotation:
+    """The rotations of a rigid body from these body momenta at the start, (B, 3).
+
+    Raises
+    ------
+    AccuracyNotReached
+        If rounding alone, magnified near a separatrix or over many turns, may exceed the tolerance.
+    """
+    tops = tuple(EulerTop(inertia, one) for one in momentum)
+    turn = max((top.magnitude / top.moments[0] for top in tops), default=0.0) * duration
+    estimates = np.array([_rounding(top, duration) for top in tops])
+    if estimates.max(initial=0.0) > tolerance:
+        worst = int(np.argmax(estimates))
+        raise AccuracyNotReached(
+            f"the closed form is uncertain by {estimates[worst]:.3g} rad where {tolerance:.3g} was requested: rounding "
+            f"over {turn / (2.0 * np.pi):.3g} turns, magnified by {tops[worst].condition:.3g} (large next to the "
+            "separatrix); loosen the tolerance or shorten the motion"
+        )
+    return RigidRotation(tops, duration, turn, estimates)
+
+
+def _rounding(top: EulerTop, duration: float) -> float:
+    """Rounding of the angles turned and, unless moments and momentum came as they are, as each half turn magnifies."""
+    angles = 1.0 + (top.magnitude / top.moments[0] + top.rate) * duration
+    exact = np.count_nonzero(top.axes) == 3
+    half_periods = 1.0 + 2.0 * duration / top.period
+    return _ROUNDING * (angles if exact or not top.rate else angles + top.condition * half_periods)
+
+
+@dataclass(frozen=True, eq=False)
+class Dop853Rotation:
+    """S(t) by SciPy's integrator, one dense output for each motion of the batch."""
+
+    dense: tuple[Callable[[Array], Array], ...]
+    times: Array
+    error_estimate: Array
+    evaluations: int
+
+    def rotation(self, t: Array) -> Array:
+        return np.stack([so3.matrix_from_quat(one(t)) for one in self.dense])
+
+
+def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float) -> Dop853Rotation:
+    """Two runs for each start, one ten times as tight; their difference bounds the error of the looser one."""
+    dense, estimates, evaluations = [], [], 0
+    rtol = max(0.01 * tolerance, _LEAST_RTOL)
+    pieces = max(2, 64 // (len(deformation.breaks) - 1))
+    times = np.unique(np.concatenate([np.linspace(a, b, pieces) for a, b in pairwise(deformation.breaks)]))
+    for start in at_start:
+        loose, first = dop853_rotation(deformation.description.sample, deformation.breaks, start, rtol)
+        tight, second = dop853_rotation(deformation.description.sample, deformation.breaks, start, 0.1 * rtol)
+        between = times[:-1] + 0.37 * np.diff(times)
+        there = np.concatenate([times, between])
+        gap = so3.angle(so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there)))
+        dense.append(tight)
+        estimates.append(float(gap.max()) + 1e-13)
+        evaluations += first + second
+    worst = max(estimates)
+    if worst > tolerance:
+        raise AccuracyNotReached(
+            f"DOP853 reached {worst:.3g} rad where {tolerance:.3g} was requested; loosen the tolerance or use "
+            "method='collocation'"
+        )
+    return Dop853Rotation(tuple(dense), times, np.array(estimates), evaluations)
+
+
+def _by_collocation(deformation: Deformation, at_start: Array, tolerance: float) -> tuple[Solution, int]:
+    solution = stepped_rotation(deformation.sampler(), at_start, tolerance)
+    return solution, solution.interpolant.evaluations
+
+
+def _by_closed_form(deformation: Deformation, at_start: Array, tolerance: float) -> tuple[Solution, int]:
+    description = deformation.description
+    if not isinstance(description, RigidDescription):
+        others = [name for name in METHODS if name != "closed_form"]
+        raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", "closed_form", others)
+    return rigid_rotation(description.tensor, at_start, deformation.duration, tolerance), 1
+
+
+def _by_dop853(deformation: Deformation, at_start: Array, tolerance: float) -> tuple[Solution, int]:
+    solution = dop853_solution(deformation, at_start, tolerance)
+    return solution, solution.evaluations
+
+
+# Deformation, body momenta at the start (B, 3) and tolerance [rad] to the solution and its number of evaluations.
+Solver = Callable[[Deformation, Array, float], tuple[Solution, int]]
+SOLVERS: dict[str, Solver] = {
+    "auto": _by_collocation,
+    "collocation": _by_collocation,
+    "closed_form": _by_closed_form,
+    "dop853": _by_dop853,
+}
+METHODS = tuple(SOLVERS)
