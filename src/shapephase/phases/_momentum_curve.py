@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from .. import so3, sphere
 from ..arrays import Array
-from ..deformation.frames import Frames, frames_argument, lift_frames, named_frames
+from ..deformation.frames import Frames, frames_argument, named_frames
 from ..errors import GaugeError
+from ..integrator.integrate import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 
 _MOST_STEPS = 20_000
@@ -27,7 +28,8 @@ class MomentumCurve:
     Attributes
     ----------
     motion : whose momentum it is
-    frames : U(t) and its rates; None: the deformation's own frame
+    lift : of the horizontal gauge, else None
+    frames : U(t) and its rates of another gauge; None too: the deformation's own frame
     axis : (B, 3) unit vector of the momentum, inertial axes; any where there is none
     edges : (K + 1,) times between which the curve bends little and its integrals are found to rounding
     dynamic : (B, K) integral of omega . Pi/|Pi| over each step [rad]
@@ -37,6 +39,7 @@ class MomentumCurve:
     """
 
     motion: Motion
+    lift: SteppedRotation | None
     frames: Frames | None
     axis: Array
     edges: Array
@@ -69,9 +72,14 @@ class MomentumCurve:
 
     def attitudes(self, times: Array) -> Array:
         """Of the gauge's frame: (N,) -> (B, N, 3, 3)."""
-        start = self.motion.initial_attitude.reshape(-1, 1, 3, 3)
-        attitude = start @ self.motion.solution.rotation(times)
-        return attitude if self.frames is None else attitude @ so3.transpose(self.frames(times)[0])
+        return self.both_attitudes(times)[1]
+
+    def both_attitudes(self, times: Array) -> tuple[Array, Array]:
+        """Of the deformation's own frame and of the gauge's: (N,) -> (B, N, 3, 3), (B, N, 3, 3)."""
+        own = self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)
+        if self.lift is not None:
+            return own, own @ so3.transpose(self.lift.rotation(times)[0])
+        return own, own if self.frames is None else own @ so3.transpose(self.frames(times)[0])
 
 
 def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> MomentumCurve:
@@ -86,25 +94,34 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     UnknownNameError, GaugeError, ShapeError
         For a gauge that does not exist.
     """
-    frames, follows = _frames(motion, gauge)
+    interpolant, solution = motion.interpolant, motion.solution
+    lift = motion.horizontal_lift if gauge == "horizontal" else None
+    # The integrator's steps are short enough for the base's frame and for the lift, which is stepped alike.
+    follows = lift is not None or gauge == "base"
+    frames = None if follows else _frames(motion, gauge)
     spatial = motion.momentum.reshape(-1, 3)
     magnitude = np.linalg.norm(spatial, axis=-1)
     without = magnitude == 0.0
     # Without momentum any axis serves: what depends on it is set to zero.
     axis = np.where(without[:, None], [0.0, 0.0, 1.0], spatial) / np.where(without, 1.0, magnitude)[:, None]
-    edges = motion.solution.times
+    start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)[:, None]
 
     def curve(at: Array) -> tuple[Array, Array]:
         """Unit momentum and angular velocity in the gauge."""
-        start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
-        direction = so3.apply(so3.transpose(motion.solution.rotation(at)), start[:, None, :])
-        inverse, drift = motion.interpolant.inverse_and_drift(at)
+        inverse, drift = interpolant.inverse_and_drift(at)
+        attitude = solution.rotation(at)
+        turn = None
+        if lift is not None:
+            # The horizontal frame turns at minus the drift: relative to it the body turns at I^-1 Pi.
+            turn, drift = lift.rotation(at)[0], np.zeros(3)
+        elif frames is not None:
+            turn, spin = frames(at)
+            drift = drift + spin
+        direction = so3.apply(so3.transpose(attitude), start)
         rate = so3.apply(inverse, magnitude[:, None, None] * direction) - drift
-        if frames is None:
-            return direction, rate
-        turn, spin = frames(at)
-        return so3.apply(turn, direction), so3.apply(turn, rate - spin)
+        return (direction, rate) if turn is None else (so3.apply(turn, direction), so3.apply(turn, rate))
 
+    edges = solution.times
     found = _by_step(curve, edges)
     if not follows:
         edges, found = _refined(curve, edges, found)
@@ -115,6 +132,7 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     dynamic, slivers, corners = found
     return MomentumCurve(
         motion=motion,
+        lift=lift,
         frames=frames,
         axis=axis,
         edges=edges,
@@ -125,27 +143,31 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     )
 
 
-def _frames(motion: Motion, gauge: Gauge) -> tuple[Frames | None, bool]:
-    """The frames of a gauge, and whether the integrator's steps are short enough for them."""
-    if not isinstance(gauge, str):
-        return frames_argument(gauge, motion.deformation.breaks), False
-    if gauge == "base":
-        return None, True
-    if gauge == "horizontal":
-        return lift_frames(motion.horizontal_lift), True
-    return named_frames(motion.deformation, gauge), False
+def _frames(motion: Motion, gauge: Gauge) -> Frames:
+    if isinstance(gauge, str):
+        return named_frames(motion.deformation, gauge)
+    return frames_argument(gauge, motion.deformation.breaks)
 
 
 def _by_step(curve: sphere.Curve, edges: Array) -> tuple[Array, Array, Array]:
     """Dynamic phase and area between arc and chord for each step (B, K), directions at the edges (B, K + 1, 3)."""
-    corners, _ = curve(edges)
-    return *_integrals(curve, edges[:-1], edges[1:], corners[:, :-1]), corners
+    nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
+    # One evaluation for both: the edges are but an eighth as many as the nodes.
+    directions, rates = curve(np.concatenate([edges, nodes.ravel()]))
+    corners = directions[:, : len(edges)]
+    direction, rate = (part[:, len(edges) :].reshape(-1, *nodes.shape, 3) for part in (directions, rates))
+    return *_of_steps(direction, rate, weights, corners[:, :-1]), corners
 
 
 def _integrals(curve: sphere.Curve, left: Array, right: Array, start: Array) -> tuple[Array, Array]:
     """Dynamic phase and area between arc and chord for steps that begin in the directions `start`: (B, K) each."""
     nodes, weights = sphere.gauss_nodes(left, right)
     direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
+    return _of_steps(direction, rate, weights, start)
+
+
+def _of_steps(direction: Array, rate: Array, weights: Array, start: Array) -> tuple[Array, Array]:
+    """The same integrals from directions and rates at the nodes of each step (B, K, n, 3)."""
     dynamic = (np.sum(direction * rate, axis=-1) * weights).sum(axis=-1)
     slivers = sphere.area_rate(start[:, :, None], direction, np.cross(direction, rate))
     return dynamic, (slivers * weights).sum(axis=-1)

@@ -83,26 +83,23 @@ def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
 
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
     """
-    start = motion.initial_attitude.reshape(-1, 3, 3)
-    duration = motion.duration
-    closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
+    deformation, batch = motion.deformation, motion.batch
     curve = momentum_curve(motion, gauge)
     has_phase = curve.has_phase
-    carried = start @ motion.horizontal_lift.end[0] @ closure
-    holonomy = carried @ so3.transpose(start)
-    end = motion.final_attitude.reshape(-1, 3, 3)
+    moving = has_phase[:, None, None]
+    own, seen = curve.both_attitudes(curve.edges[[0, -1]])
+    start, end = motion.initial_attitude.reshape(-1, 3, 3), own[:, -1]
+    first, last = seen[:, 0], seen[:, -1]
+    departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
+    closure = np.eye(3) if deformation.closure is None else deformation.closure
     total = end @ closure @ so3.transpose(start)
-    dynamical = np.where(has_phase[:, None, None], total @ so3.transpose(holonomy), np.eye(3))
+    holonomy = start @ motion.horizontal_lift.end[0] @ closure @ so3.transpose(start)
+    dynamical = np.where(moving, total @ so3.transpose(holonomy), np.eye(3))
+    tilt = np.where(moving, first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
     area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners), 0.0)
-    first, last = np.moveaxis(curve.attitudes(np.array([0.0, duration])), 1, 0)
-    departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
-    tilt = np.where(
-        has_phase[:, None, None], first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3)
-    )
     phase = dynamic - area
     read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
-    batch = motion.batch
     matrix = (*batch, 3, 3)
     return PhaseSplit(
         gauge=gauge if isinstance(gauge, str) else "given",
@@ -116,9 +113,9 @@ def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
         solid_angle=area.reshape(batch)[()],
         tilt=tilt.reshape(matrix),
         momentum_gap=(so3.angle_between(departing, arriving) * has_phase).reshape(batch)[()],
-        shape_gap=motion.deformation.shape_gap,
+        shape_gap=deformation.shape_gap,
         residual=np.abs(so3.wrap(phase - read_off)).reshape(batch)[()],
-        is_loop=motion.deformation.closure is not None,
+        is_loop=deformation.closure is not None,
         has_phase=has_phase.reshape(batch)[()],
     )
 
