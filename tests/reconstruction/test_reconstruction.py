@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 import shapephase as sp
 from shapephase.errors import ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
+from shapephase.integrator.integrate import SteppedRotation, stepped_rotation
+from shapephase.integrator.sampling import Sampler
 from support.independent import (
     BODIES,
     apart,
@@ -338,3 +341,28 @@ def test_particles_that_line_up_are_named_with_their_time():
     deformation = sp.particles([1.0, 1.0, 1.0], closing, 1.0, breaks=[0.5])
     with pytest.raises(SingularInertiaError, match=r"at t = 0\.[5-9]\d* s is not positive definite"):
         sp.reconstruct(deformation, [0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("method", ["closed_form", "dop853"])
+def test_what_another_method_needs_of_the_integrator_is_integrated_once(monkeypatch: pytest.MonkeyPatch, method: str):
+    """Interpolant, phases, areas and sensitivities of a motion share one integration; so do its splits."""
+    module = import_module("shapephase.reconstruction.reconstruction")
+    momenta: list[float] = []
+
+    def counted(sampler: Sampler, momentum: np.ndarray, tolerance: float) -> SteppedRotation:
+        momenta.append(float(np.linalg.norm(momentum)))
+        return stepped_rotation(sampler, momentum, tolerance)
+
+    monkeypatch.setattr(module, "stepped_rotation", counted)
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.3, 1.0, 0.2], method=method)
+    assert momenta == []
+    for _ in range(3):
+        _ = motion.interpolant, motion.amplification, motion.propagator, motion.sensitivity
+        motion.dynamic_phase(1.0), motion.solid_angle(1.0)
+    assert len(momenta) == 1
+    assert momenta[0] > 0.0
+    for gauge in ("horizontal", "base", "horizontal"):
+        sp.split(motion, gauge)
+        sp.running_phases(motion, 1.0, gauge)
+    assert len(momenta) == 2
+    assert momenta[1] == 0.0

@@ -37,6 +37,7 @@ from .text import (
     check_writable,
     orbit_data,
     orbit_lines,
+    path_data,
     path_lines,
     plain,
     record_data,
@@ -267,7 +268,7 @@ def check_command(
         path, recorded = _motion(motion, loaded, smooth, topic)
         moved = path_summary(loaded, path)
         lines += ["", *path_lines(loaded, motion, moved, recorded)]
-        data["motion"] = plain(moved) | record_data(loaded, recorded)
+        data["motion"] = path_data(moved) | record_data(loaded, recorded)
     return Outcome("\n".join(lines), data, judged=True)
 
 

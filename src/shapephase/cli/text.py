@@ -169,7 +169,7 @@ def path_lines(body: Body, name: str, card: PathSummary, recorded: RecordedMotio
             lines.append(f"{'largest residual':24}{recorded.residual[joint]:.3g} rms, {body.joint_names[joint]}")
         if recorded.base_attitude is not None:
             lines.append(f"{'base':24}recorded too")
-    for title, names in (("beyond their limits", card.beyond), ("at rest", card.resting)):
+    for title, names in (("beyond their limits", card.joints_beyond_limits), ("at rest", card.still_joints)):
         lines += [f"{title:24}{', '.join(names)}"] if names else []
     return lines
 
@@ -200,6 +200,15 @@ def base_said(motion: Motion, recorded: RecordedMotion | None) -> tuple[list[str
 def plain(result: Any) -> dict[str, Any]:
     """The fields of a result as JSON can hold them; infinite limits become null."""
     return {key: _as_json(value) for key, value in asdict(result).items()}
+
+
+_PATH_KEYS = {"joints_beyond_limits": "beyond", "still_joints": "resting"}
+"""JSON keys that are shorter than the names of the fields."""
+
+
+def path_data(summary: PathSummary) -> dict[str, Any]:
+    """A summary of a joint motion as JSON can hold it."""
+    return {_PATH_KEYS.get(key, key): value for key, value in plain(summary).items()}
 
 
 def _as_json(value: Any) -> Any:

@@ -1,76 +1,27 @@
-from .assemblies import (
-    AssemblyDescription,
-    Boom,
-    Moments,
-    MovingMass,
-    Part,
-    RigidPart,
-    assembly,
-    boom,
-    moving_mass,
-    rigid_part,
-)
-from .deformation import Deformation, articulated, particles, prescribed, rigid, sampled_deformation
-from .descriptions import (
-    ArticulatedDescription,
-    Description,
-    ParticleDescription,
-    ParticlePath,
-    PrescribedDescription,
-    RigidDescription,
-    SampledDescription,
-    UngaugedDescription,
-    inertia_of,
-    rate_of,
-)
-from .frames import frames_argument, integrated_frames, lift_frames, link_frames, mean_body_frames, named_frames
+from .assemblies import Boom, MovingMass, Part, RigidPart, assembly, boom, moving_mass, rigid_part
+from .deformation import Deformation, articulated, particles, prescribed, rigid
+from .descriptions import Description
 from .gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, named_gauge, principal_gauge
-from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle, least_over, line_measure
-from .principal_frame import principal_frames
 
 __all__ = [
-    "ArticulatedDescription",
-    "AssemblyDescription",
     "Boom",
     "Deformation",
     "Description",
-    "Moments",
     "MovingMass",
     "Part",
-    "ParticleDescription",
-    "ParticlePath",
-    "PrescribedDescription",
-    "RigidDescription",
     "RigidPart",
-    "SampledDescription",
-    "UngaugedDescription",
     "articulated",
     "assembly",
     "boom",
-    "check_never_on_a_line",
-    "check_not_on_a_line",
-    "check_triangle",
-    "frames_argument",
     "horizontal_gauge",
     "in_gauge",
-    "inertia_of",
-    "integrated_frames",
-    "least_over",
-    "lift_frames",
-    "line_measure",
-    "link_frames",
     "link_gauge",
-    "mean_body_frames",
     "mean_body_gauge",
     "moving_mass",
-    "named_frames",
     "named_gauge",
     "particles",
     "prescribed",
-    "principal_frames",
     "principal_gauge",
-    "rate_of",
     "rigid",
     "rigid_part",
-    "sampled_deformation",
 ]

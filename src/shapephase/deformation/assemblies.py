@@ -16,8 +16,7 @@ from ..arguments import on_unphysical_argument, positive_argument, vector_argume
 from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from ..inertia_tensor import second_moment
-from ..integrator.sampling import Sampler, sampler
-from ..shape_space.shape_path import CLOSED, ShapePath
+from ..shape_space.shape_path import CLOSED, ShapePath, Smoothness
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of
 from .physical_validity import check_never_on_a_line, check_triangle, least_over
@@ -147,31 +146,31 @@ class Boom:
 
     def moments(self, times: Array, origin: Array) -> Moments:
         """As `Part`."""
-        out, pace = (column[:, 0] for column in self.path.curve(times))
+        out, speed = (column[:, 0] for column in self.path.curve(times))
         density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
         half, third = 0.5 * density * out**2, density * out**3 / 3.0
         first = self.mass * arm + half[:, None] * axis
-        momentum = (density * out * pace)[:, None] * axis
+        momentum = (density * out * speed)[:, None] * axis
         mixed = np.outer(arm, axis)
         second = self.mass * np.outer(arm, arm) + half[:, None, None] * (mixed + mixed.T)
         second = second + third[:, None, None] * np.outer(axis, axis)
         of_rod = (density * out)[:, None] * arm + half[:, None] * axis
-        flow = (pace[:, None] * of_rod)[:, :, None] * axis
-        return Moments(first, momentum, second, flow, density * out * pace**2)
+        flow = (speed[:, None] * of_rod)[:, :, None] * axis
+        return Moments(first, momentum, second, flow, density * out * speed**2)
 
     def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:
         """As `Part`: a bit of boom that ends s behind the tip is max(length - s, 0) along the axis from the root."""
-        out, pace = (column[:, 0] for column in self.path.curve(times))
+        out, speed = (column[:, 0] for column in self.path.curve(times))
         then = self.path.curve(np.array([reference]))[0][0, 0]
         density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
         both = np.minimum(out, then)
         along = out * then * both - 0.5 * (out + then) * both**2 + both**3 / 3.0
-        along_rate = (then * both - 0.5 * both**2) * pace
+        along_rate = (then * both - 0.5 * both**2) * speed
         still = self.mass * np.outer(arm, arm) + 0.5 * density * then**2 * np.outer(arm, axis)
         here = 0.5 * density * out**2
         square, mixed = np.outer(axis, axis), np.outer(axis, arm)
         value = still + here[:, None, None] * mixed + density * along[:, None, None] * square
-        rate = (density * out * pace)[:, None, None] * mixed + density * along_rate[:, None, None] * square
+        rate = (density * out * speed)[:, None, None] * mixed + density * along_rate[:, None, None] * square
         return value, rate
 
 
@@ -238,11 +237,9 @@ class AssemblyDescription(UngaugedDescription):
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
-    def sampler(self, breaks: Array) -> Sampler:
+    def smoothness(self, breaks: Array) -> Smoothness:
         """As `Description`."""
-        return sampler(
-            self.sample, breaks, oscillations=self.oscillations, loops=self.loops, smooth_loop=self.smooth_loop
-        )
+        return Smoothness(breaks=breaks, oscillations=self.oscillations, loops=self.loops, smooth_loop=self.smooth_loop)
 
 
 def rigid_part(
@@ -321,8 +318,8 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
     weight = positive_argument(mass, "mass", "a mass in kg")
     whole = positive_argument(full_length, "full_length", "a length in m")
     axis = vector_argument(direction, "direction")
-    size = float(np.linalg.norm(axis))
-    if size == 0.0:
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
         raise ShapeError("direction: a vector other than zero is needed, got [0, 0, 0]")
     route = _columns(path, 1, "a boom")
     for sign, offset in ((1.0, 0.0), (-1.0, whole)):
@@ -332,7 +329,7 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
                 f"the length of a boom must stay between 0 and {whole:.9g} m, at t = {when:.6g} s it is "
                 f"{sign * (least - offset):.9g} m"
             )
-    return Boom(weight, whole, vector_argument(root, "root", unit="m"), axis / size, route)
+    return Boom(weight, whole, vector_argument(root, "root", unit="m"), axis / length, route)
 
 
 def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | None = None) -> Deformation:

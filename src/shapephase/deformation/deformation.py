@@ -14,7 +14,7 @@ from ..body.body import Body
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
-from ..integrator.sampling import Sampler
+from ..integrator.sampling import Sampler, sampler
 from ..shape_space.body_path import path_gap
 from ..shape_space.shape_path import CLOSED, ShapePath
 from .descriptions import (
@@ -115,8 +115,11 @@ class Deformation:
         return -least, when
 
     def sampler(self) -> Sampler:
-        """A fresh sampler for the integrator."""
-        return self.description.sampler(self.breaks)
+        """A fresh sampler for the integrator, of the kind that suits what the description says of itself.
+
+        Raises SingularInertiaError for particles that are on one line at some time.
+        """
+        return sampler(self.description.sample, **vars(self.description.smoothness(self.breaks)))
 
 
 def articulated(body: Body, path: ShapePath) -> Deformation:
@@ -242,12 +245,12 @@ def particles(
         description = ParticleDescription(weights, ParticlePath(path), path.oscillations)
     ends, _ = description.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
-    size = float(np.max(np.linalg.norm(ends[0], axis=-1)))
-    if size == 0.0:
+    radius = float(np.max(np.linalg.norm(ends[0], axis=-1)))
+    if radius == 0.0:
         raise SingularInertiaError("all particles are in one place: there is no inertia that could turn")
     if not callable(positions):
         check_never_on_a_line(description.moment, edges)
-    gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / size
+    gap = float(np.max(np.linalg.norm(ends[1] - ends[0] @ turn.T, axis=-1))) / radius
     closure = turn if gap <= CLOSED else None
     return Deformation(description, length, edges, closure, gap, f"{len(weights)} particles")
 

@@ -17,9 +17,7 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
-from ..integrator.sampling import Sampler, sampler
-from ..shape_space.body_path import path_sampler
-from ..shape_space.shape_path import ShapePath
+from ..shape_space.shape_path import ShapePath, Smoothness
 from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 
 
@@ -54,8 +52,14 @@ class Description(Protocol):
         """Orientation (N, 3, 3) and angular velocity (N, 3) of a link in this frame; GaugeError without links."""
         ...
 
-    def sampler(self, breaks: Array, /) -> Sampler:
-        """A fresh sampler of this source."""
+    def smoothness(self, breaks: Array, /) -> Smoothness:
+        """By which the integrator chooses how to sample it, given the deformation's breaks [s].
+
+        Raises
+        ------
+        SingularInertiaError
+            If the inertia is known to be singular at some time.
+        """
         ...
 
 
@@ -111,8 +115,8 @@ class ArticulatedDescription(UngaugedDescription):
         shapes, rates = self.path.curve(times)
         return self.body.link_pose(shapes, link)[:, :3, :3], self.body.link_angular_velocity(shapes, rates, link)
 
-    def sampler(self, breaks: Array) -> Sampler:  # noqa: ARG002 (the path's own)
-        return path_sampler(self.body, self.path)
+    def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
+        return self.path.smoothness
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +138,8 @@ class RigidDescription(UngaugedDescription):
     def kinetic_energy(self, times: Array, turning: Array) -> Array:  # noqa: ARG002
         return 0.5 * np.sum(turning * so3.apply(self.tensor, turning), axis=-1)
 
-    def sampler(self, breaks: Array) -> Sampler:
-        return sampler(self.sample, breaks, oscillations=0.0)
+    def smoothness(self, breaks: Array) -> Smoothness:
+        return Smoothness(breaks, oscillations=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,13 +162,13 @@ class PrescribedDescription(UngaugedDescription):
     def inertia_rate(self, times: Array) -> Array:
         return rate_of(lambda t: self.sample(t)[0], times, self.breaks)
 
-    def sampler(self, breaks: Array) -> Sampler:
-        return sampler(self.sample, breaks)
+    def smoothness(self, breaks: Array) -> Smoothness:
+        return Smoothness(breaks)
 
 
 @dataclass(frozen=True, eq=False)
 class ParticleDescription(UngaugedDescription):
-    """Point masses that move as seen from a frame; `oscillations` as `sampler` has it."""
+    """Point masses that move as seen from a frame; `oscillations` as `Smoothness` has it."""
 
     masses: Array
     positions: Callable[[Array], tuple[ArrayLike, ArrayLike]]
@@ -172,10 +176,10 @@ class ParticleDescription(UngaugedDescription):
 
     def centred(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities (N, m, 3) from the centre of mass."""
-        wanted = (len(times), len(self.masses), 3)
+        expected_shape = (len(times), len(self.masses), 3)
         both = self.positions(times)
         points, speeds = (
-            _returned(part, name, wanted) for name, part in zip(("positions", "velocities"), both, strict=True)
+            _returned(part, name, expected_shape) for name, part in zip(("positions", "velocities"), both, strict=True)
         )
         fraction = self.masses / self.masses.sum()
         return points - (fraction @ points)[:, None], speeds - (fraction @ speeds)[:, None]
@@ -198,8 +202,8 @@ class ParticleDescription(UngaugedDescription):
         return inertia_of(rate + np.swapaxes(rate, -1, -2))
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        (points, speeds), (still, _) = self.centred(times), self.centred(np.array([reference]))
-        weighted = self.masses[:, None] * still[0]
+        (points, speeds), (there, _) = self.centred(times), self.centred(np.array([reference]))
+        weighted = self.masses[:, None] * there[0]
         return np.swapaxes(points, -1, -2) @ weighted, np.swapaxes(speeds, -1, -2) @ weighted
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
@@ -207,9 +211,9 @@ class ParticleDescription(UngaugedDescription):
         total = np.cross(turning[:, :, None], points) + speeds
         return 0.5 * np.einsum("m,bnmi,bnmi->bn", self.masses, total, total)
 
-    def sampler(self, breaks: Array) -> Sampler:
+    def smoothness(self, breaks: Array) -> Smoothness:
         check_never_on_a_line(self.moment, breaks)
-        return sampler(self.sample, breaks, oscillations=self.oscillations)
+        return Smoothness(breaks, oscillations=self.oscillations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +225,8 @@ class ParticlePath:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities: (N,) -> (N, m, 3), (N, m, 3)."""
         points, speeds = self.path.curve(times)
-        wanted = (len(times), self.path.n_shape // 3, 3)
-        return points.reshape(wanted), speeds.reshape(wanted)
+        expected_shape = (len(times), self.path.n_shape // 3, 3)
+        return points.reshape(expected_shape), speeds.reshape(expected_shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,9 +247,9 @@ class SampledDescription(UngaugedDescription):
     def centre_of_mass(self, times: Array) -> Array:
         return PiecewiseChebyshev(self.interpolant.edges, self.centre)(times)
 
-    def sampler(self, breaks: Array) -> Sampler:
+    def smoothness(self, breaks: Array) -> Smoothness:
         edges = np.union1d(breaks, self.interpolant.edges)
-        return sampler(self.sample, edges, oscillations=0.5)
+        return Smoothness(edges, oscillations=0.5)
 
 
 def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> Array:
@@ -278,8 +282,8 @@ def inertia_of(moment: Array) -> Array:
     return np.trace(moment, axis1=-2, axis2=-1)[:, None, None] * np.eye(3) - moment
 
 
-def _returned(value: ArrayLike, name: str, wanted: tuple[int, ...]) -> Array:
+def _returned(value: ArrayLike, name: str, expected_shape: tuple[int, ...]) -> Array:
     array = finite_array(value, name)
-    if array.shape != wanted:
-        raise ShapeError(f"the function of the {name} must return {wanted} for these times, got {array.shape}")
+    if array.shape != expected_shape:
+        raise ShapeError(f"the function of the {name} must return {expected_shape} for these times, got {array.shape}")
     return array

@@ -17,14 +17,20 @@ from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..chebyshev import PiecewiseChebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import GaugeError, ShapeError, unknown_name
-from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import sampler
 from .deformation import Deformation
 from .principal_frame import Frames, principal_frames
 
 _LINK = "link:"
 _LIFT_TOLERANCE = 1e-12
-_PIECES, _DEGREE, _SHORTEST = 4, 16, 1e-4
+"""[rad]; tighter than any motion that is seen from these frames."""
+_PIECES = 4
+"""Panels between two breaks, to begin with."""
+_DEGREE = 16
+"""Of the Chebyshev series of U on a panel."""
+_SHORTEST = 1e-4
+"""The shortest panel, relative to the time between two breaks: below it differences lose too many digits."""
 
 
 def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> Frames:
@@ -32,7 +38,7 @@ def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]
     if not callable(u):
         raise ShapeError(f"a gauge u is a function of times, got {u!r}")
 
-    def asked(times: Array) -> tuple[Array, Array | None]:
+    def evaluate(times: Array) -> tuple[Array, Array | None]:
         answer: Any = u(times)
         turns, rates = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
         turned = so3.rotation_argument(turns, "U")
@@ -44,11 +50,11 @@ def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]
             )
         return turned, rate
 
-    if asked(breaks[:1])[1] is None:
-        return _differentiated(lambda times: asked(times)[0], breaks)
+    if evaluate(breaks[:1])[1] is None:
+        return _differentiated(lambda times: evaluate(times)[0], breaks)
 
     def frames(times: Array) -> tuple[Array, Array]:
-        turned, rate = asked(times)
+        turned, rate = evaluate(times)
         if rate is None:
             raise ShapeError("u returned body rates at the start, and U alone later on")
         return turned, rate
@@ -111,13 +117,13 @@ def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start:
             raise ShapeError(f"rates must return ({len(times)}, 3) for these times, got {spin.shape}")
         return spin
 
-    def source(times: Array) -> tuple[Array, Array]:
+    def unit_body(times: Array) -> tuple[Array, Array]:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -spins(times)
 
     first = np.eye(3) if start is None else so3.rotation_argument(start, "start")
     if first.shape != (3, 3):
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
-    turned = stepped_rotation(sampler(source, breaks), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    turned = stepped_rotation(sampler(unit_body, breaks), np.zeros((1, 3)), _LIFT_TOLERANCE)
     return lambda times: (first @ turned.rotation(times)[0], spins(times))
 
 
@@ -138,15 +144,6 @@ def _check_rates(frames: Frames, breaks: Array) -> None:
             f"u gives the body rate {rates[row]} rad/s at {middle[row]:.6g} s, but its U turns at {slope[row]}; "
             "the body rate is the vector of U^T U'"
         )
-
-
-def lift_frames(lift: SteppedRotation) -> Frames:
-    """U(t) and its body rates of the horizontal gauge, from the integrated lift."""
-
-    def frames(times: Array) -> tuple[Array, Array]:
-        return lift.rotation(times)[0], -lift.inverse_and_drift(times)[1]
-
-    return frames
 
 
 def link_frames(deformation: Deformation, link: str) -> Frames:
@@ -186,8 +183,8 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
         turned = so3.transpose(left @ right)
         # U C = V diag(sizes) V^T with the rows of `right` for V^T.
         inverse = 1.0 / (sizes.sum(axis=-1, keepdims=True) - sizes)
-        asked = so3.apply(right, 2.0 * so3.vee(turned @ slope))
-        spin = -so3.apply(so3.transpose(right), inverse * asked)
+        twisted = so3.apply(right, 2.0 * so3.vee(turned @ slope))
+        spin = -so3.apply(so3.transpose(right), inverse * twisted)
         return turned, so3.apply(so3.transpose(turned), spin)
 
     _check_unbroken(frames, deformation, time)

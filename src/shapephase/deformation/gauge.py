@@ -18,7 +18,7 @@ from ..arrays import Array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
-from ..integrator.sampling import Sampler, sampler
+from ..shape_space.shape_path import Smoothness
 from .deformation import Deformation
 from .descriptions import Description
 from .frames import (
@@ -32,6 +32,7 @@ from .frames import (
 )
 
 _LIFT_TOLERANCE = 1e-12
+"""[rad]; tighter than any motion that is seen from this frame."""
 
 
 def in_gauge(
@@ -185,8 +186,8 @@ class _Gauged:
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
         correlation, slope = self.original.correlation(times, reference)
         turn, rate = self.frames(times)
-        still = self.frames(np.array([reference]))[0][0].T
-        return turn @ correlation @ still, turn @ (so3.hat(rate) @ correlation + slope) @ still
+        back = self.frames(np.array([reference]))[0][0].T
+        return turn @ correlation @ back, turn @ (so3.hat(rate) @ correlation + slope) @ back
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
         turn, rate = self.frames(times)
@@ -197,5 +198,5 @@ class _Gauged:
         turn, rate = self.frames(times)
         return turn @ turned, so3.apply(turn, turning + rate)
 
-    def sampler(self, breaks: Array) -> Sampler:
-        return sampler(self.sample, breaks)
+    def smoothness(self, breaks: Array) -> Smoothness:
+        return Smoothness(breaks)

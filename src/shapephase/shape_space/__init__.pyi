@@ -11,13 +11,13 @@ from .connection import (
 from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .many_paths import FinalAttitudes, final_attitudes
 from .shape_path import ShapePath
-from .summaries import BodySummary, JointCard, PathSummary, body_summary, path_summary
+from .summaries import BodySummary, JointSummary, PathSummary, body_summary, path_summary
 
 __all__ = [
     "BodySummary",
     "FinalAttitudes",
     "HorizontalLift",
-    "JointCard",
+    "JointSummary",
     "PathSummary",
     "ShapePath",
     "body_summary",

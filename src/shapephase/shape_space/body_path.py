@@ -35,14 +35,4 @@ def path_sampler(body: Body, path: ShapePath) -> Sampler:
     def evaluate(times: Array) -> tuple[Array, Array]:
         return body.sample(*path.curve(times))
 
-    def probe(times: Array) -> Array:
-        return np.concatenate(path.curve(times), axis=1)
-
-    return sampler(
-        evaluate,
-        path.breaks,
-        oscillations=path.oscillations,
-        loops=path.loops,
-        smooth_loop=path.smooth_loop,
-        probe=probe,
-    )
+    return sampler(evaluate, **vars(path.smoothness))

@@ -31,6 +31,27 @@ _WHOLE_TURN = 2.0 * np.pi
 
 
 @dataclass(frozen=True, eq=False)
+class Smoothness:
+    """What is known of a function of time before it is sampled, by which a way of sampling is chosen.
+
+    Attributes
+    ----------
+    breaks : (M,) times between which it is smooth, first and last the interval's ends [s]
+    oscillations : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
+    loops : the interval is its first part, this many times
+    smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    probe : a cheap stand-in whose swings are those of the function, times (N,) -> (N, 2 n), shapes and then their
+        rates; None: there is none
+    """
+
+    breaks: Array
+    oscillations: float | None = None
+    loops: int = 1
+    smooth_loop: bool = False
+    probe: Callable[[Array], Array] | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class ShapePath:
     """A motion of the joints, r(t) on [0, duration].
 
@@ -177,6 +198,17 @@ class ShapePath:
         return self._evaluated(t)[1]
 
     @property
+    def smoothness(self) -> Smoothness:
+        """Of whatever depends smoothly on shapes and rates."""
+        return Smoothness(
+            breaks=self.breaks,
+            oscillations=self.oscillations,
+            loops=self.loops,
+            smooth_loop=self.smooth_loop,
+            probe=lambda times: np.concatenate(self.curve(times), axis=1),
+        )
+
+    @property
     def gap(self) -> Array:
         """Where the path ends, seen from where it begins: (n,) [rad or m]; zero for a loop."""
         ends, _ = self.curve(np.array([0.0, self.duration]))
@@ -247,7 +279,7 @@ class ShapePath:
 
     @property
     def sample_times(self) -> Array:
-        """Times whose samples tell the path: a spline's knots, which tell it exactly, or some 400: (N,) [s]."""
+        """Times whose samples describe the path: a spline's knots, which do so exactly, or some 400: (N,) [s]."""
         if isinstance(self.curve, PiecewisePolynomial) and len(self.curve.coefficients) == 4:
             return self.breaks
         pieces = [np.linspace(a, b, 400 // (len(self.breaks) - 1) + 2) for a, b in pairwise(self.breaks)]
@@ -264,23 +296,23 @@ class ShapePath:
             If one of them is missing, or a path without names has another number of columns. `owner` names the
             body in messages.
         """
-        wanted = tuple(joint_names)
+        expected = tuple(joint_names)
         if self.joint_names is None:
-            if self.n_shape != len(wanted):
+            if self.n_shape != len(expected):
                 raise TrajectoryError(
-                    f"the path has {self.n_shape} joints, {owner} has {len(wanted)}: {', '.join(wanted)}"
+                    f"the path has {self.n_shape} joints, {owner} has {len(expected)}: {', '.join(expected)}"
                 )
             return self
         for name in self.joint_names:
-            if name not in wanted:
-                raise unknown_name(f"joint of {owner}", name, wanted)
-        missing = [name for name in wanted if name not in self.joint_names]
+            if name not in expected:
+                raise unknown_name(f"joint of {owner}", name, expected)
+        missing = [name for name in expected if name not in self.joint_names]
         if missing:
             raise TrajectoryError(f"the path lacks these joints of {owner}: {', '.join(missing)}")
-        if self.joint_names == wanted:
+        if self.joint_names == expected:
             return self
-        order = np.array([self.joint_names.index(name) for name in wanted])
-        return replace(self, curve=Reordered(self.curve, order), joint_names=wanted)
+        order = np.array([self.joint_names.index(name) for name in expected])
+        return replace(self, curve=Reordered(self.curve, order), joint_names=expected)
 
     def _joint(self, column: int) -> str:
         return self.joint_names[column] if self.joint_names else f"number {column}"
@@ -288,8 +320,8 @@ class ShapePath:
     def _evaluated(self, t: ArrayLike) -> tuple[Array, Array]:
         times = times_argument(t, self.duration)
         shapes, rates = self.curve(times.ravel())
-        wanted = (*times.shape, self.n_shape)
-        return shapes.reshape(wanted), rates.reshape(wanted)
+        expected_shape = (*times.shape, self.n_shape)
+        return shapes.reshape(expected_shape), rates.reshape(expected_shape)
 
 
 def _piecewise(times: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
@@ -352,13 +384,13 @@ def _larger(a: float | None, b: float | None) -> float | None:
 def _check_rates(path: ShapePath) -> None:
     """Compare the function's rates with differences of its shapes away from the breaks.
 
-    At two steps: where these disagree with each other, as on the flank of a burst, they tell nothing.
+    At two steps: where these disagree with each other, as on the flank of a burst, nothing follows from them.
     """
     left, width = path.breaks[:-1], np.diff(path.breaks)
     middle = left + 0.381 * width
     coarse, _, _ = _differences(path, middle, 1e-4 * width)
-    slope, rate, size = _differences(path, middle, 1e-5 * width)
-    scale = np.abs(rate) + np.maximum(size, 1e-9) / path.duration
+    slope, rate, spread = _differences(path, middle, 1e-5 * width)
+    scale = np.abs(rate) + np.maximum(spread, 1e-9) / path.duration
     wrong = np.abs(slope - rate) > 1e-3 * scale + 10.0 * np.abs(slope - coarse)
     if wrong.any():
         where, joint = (int(i) for i in np.argwhere(wrong)[0])

@@ -13,10 +13,11 @@ from .body_path import path_gap
 from .shape_path import CLOSED, ShapePath
 
 _SAMPLES = 401
+"""Even times at which extremes are sought, beside the breaks."""
 
 
 @dataclass(frozen=True, eq=False)
-class JointCard:
+class JointSummary:
     """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit."""
 
     name: str
@@ -49,7 +50,7 @@ class BodySummary:
     principal_moments: Array
     principal_axes: Array
     triangle_defect: float
-    joints: tuple[JointCard, ...]
+    joints: tuple[JointSummary, ...]
     links: tuple[str, ...]
 
 
@@ -63,8 +64,8 @@ class PathSummary:
     breaks : how many times, ends included, between which it is smooth
     lowest, highest : (n,) of each joint, at 401 times and the breaks [rad or m]
     fastest : (n,) largest rate of each joint there [rad/s or m/s]
-    beyond : names of the joints that leave their limits
-    resting : names of the joints that do not move
+    joints_beyond_limits : names of the joints that leave their limits
+    still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
     is_loop : whether it closes
     """
@@ -74,14 +75,14 @@ class PathSummary:
     lowest: Array
     highest: Array
     fastest: Array
-    beyond: tuple[str, ...]
-    resting: tuple[str, ...]
+    joints_beyond_limits: tuple[str, ...]
+    still_joints: tuple[str, ...]
     gap: Array
     is_loop: bool
 
 
 def body_summary(body: Body) -> BodySummary:
-    """The card of a body."""
+    """What there is to know of a body at its neutral shape."""
     neutral = body.shape()
     inertia = body.locked_inertia(neutral)
     moments, axes = principal_axes(inertia)
@@ -91,36 +92,41 @@ def body_summary(body: Body) -> BodySummary:
     ]
     joints = zip(body.joint_names, kinds, body.joint_limits.tolist(), body.joint_units, strict=True)
     return BodySummary(
-        body.name,
-        body.sha256,
-        body.mass,
-        body.centre_of_mass(neutral),
-        moments,
-        axes,
-        float(triangle_defect(inertia)),
-        tuple(JointCard(name, kind, lower, upper, unit) for name, kind, (lower, upper), unit in joints),
-        body.link_names,
+        name=body.name,
+        sha256=body.sha256,
+        mass=body.mass,
+        centre_of_mass=body.centre_of_mass(neutral),
+        principal_moments=moments,
+        principal_axes=axes,
+        triangle_defect=float(triangle_defect(inertia)),
+        joints=tuple(
+            JointSummary(name=name, kind=kind, lower=lower, upper=upper, unit=unit)
+            for name, kind, (lower, upper), unit in joints
+        ),
+        links=body.link_names,
     )
 
 
 def path_summary(body: Body, path: ShapePath) -> PathSummary:
-    """The card of a joint motion. Raises TrajectoryError, UnknownNameError for joints of another body."""
+    """What there is to know of a joint motion for a body. Raises TrajectoryError, UnknownNameError for other joints."""
     route = path.matched(body.joint_names, body.name)
     times = np.union1d(np.linspace(0.0, route.duration, _SAMPLES), route.breaks)
     shapes, rates = route.curve(times)
     lowest, highest, fastest = shapes.min(axis=0), shapes.max(axis=0), np.abs(rates).max(axis=0)
     lower, upper = body.joint_limits.T
+    # A joint that is driven up to its limit is not beyond it, whatever rounding has done to the samples.
     slack = CLOSED * (1.0 + np.abs(shapes).max(axis=0))
-    beyond = (lowest < lower - slack) | (highest > upper + slack)
+    outside = (lowest < lower - slack) | (highest > upper + slack)
     gap = path_gap(body, route)
+    names = np.array(body.joint_names)
     return PathSummary(
-        route.duration,
-        len(route.breaks),
-        lowest,
-        highest,
-        fastest,
-        tuple(np.array(body.joint_names)[beyond].tolist()),
-        tuple(np.array(body.joint_names)[fastest == 0.0].tolist()),
-        gap,
-        bool(np.all(np.abs(gap) <= CLOSED)),
+        duration=route.duration,
+        breaks=len(route.breaks),
+        lowest=lowest,
+        highest=highest,
+        fastest=fastest,
+        joints_beyond_limits=tuple(names[outside].tolist()),
+        still_joints=tuple(names[fastest == 0.0].tolist()),
+        gap=gap,
+        is_loop=bool(np.all(np.abs(gap) <= CLOSED)),
     )
