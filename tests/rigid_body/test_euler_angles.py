@@ -500,7 +500,7 @@ def test_bonnards_precession_and_angles_j9():
     assert np.abs(first / precession_rate(momentum, velocity) - 1.0).max() < 1e-12
 
 
-def test_printed_brackets_of_proposition_6_j9():
+def test_momentum_and_energy_of_proposition_6_j9():
     rng = np.random.default_rng(24)
     moments = np.array([3.0, 2.0, 1.2])
     for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):

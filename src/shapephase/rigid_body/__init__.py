@@ -4,6 +4,9 @@
 twists (Dzhanibekov, tennis racket), Euler angles, the pendulum in the rigid body; heavy and Lagrange tops with their
 nutation. `lie` has Lie algebras and their brackets, `geodesics` the metrics of the rigid body. Mostly after Marsden
 and Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
+
+Principal moments may be given in any order, and answers are on the axes as given; where an order is named, it is
+ascending: axis 1 has the smallest moment (see `inertia_tensor`).
 """
 
 from lazy_loader import attach_stub

@@ -1,4 +1,4 @@
-"""Lie algebras, Lie-Poisson brackets and Euler-Poincare equations, and what of the rigid body lives on them.
+"""Lie algebras, Lie-Poisson brackets and Euler-Poincare equations, with the rigid body as their example.
 
 Mostly after Marsden and Ratiu, Introduction to Mechanics and Symmetry, chapters 13 to 15.
 """

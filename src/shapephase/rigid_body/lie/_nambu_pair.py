@@ -27,8 +27,13 @@ from ...errors import ShapeError
 from ...inertia_tensor import principal_axes
 
 _ZERO = 1e-14
+"""Eigenvalue of a quadratic form, relative to the largest, that counts as zero: rounding leaves as much."""
 _CANCELLED = 16.0 * np.finfo(float).eps
+"""Sum, relative to its two terms, that counts as zero: the rounding of moments and of the matrix (a, b; c, d)."""
 _UNIT = 1e-9
+"""Farthest that a determinant may be from 1 or -1, relative to its terms: nine digits, as people write them."""
+_ASYMMETRY = 1e-9
+"""Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
 
 _GROUPS = {
     (3, 0): "SO(3)",
@@ -38,7 +43,7 @@ _GROUPS = {
     (1, 0): "Heisenberg",
     (0, 0): "R^3",
 }
-"""By the numbers of eigenvalues of the more and of the less frequent sign."""
+"""Groups by the number of eigenvalues of the more frequent and of the less frequent sign."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +103,7 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
 
     Returns
     -------
-    NambuPair; coefficients of Pi^2 that vanish but for rounding are zero
+    NambuPair; coefficients of Pi^2 that vanish up to rounding are zero
 
     Raises
     ------
@@ -124,16 +129,21 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
         )
     moments, axes = principal_axes(tensor)
     is_diagonal = not np.any(tensor - np.diag(np.diag(tensor)))
-    # The moments of a diagonal tensor are exact; else they have the rounding of the largest.
+    # The moments of a diagonal tensor are exact; others carry the rounding of the largest.
     rounding = np.ones(3) if is_diagonal else moments[2] / moments
     casimir, hamiltonian = (axes @ np.diag(_coefficients(moments, row, rounding)) @ axes.T for row in entries)
-    return NambuPair(0.5 * (casimir + casimir.T), 0.5 * (hamiltonian + hamiltonian.T), float(-np.sign(determinant)))
+    return NambuPair(
+        casimir=0.5 * (casimir + casimir.T),
+        hamiltonian=0.5 * (hamiltonian + hamiltonian.T),
+        orientation=float(-np.sign(determinant)),
+    )
 
 
 def cylinder_matrix(moments: ArrayLike) -> Array:
-    """(a, b; c, d) that makes K and N elliptic cylinders, about the third and the first axis: (3,) -> (2, 2).
+    """(a, b; c, d) that makes K and N cylinders, about the third and the first axis: (3,) -> (2, 2).
 
-    Determinant 1, as in the book, so Pi' = grad N x grad K.
+    The moments may be in any order; the cylinders are elliptic where the second one is the intermediate, as for the
+    ascending moments of the book. The determinant is 1, as there, so Pi' = grad N x grad K.
 
     Raises
     ------
@@ -203,7 +213,7 @@ def maxwell_bloch_rate(state: ArrayLike) -> Array:
 
 
 def _coefficients(moments: Array, row: Array, rounding: Array) -> Array:
-    """a / I_i + b, zero where it cancels but for rounding."""
+    """a / I_i + b, zero where the terms cancel up to rounding."""
     inverse = row[0] / moments
     total = inverse + row[1]
     return np.where(np.abs(total) <= _CANCELLED * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total)
@@ -214,7 +224,7 @@ def _form(form: ArrayLike) -> Array:
     if matrix.shape != (3, 3):
         raise ShapeError(f"form: expected one matrix (3, 3), got {matrix.shape}")
     skew = np.abs(matrix - matrix.T).max()
-    if skew > 1e-9 * np.abs(matrix).max():
+    if skew > _ASYMMETRY * np.abs(matrix).max():
         raise ShapeError(f"form: the matrix of a quadratic form is symmetric; its entries differ by {skew:.3g}")
     return 0.5 * (matrix + matrix.T)
 

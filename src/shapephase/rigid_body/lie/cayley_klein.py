@@ -24,6 +24,10 @@ from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, kinetic_energy
 
 Spinor = NDArray[np.complex128]
+"""Vectors of C^2: (..., 2)."""
+
+_EQUAL_LENGTHS = 1e-6
+"""Largest relative difference of |z| and |start|, which a motion keeps equal: six digits, as people write them."""
 
 PAULI = 2j * su2().matrix_basis
 """Pauli's matrices sigma_k: (3, 2, 2)."""
@@ -40,14 +44,14 @@ def cayley_klein_momentum(z: ArrayLike) -> Array:
 
 
 def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
-    """A z over a momentum, the fibre's coordinate being its phase: (..., 3), (...) -> (..., 2).
+    """A z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
 
     Raises ShapeError.
     """
     pi, angle = finite_array(momentum, "momentum", (3,)), finite_array(phase, "phase")
     length = np.linalg.norm(pi, axis=-1)
     below = pi[..., 2] <= 0.0
-    # The larger component is made real: no cancellation, wherever the momentum points.
+    # The larger component is made real, so that nothing cancels wherever the momentum points.
     large = np.sqrt(2.0 * (length + np.abs(pi[..., 2])))
     cross = -2.0 * (pi[..., 0] + 1j * pi[..., 1])
     small = np.where(below, cross, cross.conj()) / np.where(large > 0.0, large, 1.0)
@@ -117,7 +121,7 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")
     length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)
-    if not np.all((length > 0.0) & (np.abs(length - other) <= 1e-6 * length)):
+    if not np.all((length > 0.0) & (np.abs(length - other) <= _EQUAL_LENGTHS * length)):
         raise ShapeError("z: not on the sphere |z| = |start| of a motion; equal lengths above 0 are needed")
     a, b = (np.stack(_frame(x / n[..., None]), axis=-1) for x, n in ((first, length), (last, other)))
     unitary = a @ np.swapaxes(b.conj(), -1, -2)
@@ -125,7 +129,7 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
 
 
 def _frame(unit: Spinor) -> tuple[Spinor, Spinor]:
-    """A unit vector of C^2 and the one that makes with it a matrix of SU(2)."""
+    """A unit vector of C^2 and the one that completes it to a matrix of SU(2)."""
     return unit, np.stack([-unit[..., 1].conj(), unit[..., 0].conj()], axis=-1)
 
 

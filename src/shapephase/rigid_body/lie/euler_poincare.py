@@ -91,7 +91,7 @@ def euler_poincare_motion(
     ShapeError, LieAlgebraError
         As `euler_poincare_rate`, or if the times do not ascend.
     AccuracyNotReached
-        If the motion goes to infinity before the last time, which some algebras allow.
+        If the motion goes to infinity before the last time, as it can on some algebras.
 
     Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
     """
@@ -114,7 +114,13 @@ def euler_poincare_motion(
     scale[..., :d] = np.abs(mu).max(axis=-1, initial=0.0, keepdims=True)
     momenta, adjoint, *rest = _split(flow(rate, start, instants, scale), blocks)
     return EulerPoincareMotion(
-        algebra, operator, instants, momenta, linear_solution(operator, momenta), adjoint, rest[0] if rest else None
+        algebra=algebra,
+        inertia=operator,
+        times=instants,
+        momentum=momenta,
+        velocity=linear_solution(operator, momenta),
+        adjoint=adjoint,
+        attitude=rest[0] if rest else None,
     )
 
 
@@ -128,7 +134,7 @@ def _joined(momentum: Array, elements: list[Matrices]) -> Array:
 
 
 def _split(state: Array, blocks: list[Matrices]) -> list[Matrices]:
-    """The inverse of `_joined`: the momentum, then a matrix for each block of generators."""
+    """The inverse of `_joined`: the momentum, then one matrix for each set of generators."""
     at = len(blocks[0])
     parts: list[Matrices] = [state[..., :at]]
     for block in blocks:

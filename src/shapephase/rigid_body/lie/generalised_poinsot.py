@@ -52,7 +52,7 @@ class RollingContact:
     tangency_defect : (..., N, d) conormal of the moved quadric at the point less that of the hyperplane; zero, (b)
     contact_velocity : (..., N, d) velocity of the point of the moved quadric that touches; zero, part (c)
     body_rate : (..., N, d) xi', the rate of the contact along the quadric, body components
-    space_rate : (..., N, d) Ad_g xi', its rate along the hyperplane: what one curve has run the other has too
+    space_rate : (..., N, d) Ad_g xi', its rate along the hyperplane; equal rates are equal lengths of the two curves
     """
 
     hyperplane: InvariableHyperplane
@@ -79,7 +79,7 @@ def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: Arr
         raise LieAlgebraError(
             "momentum: a body at rest has no invariable hyperplane; a momentum other than 0 is needed"
         )
-    return InvariableHyperplane(mu, np.sum(mu * linear_solution(operator, mu), axis=-1))
+    return InvariableHyperplane(normal=mu, level=np.sum(mu * linear_solution(operator, mu), axis=-1))
 
 
 def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -> Array:
@@ -116,7 +116,7 @@ def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLik
 
 
 def rolling_contact(motion: EulerPoincareMotion) -> RollingContact:
-    """The contact of energy quadric and invariable hyperplane along a motion, with every defect of the theorem.
+    """The contact of energy quadric and invariable hyperplane along a motion, with what the theorem says is zero.
 
     Raises LieAlgebraError for a body at rest.
     """
@@ -127,12 +127,12 @@ def rolling_contact(motion: EulerPoincareMotion) -> RollingContact:
     body_rate = linear_solution(inertia, euler_poincare_rate(algebra, inertia, motion.momentum))
     energy = 0.5 * np.einsum("...i,ij,...j->...", body_point, inertia, body_point)
     return RollingContact(
-        hyperplane,
-        point,
-        hyperplane.offset(point),
-        energy - 0.5 * hyperplane.level[..., None],
-        contact_conormal(inertia, motion.adjoint, point) - hyperplane.normal[..., None, :],
-        contact_velocity(algebra, motion.adjoint, motion.velocity, body_point),
-        body_rate,
-        np.einsum("...ij,...j->...i", motion.adjoint, body_rate),
+        hyperplane=hyperplane,
+        point=point,
+        hyperplane_offset=hyperplane.offset(point),
+        quadric_offset=energy - 0.5 * hyperplane.level[..., None],
+        tangency_defect=contact_conormal(inertia, motion.adjoint, point) - hyperplane.normal[..., None, :],
+        contact_velocity=contact_velocity(algebra, motion.adjoint, motion.velocity, body_point),
+        body_rate=body_rate,
+        space_rate=np.einsum("...ij,...j->...i", motion.adjoint, body_rate),
     )

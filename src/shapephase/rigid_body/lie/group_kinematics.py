@@ -29,7 +29,7 @@ def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     Raises
     ------
     LieAlgebraError
-        If g has no inverse, or takes the algebra out of itself: then it is not an element of the group.
+        If g has no inverse, or does not map the algebra to itself: then it is not an element of the group.
     """
     element, inverse = _element(algebra, g)
     turned = element[..., None, :, :] @ algebra.matrix_basis @ inverse[..., None, :, :]
@@ -96,7 +96,7 @@ def _element(algebra: LieAlgebra, g: ArrayLike) -> tuple[Matrices, Matrices]:
     try:
         inverse = np.linalg.inv(element)
     except np.linalg.LinAlgError:
-        raise LieAlgebraError(f"g: a singular matrix is no element of the group of {algebra.name}") from None
+        raise LieAlgebraError(f"g: a singular matrix is not an element of the group of {algebra.name}") from None
     return element, inverse
 
 

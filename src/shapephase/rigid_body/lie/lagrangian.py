@@ -17,6 +17,9 @@ from ... import so3
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 
+_SYMMETRIC_PART = 1e-6
+"""Largest symmetric part of R^T R', relative to its entries: six digits, as people write them, are enough."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
@@ -74,14 +77,14 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     Raises
     ------
     ShapeError
-        If R is no rotation, or R' is not tangent to the rotations at R.
+        If R is not a rotation, or R' is not tangent to the rotations at R.
 
     Source: equation (15.2.8).
     """
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
     spin = so3.transpose(rotation) @ rate
     symmetric = np.abs(spin + so3.transpose(spin)).max(initial=0.0)
-    if symmetric > 1e-6 * np.abs(spin).max(initial=0.0):
+    if symmetric > _SYMMETRIC_PART * np.abs(spin).max(initial=0.0):
         raise ShapeError(
             f"attitude_rate: not the rate of a rotation, R^T R' has a symmetric part of {symmetric:.3g}; "
             "R' = R hat(Omega) is needed"
@@ -108,7 +111,7 @@ def material_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude_rate: 
 
 
 def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
-    """L = sum m |v(x)|^2 / 2 over the field of space at x = R X: -> (...) [J]. Raises ShapeError; equation (15.2.5)."""
+    """L = sum m |v(x)|^2 / 2 of the spatial velocity field at x = R X: -> (...) [J]. Raises ShapeError; (15.2.5)."""
     m, points = _particles(masses, positions)
     placed = points @ so3.transpose(so3.rotation_argument(attitude, "attitude"))
     return _energy(m, spatial_velocity(attitude, attitude_rate, placed))
@@ -164,7 +167,7 @@ def spatial_momentum(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLik
 def se3_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia operator on se(3), twist (Omega, V) of the material origin -> (Pi, P): (P,), (P, 3) -> (6, 6).
 
-    Of the kinetic energy with translations; for `euler_poincare_motion(se3(), ...)`. Raises ShapeError.
+    That of the kinetic energy with translations; for `euler_poincare_motion(se3(), ...)`. Raises ShapeError.
     """
     m, points = _particles(masses, positions)
     coupling = so3.hat(m @ points)
@@ -178,7 +181,12 @@ def reduce_translations(masses: ArrayLike, positions: ArrayLike) -> ReducedBody:
     """
     m, points = _particles(masses, positions)
     centre = m @ points / m.sum()
-    return ReducedBody(float(m.sum()), centre, points - centre, _inertia(m, points - centre))
+    return ReducedBody(
+        mass=float(m.sum()),
+        centre=centre,
+        positions=points - centre,
+        inertia=_inertia(m, points - centre),
+    )
 
 
 def _inertia(masses: Array, points: Array) -> Array:

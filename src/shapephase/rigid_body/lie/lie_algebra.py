@@ -23,7 +23,12 @@ Matrices = NDArray[Any]
 _ROUNDING = 1e-12
 """Largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries."""
 _OUTSIDE = 1e-9
-"""A matrix further from the span of the basis, relative to its size, is no element of the algebra."""
+"""Distance of a matrix from the span of the basis, relative to its largest entry, up to which it is an element of the
+algebra; also the largest asymmetry of an operator. Nine digits, as people write them, are enough."""
+_SINGULAR = 1e-14
+"""Least ratio of an operator's eigenvalues, by magnitude: below it the smallest is rounding."""
+_INTEGER = 1e-14
+"""Fitted structure constants closer than this to an integer, relative to the largest, are that integer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +39,7 @@ class LieAlgebra:
     ----------
     structure : (d, d, d) structure constants c[i, j, k]
     basis : (d, n, n) real or complex matrices with the same brackets, or None for an abstract algebra
-    name : for people
+    name : for messages
 
     Raises
     ------
@@ -50,13 +55,13 @@ class LieAlgebra:
     name: str = "Lie algebra"
 
     def __post_init__(self) -> None:
-        """Check the laws once; what is kept is exactly antisymmetric and cannot be written to."""
+        """Check the laws once, and keep structure constants that are exactly antisymmetric and read-only."""
         structure = finite_array(self.structure, "structure", (None, None, None))
         if structure.ndim != 3 or len(set(structure.shape)) != 1 or not structure.size:
             raise ShapeError(f"structure: structure constants (d, d, d) are needed, got {structure.shape}")
-        size = float(np.abs(structure).max())
+        largest = float(np.abs(structure).max())
         defect = np.abs(structure + structure.swapaxes(0, 1))
-        if defect.max() > _ROUNDING * size:
+        if defect.max() > _ROUNDING * largest:
             i, j, k = np.unravel_index(int(np.argmax(defect)), defect.shape)
             raise LieAlgebraError(
                 f"structure: not antisymmetric, c[{i}, {j}, {k}] = {structure[i, j, k]:.9g} and "
@@ -65,7 +70,7 @@ class LieAlgebra:
         structure = 0.5 * (structure - structure.swapaxes(0, 1))
         double = np.einsum("ijm,mkl->ijkl", structure, structure)
         cyclic = np.abs(double + double.transpose(1, 2, 0, 3) + double.transpose(2, 0, 1, 3))
-        if cyclic.max() > _ROUNDING * len(structure) * size**2:
+        if cyclic.max() > _ROUNDING * len(structure) * largest**2:
             i, j, k, _ = np.unravel_index(int(np.argmax(cyclic)), cyclic.shape)
             raise LieAlgebraError(
                 f"structure: Jacobi's identity fails for e_{i}, e_{j}, e_{k} by {cyclic.max():.3g}; "
@@ -101,7 +106,7 @@ class LieAlgebra:
 
     @cached_property
     def killing_form(self) -> Array:
-        """The Killing form tr(ad_i ad_j): (d, d), invariant, nondegenerate iff the algebra is semisimple."""
+        """The Killing form tr(ad_i ad_j): (d, d), invariant, nondegenerate if and only if the algebra is semisimple."""
         return np.einsum("ikl,jlk->ij", self.structure, self.structure)
 
     @cached_property
@@ -119,7 +124,7 @@ class LieAlgebra:
         Raises
         ------
         LieAlgebraError
-            If the matrix is further than 1e-9 of its size from the span of the basis, or there is no basis.
+            If the matrix is further from the span of the basis than 1e-9 of its largest entry, or there is no basis.
         """
         basis = self.matrix_basis
         matrices = _matrices(matrix, "matrix")
@@ -158,7 +163,7 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
     Raises
     ------
     LieAlgebraError
-        If the matrices depend on each other, or a bracket leaves their span.
+        If the matrices are linearly dependent, or a bracket leaves their span.
     """
     matrices = _matrices(basis, "basis")
     if matrices.ndim != 3 or not len(matrices):
@@ -166,9 +171,11 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
     if np.linalg.matrix_rank(_flat(matrices)) < len(matrices):
         raise LieAlgebraError(f"basis: the {len(matrices)} matrices are not linearly independent over the reals")
     structure = _flat(_commutators(matrices)) @ np.linalg.pinv(_flat(matrices))
-    # Constants that are integers but for the rounding of the fit are meant to be.
+    # Constants that differ from integers by the rounding of the fit alone are integers.
     whole = np.round(structure)
-    structure = np.where(np.abs(structure - whole) < 1e-14 * max(1.0, float(np.abs(structure).max())), whole, structure)
+    structure = np.where(
+        np.abs(structure - whole) < _INTEGER * max(1.0, float(np.abs(structure).max())), whole, structure
+    )
     return LieAlgebra(structure, matrices, name)
 
 
@@ -239,18 +246,17 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
     ShapeError
         If the shape is wrong or an entry is not finite.
     LieAlgebraError
-        If it is not symmetric to 1e-9 of its size, or singular.
+        If it is not symmetric to 1e-9 of its largest entry, or singular.
     """
     d = algebra.dimension
     operator = finite_array(inertia, "inertia", (d, d))
     if operator.ndim != 2:
         raise ShapeError(f"inertia: one ({d}, {d}) operator is needed, got {operator.shape}")
-    size = float(np.abs(operator).max())
-    if np.abs(operator - operator.T).max() > _OUTSIDE * size:
+    if np.abs(operator - operator.T).max() > _OUTSIDE * float(np.abs(operator).max()):
         raise LieAlgebraError("inertia: the operator is not symmetric; <I a, b> = <I b, a> is needed")
     values = np.abs(np.linalg.eigvalsh(operator))
-    if values.min() <= 1e-14 * values.max():
-        raise LieAlgebraError(f"inertia: the operator is singular, its eigenvalues have sizes {np.sort(values)}")
+    if values.min() <= _SINGULAR * values.max():
+        raise LieAlgebraError(f"inertia: the operator is singular, its eigenvalues have magnitudes {np.sort(values)}")
     return 0.5 * (operator + operator.T)
 
 

@@ -24,6 +24,13 @@ Gradient = ArrayLike | Callable[[Array], ArrayLike]
 """The gradient of a function on the dual: values (..., d), or a callable of momenta (..., d)."""
 
 _SO3 = so3()
+"""The algebra of a function that is not given one."""
+_TANGENT = 1e-9
+"""Part of a vector off the orbit's tangent plane, relative to its length, that is allowed: nine digits, as written."""
+_RANK = 1e-12
+"""Singular values of the Poisson tensor below this share of the largest are zero, and the leaf is smaller."""
+_NULL = 1e-10
+"""Singular values of a linear system below this share of the largest (or of 1) belong to its null space."""
 
 
 def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
@@ -109,7 +116,7 @@ def lie_poisson_motion(
 
 
 def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
-    """Length of ad*_{dC} mu, the vector field of a function: (..., d) -> (...); zero everywhere iff C is a Casimir.
+    """Length of ad*_{dC} mu, the vector field of a function: (..., d) -> (...); zero everywhere if and only if C is a Casimir.
 
     Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.12).
     """
@@ -151,15 +158,15 @@ def coadjoint_orbit_form(first: ArrayLike, second: ArrayLike, momentum: ArrayLik
     Raises
     ------
     ShapeError
-        If a vector is not tangent to the orbit: it is no ad*_a mu, to 1e-9 of its length.
+        If a vector is not tangent to the orbit, that is not an ad*_a mu, to 1e-9 of its length.
     """
     mu = _momentum(momentum, algebra)
     tensor = poisson_tensor(mu, algebra)
-    inverse = np.linalg.pinv(tensor, rcond=1e-12)
+    inverse = np.linalg.pinv(tensor, rcond=_RANK)
     u, v = finite_array(first, "first", mu.shape[-1:]), finite_array(second, "second", mu.shape[-1:])
     for name, vector in (("first", u), ("second", v)):
         off = np.linalg.norm((tensor @ inverse @ vector[..., None])[..., 0] - vector, axis=-1)
-        if np.any(off > 1e-9 * np.linalg.norm(vector, axis=-1)):
+        if np.any(off > _TANGENT * np.linalg.norm(vector, axis=-1)):
             raise ShapeError(
                 f"{name}: not tangent to the coadjoint orbit, {off.max():.3g} of it points out of the leaf"
             )
@@ -232,7 +239,7 @@ def _radius(pi: Array) -> Array:
 
 def _null_space(equations: Array) -> Array:
     """Orthonormal solutions of a homogeneous linear system: (m, n) -> (count, n)."""
-    # By the triangular factor first: there are many more equations than unknowns.
+    # The triangular factor comes first because there are many more equations than unknowns.
     _, values, vectors = np.linalg.svd(np.linalg.qr(equations, mode="r"))
-    rank = int(np.sum(values > 1e-10 * max(float(values.max(initial=0.0)), 1.0)))
+    rank = int(np.sum(values > _NULL * max(float(values.max(initial=0.0)), 1.0)))
     return vectors[rank:]

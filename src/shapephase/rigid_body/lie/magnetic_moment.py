@@ -57,7 +57,7 @@ def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Ar
 
 
 def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEquilibrium, MagneticEquilibrium]:
-    """The two equilibria on a sphere, along the field and against it: both stable centres.
+    """The two equilibria on a sphere, along the field and opposite to it: both stable centres.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEqu
     axis, radius = finite_array(field, "field", (3,)), finite_array(magnitude, "magnitude")
     strength = np.linalg.norm(axis, axis=-1)
     if not np.all(strength > 0.0):
-        raise ShapeError("field: in no field every moment is an equilibrium; a field other than 0 is needed")
+        raise ShapeError("field: without a field every moment is an equilibrium; a field other than 0 is needed")
     if not np.all(radius > 0.0):
         raise ShapeError(f"magnitude: the length of the moment must be above 0, got {magnitude!r}")
     spectrum = strength[..., None] * np.array([0.0, 1j, -1j])
     along, against = (
-        MagneticEquilibrium(m, magnetic_hamiltonian(m, axis), spectrum)
+        MagneticEquilibrium(moment=m, energy=magnetic_hamiltonian(m, axis), spectrum=spectrum)
         for m in radius[..., None] * np.stack([axis, -axis]) / strength[..., None]
     )
     return along, against

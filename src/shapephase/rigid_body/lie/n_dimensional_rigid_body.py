@@ -2,7 +2,7 @@
 
 The body momentum is the antisymmetric matrix M = Omega J + J Omega, J the second moment of mass, and
 M' = [M, Omega]; in three dimensions it is hat(I Omega) with I = tr(J) - J. The pairing is <A, B> = -tr(AB)/2, so the
-components of matrices in the basis of `so` are at once those of covectors.
+components of a matrix in the basis of `so` are also those of the covector that it stands for.
 
 Sources: Marsden and Ratiu, end of section 15.3 (after Mishchenko and Fomenko, Ratiu); Manakov 1976 for the integrals.
 """
@@ -16,6 +16,13 @@ from ...arrays import Array, finite_array
 from ...errors import ShapeError, SingularInertiaError
 from .lie_algebra import so
 
+_ASYMMETRY = 1e-9
+"""Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
+_NO_INERTIA = 1e-14
+"""Least inertia of a plane, relative to the largest eigenvalue of J: below it the sum of two eigenvalues is rounding."""
+_LARGEST_PFAFFIAN = 10
+"""Largest dimension of a Pfaffian: its expansion has (n - 1)!! terms, 945 for ten."""
+
 
 def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
     """The inertia operator Omega -> Omega J + J Omega in the basis of `so(n)`: (n, n) -> (d, d), d = n(n-1)/2.
@@ -25,7 +32,7 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
     Raises
     ------
     ShapeError, SingularInertiaError
-        If J is not symmetric, or two of its eigenvalues add to nothing positive: a plane without inertia.
+        If J is not symmetric, or two of its eigenvalues have no positive sum: their plane has no inertia.
     """
     j = _second_moment(second_moment)
     basis = so(len(j)).matrix_basis
@@ -77,11 +84,11 @@ def pfaffian(momentum: ArrayLike) -> Array:
     Raises
     ------
     ShapeError
-        If n is odd or above 10 (the expansion has (n - 1)!! terms), or the matrix is not antisymmetric.
+        If n is odd or above 10, or the matrix is not antisymmetric.
     """
     m = _antisymmetric(momentum, "momentum")
     n = m.shape[-1]
-    if n % 2 or n > 10:
+    if n % 2 or n > _LARGEST_PFAFFIAN:
         raise ShapeError(f"momentum: a Pfaffian needs an even dimension up to 10, got {n}")
     return _pfaffian(m)[()]
 
@@ -98,7 +105,7 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     Raises
     ------
     ShapeError, SingularInertiaError
-        As `n_dimensional_inertia`, or if k is no whole number from 1 up.
+        As `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
 
     Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
     """
@@ -128,10 +135,10 @@ def _second_moment(value: ArrayLike) -> Array:
     j = finite_array(value, "second_moment", (None, None), unit="kg m^2")
     if j.ndim != 2 or j.shape[0] != j.shape[1] or len(j) < 2:
         raise ShapeError(f"second_moment: one symmetric matrix (n, n), n >= 2, is needed, got {j.shape}")
-    if np.abs(j - j.T).max() > 1e-9 * np.abs(j).max():
+    if np.abs(j - j.T).max() > _ASYMMETRY * np.abs(j).max():
         raise ShapeError(f"second_moment: not symmetric, off by {np.abs(j - j.T).max():.3g}")
     moments = np.linalg.eigvalsh(j)
-    if not moments[0] + moments[1] > 1e-14 * np.abs(moments).max():
+    if not moments[0] + moments[1] > _NO_INERTIA * np.abs(moments).max():
         raise SingularInertiaError(
             f"second_moment: the two least eigenvalues {moments[:2]} give a plane no inertia; their sum must be above 0"
         )
@@ -143,6 +150,6 @@ def _antisymmetric(value: ArrayLike, name: str, n: int | None = None) -> Array:
     if m.shape[-1] != m.shape[-2] or m.shape[-1] < 2:
         raise ShapeError(f"{name}: matrices (..., n, n), n >= 2, are needed, got {m.shape}")
     symmetric = np.abs(m + np.swapaxes(m, -1, -2)).max(initial=0.0)
-    if symmetric > 1e-9 * np.abs(m).max(initial=0.0):
+    if symmetric > _ASYMMETRY * np.abs(m).max(initial=0.0):
         raise ShapeError(f"{name}: not antisymmetric, off by {symmetric:.3g}")
     return 0.5 * (m - np.swapaxes(m, -1, -2))
