@@ -480,7 +480,7 @@ def rolling(algebra, rng, nodes=41, duration=1.5):
 
 
 @rolling_algebra
-def test_spatial_velocity_stays_in_the_invariable_hyperplane_i6a(algebra, rng):
+def test_spatial_velocity_stays_in_the_invariable_hyperplane_i6(algebra, rng):
     motion = rolling(algebra, rng)
     # xi_s through the group's matrices, and the plane through xi(0) with the conormal mu(0), by hand.
     g = motion.attitude
@@ -494,7 +494,7 @@ def test_spatial_velocity_stays_in_the_invariable_hyperplane_i6a(algebra, rng):
 
 
 @rolling_algebra
-def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6b(algebra, rng):
+def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6(algebra, rng):
     motion = rolling(algebra, rng)
     contact = rolling_contact(motion)
     np.testing.assert_allclose(contact.quadric_offset, 0.0, atol=1e-11, rtol=0)
@@ -515,7 +515,7 @@ def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6b(algebra, rn
 
 
 @rolling_algebra
-def test_the_energy_quadric_rolls_without_slipping_i6c(algebra, rng):
+def test_the_energy_quadric_rolls_without_slipping_i6(algebra, rng):
     motion = rolling(algebra, rng)
     contact = rolling_contact(motion)
     np.testing.assert_allclose(contact.contact_velocity, 0.0, atol=1e-12, rtol=0)

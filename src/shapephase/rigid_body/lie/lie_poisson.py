@@ -116,7 +116,9 @@ def lie_poisson_motion(
 
 
 def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
-    """Length of ad*_{dC} mu, the vector field of a function: (..., d) -> (...); zero everywhere if and only if C is a Casimir.
+    """Length of ad*_{dC} mu, the vector field of a function: (..., d) -> (...).
+
+    Zero everywhere if and only if C is a Casimir.
 
     Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.12).
     """

@@ -19,7 +19,7 @@ from .lie_algebra import so
 _ASYMMETRY = 1e-9
 """Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
 _NO_INERTIA = 1e-14
-"""Least inertia of a plane, relative to the largest eigenvalue of J: below it the sum of two eigenvalues is rounding."""
+"""Least inertia of a plane, relative to the largest eigenvalue of J: below it the sum of two is rounding."""
 _LARGEST_PFAFFIAN = 10
 """Largest dimension of a Pfaffian: its expansion has (n - 1)!! terms, 945 for ten."""
 
