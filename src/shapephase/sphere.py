@@ -16,6 +16,7 @@ import numpy as np
 from . import so3
 from .arrays import Array
 from .errors import AccuracyNotReached
+from .refinement import halved, settled
 
 Curve = Callable[[Array], tuple[Array, Array]]
 """Times (N,) -> directions (..., N, 3) and a second vector along with them (..., N, 3)."""
@@ -78,19 +79,23 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
     AccuracyNotReached
         If the area has not converged after the steps were halved twelve times.
     """
-    last = None
-    for _ in range(_HALVINGS):
+
+    def area(edges: Array) -> Array:
         nodes, weights = gauss_nodes(edges[:-1], edges[1:])
         direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
         corners, _ = curve(edges)
         slivers = (area_rate(corners[..., :-1, None, :], direction, rate) * weights).sum(axis=(-1, -2))
-        area = slivers + polygon_area(corners)
-        if last is not None and np.max(np.abs(wrapped(area - last))) <= tolerance:
-            return area
-        last, edges = area, np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
-    raise AccuracyNotReached(
-        "the solid angle of a curve does not settle; give more edges, the times of its kinks among them"
-    )
+        return slivers + polygon_area(corners)
+
+    def change(last: Array, new: Array) -> float:
+        return float(np.max(np.abs(wrapped(new - last))))
+
+    found = settled(map(area, halved(edges, _HALVINGS)), change, tolerance)
+    if found is None:
+        raise AccuracyNotReached(
+            "the solid angle of a curve does not settle; give more edges, the times of its kinks among them"
+        )
+    return found
 
 
 def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
@@ -112,8 +117,8 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
 
     Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
     """
-    last = None
-    for _ in range(_HALVINGS):
+
+    def rotation(edges: Array) -> Array:
         steps = np.diff(edges)
         nodes = edges[:-1, None] + 0.5 * steps[:, None] * (_MAGNUS_NODES + 1.0)
         direction, rate = (part.reshape(*part.shape[:-2], *nodes.shape, 3) for part in curve(nodes.ravel()))
@@ -125,12 +130,17 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
         whole = turns[..., 0, :, :]
         for step in range(1, len(steps)):
             whole = turns[..., step, :, :] @ whole
-        if last is not None and np.max(so3.angle(whole @ so3.transpose(last))) <= tolerance:
-            return whole
-        last, edges = whole, np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
-    raise AccuracyNotReached(
-        "the transport along a curve does not settle; give more edges, the times of its kinks among them"
-    )
+        return whole
+
+    def change(last: Array, new: Array) -> float:
+        return float(np.max(so3.angle(new @ so3.transpose(last))))
+
+    found = settled(map(rotation, halved(edges, _HALVINGS)), change, tolerance)
+    if found is None:
+        raise AccuracyNotReached(
+            "the transport along a curve does not settle; give more edges, the times of its kinks among them"
+        )
+    return found
 
 
 def wrapped(area: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
+from ..refinement import halved, settled
 
 # Mean anomaly of an ellipse [rad]: beyond, its rounding alone is more than 1e-6 rad.
 _MAX_ANOMALY_ELLIPSE = 1e10
@@ -326,19 +328,18 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
     edges = np.unique(np.concatenate([motion.solution.times, motion.deformation.breaks]))
     edges = edges[np.concatenate([[True], np.diff(edges) > _SAME_TIME * motion.duration])]
     edges[-1] = motion.duration
-    before = None
-    for _ in range(_MAX_HALVINGS):
-        if len(edges) > _MAX_STEPS:
-            break
-        now = _largest_effects(motion, orbit, edges)
-        if before is not None and np.all(np.abs(now - before) <= _AGREEMENT * now):
-            torque, impulse, error = now.tolist()
-            return GravityTorque(largest_torque=torque, impulse=impulse, attitude_error=error, tolerance=allowed)
-        before = now
-        edges = np.sort(np.concatenate([edges, 0.5 * (edges[1:] + edges[:-1])]))
-    raise AccuracyNotReached(
-        "the torque of gravity changes too fast to be estimated; choose a shorter part of the motion"
-    )
+
+    def excess(last: Array, new: Array) -> float:
+        return float(np.max(np.abs(new - last) - _AGREEMENT * new))
+
+    steps = takewhile(lambda ends: len(ends) <= _MAX_STEPS, halved(edges, _MAX_HALVINGS))
+    effects = settled((_largest_effects(motion, orbit, ends) for ends in steps), excess, 0.0)
+    if effects is None:
+        raise AccuracyNotReached(
+            "the torque of gravity changes too fast to be estimated; choose a shorter part of the motion"
+        )
+    torque, impulse, error = effects.tolist()
+    return GravityTorque(largest_torque=torque, impulse=impulse, attitude_error=error, tolerance=allowed)
 
 
 def _largest_effects(motion: Motion, orbit: KeplerOrbit, edges: Array) -> Array:
