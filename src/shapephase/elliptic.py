@@ -1,8 +1,8 @@
 """Jacobi's elliptic functions and Legendre's integrals by the complementary parameter, batched.
 
 SciPy and mpmath take the parameter m = k²; here everything takes m1 = 1 − m = k'², in [0, 1], given as such: near the
-separatrix m1 is as small as 1e-30 and m rounds to one, so m1 cannot be had from m. The limit m1 = 0 (hyperbolic
-functions) is allowed. Arguments broadcast; those that are no finite real numbers, or outside their range, raise
+separatrix m1 is as small as 1e-30 and m rounds to one, so m1 cannot be computed from m. The limit m1 = 0 (hyperbolic
+functions) is allowed. Arguments broadcast; those that are not finite real numbers, or out of range, raise
 `ShapeError`.
 
 No formula loses digits by a subtraction. An argument is reduced by the period 2K, which costs as much
@@ -24,11 +24,15 @@ from .errors import ShapeError
 _SMALL_ARGUMENT = 1e-9
 """Below it sn u = am u = u and cn u = 1 to the last digit."""
 _FLOOR = 1e-60
-"""Where an integral converges as m1 goes to 0, a smaller m1 makes no difference but an overflow."""
+"""Least m1 used in integrals that converge as m1 goes to 0: a smaller one changes no digit, but overflows."""
 _CHARACTERISTIC = 1e100
-"""A larger one overflows in the integral of the third kind."""
+"""Largest -n: beyond it the integral of the third kind overflows."""
 _PERIODS = 1e12
-"""Of an argument this many periods long, twelve of sixteen digits are gone."""
+"""Longest argument [periods 2K]: reducing it costs twelve of the sixteen digits."""
+_MEANS_AGREE = 1e-8
+"""Relative difference of two means below which the next step of the arithmetic-geometric mean makes them equal."""
+_FAR = 1e-3
+"""Ratio y/p below which SciPy's R_J uses an asymptotic form that is accurate to 1e-12 only."""
 
 
 def complete_k(m1: ArrayLike) -> Array:
@@ -72,8 +76,8 @@ def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
 def jacobi_and_pi_excess(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array, Array]:
     """`jacobi`, and Pi(n; am u) − u/(1 − n) for n <= 0, at the cost of little more: (...) x 3 -> five (...).
 
-    The part proportional to u is split off, so that a caller with a large factor before it need not find it as the
-    difference of two rounded arguments.
+    The part proportional to u is left out, so that a caller who multiplies it by a large factor can add it exactly and
+    not as the difference of two rounded arguments.
 
     Source: Abramowitz and Stegun 17.7.15, where the integrals of the first kind add up to u/(1 − n).
     """
@@ -94,7 +98,7 @@ def complete_pi_excess(n: ArrayLike, m1: ArrayLike) -> Array:
 def argument_of(sn: ArrayLike, cn: ArrayLike, m1: ArrayLike) -> Array:
     """The u in [−K, K] with these sn and cn >= 0, up to a common factor: (...), (...), (...) -> (...).
 
-    To be preferred to `incomplete_f` of the amplitude: for small m1 next to ±K an amplitude has not the digits of cn.
+    Preferable to `incomplete_f` of the amplitude: for small m1 next to ±K an amplitude lacks the digits of cn.
     Infinite at m1 = 0 and cn = 0. Parameter m = k² = 1 − m1.
     """
     sine, cosine, m1 = _arguments(sn=sn, cn=cn, m1=m1)
@@ -108,8 +112,8 @@ def argument_of(sn: ArrayLike, cn: ArrayLike, m1: ArrayLike) -> Array:
 def jacobi_pi(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> Array:
     """The integral of 1/(1 − n sn²) from 0 to u, which is Pi(n; am u), for n <= 0: (...), (...), (...) -> (...).
 
-    To be preferred to `incomplete_pi` of an amplitude: for small m1 the amplitude stays at odd pi/2 so long that its
-    digits do not tell the time. Parameter m = k² = 1 − m1; u as in `jacobi`, also at m1 = 0.
+    Preferable to `incomplete_pi` of an amplitude: for small m1 the amplitude stays near odd multiples of pi/2
+    for so long that its digits do not determine u. Parameter m = k² = 1 − m1; u as in `jacobi`, also at m1 = 0.
     """
     n, u, m1 = _arguments(n=n, u=u, m1=m1)
     _refuse(n > 0.0, n, "n", "along u the characteristic must be 0 or less; incomplete_pi takes those up to 1")
@@ -153,7 +157,7 @@ def incomplete_pi(n: ArrayLike, phi: ArrayLike, m1: ArrayLike) -> Array:
         For n >= 1, where the integrand has poles, for n < -1e100, and where the integral is infinite: m1 = 0 and
         |phi| >= pi/2 as rounded.
 
-    Source: for n < 0 Abramowitz and Stegun 17.7.15, the only form whose terms all have one sign.
+    Source: for n < 0 Abramowitz and Stegun 17.7.15, the only form whose terms all have the same sign.
     """
     n, phi, m1 = _arguments(n=n, phi=phi, m1=m1)
     _refuse_infinite(phi, m1)
@@ -196,7 +200,7 @@ def _whole(turns: Array, quarter: Array) -> Array:
 def _means(m1: Array) -> tuple[list[Array], list[Array]]:
     """The arithmetic-geometric mean of 1 and sqrt(m1) > 0, all its steps down to where the two agree."""
     upper, lower = [np.ones(m1.shape)], [np.sqrt(m1)]
-    while np.any(upper[-1] - lower[-1] > 1e-8 * upper[-1]):
+    while np.any(upper[-1] - lower[-1] > _MEANS_AGREE * upper[-1]):
         upper.append(0.5 * (upper[-1] + lower[-1]))
         lower.append(np.sqrt(upper[-2] * lower[-1]))
     return upper, lower
@@ -216,12 +220,12 @@ def _reduced_jacobi(u: Array, m1: Array) -> tuple[Array, Array, Array, Array]:
     long = "that is more than 1e12 periods 2K, and rounding leaves few digits of the phase; take whole periods off"
     _refuse(np.abs(turns) > _PERIODS, np.broadcast_to(u, turns.shape), "u", long)
     rest = u - turns * np.where(m1 > 0.0, period, 0.0)
-    size = np.maximum(np.abs(rest), _SMALL_ARGUMENT)
-    fade = np.exp(-size)
+    length = np.maximum(np.abs(rest), _SMALL_ARGUMENT)
+    fade = np.exp(-length)
     scale = 1.0 / (1.0 + fade * fade)
-    sine, cosine = -np.expm1(-2.0 * size) * scale, 2.0 * fade * scale
+    sine, cosine = -np.expm1(-2.0 * length) * scale, 2.0 * fade * scale
     if np.any(m1 > 0.0):
-        angle = np.where(m1 > 0.0, size * mean, 1.0)
+        angle = np.where(m1 > 0.0, length * mean, 1.0)
         cotangent = np.cos(angle) / np.sin(angle)
         scaled, delta, square = mean * cotangent, np.ones(()), mean * cotangent * cotangent
         for a, b in zip(reversed(upper), reversed(lower), strict=True):
@@ -246,8 +250,8 @@ def _continued(sine: Array, cosine: Array, turns: Array, m1: Array) -> tuple[Arr
 def _folded(phi: Array) -> tuple[Array, Array, Array]:
     """Sine and cosine >= 0 of the amplitude's rest in [-pi/2, pi/2] after whole half turns, and their number.
 
-    The library's sine and cosine are right for any phi as it stands; a rest formed by subtraction would not be, and
-    at small m1 the integrals magnify its error by 1/sqrt(m1).
+    The sine and cosine of NumPy are accurate for any phi; a remainder formed by subtraction would not be, and at small
+    m1 the integrals magnify its error by 1/sqrt(m1).
     """
     sine, cosine = np.sin(phi), np.cos(phi)
     odd = np.where(cosine < 0.0, 1.0, 0.0)
@@ -299,10 +303,10 @@ def _excess(n: Array, sine: Array, cosine: Array, m1: Array) -> Array:
 def _carlson_j(x: Array, y: Array, p: Array) -> Array:
     """R_J(x, y, 1, p) for x <= y, p > 0.
 
-    Where y is far below p, SciPy's asymptotic form is right to 1e-12 only; three duplications (DLMF 19.26.18) lead
-    away from there.
+    Where y is far below p, SciPy's asymptotic form is accurate to 1e-12 only; three duplications (DLMF 19.26.18) lead
+    out of that region.
     """
-    far = y < 1e-3 * p
+    far = y < _FAR * p
     a, b, c, q = x, y, np.ones(()), np.where(far, p, 1.0)
     total, scale = np.zeros(()), 1.0
     for _ in range(3):
@@ -316,7 +320,7 @@ def _carlson_j(x: Array, y: Array, p: Array) -> Array:
 
 
 def _complete_third_kind(n: Array, m1: Array) -> Array:
-    """Below the floor and for n > 0 by its limit, as Carlson's integral would overflow next to m1 = 0."""
+    """Pi(n); below the floor and for n > 0 by its limit, as Carlson's integral would overflow next to m1 = 0."""
     regular = _regular(m1)
     quarter = _quarter_period(regular)
     value = _third_kind(n, np.ones(()), np.zeros(()), np.maximum(regular, _FLOOR), quarter)
