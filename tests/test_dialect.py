@@ -13,7 +13,6 @@ NOT_YET = {
     "body",
     "cli",
     "deformation",
-    "phases",
     "plotting",
     "shape_space",
 }

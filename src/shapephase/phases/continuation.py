@@ -1,4 +1,4 @@
-"""Closed orbits followed through sizes of the momentum."""
+"""Closed orbits followed through magnitudes of the momentum."""
 
 from __future__ import annotations
 
@@ -12,25 +12,28 @@ from ..arguments import direction_argument, magnitudes_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, TrajectoryError
-from .loop_map import MomentumLoop, closed_points, solved, tangent_basis
+from .loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
 
 _UP = np.array([0.0, 0.0, 1.0])
-_LARGEST_STEP, _SMALLEST_STEP = 0.1, 1e-6
+# [rad] The direction moves by this at most from one orbit to the next, so that Newton's method stays with it.
+_LARGEST_STEP = 0.1
+# Share of the range followed: an orbit that needs shorter steps is lost, as at a fold.
+_SMALLEST_STEP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitBranch:
-    """A closed orbit followed through sizes of the momentum.
+    """A closed orbit followed through magnitudes of the momentum.
 
     Attributes
     ----------
     magnitudes : (k,) of those asked for, the ones reached [kg m^2/s]
     directions : (k, 3) u(0), unit vectors, the deformation's frame
-    drift : (k, 3) how the direction moves with the size, its derivative [per kg m^2/s]
+    drift : (k, 3) how the direction moves with the magnitude, its derivative [per kg m^2/s]
     trace : (k,) of the linearised map
     stopped : why the branch ends before the last magnitude asked for; None when it does not
-    fold : the size at which it meets another orbit and both vanish, to about 1e-8 of the range followed [kg m^2/s];
-        None when it does not
+    fold : the magnitude at which it meets another orbit and both vanish, to about 1e-8 of the range followed
+        [kg m^2/s]; None when it does not
     """
 
     magnitudes: Array
@@ -44,9 +47,9 @@ class OrbitBranch:
 def continued_orbits(
     deformation: Deformation, magnitudes: ArrayLike, *, start: ArrayLike | None = None, tolerance: float = 1e-10
 ) -> OrbitBranch:
-    """One closed orbit followed through growing, or falling, sizes of the momentum.
+    """One closed orbit followed through growing, or falling, magnitudes of the momentum.
 
-    Each step foretells the orbit by the exact derivative with respect to the momentum's size, and Newton's method
+    Each step foretells the orbit by the exact derivative with respect to the momentum's magnitude, and Newton's method
     corrects it; a step is shortened until the correction is small against it. The branch ends at a fold, where two
     orbits meet (trace 2) and there are none beyond.
 
@@ -72,9 +75,9 @@ def continued_orbits(
 
     Source: theory.md section 2.
     """
-    sizes = magnitudes_argument(magnitudes)
+    magnitudes = magnitudes_argument(magnitudes)
     loop = MomentumLoop.of(deformation, tolerance)
-    first = 0.0 if start is None else float(sizes[0])
+    first = 0.0 if start is None else float(magnitudes[0])
     axis = _axis_at_rest(loop) if first == 0.0 else _UP
     given = axis if start is None else direction_argument(start, "start")
     if given.shape != (3,):
@@ -85,16 +88,16 @@ def continued_orbits(
             f"start: no closed orbit within {_LARGEST_STEP} rad of {given} was found at {first:.9g} kg m^2/s; "
             "`fixed_points` tells where they are"
         )
-    span = max(float(np.ptp([first, *sizes])), float(sizes[0]))
+    span = max(float(np.ptp([first, *magnitudes])), float(magnitudes[0]))
     reached: list[_Orbit] = []
     stopped, fold = None, None
-    for size in sizes:
-        orbit, stopped, fold = _followed(loop, orbit, float(size), span)
+    for magnitude in magnitudes:
+        orbit, stopped, fold = _followed(loop, orbit, float(magnitude), span)
         if stopped:
             break
         reached.append(orbit)
     return OrbitBranch(
-        sizes[: len(reached)],
+        magnitudes[: len(reached)],
         np.array([one.direction for one in reached]).reshape(-1, 3),
         np.array([one.drift for one in reached]).reshape(-1, 3),
         np.array([2.0 - one.excess for one in reached]),
@@ -105,9 +108,9 @@ def continued_orbits(
 
 @dataclass(frozen=True)
 class _Orbit:
-    """A fixed point at one size of the momentum: direction (3,), 2 - trace, and how it moves with the size (3,)."""
+    """A fixed point at one magnitude of the momentum: direction (3,), 2 - trace, and its rate by magnitude (3,)."""
 
-    size: float
+    magnitude: float
     direction: Array
     excess: float
     drift: Array
@@ -125,32 +128,32 @@ def _axis_at_rest(loop: MomentumLoop) -> Array:
     return turn / angle
 
 
-def _corrected(loop: MomentumLoop, size: float, guess: Array) -> _Orbit | None:
+def _corrected(loop: MomentumLoop, magnitude: float, guess: Array) -> _Orbit | None:
     """The fixed point next to a guess, or None."""
-    closed = closed_points(loop, size, guess[None], loop.goal, 1e-12, iterations=6)
+    closed = closed_points(loop, magnitude, guess[None], loop.goal, 1e-12, iterations=6)
     if not closed.gap[0] < loop.accepted:
         return None
-    drift = -solved(closed.slope, closed.by_size, 1e-9)[0] @ tangent_basis(closed.points)[0]
-    return _Orbit(size, closed.points[0], float(closed.excess[0]), drift)
+    drift = -solve_linear(closed.slope, closed.by_magnitude, 1e-9)[0] @ tangent_basis(closed.points)[0]
+    return _Orbit(magnitude, closed.points[0], float(closed.excess[0]), drift)
 
 
 def _followed(loop: MomentumLoop, orbit: _Orbit, target: float, span: float) -> tuple[_Orbit, str | None, float | None]:
-    """The orbit at another size of the momentum; or how far it went, why no further, and the size at a fold."""
-    passed, step = [orbit], abs(target - orbit.size)
-    while orbit.size != target:
-        left = target - orbit.size
+    """The orbit at another magnitude of the momentum; or how far it went, why no further, and where the fold is."""
+    passed, step = [orbit], abs(target - orbit.magnitude)
+    while orbit.magnitude != target:
+        left = target - orbit.magnitude
         step = min(step, abs(left), _LARGEST_STEP / max(float(np.linalg.norm(orbit.drift)), 1e-300))
-        size = target if step == abs(left) else orbit.size + float(np.copysign(step, left))
-        moved = orbit.drift * (size - orbit.size)
+        magnitude = target if step == abs(left) else orbit.magnitude + float(np.copysign(step, left))
+        moved = orbit.drift * (magnitude - orbit.magnitude)
         guess = so3.normalised(orbit.direction + moved)
-        following = _corrected(loop, size, guess)
+        following = _corrected(loop, magnitude, guess)
         if following is not None and _continues(orbit, following, guess, moved, span):
             orbit, step = following, 2.0 * step
             passed = [*passed[-2:], orbit]
             continue
         step *= 0.5
         if step < _SMALLEST_STEP * span:
-            return orbit, *_ending(passed, size)
+            return orbit, *_ending(passed, magnitude)
     return orbit, None, None
 
 
@@ -165,21 +168,21 @@ def _continues(orbit: _Orbit, following: _Orbit, guess: Array, moved: Array, spa
     return bool(np.linalg.norm(following.drift - orbit.drift) < 0.3 * (pace + other) + 1e-3 / span)
 
 
-def _ending(passed: list[_Orbit], beyond: float) -> tuple[str, float | None]:
-    """What stopped a branch: a fold, or nobody knows.
+def _ending(passed: list[_Orbit], lost: float) -> tuple[str, float | None]:
+    """What stopped a branch: a fold, or an unknown cause.
 
-    At a fold the excess 2 - trace goes through zero evenly along the branch, and the size has its extreme: size = fold
-    + a excess^2 + b excess^3, from the last three orbits.
+    At a fold the excess 2 - trace goes through zero evenly along the branch, and the magnitude has its extreme:
+    magnitude = fold + a excess^2 + b excess^3, from the last three orbits.
     """
-    size, excess = passed[-1].size, np.array([one.excess for one in passed])
+    magnitude, excess = passed[-1].magnitude, np.array([one.excess for one in passed])
     if len(passed) == 3 and np.all(np.diff(np.abs(excess)) < 0.0):
         powers = np.stack([np.ones(3), excess**2, excess**3], axis=1)
-        fold = float(np.linalg.solve(powers, np.array([one.size for one in passed]))[0])
-        if abs(fold - size) < 10.0 * abs(beyond - size):
-            side = "above" if beyond > size else "below"
+        fold = float(np.linalg.solve(powers, np.array([one.magnitude for one in passed]))[0])
+        if abs(fold - magnitude) < 10.0 * abs(lost - magnitude):
+            side = "above" if lost > magnitude else "below"
             return (
                 f"at {fold:.9g} kg m^2/s this orbit meets another (trace 2), and {side} there is neither; the branch "
                 "goes back along the other"
             ), fold
     trace = 2.0 - passed[-1].excess
-    return f"the orbit was lost between {size:.9g} and {beyond:.9g} kg m^2/s, at trace {trace:.6g}", None
+    return f"the orbit was lost between {magnitude:.9g} and {lost:.9g} kg m^2/s, at trace {trace:.6g}", None

@@ -9,15 +9,23 @@ from ..arrays import Array, Integers, Mask
 from ..sphere import fibonacci_directions
 from .loop_map import MomentumLoop, tangent_basis
 
-_SMALLEST_CELL, _MANY_SMALL_CELLS, _MOST_STARTS = 0.002, 300, 1000
+# [rad] Cells narrower than this are not divided: Newton's method starts from them as they are.
+_SMALLEST_CELL = 0.002
+# More such cells than this are thinned out: they line a curve of fixed points.
+_MANY_SMALL_CELLS = 300
+# Newton's method starts from this many directions at most.
+_MOST_STARTS = 1000
 SEARCH_TOLERANCE = 1e-6
 FAMILY_SPACING = 0.3  # of points taken of a curve of fixed points [rad]
-# A cell is all but linear when its sides bend by less than this share of its width; where the midpoints tell how much
-# they bend, this many times as much is allowed for; images of half sides longer than this tell nothing [rad].
-_BEND, _CAUTION, _WIDE = 0.06, 3.0, 0.7
+# A cell is all but linear when its sides bend by less than this share of its width.
+_BEND = 0.06
+# Where the midpoints show how much the sides bend, this many times as much is allowed for.
+_SAFETY_FACTOR = 3.0
+# [rad] Images of half sides longer than this show nothing.
+_WIDE = 0.7
 
 
-def search(loop: MomentumLoop, size: float, count: int, most: int) -> tuple[Array, bool]:
+def search(loop: MomentumLoop, magnitude: float, count: int, most: int) -> tuple[Array, bool]:
     """Where Newton's method shall start (n, 3), and whether some of the sphere was left out.
 
     Triangles between even directions are divided where a fixed point may be and the map is not yet linear.
@@ -27,12 +35,12 @@ def search(loop: MomentumLoop, size: float, count: int, most: int) -> tuple[Arra
     corners = fibonacci_directions(count)
     cells = np.asarray(ConvexHull(corners).simplices)
     tolerance = max(SEARCH_TOLERANCE, loop.goal)
-    shifts = loop.shift(size, corners, tolerance)
+    shifts = loop.shift(magnitude, corners, tolerance)
     reach = float(np.linalg.norm(shifts, axis=-1).max())
     if reach < 0.1:
         # The map is nearly the identity, and what it differs by must be known well.
         tolerance = max(loop.goal, 1e-5 * reach)
-        shifts = loop.shift(size, corners, tolerance)
+        shifts = loop.shift(magnitude, corners, tolerance)
     if reach < 100.0 * loop.goal:
         return corners[spaced(corners, FAMILY_SPACING)], True
     starts, tiny, tiny_inside, left_out = [], [], [], np.empty((0, 3))
@@ -46,7 +54,7 @@ def search(loop: MomentumLoop, size: float, count: int, most: int) -> tuple[Arra
         halves = so3.normalised(corners[edges].sum(axis=1))
         (a, b, c), (ab, bc, ca) = cells.T, len(corners) + place.reshape(3, -1)
         corners = np.concatenate([corners, halves])
-        shifts = np.concatenate([shifts, loop.shift(size, halves, tolerance)])
+        shifts = np.concatenate([shifts, loop.shift(magnitude, halves, tolerance)])
         nodes = np.stack([a, b, c, ab, bc, ca], axis=1)
         possible, linear, inside, zero, width = _examined(corners[nodes], shifts[nodes])
         starts.append(zero[possible & linear])
@@ -103,9 +111,9 @@ def _examined(points: Array, shifts: Array) -> tuple[Mask, Mask, Mask, Array, Ar
     away = _distance_of_origin(corner - zero[:, None])
     linear = ~flat & ~wide & (seen < _BEND * width)
     inside = ~flat & (away < 0.05 * width)
-    told = ~flat & (seen < width)
-    possible = _distance_of_origin(value) <= _CAUTION * most + 0.02 * steepness * width
-    possible &= ~told | (away <= _CAUTION * seen + 0.05 * width)
+    informative = ~flat & (seen < width)
+    possible = _distance_of_origin(value) <= _SAFETY_FACTOR * most + 0.02 * steepness * width
+    possible &= ~informative | (away <= _SAFETY_FACTOR * seen + 0.05 * width)
     shown = np.where((linear | inside)[:, None], zero, 0.0)
     return possible | wide, linear, inside, so3.normalised(middle + so3.apply(across, shown)), width
 

@@ -36,20 +36,20 @@ class MomentumLoop:
         """The gap of what counts as closed [rad]."""
         return max(1e-10, 10.0 * self.goal)
 
-    def run(self, size: float, points: Array, tolerance: float | None = None) -> SteppedRotation:
-        """The motions that start with momenta of this size along these directions (N, 3)."""
-        return stepped_rotation(self.sampler, size * points, tolerance or self.goal)
+    def run(self, magnitude: float, points: Array, tolerance: float | None = None) -> SteppedRotation:
+        """The motions that start with momenta of this magnitude along these directions (N, 3)."""
+        return stepped_rotation(self.sampler, magnitude * points, tolerance or self.goal)
 
-    def shift(self, size: float, points: Array, tolerance: float) -> Array:
+    def shift(self, magnitude: float, points: Array, tolerance: float) -> Array:
         """u(T) - u(0): (N, 3)."""
         parts = [points[row : row + _ROWS_AT_ONCE] for row in range(0, len(points), _ROWS_AT_ONCE)]
-        return np.concatenate([ends_of(self.run(size, part, tolerance), part) - part for part in parts])
+        return np.concatenate([ends_of(self.run(magnitude, part, tolerance), part) - part for part in parts])
 
-    def exactly(self, size: float, points: Array, tolerance: float | None = None) -> tuple[Array, Array, Array]:
-        """u(T) (N, 3), its derivatives by u(0) (N, 3, 3) and by the momentum's size (N, 3)."""
-        solution = self.run(size, points, tolerance)
+    def exactly(self, magnitude: float, points: Array, tolerance: float | None = None) -> tuple[Array, Array, Array]:
+        """u(T) (N, 3), its derivatives by u(0) (N, 3, 3) and by the momentum's magnitude (N, 3)."""
+        solution = self.run(magnitude, points, tolerance)
         ends = ends_of(solution, points)
-        return ends, *exact_slopes(solution, points, ends, size)
+        return ends, *exact_slopes(solution, points, ends, magnitude)
 
 
 def ends_of(solution: SteppedRotation, points: Array) -> Array:
@@ -57,10 +57,10 @@ def ends_of(solution: SteppedRotation, points: Array) -> Array:
     return so3.apply(so3.transpose(solution.end), points)
 
 
-def exact_slopes(solution: SteppedRotation, points: Array, ends: Array, size: float) -> tuple[Array, Array]:
-    """Derivatives of u(T) = S^T u(0), by u(0) (N, 3, 3) and by the momentum's size (N, 3)."""
+def exact_slopes(solution: SteppedRotation, points: Array, ends: Array, magnitude: float) -> tuple[Array, Array]:
+    """Derivatives of u(T) = S^T u(0), by u(0) (N, 3, 3) and by the momentum's magnitude (N, 3)."""
     turning = so3.hat(ends) @ solution.momentum_slope
-    return so3.transpose(solution.end) + size * turning, so3.apply(turning, points)
+    return so3.transpose(solution.end) + magnitude * turning, so3.apply(turning, points)
 
 
 def tangent_basis(points: Array) -> Array:
@@ -73,18 +73,21 @@ def tangent_basis(points: Array) -> Array:
 class ClosedPoints:
     """What Newton's method came to.
 
-    Points (N, 3), gaps and last steps (N,), and the derivatives of u(T) - u(0) by u(0) (N, 2, 2) and by size (N, 2).
+    Points (N, 3), gaps and last steps (N,), and the derivatives of u(T) - u(0) by u(0) (N, 2, 2) and by
+    magnitude (N, 2).
     """
 
     points: Array
     gap: Array
     step: Array
     slope: Array
-    by_size: Array
+    by_magnitude: Array
 
     def __getitem__(self, rows: Integers | Mask) -> ClosedPoints:
         """Some of them."""
-        return ClosedPoints(self.points[rows], self.gap[rows], self.step[rows], self.slope[rows], self.by_size[rows])
+        return ClosedPoints(
+            self.points[rows], self.gap[rows], self.step[rows], self.slope[rows], self.by_magnitude[rows]
+        )
 
     @property
     def excess(self) -> Array:
@@ -104,18 +107,18 @@ class ClosedPoints:
 
 
 def closed_points(
-    loop: MomentumLoop, size: float, points: Array, tolerance: float, enough: float, iterations: int = 12
+    loop: MomentumLoop, magnitude: float, points: Array, tolerance: float, enough: float, iterations: int = 12
 ) -> ClosedPoints:
     """Newton's method with exact derivatives, until steps are `enough`, or rounding is all that is left: (N, 3)."""
     count = len(points)
     points, active = points.copy(), np.arange(count)
     gap, length = np.full(count, np.inf), np.full(count, np.inf)
-    slope, by_size = np.zeros((count, 2, 2)), np.zeros((count, 2))
+    slope, by_magnitude = np.zeros((count, 2, 2)), np.zeros((count, 2))
     for left in reversed(range(iterations)):
         if not len(active):
             break
-        ends, slopes, answer = loop.exactly(size, points[active], tolerance)
-        by_size[active] = so3.apply(tangent_basis(points[active]), answer)
+        ends, slopes, answer = loop.exactly(magnitude, points[active], tolerance)
+        by_magnitude[active] = so3.apply(tangent_basis(points[active]), answer)
         slope[active], missing = in_tangent_planes(points[active], ends, slopes)
         step = newton_step(slope[active], missing, 1e-7)
         before, length[active] = length[active], np.linalg.norm(step, axis=-1)
@@ -125,7 +128,7 @@ def closed_points(
         going = (length[active] > enough) & ~settled & ~hopeless & (left > 0)
         active = active[going]
         points[active] = moved_along(points[active], step[going])
-    return ClosedPoints(points, gap, length, slope, by_size)
+    return ClosedPoints(points, gap, length, slope, by_magnitude)
 
 
 def in_tangent_planes(points: Array, ends: Array, slopes: Array) -> tuple[Array, Array]:
@@ -136,12 +139,12 @@ def in_tangent_planes(points: Array, ends: Array, slopes: Array) -> tuple[Array,
 
 def newton_step(slope: Array, missing: Array, least: float) -> Array:
     """The step that closes what is missing, no longer than 0.3: (N, 2)."""
-    step = -solved(slope, missing, least)
+    step = -solve_linear(slope, missing, least)
     length = np.linalg.norm(step, axis=-1, keepdims=True)
     return step * np.minimum(1.0, 0.3 / np.maximum(length, 1e-300))
 
 
-def solved(slope: Array, right: Array, least: float) -> Array:
+def solve_linear(slope: Array, right: Array, least: float) -> Array:
     """slope^-1 right (N, 2); nothing along directions that answer less than `least` of the most."""
     scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), 1e-300)[:, None, None]
     return so3.apply(np.linalg.pinv(slope / scale, rcond=least) / scale, right)

@@ -17,15 +17,28 @@ from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
 from ..reconstruction.reconstruction import Motion
 
-_LONGEST, _BENT = 0.05, 0.3
-_TOO_SHORT, _RESTING = 1e-6, 1e-11
+# [rad] Length of a piece of the curve at most: two passages through one piece are told apart by its cubic.
+_LONGEST = 0.05
+# [rad] A piece turns by this at most, so that a cubic is right to a hundredth of its length.
+_BENT = 0.3
+# [rad] Shorter pieces are not divided for their bend: near a cusp the heading turns at once.
+_TOO_SHORT = 1e-6
+# [rad] Where the curve moves on by less than this, its heading is rounding.
+_RESTING = 1e-11
+# Memory: a curve with more pieces is refused.
 _MOST_PIECES = 500_000
+# Memory: pieces whose neighbours are searched for together.
 _AT_ONCE = 2048
-_FAR, _TURNED = 1.0, 2.0
+# [rad] A curve that has gone this far along may have come back to where it was.
+_FAR = 1.0
+# [rad] So may a small loop: it turns by more than pi before it meets itself, and this is safely less.
+_TURNED = 2.0
+# [rad] Passages this close along whole pieces are one curve gone through again.
 _SAME_CURVE = 1e-8
 # [rad] Newton's method has brought two passages together: a further step leaves about the square of this, which is
 # below rounding even for passages at 1e-6 rad to each other.
 _MET = 1e-11
+# [rad] Passages at less than this angle touch and do not cross.
 _TANGENT = 1e-6
 
 
@@ -166,22 +179,22 @@ class _Curve:
     motion: Motion
     interpolant: Interpolant
     start: Array
-    size: float
+    magnitude: float
 
     @classmethod
     def of(cls, motion: Motion) -> _Curve:
         if motion.batch:
             raise ShapeError(f"one motion is needed, this is a batch of {motion.batch}; reconstruct one of them")
-        size = float(np.linalg.norm(motion.momentum))
-        if size == 0.0:
+        magnitude = float(np.linalg.norm(motion.momentum))
+        if magnitude == 0.0:
             raise ShapeError("a motion without angular momentum has no momentum curve: its direction is undefined")
-        return cls(motion, motion.interpolant, motion.initial_attitude.T @ (motion.momentum / size), size)
+        return cls(motion, motion.interpolant, motion.initial_attitude.T @ (motion.momentum / magnitude), magnitude)
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Directions and their rates: (N,) -> (N, 3), (N, 3)."""
         directions = so3.apply(so3.transpose(self.motion.solution.rotation(times)[0]), self.start)
         inverse, drift = self.interpolant.inverse_and_drift(times)
-        return directions, np.cross(directions, so3.apply(inverse, self.size * directions) - drift)
+        return directions, np.cross(directions, so3.apply(inverse, self.magnitude * directions) - drift)
 
 
 def _resolved(curve: _Curve, motion: Motion) -> Array:

@@ -1,7 +1,7 @@
 """The momentum map of a loop of shapes, and the motions whose shape and momentum close together.
 
-Over one loop the direction u = Pi/|Pi| of the body momentum goes from u(0) to u(T): for each size of the momentum an
-area-preserving map of the sphere (theory.md section 2). A fixed point of it is an orbit that closes together with
+Over one loop the direction u = Pi/|Pi| of the body momentum goes from u(0) to u(T): for each magnitude of the momentum
+an area-preserving map of the sphere (theory.md section 2). A fixed point of it is an orbit that closes together with
 the shape.
 """
 
@@ -83,7 +83,7 @@ class FixedPoints:
     stability : "elliptic" (|trace| < 2: neighbours circle it), "hyperbolic" (above 2), "inverse hyperbolic" (below
         -2), or "parabolic" (too near 2 or -2 to tell)
     gap : (m,) angle between u(T) and u(0) [rad]
-    index_sum : of the indices; 2 for every loop and size when none is missing
+    index_sum : of the indices; 2 for every loop and magnitude when none is missing
     complete : whether the indices sum to 2, none is 0, and the search left no part of the sphere out
     """
 
@@ -117,11 +117,11 @@ def stroboscopic_map(
 
     Source: theory.md section 2.
     """
-    size = magnitude_argument(magnitude, allow_zero=True)
+    magnitude = magnitude_argument(magnitude, allow_zero=True)
     start = direction_argument(directions, "directions")
     flat = start.reshape(-1, 3)
-    solution = MomentumLoop.of(deformation, tolerance).run(size, flat)
-    return ReturnMap(size, start, ends_of(solution, flat).reshape(start.shape), solution)
+    solution = MomentumLoop.of(deformation, tolerance).run(magnitude, flat)
+    return ReturnMap(magnitude, start, ends_of(solution, flat).reshape(start.shape), solution)
 
 
 def fixed_points(
@@ -156,24 +156,24 @@ def fixed_points(
 
     Source: theory.md section 2, B9, D16.
     """
-    size = magnitude_argument(magnitude)
+    magnitude = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
         raise ShapeError(f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {most_directions!r}")
     loop = MomentumLoop.of(deformation, tolerance)
-    starts, exhausted = search(loop, size, _STARTS[0], most_directions)
-    found = _judged(loop, size, starts, exhausted=exhausted)
+    starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)
+    found = _fixed_points_from(loop, magnitude, starts, exhausted=exhausted)
     for count in _STARTS[1:]:
         if found.index_sum == _LEFSCHETZ or not found.index.all() or exhausted:
             break
-        starts, exhausted = search(loop, size, count, most_directions)
-        found = _judged(loop, size, np.concatenate([found.directions, starts]), exhausted=exhausted)
+        starts, exhausted = search(loop, magnitude, count, most_directions)
+        found = _fixed_points_from(loop, magnitude, np.concatenate([found.directions, starts]), exhausted=exhausted)
     return found
 
 
 def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: float = 1e-11) -> list[Motion]:
     """Motions (momentum along inertial z) whose body momentum closes in this deformation's gauge with the shape.
 
-    The motions at the `fixed_points`, in their order, the highest first. Every loop and size has at least two
+    The motions at the `fixed_points`, in their order, the highest first. Every loop and magnitude has at least two
     (theory.md section 2); whether all were found `fixed_points` tells.
 
     Parameters
@@ -196,11 +196,11 @@ def _attitude_of(direction: Array) -> Array:
     return so3.transpose(so3.between(np.broadcast_to(_UP, direction.shape), direction))
 
 
-def _judged(loop: MomentumLoop, size: float, starts: Array, *, exhausted: bool) -> FixedPoints:
+def _fixed_points_from(loop: MomentumLoop, magnitude: float, starts: Array, *, exhausted: bool) -> FixedPoints:
     """The fixed points that Newton's method reaches from these starts, and what they are."""
-    roughly = closed_points(loop, size, starts, max(SEARCH_TOLERANCE, loop.goal), 1e-5)
+    roughly = closed_points(loop, magnitude, starts, max(SEARCH_TOLERANCE, loop.goal), 1e-5)
     near = roughly.points[(roughly.step < 1e-3) | (roughly.gap < 1e-4)]
-    closed = closed_points(loop, size, near[spaced(near, 30.0 * _SAME)], loop.goal, 1e-12)
+    closed = closed_points(loop, magnitude, near[spaced(near, 30.0 * _SAME)], loop.goal, 1e-12)
     vague = np.abs(closed.excess) <= closed.doubt
     closed = closed[(closed.gap < loop.accepted) & ((closed.step < _SAME) | vague)]
     x, y, z = closed.points.T
@@ -214,7 +214,7 @@ def _judged(loop: MomentumLoop, size: float, starts: Array, *, exhausted: bool) 
     index = np.where(np.abs(excess) <= doubt, 0, np.sign(excess)).astype(np.int64)
     total = int(index.sum())
     return FixedPoints(
-        magnitude=size,
+        magnitude=magnitude,
         directions=closed.points,
         trace=2.0 - excess,
         index=index,
