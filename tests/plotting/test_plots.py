@@ -18,7 +18,7 @@ from shapephase.deformation.gauge import named_gauge
 from shapephase.errors import GaugeError, MissingExtraError, ShapeError, UnknownNameError
 from shapephase.examples.scenarios import astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
 from shapephase.plotting import plots
-from shapephase.plotting.sphere_area import enclosed_cells
+from shapephase.plotting._sphere_area import enclosed_cells
 from shapephase.rigid_body.euler_top import EulerTop
 
 BLACK, BLUE, VERMILION, GREEN, WRAPPED = "#000000", "#0072B2", "#D55E00", "#009E73", "#F3CE86"
@@ -434,8 +434,8 @@ def test_energy_lies_between_the_bands_whose_edges_are_the_thresholds_e5(motions
     assert by_label(ax, "l²/(2I₂), separatrix") == pytest.approx(size**2 / (2.0 * middle), rel=1e-12)
     bands = {band.get_label(): band.get_paths()[0].vertices for band in ax.collections}
     for label, low, high in (
-        ("round smallest moment", size**2 / (2.0 * middle), size**2 / (2.0 * least)),
-        ("round largest moment", size**2 / (2.0 * most), size**2 / (2.0 * middle)),
+        ("about smallest moment", size**2 / (2.0 * middle), size**2 / (2.0 * least)),
+        ("about largest moment", size**2 / (2.0 * most), size**2 / (2.0 * middle)),
     ):
         for edge in (low, high):
             expected = np.stack([times, edge], axis=-1)[::17]
@@ -447,7 +447,7 @@ def test_energy_lies_between_the_bands_whose_edges_are_the_thresholds_e5(motions
         (energy >= size**2 / (2.0 * most) * (1.0 - 1e-12)) & (energy <= size**2 / (2.0 * least) * (1 + 1e-12))
     )
     hatches = {band.get_label(): band.get_hatch() for band in ax.collections}
-    assert hatches["round smallest moment"] != hatches["round largest moment"]
+    assert hatches["about smallest moment"] != hatches["about largest moment"]
     assert ax.get_ylabel() == "energy [J]"
 
 
@@ -628,6 +628,7 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
         plots.plot_curvature: (cat, joints),
     }
     elsewhere = ("polhodes", "herpolhode", "heavy_top_stability", "crown", "bounds")
+    elsewhere += ("caustic", "conjugate_locus", "ellipsoid_locus")
     others = {getattr(plots, f"plot_{name}") for name in elsewhere}
     assert {getattr(plots, name) for name in plots.__all__} - others == {*figures, plots.column_axes}
     for plot, arguments in figures.items():
@@ -663,7 +664,7 @@ def test_lines_differ_without_colours(motions):
 def test_what_cannot_be_drawn_is_refused(motions, cat):
     motion, path = motions["cat"], cat_righting()
     batch = sp.reconstruct(motion.deformation, np.ones((2, 3)))
-    still = sp.reconstruct(motion.deformation, np.zeros(3))
+    without = sp.reconstruct(motion.deformation, np.zeros(3))
     for plot in (plots.plot_momentum_curve, plots.plot_phases, plots.plot_attitude, plots.plot_energy):
         with pytest.raises(ShapeError, match=r"one motion, this is a batch of \(2,\)"):
             plot(flat_axes(), batch)
@@ -671,7 +672,7 @@ def test_what_cannot_be_drawn_is_refused(motions, cat):
             plot(None, motion)
     for plot in (plots.plot_momentum_curve, plots.plot_energy):
         with pytest.raises(ShapeError, match="without angular momentum"):
-            plot(flat_axes(), still)
+            plot(flat_axes(), without)
     for plot in (plots.plot_phases, plots.plot_attitude, plots.plot_energy):
         with pytest.raises(ShapeError, match="flat axes are needed"):
             plot(solid_axes(), motion)

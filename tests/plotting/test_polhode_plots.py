@@ -63,7 +63,7 @@ def test_curves_lie_on_the_sphere_and_on_their_energy_g8():
     assert energy(whole, MOMENTS) == pytest.approx(np.full(len(whole), 0.25), rel=1e-14)
     assert sorted(map(tuple, markers(ax, "o"))) == sorted([(0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)])
     assert sorted(map(tuple, markers(ax, "X"))) == [(-1, 0, 0), (1, 0, 0)]
-    assert labels(ax) == ["round largest moment", "round smallest moment", "separatrix", "saddle", "centre"]
+    assert labels(ax) == ["about largest moment", "about smallest moment", "separatrix", "saddle", "centre"]
 
 
 def test_the_usual_energies_go_round_each_stable_axis_g8():
@@ -90,7 +90,7 @@ def test_the_far_side_is_dimmed_g8(view):
         # Neighbouring pieces share the point at the limb, which is a step beyond it.
         assert heights.min() > -0.06 if line.get_alpha() == 1.0 else heights.max() < 0.06
     handles = ax.get_legend().legend_handles
-    assert labels(ax) == ["round largest moment", "round smallest moment", "separatrix", "saddle", "centre"]
+    assert labels(ax) == ["about largest moment", "about smallest moment", "separatrix", "saddle", "centre"]
     assert [handle.get_alpha() for handle in handles] == [1.0] * 5
 
 
@@ -134,20 +134,20 @@ def test_the_polhode_of_a_top_is_drawn_whole_g8(name):
 
 def test_degenerate_bodies_g8():
     ax = plot_polhodes(solid_axes(), (1.0, 2.0, 1.0))
-    assert labels(ax) == ["round largest moment", "circle of equilibria", "centre"]
+    assert labels(ax) == ["about largest moment", "circle of equilibria", "centre"]
     assert len({round(float(energy(c[0], (1.0, 2.0, 1.0))), 12) for c in curves(ax, ROUND_LARGEST)}) == 4
     assert curves(ax, ROUND_SMALLEST) == []
     circle = np.concatenate(curves(ax, "#E69F00"))
     assert circle[:, 1] == pytest.approx(np.zeros(len(circle)), abs=0.0)
     assert np.linalg.norm(circle, axis=-1) == pytest.approx(np.ones(len(circle)), abs=1e-15)
     assert sorted(map(tuple, markers(ax, "o"))) == [(0, -1, 0), (0, 1, 0)]
-    assert labels(plot_polhodes(solid_axes(), (1.0, 1.0, 2.0), energies=[0.5]))[0] == "round largest moment"
+    assert labels(plot_polhodes(solid_axes(), (1.0, 1.0, 2.0), energies=[0.5]))[0] == "about largest moment"
     ax = plot_polhodes(solid_axes(), (1.0, 2.0, 2.0))
-    assert labels(ax) == ["round smallest moment", "circle of equilibria", "centre"]
+    assert labels(ax) == ["about smallest moment", "circle of equilibria", "centre"]
     assert len({round(float(energy(c[0], (1.0, 2.0, 2.0))), 12) for c in curves(ax, ROUND_SMALLEST)}) == 4
     spherical = EulerTop.principal((2.0, 2.0, 2.0), (0.3, 0.5, -0.8))
     ax = plot_polhodes(flat_axes(), spherical)
-    assert labels(ax) == ["t = 0", "at rest, as every point"]
+    assert labels(ax) == ["t = 0", "equilibrium, as every point"]
     ax = plot_polhodes(flat_axes(), EulerTop.principal((1.0, 2.0, 3.0), (0.0, 0.0, 0.0)))
     assert "t = 0" not in labels(ax)
     ax = plot_polhodes(solid_axes(), EulerTop.principal((1.0, 2.0, 3.0), (0.0, -2.0, 0.0)))

@@ -21,7 +21,8 @@ from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import MissingExtraError, ShapeError, UnknownNameError, VisualWarning
 from shapephase.examples.scenarios import cat_righting
-from shapephase.plotting import scene_drawing, viewer
+from shapephase.plotting import _scene_drawing as scene_drawing
+from shapephase.plotting import viewer
 from shapephase.plotting._moving_scene import moving_scene
 from shapephase.plotting.viewer import motion_page, view
 from support.bodies import link, random_loop, urdf

@@ -127,15 +127,25 @@ def satellite_sweep(duration: float = 60.0) -> ShapePath:
 
 MOTIONS: Mapping[str, NamedMotion] = {
     "kane_scher": NamedMotion(
-        "cat_two_halves",
-        lambda: kane_scher(np.radians(20.0), np.radians(61.813873)),
-        "the cat of Kane and Scher rights itself, bend 81.8 to 41.8 degrees",
+        body="cat_two_halves",
+        path=lambda: kane_scher(np.radians(20.0), np.radians(61.813873)),
+        about="the cat of Kane and Scher rights itself, bend 81.8 to 41.8 degrees",
     ),
-    "cat_righting": NamedMotion("cat", cat_righting, "a realistic cat rights itself, legs tucked, rest to rest"),
-    "astronaut_arm_circles": NamedMotion("astronaut", astronaut_arm_circles, "pitch turn by one circle of the arms"),
-    "astronaut_leg_swing": NamedMotion("astronaut", astronaut_leg_swing, "pitch turn by one swing of legs and trunk"),
-    "antenna_deployment": NamedMotion("satellite", antenna_deployment, "the boom antenna comes out, an open path"),
-    "satellite_sweep": NamedMotion("satellite", satellite_sweep, "boom out and in, arm to and fro: turn about z"),
+    "cat_righting": NamedMotion(
+        body="cat", path=cat_righting, about="a realistic cat rights itself, legs tucked, rest to rest"
+    ),
+    "astronaut_arm_circles": NamedMotion(
+        body="astronaut", path=astronaut_arm_circles, about="pitch turn by one circle of the arms"
+    ),
+    "astronaut_leg_swing": NamedMotion(
+        body="astronaut", path=astronaut_leg_swing, about="pitch turn by one swing of legs and trunk"
+    ),
+    "antenna_deployment": NamedMotion(
+        body="satellite", path=antenna_deployment, about="the boom antenna comes out, an open path"
+    ),
+    "satellite_sweep": NamedMotion(
+        body="satellite", path=satellite_sweep, about="boom out and in, arm to and fro: turn about z"
+    ),
 }
 
 CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {

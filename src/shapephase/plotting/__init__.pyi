@@ -1,20 +1,22 @@
 from . import plots
-from ._moving_scene import MovingNode, MovingScene, moving_scene
+from ._moving_scene import MovingScene, moving_scene
 from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
-from .named_figures import Figure, figure_image, write_figure
-from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes, spread_energies
+from .named_figures import FIGURES, Figure, figure_image, write_figure
+from .plot_style import column_axes
+from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
 from .report import write_report
 from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
-from .viewer import LiveView, motion_html, motion_page, view, viser_module
+from .viewer import LiveView, motion_html, motion_page, view
 
 __all__ = [
+    "FIGURES",
     "Figure",
     "LiveView",
-    "MovingNode",
     "MovingScene",
+    "column_axes",
     "figure_image",
     "motion_html",
     "motion_page",
@@ -38,9 +40,7 @@ __all__ = [
     "plot_shape_path",
     "plot_shape_plane",
     "plots",
-    "spread_energies",
     "view",
-    "viser_module",
     "write_figure",
     "write_report",
 ]

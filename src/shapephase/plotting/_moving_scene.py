@@ -1,4 +1,4 @@
-"""A motion as things that move in space: poses and sizes of all that is to be drawn, at the times of the frames."""
+"""A motion as a scene in space: poses and scales of all the shapes to be drawn, frame by frame."""
 
 from __future__ import annotations
 
@@ -19,10 +19,13 @@ from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
 from ..reconstruction.reconstruction import Motion
 
-_MOST_FRAMES = 10_000
-_THINNEST = 0.01
-_PARTICLE = 0.06
-"""Radius of the heaviest particle, of the largest distance from the centre of mass."""
+# Frames of a scene: five minutes at 30 a second; a page of more would be too large for a browser.
+_MAX_FRAMES = 10_000
+# Shortest edge of the box of an inertia, of its longest: the box of a flat body stays visible.
+_MIN_THICKNESS = 0.01
+# Radius of the heaviest particle, of the largest distance from the centre of mass.
+_PARTICLE_RADIUS = 0.06
+# Corners of the cube [-1, 1]^3: (8, 3).
 _CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, 8).T
 
 
@@ -32,7 +35,7 @@ class MovingNode:
 
     Attributes
     ----------
-    name : what carries them
+    name : of the link, particle or inertia that carries them
     shapes : their poses are relative to the node
     poses : (F, 4, 4) of the node in base axes, one for each frame
     scales : (F, 3) by which the shapes are stretched along the axes of the node; None: they keep their size
@@ -46,17 +49,17 @@ class MovingNode:
 
 @dataclass(frozen=True, eq=False)
 class MovingScene:
-    """What moves, at F frames; lengths in m, inertial axes where nothing else is said.
+    """All that moves, at F frames; lengths in m, in inertial axes unless stated otherwise.
 
     Attributes
     ----------
-    title : for people
+    title : of the page
     times : (F,) of the frames, evenly from 0 to the end of the motion [s]
     base : (F, 4, 4) pose of the base axes
-    nodes : what hangs on the base
+    nodes : attached to the base axes
     centre : (F, 3) centre of mass
     momentum : (3,) the angular momentum [kg m^2/s]
-    trail : (F, 3) way of the origin of a link; None: not asked for
+    trail : (F, 3) positions of the origin of a link; None: no trail
     articulated : whether the nodes are the links of a body, else particles or the locked inertia
     """
 
@@ -82,12 +85,12 @@ class MovingScene:
 
     @cached_property
     def reach(self) -> float:
-        """The largest distance of what is drawn from the centre of mass of its time [m]."""
+        """The largest distance of anything drawn from the centre of mass of the same frame [m]."""
         return float(np.linalg.norm(self.corners - self.centre[:, None], axis=-1).max())
 
     @cached_property
     def bounds(self) -> Array:
-        """(2, 3) least and largest coordinates of all that is drawn of the body, at all frames."""
+        """Least and largest coordinates of the body over all frames: (2, 3)."""
         points = self.corners.reshape(-1, 3)
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
@@ -105,15 +108,15 @@ class MovingScene:
 
 
 def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fall: ArrayLike) -> MovingScene:
-    """What a motion looks like.
+    """The scene of a motion.
 
     An articulated body has the shapes of its links (`visuals`), whatever gauge the motion was reconstructed in. Point
-    masses are balls. Of other deformations the box of uniform density with the same locked inertia is shown; where the
-    mass is not known, it measures one metre from corner to corner at the start.
+    masses are balls. Other deformations are shown as the box of uniform density with the same locked inertia; if the
+    mass is not known, the box measures one metre from corner to corner at the start.
 
     Parameters
     ----------
-    frames : how many, evenly over the motion, 2 or more
+    frames : number of frames, evenly over the motion, 2 or more
     trail : a link whose origin leaves a trail
     fall : start, velocity, gravity of the centre of mass as in `Motion.base_position`
 
@@ -131,34 +134,41 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     """
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
-    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MOST_FRAMES:
-        raise ShapeError(f"frames: a whole number from 2 to {_MOST_FRAMES} is needed, got {frames!r}")
+    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MAX_FRAMES:
+        raise ShapeError(f"frames: a whole number from 2 to {_MAX_FRAMES} is needed, got {frames!r}")
     times = np.linspace(0.0, motion.duration, int(frames))
-    description = _original(motion.deformation)
+    description = _ungauged(motion.deformation)
     base = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
     base[:, :3, :3] = motion.attitude(times) @ motion.deformation.frame(times)
     base[:, :3, 3] = motion.base_position(times, **fall)
     in_base = description.centre_of_mass(times)
     centre = base[:, :3, 3] + so3.apply(base[:, :3, :3], in_base)
-    way = None
+    points = None
     if isinstance(description, ArticulatedDescription):
         nodes = _link_nodes(description, times)
         if trail is not None:
-            place = description.body.link_pose(description.path.curve(times)[0], trail)
-            way = (base @ place)[:, :3, 3]
+            link_pose = description.body.link_pose(description.path.curve(times)[0], trail)
+            points = (base @ link_pose)[:, :3, 3]
+    elif trail is not None:
+        raise unknown_name(f"link of {motion.deformation.label}", trail, ())
+    elif isinstance(description, ParticleDescription):
+        nodes = _particle_nodes(description, times)
     else:
-        if trail is not None:
-            raise unknown_name(f"link of what has none ({motion.deformation.label})", trail, ())
-        particles = isinstance(description, ParticleDescription)
-        nodes = (
-            _particle_nodes(description, times) if particles else (_inertia_node(motion.deformation, in_base, times),)
-        )
-    articulated = isinstance(description, ArticulatedDescription)
-    return MovingScene(motion.deformation.label, times, base, nodes, centre, motion.momentum, way, articulated)
+        nodes = (_inertia_node(motion.deformation, in_base, times),)
+    return MovingScene(
+        title=motion.deformation.label,
+        times=times,
+        base=base,
+        nodes=nodes,
+        centre=centre,
+        momentum=motion.momentum,
+        trail=points,
+        articulated=isinstance(description, ArticulatedDescription),
+    )
 
 
-def _original(deformation: Deformation) -> Description:
-    """What a gauge has turned; its `frame` turns it back."""
+def _ungauged(deformation: Deformation) -> Description:
+    """The description before any gauge; the deformation's `frame` leads back to its axes."""
     description = deformation.description
     while hasattr(description, "original"):
         description = description.original  # pyright: ignore[reportAttributeAccessIssue]
@@ -171,42 +181,42 @@ def _link_nodes(description: ArticulatedDescription, times: Array) -> tuple[Movi
         by_link.setdefault(shape.link, []).append(shape)
     configuration = description.path.curve(times)[0]
     return tuple(
-        MovingNode(link, tuple(shapes), description.body.link_pose(configuration, link))
+        MovingNode(name=link, shapes=tuple(shapes), poses=description.body.link_pose(configuration, link))
         for link, shapes in by_link.items()
     )
 
 
 def _particle_nodes(description: ParticleDescription, times: Array) -> tuple[MovingNode, ...]:
     points, _ = description.centred(times)
-    largest = _PARTICLE * float(np.linalg.norm(points, axis=-1).max())
+    largest = _PARTICLE_RADIUS * float(np.linalg.norm(points, axis=-1).max())
     radii = largest * np.cbrt(description.masses / description.masses.max())
     nodes = []
     for number, radius in enumerate(radii.tolist()):
         poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
         poses[:, :3, 3] = points[:, number]
-        ball = Visual(f"particle {number + 1}", "sphere", (radius,), np.eye(4), BOX_COLOUR)
-        nodes.append(MovingNode(ball.link, (ball,), poses))
+        ball = Visual(link=f"particle {number + 1}", kind="sphere", size=(radius,), pose=np.eye(4), colour=BOX_COLOUR)
+        nodes.append(MovingNode(name=ball.link, shapes=(ball,), poses=poses))
     return tuple(nodes)
 
 
 def _inertia_node(deformation: Deformation, in_base: Array, times: Array) -> MovingNode:
     """The box of the locked inertia, stretched frame by frame."""
-    description = _original(deformation)
+    description = _ungauged(deformation)
     moment = second_moment(description.sample(times)[0])
     axes = _continuous_axes(replace(deformation, description=description, closure=None), moment, times)
     moments = np.maximum(np.einsum("nji,njk,nki->ni", axes, moment, axes), 0.0)
-    # Of a box m a^2 / 12 is the second moment along an edge a; without a mass, the start sets the scale.
+    # The second moment of a box along an edge a is m a^2/12; if the mass is unknown, the start sets the scale.
     mass = getattr(description, "mass", 12.0 * moments[0].sum())
     edges = np.sqrt(12.0 * moments / mass)
     poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
     poses[:, :3, :3], poses[:, :3, 3] = axes, in_base
-    cube = Visual("locked inertia", "box", (1.0, 1.0, 1.0), np.eye(4), BOX_COLOUR)
-    thin = _THINNEST * edges.max(axis=-1, keepdims=True)
-    return MovingNode(cube.link, (cube,), poses, np.maximum(edges, thin))
+    cube = Visual(link="locked inertia", kind="box", size=(1.0, 1.0, 1.0), pose=np.eye(4), colour=BOX_COLOUR)
+    thin = _MIN_THICKNESS * edges.max(axis=-1, keepdims=True)
+    return MovingNode(name=cube.link, shapes=(cube,), poses=poses, scales=np.maximum(edges, thin))
 
 
 def _continuous_axes(deformation: Deformation, moment: Array, times: Array) -> Array:
-    """Principal axes that go along continuously, where there are such, as columns: (F, 3, 3)."""
+    """Continuous principal axes if there are any, else those of each frame, as columns: (F, 3, 3)."""
     try:
         return so3.transpose(principal_frames(deformation)(times)[0])
     except ShapePhaseError:

@@ -1,4 +1,4 @@
-"""Figures on the sphere of momenta: the curve of a motion with the area inside it, and the orbits that close."""
+"""Figures on the sphere of momenta: the curve of a motion with the area inside it, and closed orbits."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..phases._momentum_curve import Gauge, MomentumCurve, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
+from ._sphere_area import enclosed_cells
+from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided
 from .polhode_plots import spread_energies
-from .sphere_area import enclosed_cells
-from .sphere_axes import SphereAxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,13 +33,24 @@ _KINDS: dict[str, dict[str, Any]] = {
     "inverse hyperbolic": {"marker": "D", "color": ORANGE, "markersize": 5.5},
     "parabolic": {"marker": "s", "color": GREEN, "markersize": 5.5},
 }
-_BEND = 0.02
+# Angle between neighbouring points of the curve [rad]: its chords then stay within a line's width of the arc.
+_MAX_ANGLE = 0.02
+# Parts of one step, so that a curve that is very fast somewhere does not fill the memory.
+_MAX_PARTS = 40
+# Length of a curve on the unit sphere [1], some six revolutions, from which on it is drawn in a finer line.
 _LONG = 40.0
-_MOST_PARTS = 40
+# Angle between start and end [rad] below which a curve counts as closed.
 _CLOSED = 1e-6
+# Relative difference of two moments that is rounding.
 _EQUAL = 1e-9
+# Elevation and azimuth of the eye [degrees] where no direction is preferred: no axis points to it or stands upright.
 _DEFAULT_VIEW = (24.0, 32.0)
-_TILTED = (12.0, 18.0)
+# Elevation and azimuth of the eye beside the middle of a curve [degrees].
+_VIEW_OFFSET = (12.0, 18.0)
+# Highest elevation of the eye [degrees]: nearer to the pole the azimuth means little.
+_MAX_ELEVATION = 65.0
+# Length of the mean direction below which a curve has no side of the sphere that it prefers.
+_SPREAD = 0.2
 
 
 def plot_momentum_curve(
@@ -51,21 +62,20 @@ def plot_momentum_curve(
     area: bool = True,
     view: tuple[float, float] | None = None,
 ) -> Axes:
-    """The direction of the body momentum on its sphere, seen from a gauge, with the signed area that it goes round.
+    """The direction of the body momentum on its sphere, in a gauge, with the signed area that it encloses.
 
-    Where the curve does not close, the great circle that closes it is drawn. The area is that of `split`, shaded by how
-    often the curve winds round it, and hatched where clockwise, which counts negative. Behind are the polhodes,
-    separatrices and axes of the rigid body that the deforming one is at one time, in the same frame. The far side is
-    dimmed.
+    If the curve is open, the great circle that closes it is drawn. The area is that of `split`, shaded by its winding
+    number, and hatched where the curve is clockwise, which counts as negative. Behind are the polhodes, separatrices
+    and axes of the rigid body with the inertia of one time, in the same frame. The far side is dimmed.
 
     Parameters
     ----------
-    ax : flat axes, drawn on in parallel projection, or three-dimensional ones, seen from where they are
+    ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
     motion : of one momentum, no batch
     gauge : as for `split`
     frozen_at : the time of that rigid body [s]; None: no portrait
-    area : whether it is shaded
-    view : elevation and azimuth of the eye [degrees], for flat axes; None: so that most of the curve is in front
+    area : whether the area is shaded
+    view : elevation and azimuth of the eye [degrees], for flat axes; None: such that most of the curve is in front
 
     Raises
     ------
@@ -78,14 +88,14 @@ def plot_momentum_curve(
     check_axes(ax)
     one_motion(motion)
     if not np.any(motion.momentum):
-        raise ShapeError("a motion without angular momentum has no curve of momentum; its shape alone turns it")
+        raise ShapeError("a motion without angular momentum has no momentum curve; the body turns by its shape alone")
     curve = _fine_curve(motion, gauge)
     points = curve.corners[0]
     drawn = SphereAxes(ax, _view_of(points) if view is None else view)
     title = f"{gauge if isinstance(gauge, str) else 'given'} gauge"
     closing = _great_circle(points[-1], points[0])
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    # Many turns in a finer line, or they would run together.
+    # Many revolutions need a finer line, or they would run together.
     width = _CURVE["linewidth"] * float(np.clip(_LONG / max(length[-1], _LONG), 0.2, 1.0))
     drawn.curve(points, "Π/|Π|", **{**_CURVE, "linewidth": width})
     drawn.arrows(points, np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875])), BLACK)
@@ -115,10 +125,10 @@ def plot_momentum_curve(
 def plot_fixed_points(
     ax: Axes, points: FixedPoints, *, inertia: Array | None = None, view: tuple[float, float] | None = None
 ) -> Axes:
-    """The directions of the momentum that come back with the shape, each with its index and stability.
+    """The directions of the momentum that return after a loop of shapes, each with its index and stability.
 
-    Circles, crosses, diamonds and squares are elliptic, hyperbolic, inverse hyperbolic and parabolic points; beside
-    each is its index. Those on the far side are dimmed.
+    Circles, crosses, diamonds and squares are elliptic, hyperbolic, inverse hyperbolic and parabolic points, labelled
+    by their indices. Those on the far side are dimmed.
 
     Parameters
     ----------
@@ -142,10 +152,10 @@ def plot_fixed_points(
 
 
 def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
-    """Cut so finely that what a chord cuts off is thinner than a line."""
+    """The curve, cut so finely that its chords stay within a line's width of it."""
     curve = momentum_curve(motion, gauge, times=subdivided(motion.solution.times, 4))
     bend = so3.angle_between(curve.corners[0, :-1], curve.corners[0, 1:])
-    parts = np.clip(np.ceil(bend / _BEND), 1, _MOST_PARTS).astype(int)
+    parts = np.clip(np.ceil(bend / _MAX_ANGLE), 1, _MAX_PARTS).astype(int)
     step = np.repeat(np.arange(len(parts)), parts)
     within = np.arange(len(step)) - np.repeat(np.cumsum(parts) - parts, parts)
     times = curve.edges[step] + np.diff(curve.edges)[step] * within / parts[step]
@@ -155,14 +165,14 @@ def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
 def _portrait(drawn: SphereAxes, inertia: Array) -> None:
     """Polhodes, separatrices and equilibria of a rigid body, in grey: dots are its centres, crosses its saddles."""
     moments, axes = np.linalg.eigh(inertia)
-    # What differs by rounding only is symmetric.
+    # Moments that differ only by rounding are equal: the body is symmetric.
     for lower in (0, 1):
         if moments[lower + 1] - moments[lower] <= _EQUAL * moments[2]:
             moments[lower + 1] = moments[lower]
     levels = spread_energies(moments)
     for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
         largest = 2.0 * level * moments[1] < 1.0 or moments[0] == moments[1]
-        label = "round largest moment" if largest else "round smallest moment"
+        label = "about largest moment" if largest else "about smallest moment"
         for line in pair:
             drawn.curve(line @ axes.T, label, behind=True, **(_ROUND_LARGEST if largest else _ROUND_SMALLEST))
     if moments[0] < moments[1] < moments[2]:
@@ -177,27 +187,28 @@ def _portrait(drawn: SphereAxes, inertia: Array) -> None:
 
 
 def _great_circle(start: Array, end: Array) -> Array:
-    """From one direction to another, through the same midpoint as the area is closed: (N, 3)."""
+    """The arc from one direction to another, with the midpoint of the arc that closes the area: (N, 3)."""
     middle = so3.middle(start, end)
     half = 0.5 * float(so3.angle_between(start, end))
     across = end - start
     length = float(np.linalg.norm(across))
     if length == 0.0:
         return np.stack([start, end])
-    angle = np.linspace(-half, half, 2 * max(1, int(np.ceil(half / _BEND))) + 1)[:, None]
+    angle = np.linspace(-half, half, 2 * max(1, int(np.ceil(half / _MAX_ANGLE))) + 1)[:, None]
     arc = np.cos(angle) * middle + np.sin(angle) * across / length
     return np.concatenate([start[None], arc[1:-1], end[None]])
 
 
 def _view_of(points: Array) -> tuple[float, float]:
-    """An eye a little beside the middle of a curve, so that its sphere still looks round."""
+    """A view from a little beside the middle of a curve, so that the sphere still looks round."""
     middle = points.mean(axis=0)
-    if float(np.linalg.norm(middle)) < 0.2:
+    if float(np.linalg.norm(middle)) < _SPREAD:
         return _DEFAULT_VIEW
     elevation = float(np.degrees(np.arctan2(middle[2], np.hypot(middle[0], middle[1]))))
     azimuth = float(np.degrees(np.arctan2(middle[1], middle[0])))
     beside = -1.0 if elevation > 0.0 else 1.0
-    return float(np.clip(elevation + beside * _TILTED[0], -65.0, 65.0)), azimuth - _TILTED[1]
+    tilted = float(np.clip(elevation + beside * _VIEW_OFFSET[0], -_MAX_ELEVATION, _MAX_ELEVATION))
+    return tilted, azimuth - _VIEW_OFFSET[1]
 
 
 def _signed(value: float) -> str:

@@ -1,4 +1,4 @@
-"""Figures in time: phases, attitude, energy, and the deformation that makes them."""
+"""Figures in time: phases, attitude, energy, and the deformation behind them."""
 
 from __future__ import annotations
 
@@ -40,22 +40,24 @@ INERTIAS = ("principal", "entries")
 _ENTRIES = ((0, 0, "xx"), (1, 1, "yy"), (2, 2, "zz"), (0, 1, "xy"), (1, 2, "yz"), (0, 2, "xz"))
 _TOTAL: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
 _WRAPPED: dict[str, Any] = {"color": "#F3CE86", "linewidth": 4.0, "zorder": 1.4}
+# Change between neighbouring points [rad, or 1 for a quaternion] that is a jump and not a curve.
 _JUMP = 1.0
+# Angle short of a half turn [rad] at which the sign of a rotation vector is free.
 _HALF_TURN = 1e-6
 
 
 def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times: ArrayLike | None = None) -> Axes:
     """The dynamic, geometric and total (Montgomery) phase in time, continuous from zero, and the total in (-π, π].
 
-    The band about the total is the residual, the difference to the same angle read off the attitude; mostly it is far
-    thinner than the line, and its size is in the legend.
+    The band about the total is the residual, the difference from the same angle read off the attitude; usually it is
+    far thinner than the line, and its width is in the legend.
 
     Parameters
     ----------
     ax : flat axes
-    motion : of one momentum, no batch; without momentum all is zero
+    motion : of one momentum, no batch; without momentum all phases are zero
     gauge : as for `running_phases`
-    times : (N,) where to draw [s]; None: so many that nothing is missed
+    times : (N,) where to draw [s]; None: several in each step of the integrator
 
     Raises MissingExtraError, ShapeError, and as `running_phases`. Source: Cabrera 2006, equation (12).
     """
@@ -78,8 +80,8 @@ def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times:
 def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, times: ArrayLike | None = None) -> Axes:
     """The attitude in time, base axes to inertial ones: its rotation vector and angle, or its quaternion x y z w.
 
-    The rotation vector is at most a half turn long; where it passes that it goes over to its opposite, and the lines
-    are cut. The quaternion keeps one sign throughout.
+    The rotation vector is at most a half turn long; beyond that it jumps to the opposite side, and the lines are
+    interrupted. The quaternion does not change its sign.
 
     Parameters
     ----------
@@ -172,7 +174,7 @@ def plot_energy(
 ) -> Axes:
     """The energy E_t in time between the bands of the regimes of the body frozen at each time.
 
-    With l the momentum's size, the energy lies between l²/(2 I₃) and l²/(2 I₁). Above l²/(2 I₂), the energy on the
+    With l the momentum's norm, the energy lies between l²/(2 I₃) and l²/(2 I₁). Above l²/(2 I₂), the energy on the
     separatrix, the frozen polhode circles the axis of the smallest moment, below it that of the largest.
 
     Parameters
@@ -192,14 +194,14 @@ def plot_energy(
     """
     check_flat_axes(ax)
     one_motion(motion)
-    size = float(np.linalg.norm(motion.momentum))
-    if not size:
+    magnitude = float(np.linalg.norm(motion.momentum))
+    if not magnitude:
         raise ShapeError("a motion without angular momentum has E_t = 0 and no regimes")
     t = motion_times(motion, times)
-    top, middle, bottom = (0.5 * size * size / np.linalg.eigvalsh(motion.deformation.inertia(t))).T
+    top, middle, bottom = (0.5 * magnitude * magnitude / np.linalg.eigvalsh(motion.deformation.inertia(t))).T
     bands: tuple[tuple[Array, Array, str, dict[str, Any]], ...] = (
-        (middle, top, "round smallest moment", {"facecolor": "#CBE5F5", "edgecolor": SKY}),
-        (bottom, middle, "round largest moment", {"facecolor": "#FBE8C8", "edgecolor": ORANGE, "hatch": "///"}),
+        (middle, top, "about smallest moment", {"facecolor": "#CBE5F5", "edgecolor": SKY}),
+        (bottom, middle, "about largest moment", {"facecolor": "#FBE8C8", "edgecolor": ORANGE, "hatch": "///"}),
     )
     for low, high, label, look in bands:
         ax.fill_between(t, low, high, linewidth=0.0, label=label, zorder=1, **look)
@@ -218,7 +220,7 @@ def plot_energy(
 
 
 def _pieces(ax: Any, t: Array, values: Array, looks: list[tuple[str, dict[str, Any]]]) -> None:
-    """Lines, cut where the values jump together: (N,), (N, k)."""
+    """Lines, interrupted where the values jump: (N,), (N, k)."""
     step = np.linalg.norm(np.diff(values, axis=0), axis=-1)
     cuts = [0, *(np.flatnonzero(step > _JUMP) + 1).tolist(), len(t)]
     for k, (label, look) in enumerate(looks):
@@ -227,7 +229,7 @@ def _pieces(ax: Any, t: Array, values: Array, looks: list[tuple[str, dict[str, A
 
 
 def _rotation_vectors(attitudes: Array) -> Array:
-    """Of the two of a half turn, the one nearer to the neighbour: (N, 3, 3) -> (N, 3)."""
+    """Rotation vectors; of the two of a half turn, the one nearer to its neighbour: (N, 3, 3) -> (N, 3)."""
     values = so3.log(attitudes)
     straight = np.flatnonzero(np.linalg.norm(values, axis=-1) > np.pi - _HALF_TURN)
     for k in straight[::-1]:

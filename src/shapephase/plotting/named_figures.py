@@ -37,8 +37,8 @@ class Figure:
     ----------
     caption : one line
     height : [in]
-    draw : from axes, motion, path of the joints and gauge
-    with_momentum, with_path : whether it shows nothing without a momentum, without a path
+    draw : draws into axes, from a motion, the path of the joints and a gauge
+    with_momentum, with_path : whether it needs a momentum, a path of the joints
     """
 
     caption: str
@@ -56,26 +56,42 @@ def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
 
 FIGURES: Mapping[str, Figure] = {
     "momentum": Figure(
-        "The momentum seen from the gauge's frame, and the area it goes round",
-        3.9,
-        lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
+        caption="The momentum in the frame of the gauge, and the area it encloses",
+        height=3.9,
+        draw=lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
         with_momentum=True,
     ),
     "phases": Figure(
-        "The phases as they grow", 2.8, lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge), with_momentum=True
+        caption="The phases in time",
+        height=2.8,
+        draw=lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge),
+        with_momentum=True,
     ),
-    "attitude": Figure("The attitude as a rotation vector", 2.8, lambda ax, motion, *_: plot_attitude(ax, motion)),
-    "shape": Figure("The joints", 2.8, lambda ax, motion, path, _: _draw_shape(ax, motion, path), with_path=True),
+    "attitude": Figure(
+        caption="The attitude as a rotation vector",
+        height=2.8,
+        draw=lambda ax, motion, *_: plot_attitude(ax, motion),
+    ),
+    "shape": Figure(
+        caption="The joints",
+        height=2.8,
+        draw=lambda ax, motion, path, _: _draw_shape(ax, motion, path),
+        with_path=True,
+    ),
     "inertia": Figure(
-        "Principal moments of the locked inertia", 2.8, lambda ax, motion, *_: plot_inertia(ax, motion.deformation)
+        caption="Principal moments of the locked inertia",
+        height=2.8,
+        draw=lambda ax, motion, *_: plot_inertia(ax, motion.deformation),
     ),
     "internal_momentum": Figure(
-        "Internal momentum", 2.8, lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation)
+        caption="Internal momentum",
+        height=2.8,
+        draw=lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation),
     ),
     "energy": Figure(
-        "The energy, and which axis the momentum circles",
-        2.8,
-        lambda ax, motion, *_: plot_energy(ax, motion),
+        caption="The energy, and the axis that the momentum circles",
+        height=2.8,
+        draw=lambda ax, motion, *_: plot_energy(ax, motion),
         with_momentum=True,
     ),
 }
@@ -88,7 +104,7 @@ def figure_image(
 
     Parameters
     ----------
-    path : what the joints did, for "shape"
+    path : of the joints, for "shape"
     ending : "svg", "pdf" or "png"
 
     Raises
@@ -96,7 +112,7 @@ def figure_image(
     UnknownNameError
         For another kind, or another ending.
     ShapeError
-        For a kind that shows nothing without momentum, or without a path; or if the motion is a batch.
+        For a kind that needs a momentum or a path, if there is none; or if the motion is a batch.
     MissingExtraError
         Without Matplotlib.
     """

@@ -1,7 +1,8 @@
-"""How every figure looks: colours, lines and sizes; and the checks that each drawing function begins with.
+"""The style of all figures: colours, lines and sizes; and the argument checks that drawing functions share.
 
-The colours are those of Okabe and Ito, which the colour-blind tell apart; lines also differ by their dashes and points
-by their markers, so nothing is lost in black and white. Sizes are for figures one column wide, 3.4 in.
+The colours are those of Okabe and Ito, which people with any colour vision can tell apart; lines also differ by their
+dashes and points by their markers, so that nothing is lost in black and white. Sizes are for figures one column wide,
+3.4 in.
 """
 
 from __future__ import annotations
@@ -22,12 +23,20 @@ from ..shape_space.shape_path import ShapePath
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-BLACK, BLUE, SKY, VERMILION, ORANGE, GREEN = "#000000", "#0072B2", "#56B4E9", "#D55E00", "#E69F00", "#009E73"
-PURPLE, GREY = "#CC79A7", "#999999"
+# Colours of Okabe and Ito, as hexadecimal RGB.
+BLACK = "#000000"
+BLUE = "#0072B2"
+SKY = "#56B4E9"
+VERMILION = "#D55E00"
+ORANGE = "#E69F00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
+# Not of that palette: for what is in the background.
+GREY = "#999999"
 SMALL = 8
-"""Points; readable in a figure one column wide."""
+"""Size of text [pt]; readable in a figure one column wide."""
 COLUMN = 3.4
-"""Inches."""
+"""Width of a figure [in]: one column of most journals."""
 SERIES: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linestyle": "-", "linewidth": 1.6},
     {"color": VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.5},
@@ -36,10 +45,13 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": ORANGE, "linestyle": (0, (7, 5)), "linewidth": 1.7},
     {"color": PURPLE, "linestyle": (0, (3, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.5},
 )
-"""One look for each curve of a figure, the first three for x, y and z."""
+"""One style for each curve of a figure, the first three for x, y and z."""
+# Dots per inch of raster images: what journals ask for.
 _RESOLUTION = 300
-_FEWEST = 800
-_BY_LOOP = 200
+# Points of a curve in time: more than one column has pixels at 200 dpi.
+_MIN_POINTS = 800
+# Points of a curve in time for each loop of a repeated path.
+_POINTS_PER_LOOP = 200
 
 
 def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
@@ -50,21 +62,21 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     height : [in]
     projection : None: flat; "3d"
 
-    The figure is `axes.figure`, which no window shows; `axes.figure.savefig(path, dpi=300)` writes it.
+    The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it.
 
     Raises MissingExtraError.
     """
     _check_matplotlib()
     from matplotlib.figure import Figure
 
-    tall = float(finite_array(height, "height", unit="in"))
-    if not tall > 0.0:
+    inches = float(finite_array(height, "height", unit="in"))
+    if not inches > 0.0:
         raise ShapeError(f"height: a length above 0 [in] is needed, got {height!r}")
-    return Figure(figsize=(COLUMN, tall), layout="constrained").add_subplot(projection=projection)
+    return Figure(figsize=(COLUMN, inches), layout="constrained").add_subplot(projection=projection)
 
 
 def axes_image(ax: Any, ending: str) -> bytes:
-    """The figure of some axes as "svg", "pdf" or "png"; nothing in it depends on the time of day."""
+    """The figure of some axes as "svg", "pdf" or "png", without a date, so that equal figures give equal files."""
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
     stream = BytesIO()
     ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
@@ -72,13 +84,14 @@ def axes_image(ax: Any, ending: str) -> bytes:
 
 
 def check_axes(ax: object) -> None:
-    """
+    """Check that these are Matplotlib axes.
+
     Raises
     ------
     MissingExtraError
         If Matplotlib is not installed.
     ShapeError
-        If these are no axes of it.
+        For anything else.
     """
     _check_matplotlib()
     from matplotlib.axes import Axes
@@ -88,7 +101,7 @@ def check_axes(ax: object) -> None:
 
 
 def check_flat_axes(ax: object) -> None:
-    """As `check_axes`, for figures that have no depth."""
+    """Check that these are two-dimensional Matplotlib axes. Raises as `check_axes`."""
     check_axes(ax)
     if getattr(ax, "name", "") == "3d":
         raise ShapeError("ax: flat axes are needed here, got three-dimensional ones; make them without a projection")
@@ -101,19 +114,19 @@ def one_motion(motion: Motion) -> None:
 
 
 def motion_times(motion: Motion, times: ArrayLike | None) -> Array:
-    """The times to draw at: those given, or every step of the integrator in so many parts that no turn is missed."""
+    """The times to draw at: those given, or every integrator step cut into so many parts that no turn is missed."""
     if times is not None:
         return given_times(times, motion.duration)
     steps = motion.solution.times
-    parts = max(4, int(np.ceil(_FEWEST / (len(steps) - 1))))
+    parts = max(4, int(np.ceil(_MIN_POINTS / (len(steps) - 1))))
     return subdivided(np.union1d(steps, motion.deformation.breaks), parts)
 
 
 def even_times(of: Deformation | ShapePath, times: ArrayLike | None) -> Array:
-    """The times to draw at: those given, or even ones between the breaks."""
+    """The times to draw at: those given, or evenly spaced ones between the breaks."""
     if times is not None:
         return given_times(times, of.duration)
-    count = max(_FEWEST, _BY_LOOP * of.loops)
+    count = max(_MIN_POINTS, _POINTS_PER_LOOP * of.loops)
     return subdivided(of.breaks, max(2, int(np.ceil(count / (len(of.breaks) - 1)))))
 
 
@@ -148,7 +161,7 @@ def finish(ax: Any, **place: Any) -> Any:
 
 
 def in_time(ax: Any, duration: tuple[float, float], label: str, **place: Any) -> None:
-    """The frame of a figure whose abscissa is time [s]; `label` with its unit."""
+    """Limits, labels and legend of a figure whose abscissa is time [s]; `label` with its unit is for the ordinate."""
     ax.set_xlim(*duration)
     ax.set_xlabel("t [s]", fontsize=SMALL)
     ax.set_ylabel(label, fontsize=SMALL)

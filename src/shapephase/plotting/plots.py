@@ -1,7 +1,7 @@
-"""Every figure of the library: functions that draw into Matplotlib axes they are given, and return them.
+"""Every figure of the library: functions that draw into given Matplotlib axes and return them.
 
-Nothing here opens a window or keeps a state; figures, their sizes and files are the caller's, and `column_axes` makes
-one of a paper's column. Importing this does not import Matplotlib: the first drawing does.
+Nothing here opens a window or keeps any state; figures, their sizes and files are left to the caller, and `column_axes`
+makes a figure one column wide. Importing this does not import Matplotlib: the first drawing does.
 
     ax = plots.plot_momentum_curve(plots.column_axes(3.8), motion)
     ax.figure.savefig("curve.pdf")
@@ -9,6 +9,7 @@ one of a paper's column. Importing this does not import Matplotlib: the first dr
 
 from __future__ import annotations
 
+from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
 from .plot_style import column_axes
@@ -20,8 +21,11 @@ __all__ = [
     "column_axes",
     "plot_attitude",
     "plot_bounds",
+    "plot_caustic",
+    "plot_conjugate_locus",
     "plot_crown",
     "plot_curvature",
+    "plot_ellipsoid_locus",
     "plot_energy",
     "plot_fixed_points",
     "plot_heavy_top_stability",

@@ -1,7 +1,7 @@
 """Figures of the rigid body: polhodes on the momentum sphere, the herpolhode in its annulus, the heavy top's stability.
 
-Each function draws into Matplotlib axes that it is given and returns them; figures, sizes and files are the caller's.
-Line styles and markers differ as the colours do (those of Okabe and Ito), so nothing is lost in black and white.
+Each function draws into given Matplotlib axes and returns them. Line styles and markers differ as the colours do (those
+of Okabe and Ito), so that nothing is lost in black and white.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ..errors import ShapeError
 from ..rigid_body.euler_top import EulerTop
 from ..rigid_body.poinsot import Poinsot
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
+from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, GREEN, ORANGE, SKY, SMALL, VERMILION, check_axes, finish
-from .sphere_axes import SphereAxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,8 +28,16 @@ _SMALLEST = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.9}
 _SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.8}
 _AT_REST = {"color": ORANGE, "linestyle": (0, (1, 1)), "linewidth": 2.4}
 _OWN = {"color": GREEN, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 2.4}
+# Time from its crest [1/rate] at which a herpolhode of the separatrix is within a line's width of the foot: exp(-10).
 _TAIL = 10.0
-"""So many 1/rate from its crest, a herpolhode of the separatrix is within a line's width of the foot."""
+# Of the amplitude on the separatrix [rad], short of a quarter turn, where the elliptic integral is infinite.
+_SEPARATRIX_END = 1e-5
+# Phase between points of a herpolhode [rad]: its chords then stay within a line's width of the curve.
+_PHASE_STEP = 0.02
+# Points of a herpolhode: smooth at the least, and a second of drawing at the most.
+_MIN_POINTS = 400
+_MAX_POINTS = 200_000
+# I3/I1 at the top of the chart: a little above 2, which no rigid body exceeds, to show the line of double roots.
 _LARGEST_RATIO = 2.2
 
 
@@ -40,10 +48,10 @@ def plot_polhodes(
 
     Parameters
     ----------
-    ax : flat axes, drawn on in parallel projection, or three-dimensional ones, seen from where they are
-    body : (3,) principal moments [kg m^2]; or a top, whose principal axes of ascending moments are taken and whose
-        own polhode is drawn thick, with a star where it starts
-    energies : (N,) of the curves for |Pi| = 1 [1/(kg m^2)]; None: four round each stable axis
+    ax : flat axes, drawn on in parallel projection, or three-dimensional ones, in the view they have
+    body : (3,) principal moments [kg m^2]; or a top, whose principal axes are taken by ascending moments, and whose own
+        polhode is drawn thick, with a star at its start
+    energies : (N,) of the curves for |Pi| = 1 [1/(kg m^2)]; None: four about each stable axis
     view : elevation and azimuth of the eye [degrees], for flat axes
 
     Raises
@@ -60,7 +68,7 @@ def plot_polhodes(
     levels = spread_energies(moments) if energies is None else np.atleast_1d(finite_array(energies, "energies"))
     for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
         largest = 2.0 * level * np.median(moments) < 1.0 or np.median(moments) == np.min(moments)
-        label = "round largest moment" if largest else "round smallest moment"
+        label = "about largest moment" if largest else "about smallest moment"
         for curve in pair:
             sphere.curve(curve, label, **(_LARGEST if largest else _SMALLEST))
     kinds = {point.kind for point in points}
@@ -77,7 +85,7 @@ def plot_polhodes(
     markers: dict[str, tuple[str, dict[str, Any]]] = {
         "centre": ("centre", {"marker": "o", "color": BLACK}),
         "saddle": ("saddle", {"marker": "X", "color": VERMILION}),
-        "degenerate": ("at rest, as every point", {"marker": "s", "color": ORANGE}),
+        "degenerate": ("equilibrium, as every point", {"marker": "s", "color": ORANGE}),
     }
     for point in points:
         label, style = markers[point.kind]
@@ -89,17 +97,21 @@ def plot_polhodes(
 
 
 def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
-    """The herpolhode in the invariable plane, between the circles of its annulus, over so many periods of the momentum.
+    """The herpolhode in the invariable plane, between the two circles of its annulus.
 
-    The origin is the foot of the normal, the first coordinate points to the curve at t = 0, marked by a star; the
-    normal points to the eye. On the separatrix the whole spiral is drawn, whatever the periods; a steady rotation
-    is a point.
+    The origin is the foot of the normal, which points to the eye; the first axis points to the curve at t = 0, marked
+    by a star. On the separatrix the whole spiral is drawn, whatever the periods; a steady rotation is a point.
+
+    Parameters
+    ----------
+    ax : flat axes
+    periods : of the body momentum, above 0
 
     Raises
     ------
     MissingExtraError
     ShapeError
-        If the periods are not a positive number, or the top has no momentum.
+        If the number of periods is not above 0, or the top has no momentum.
 
     Source: Marsden and Ratiu, section 15.5; theory.md I5.
     """
@@ -114,8 +126,8 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
         times = _herpolhode_times(top, count)
         radius, angle = poinsot.herpolhode_radius(times), poinsot.herpolhode_angle(times)
         ax.plot(radius * np.cos(angle), radius * np.sin(angle), color=BLUE, linewidth=1.0, label="herpolhode")
-        for size, label in ((outer, f"annulus, {inner:.3g} to {outer:.3g} rad/s"), (inner, None)):
-            x, y = size * np.cos(around), size * np.sin(around)
+        for circle, label in ((outer, f"annulus, {inner:.3g} to {outer:.3g} rad/s"), (inner, None)):
+            x, y = circle * np.cos(around), circle * np.sin(around)
             ax.plot(x, y, color=VERMILION, linestyle=(0, (4, 2)), linewidth=1.2, label=label)
     start = float(poinsot.herpolhode_radius(0.0))
     ax.plot([start], [0.0], marker="*", color=GREEN, markersize=9, linestyle="none", label="t = 0")
@@ -177,10 +189,10 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
 
 
 def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
-    """That of a top, uniform in the amplitude, which on the separatrix goes through half a turn only."""
+    """The polhode of a top, at even amplitudes, which on the separatrix span only half a turn."""
     orbit = top.orbit
     if top.regime not in ("steady", "spherical"):
-        half = 0.5 * np.pi - 1e-5 if top.regime == "separatrix" else np.pi
+        half = 0.5 * np.pi - _SEPARATRIX_END if top.regime == "separatrix" else np.pi
         u = incomplete_f(np.linspace(-half, half, 721), top.complement)
         points = top.body_momentum((u - orbit.phase) / top.rate) @ top.axes / top.magnitude
         sphere.curve(points, "this top", **_OWN)
@@ -188,7 +200,7 @@ def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
 
 
 def spread_energies(moments: Array) -> Array:
-    """Energies of four curves round each stable axis, at equal angles from the axis to the separatrix."""
+    """Energies of four curves about each stable axis, at equal angles from the axis to the separatrix."""
     least, middle, most = np.sort(1.0 / moments)
     if least == most:
         return np.zeros(0)
@@ -200,10 +212,10 @@ def spread_energies(moments: Array) -> Array:
 
 
 def _herpolhode_times(top: EulerTop, periods: float) -> Array:
-    """Fine enough for both the turns about mu and the waves between the circles."""
+    """Times fine enough both for the rotation about mu and for the waves between the circles."""
     if top.regime == "separatrix":
         start, end = (np.array([-_TAIL, _TAIL]) - top.orbit.phase) / top.rate
     else:
         start, end = 0.0, periods * top.period
     phases = (end - start) * max(top.rate, top.magnitude / float(top.moments[0]))
-    return np.linspace(start, end, int(np.clip(phases / 0.02, 400, 200_000)))
+    return np.linspace(start, end, int(np.clip(phases / _PHASE_STEP, _MIN_POINTS, _MAX_POINTS)))

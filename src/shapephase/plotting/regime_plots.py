@@ -1,4 +1,4 @@
-"""Figures of what is certain before a motion: the part of the momentum sphere it can reach, bounds beside values."""
+"""Figures of what is certain before a motion is computed: the reachable part of the momentum sphere, and bounds."""
 
 from __future__ import annotations
 
@@ -12,19 +12,29 @@ from ..bounds.all_bounds import Bound
 from ..bounds.regimes import CrownRegion
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
+from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, SKY, SMALL, VERMILION, check_flat_axes, one_motion
-from .sphere_axes import SphereAxes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_POINTS, _TIMES = 241, 800
+# Points of the raster of the crown across the sphere: one is 0.01 in wide.
+_POINTS = 241
+# Points of the motion's curve.
+_TIMES = 800
+# Angle between eye and axis [degrees] in the default view, where the axis would be too near to the pole.
+_OFF_AXIS = 40.0
+# Elevation of an axis [degrees] from which on it is too near to the pole.
+_NEAR_POLE = 50.0
+# Elevation of the eye, and its azimuth from that of the axis [degrees], otherwise.
+_ELEVATION = 24.0
+_AZIMUTH_OFFSET = 35.0
 
 
 def plot_crown(
     ax: Axes, crown: CrownRegion, motion: Motion | None = None, *, view: tuple[float, float] | None = None
 ) -> Axes:
-    """The crown region on the sphere of unit momentum, in which Pi is certain to stay; and the motion, inside.
+    """The crown region on the sphere of unit momentum, in which Pi is certain to stay, and a motion inside it.
 
     Parameters
     ----------
@@ -65,11 +75,11 @@ def plot_crown(
 
 
 def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
-    """How near each bound is to what it bounds: a bar of the smaller over the larger, 1 where they are equal.
+    """How near each bound is to the value it bounds: a bar of `Bound.tightness`, 1 where they are equal.
 
     Parameters
     ----------
-    bounds : from `estimates.bounds`
+    bounds : from `bounds.bounds`
 
     Raises
     ------
@@ -77,7 +87,7 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
     """
     check_flat_axes(ax)
     if not bounds:
-        raise ShapeError("bounds: there are none to be drawn")
+        raise ShapeError("bounds: one or more are needed to be drawn, got none")
     places = np.arange(len(bounds))[::-1]
     for upper, colour, hatch in ((True, SKY, None), (False, "#F3BE73", "////")):
         chosen = [(place, bound) for place, bound in zip(places, bounds, strict=True) if bound.is_upper is upper]
@@ -93,7 +103,7 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
         )
     ax.set_yticks(places, [bound.name for bound in bounds], fontsize=SMALL - 1)
     ax.set(xlim=(0.0, 1.0), ylim=(-0.6, len(bounds) - 0.4))
-    ax.set_xlabel("sharpness (1: equal)", fontsize=SMALL)
+    ax.set_xlabel("tightness (1: equal)", fontsize=SMALL)
     ax.tick_params(axis="x", labelsize=SMALL)
     ax.legend(fontsize=SMALL, frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
     return ax
@@ -102,7 +112,8 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
 def _beside(axis: Array) -> tuple[float, float]:
     """A view from 40 degrees off a direction, lower than it where it points up."""
     elevation, azimuth = np.degrees([np.arcsin(np.clip(axis[2], -1.0, 1.0)), np.arctan2(axis[1], axis[0])])
-    return (elevation - np.copysign(40.0, elevation) if abs(elevation) > 50.0 else 24.0), azimuth + 35.0
+    near_pole = abs(elevation) > _NEAR_POLE
+    return elevation - np.copysign(_OFF_AXIS, elevation) if near_pole else _ELEVATION, azimuth + _AZIMUTH_OFFSET
 
 
 def _track(motion: Motion, crown: CrownRegion) -> Array:

@@ -1,4 +1,4 @@
-"""One HTML file that tells a motion: the split in numbers, the animation, the figures, the inputs with their hashes."""
+"""One HTML file about a motion: its split in numbers, the animation, the figures, the inputs with their hashes."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def write_report(
     motion : of one momentum, no batch
     result : its split
     path : of the file
-    shape_path : what the joints did, for a figure of it
+    shape_path : of the joints, for a figure of it
     title : None: the label of the deformation
     trail : a link whose origin leaves a trail in the animation
-    begin : called with a few words before every longer step
+    begin : called with a few words before each longer step
 
     Raises
     ------
@@ -122,7 +122,10 @@ def _split_rows(result: PhaseSplit) -> list[tuple[str, str, str]]:
         _rotation("Dynamical rotation", result.dynamical_rotation),
     ]
     if not result.has_phase:
-        return [*rows, ("Montgomery phase", "", "none: there is no angular momentum, the shape alone turns the body")]
+        return [
+            *rows,
+            ("Montgomery phase", "", "none: there is no angular momentum, the body turns by its shape alone"),
+        ]
     return [
         *rows,
         _phase("Montgomery phase", result.montgomery_phase, f"{result.gauge} gauge"),
@@ -141,8 +144,8 @@ def _rotation(name: str, rotation: Array) -> tuple[str, str, str]:
 
 
 def _phase(name: str, phase: Array, remark: str) -> tuple[str, str, str]:
-    said = f"{float(phase):.9f} rad"
-    return name, f"{float(np.degrees(phase)):.6f}°", f"{said}; {remark}" if remark else said
+    radians = f"{float(phase):.9f} rad"
+    return name, f"{float(np.degrees(phase)):.6f}°", f"{radians}; {remark}" if remark else radians
 
 
 def _input_rows(motion: Motion) -> list[tuple[str, str, str]]:

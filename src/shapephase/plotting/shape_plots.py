@@ -18,11 +18,18 @@ from .plot_style import BLACK, BLUE, GREEN, GREY, SERIES, SMALL, check_flat_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_STILL = 1e-9
-_MOST_NAMED = 6
+# Range of a joint [rad or m] below which it does not move.
+_AT_REST = 1e-9
+# Joints with a style of their own and a name in the legend; more could not be told apart.
+_MAX_NAMED = 6
+# Lines of equal curvature, about so many.
 _LEVELS = 8
+# Points of the plane along each joint: smooth under shading, and a second of computation.
 _COUNT = 61
+# Of the range of a path: room around it in the plane.
 _MARGIN = 0.25
+# Level over the largest value [1] that is zero up to rounding.
+_ZERO_LEVEL = 1e-9
 _AXES = "xyz"
 
 
@@ -40,8 +47,8 @@ def plot_shape_path(
     ----------
     ax : flat axes; where there are joints of both units, a twin of them is added to their figure
     body : whose joints they are, for names and units; None: names as the path has them, all on one scale
-    joints : names or places of those to draw; None: those that move. The six that move most get a name, the others are
-        grey
+    joints : names or indices of those to draw; None: those that move. The six that move most are named, the others
+        are grey
     times : (N,) where to draw [s]; None: evenly between the breaks
 
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
@@ -51,19 +58,19 @@ def plot_shape_path(
     route, names, units = _named(path, body)
     values = route.shape(t)
     span = np.ptp(values, axis=0)
-    chosen = np.flatnonzero(span > _STILL) if joints is None else np.array([_place(j, names) for j in joints], int)
+    chosen = np.flatnonzero(span > _AT_REST) if joints is None else np.array([_place(j, names) for j in joints], int)
     if not len(chosen):
         raise ShapeError("joints: none of them moves along this path; name those to draw")
-    chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MOST_NAMED else chosen
+    chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MAX_NAMED else chosen
     scales = sorted({units[k] for k in chosen}, key=("rad", "m", "rad or m").index)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
     handles: dict[str, Any] = {}
     for number, k in enumerate(chosen):
-        named = number < _MOST_NAMED
+        named = number < _MAX_NAMED
         look = SERIES[number] if named else {"color": GREY, "linewidth": 0.6, "zorder": 1.5}
         (line,) = places[units[k]].plot(t, values[:, k], **look)
         text = names[k] if len(scales) == 1 else f"{names[k]} [{units[k]}]"
-        handles[text if named else f"{len(chosen) - _MOST_NAMED} others"] = line
+        handles[text if named else f"{len(chosen) - _MAX_NAMED} others"] = line
     for unit, place in list(places.items())[1:]:
         place.set_ylabel(f"joints [{unit}]", fontsize=SMALL)
         place.tick_params(labelsize=SMALL)
@@ -80,12 +87,12 @@ def plot_shape_plane(
     *,
     times: ArrayLike | None = None,
 ) -> Axes:
-    """The path of shapes in the plane of two joints, its start and its direction.
+    """A path of shapes in the plane of two joints, with its start and its direction.
 
     Parameters
     ----------
     ax : flat axes
-    joints : the two, names or places; the first is the abscissa
+    joints : the names or indices of the two; the first is the abscissa
     body, times : as for `plot_shape_path`
 
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
@@ -113,19 +120,19 @@ def plot_curvature(
     shape: ArrayLike | None = None,
     path: ShapePath | None = None,
 ) -> Axes:
-    """One component of the curvature over the plane of two joints, and a path of shapes on it.
+    """One component of the curvature over the plane of two joints, with a path of shapes on it.
 
     Violet is positive and orange negative; lines of equal curvature are labelled, solid where positive, dashed where
-    negative, thick where zero. A small square gone round counterclockwise turns the body by minus this, times its area.
+    negative, thick where zero. A small counterclockwise loop turns the body by minus the curvature times its area.
 
     Parameters
     ----------
     ax : flat axes; a scale of colours is added to their figure
-    joints : the two, names or places; the first is the abscissa
-    first, second : (A,), (B,) where to evaluate, ascending [rad or m]; None: round the path, or the joints' limits
+    joints : the names or indices of the two; the first is the abscissa
+    first, second : (A,), (B,) where to evaluate, ascending [rad or m]; None: around the path, or the joints' limits
     axis : "x", "y", "z", or the direction (3,) whose component is drawn, base axes; None: that of the largest component
-    shape : (n,) where the other joints stand; None: neutral
-    path : to be drawn on it; its other joints may move
+    shape : (n,) positions of the other joints; None: neutral
+    path : to be drawn; its other joints may move
 
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError. Source: theory.md B6.
     """
@@ -162,7 +169,7 @@ def plot_curvature(
 
 
 def _loop(ax: Any, points: Array) -> None:
-    """A path in a plane with its start and heads along it."""
+    """Draw a path in a plane with its start, and arrowheads along it."""
     ax.plot(*points.T, color=BLACK, linewidth=1.6, label="path")
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points / _extent(points), axis=0), axis=1))])
     for k in np.searchsorted(length, length[-1] * np.array([0.15, 0.4, 0.65, 0.9])):
@@ -172,35 +179,35 @@ def _loop(ax: Any, points: Array) -> None:
             ax.annotate("", points[after], points[after - 1], arrowprops=style)
     start = {"marker": "*", "color": GREEN, "markersize": 10.0, "markeredgecolor": "white", "linestyle": "none"}
     ax.plot(*points[:1].T, label="start", **start)
-    if np.abs(points[-1] - points[0]).max() > _STILL:
+    if np.abs(points[-1] - points[0]).max() > _AT_REST:
         ax.plot(*points[-1:].T, marker="s", color=BLUE, markersize=5.0, linestyle="none", label="end")
 
 
 def _coloured(ax: Any, rows: list[Array], values: Array, largest: float) -> Any:
     from matplotlib.colors import LinearSegmentedColormap
 
-    # Neither end so dark that lines and text on it could not be read.
+    # Neither end is so dark that lines and text on it could not be read.
     colours = LinearSegmentedColormap.from_list("orange to violet", ["#C8701A", "#F7F7F7", "#7F6FB0"])
     look = {"cmap": colours, "vmin": -largest, "vmax": largest, "shading": "gouraud", "rasterized": True}
     return ax.pcolormesh(*rows, values, **look)
 
 
 def _contours(ax: Any, rows: list[Array], values: Array, largest: float) -> None:
-    """Lines of equal values at round numbers, as far as there are any."""
+    """Draw lines of equal values at round numbers, if there are any in the range."""
     from matplotlib.ticker import MaxNLocator
 
     levels = MaxNLocator(nbins=_LEVELS, symmetric=True).tick_values(-largest, largest)
     levels = levels[(levels > values.min()) & (levels < values.max())]
     if len(levels):
         styles = ["-" if level >= 0.0 else "--" for level in levels]
-        widths = [1.5 if abs(level) < 1e-9 * largest else 0.7 for level in levels]
+        widths = [1.5 if abs(level) < _ZERO_LEVEL * largest else 0.7 for level in levels]
         lines = ax.contour(*rows, values, levels=levels, colors="#333333", linestyles=styles, linewidths=widths)
         ax.clabel(lines, fmt=lambda level: f"{level:.2g}".replace("-", "−"), fontsize=SMALL - 2, inline_spacing=2)
 
 
-def _power_of_ten(size: float) -> tuple[int, str]:
-    """To be taken out of numbers up to this size, and how that is written before a unit."""
-    power = int(np.floor(np.log10(size))) if size > 0.0 else 0
+def _power_of_ten(largest: float) -> tuple[int, str]:
+    """The power to take out of numbers up to the largest, and how it is written before a unit."""
+    power = int(np.floor(np.log10(largest))) if largest > 0.0 else 0
     if -3 <= power <= 2:
         return 0, ""
     return power, "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")) + " "
@@ -214,10 +221,10 @@ def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:
             raise unknown_name("axis", axis, _AXES)
         return np.eye(3)[_AXES.index(axis)], f"{axis} component"
     direction = finite_array(axis, "axis", (3,))
-    size = float(np.linalg.norm(direction))
-    if direction.ndim != 1 or not size:
+    norm = float(np.linalg.norm(direction))
+    if direction.ndim != 1 or not norm:
         raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {direction}")
-    unit = direction / size
+    unit = direction / norm
     return unit, "along ({:.2g}, {:.2g}, {:.2g})".format(*unit).replace("-", "−")
 
 

@@ -1,4 +1,4 @@
-"""Motions in three dimensions: live in a browser or a notebook, and as one HTML file that opens without a network."""
+"""Motions in three dimensions: live in a browser or a notebook, or as one HTML file that needs no network."""
 
 from __future__ import annotations
 
@@ -21,14 +21,21 @@ from ..errors import MissingExtraError, ShapeError, VisualWarning
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
 from ._moving_scene import MovingScene, moving_scene
-from .scene_drawing import DrawnScene, set_camera
+from ._scene_drawing import DrawnScene, set_camera
 
 if TYPE_CHECKING:
     import viser
 
-_SHORTEST, _LONGEST, _RATE, _MOST_FRAMES = 4.0, 20.0, 30, 3000
-"""Seconds that a motion is played in unless a speed is asked for, frames in each of them, and in all."""
-_HOLD_FIRST, _HOLD_LAST = 0.5, 1.0
+# Seconds that a motion is played in, unless a speed is given: long enough to follow it, not so long as to tire.
+_MIN_PLAYING = 4.0
+_MAX_PLAYING = 20.0
+# Frames in a second of playing [1/s]: smooth to the eye.
+_FRAME_RATE = 30
+# Frames of a page, unless their number is given: keeps its file below some megabytes.
+_MAX_FRAMES = 3000
+# Seconds that the first and the last frame stand still, so that start and end can be seen before it repeats.
+_HOLD_FIRST = 0.5
+_HOLD_LAST = 1.0
 
 
 def motion_page(
@@ -43,13 +50,13 @@ def motion_page(
 ) -> None:
     """Write a motion as one HTML page to play, stop and scrub; it needs no network and no server.
 
-    The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass and the
-    body at the start as a shadow of itself.
+    The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass, and the
+    body at the start as a transparent ghost.
 
     Parameters
     ----------
     path : of the file, written whole or not at all
-    speed : seconds of motion in a second of playing; None: 1, or what makes the playing last from 4 to 20 s
+    speed : seconds of motion in a second of playing; None: 1, or such that playing takes from 4 to 20 s
     frames : None: 30 in a second of playing
     trail : a link whose origin leaves a trail, light at the start and dark at the end
     ghost : whether the body at the start is shown
@@ -61,13 +68,13 @@ def motion_page(
     MissingExtraError
         If viser is not installed.
     ShapeError, UnknownNameError
-        As `moving_scene`, and for a speed that is not above zero.
+        As `moving_scene`, and for a speed that is not above 0.
 
     Warns
     -----
     VisualWarning
-        As `visuals`; and if something turns by more than a quarter from one frame to the next, so that it may seem to
-        turn the other way, where `frames` is None.
+        As `visuals`; and, where `frames` is None, if something turns by more than a quarter turn from one frame to the
+        next, so that it may seem to turn the other way.
     """
     page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, **fall)
     write_whole(path, lambda stream: stream.write(page.encode()))
@@ -84,10 +91,10 @@ def motion_html(
 ) -> str:
     """The page that `motion_page` writes, as text: arguments, errors and warnings as there."""
     viser_module()
-    pace = _pace(motion, speed)
-    scene = _scene(motion, pace, frames, trail, fall)
+    playing_speed = _playing_speed(motion, speed)
+    scene = _scene(motion, playing_speed, frames, trail, fall)
     with _server() as server:
-        page = _recording(server, scene, pace, ghost).as_html()
+        page = _recording(server, scene, playing_speed, ghost).as_html()
     title = f"<title>{html.escape(scene.title)}</title>"
     return page.replace("<title>Viser</title>", title, 1)
 
@@ -105,13 +112,13 @@ def view(
     browser: bool = True,
     **fall: ArrayLike,
 ) -> LiveView | None:
-    """Show a motion: in a browser by a server of this process, or in the cell of a notebook.
+    """Show a motion, in a browser by a server of this process, or in the cell of a notebook.
 
     Parameters
     ----------
     speed, frames, trail, ghost, fall : as in `motion_page`
-    notebook : whether to show it in a cell, recorded as `motion_page` does; None: in a notebook
-    host, port : where the server listens; a port in use is passed over
+    notebook : whether to show it in a cell, recorded as by `motion_page`; None: if this runs in a notebook
+    host, port : where the server listens; if the port is in use, the next free one
     browser : whether to open a browser there
 
     Returns
@@ -121,13 +128,13 @@ def view(
     Raises and warns as `motion_page`.
     """
     viser_module()
-    pace = _pace(motion, speed)
-    scene = _scene(motion, pace, frames, trail, fall)
+    playing_speed = _playing_speed(motion, speed)
+    scene = _scene(motion, playing_speed, frames, trail, fall)
     if _in_notebook() if notebook is None else notebook:
         with _server() as server:
-            _recording(server, scene, pace, ghost).show(height=480)
+            _recording(server, scene, playing_speed, ghost).show(height=480)
         return None
-    running = LiveView(_started(host, port), scene, pace, ghost)
+    running = LiveView(_started(host, port), scene, playing_speed, ghost)
     if browser:
         webbrowser.open(running.url)
     return running
@@ -143,32 +150,32 @@ def viser_module() -> Any:
 
 
 class LiveView:
-    """A motion shown by a server of this process, with a slider of time, a button to play and a speed.
+    """A motion shown by a server of this process, with a time slider, a play button and a speed.
 
-    Made by `view`. It runs until `stop()`, or the end of the process; a with-block stops it, too.
+    Made by `view`. It runs until `stop()` or the end of the process; used in a with statement, until the end of that.
 
     Attributes
     ----------
-    server : the viser server, to which more can be added
+    server : the viser server, to which other things can be added
     """
 
-    def __init__(self, server: viser.ViserServer, scene: MovingScene, pace: float, ghost: bool) -> None:
+    def __init__(self, server: viser.ViserServer, scene: MovingScene, speed: float, ghost: bool) -> None:
         self.server = server
         self._scene = scene
-        self._drawn = DrawnScene(server.scene, scene, pace, ghost)
+        self._drawn = DrawnScene(server.scene, scene, speed, ghost)
         set_camera(server, scene)
         self._stopped = threading.Event()
         end = float(scene.times[-1])
         gui = server.gui
         self._slider = gui.add_slider("time [s]", min=0.0, max=end, step=end / 1000.0, initial_value=0.0)
         self._playing = gui.add_checkbox("play", initial_value=True)
-        self._speed = gui.add_number("speed", initial_value=pace, min=0.0)
+        self._speed = gui.add_number("speed", initial_value=speed, min=0.0)
         self._thread = threading.Thread(target=self._play, daemon=True, name="shapephase view")
         self._thread.start()
 
     @property
     def url(self) -> str:
-        """Where a browser finds it."""
+        """Address for a browser."""
         return f"http://{self.server.get_host()}:{self.server.get_port()}"
 
     def stop(self) -> None:
@@ -179,7 +186,7 @@ class LiveView:
             self.server.stop()
 
     def wait(self) -> None:
-        """Return when the view is stopped, from elsewhere or by Ctrl-C: for a script that has nothing else to do."""
+        """Return when the view is stopped, by `stop()` or by Ctrl-C: for a script that has nothing else to do."""
         try:
             self._thread.join()
         except KeyboardInterrupt:
@@ -194,27 +201,28 @@ class LiveView:
         self.stop()
 
     def __repr__(self) -> str:
-        """One line for people."""
+        """Title and address."""
         return f"LiveView({self._scene.title!r}, {self.url})"
 
     def _play(self) -> None:
         end, last = float(self._scene.times[-1]), time.monotonic()
-        while not self._stopped.wait(1.0 / _RATE):
+        while not self._stopped.wait(1.0 / _FRAME_RATE):
             now = time.monotonic()
             if self._playing.value:
                 moved = self._slider.value + (now - last) * self._speed.value
                 self._slider.value = moved if moved <= end else 0.0
-            last, self._drawn.pace = now, self._speed.value
+            last, self._drawn.speed = now, self._speed.value
             with self.server.atomic():
                 self._drawn.show(round(self._slider.value / end * (len(self._scene.times) - 1)))
 
 
-def _recording(server: viser.ViserServer, scene: MovingScene, pace: float, ghost: bool) -> Any:
-    drawn = DrawnScene(server.scene, scene, pace, ghost)
+def _recording(server: viser.ViserServer, scene: MovingScene, speed: float, ghost: bool) -> Any:
+    """All frames of a scene as viser records them."""
+    drawn = DrawnScene(server.scene, scene, speed, ghost)
     set_camera(server, scene)
     serializer = server.get_scene_serializer()
     serializer.insert_sleep(_HOLD_FIRST)
-    step = float(scene.times[1] - scene.times[0]) / pace
+    step = float(scene.times[1] - scene.times[0]) / speed
     for frame in range(1, len(scene.times)):
         serializer.insert_sleep(step)
         drawn.show(frame)
@@ -224,7 +232,7 @@ def _recording(server: viser.ViserServer, scene: MovingScene, pace: float, ghost
 
 @contextlib.contextmanager
 def _server() -> Iterator[viser.ViserServer]:
-    """A server for as long as a scene is recorded, on a port that the system chooses."""
+    """A server while a scene is recorded, on a port that the system chooses."""
     server = _started("127.0.0.1", 0)
     try:
         yield server
@@ -240,30 +248,32 @@ def _started(host: str, port: int) -> viser.ViserServer:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what viser prints when it begins and ends."""
+    """Suppress what viser prints when it starts and stops."""
     with contextlib.redirect_stdout(io.StringIO()):
         yield
 
 
-def _pace(motion: Motion, speed: float | None) -> float:
+def _playing_speed(motion: Motion, speed: float | None) -> float:
+    """Seconds of motion in a second of playing: as given, or by default. Raises ShapeError."""
     if speed is None:
-        return motion.duration / min(max(motion.duration, _SHORTEST), _LONGEST)
+        return motion.duration / min(max(motion.duration, _MIN_PLAYING), _MAX_PLAYING)
     if not (isinstance(speed, int | float | np.floating | np.integer) and 0.0 < speed < math.inf):
-        raise ShapeError(f"speed: seconds of motion in a second of playing, above zero, are needed, got {speed!r}")
+        raise ShapeError(f"speed: seconds of motion in a second of playing, above 0, are needed, got {speed!r}")
     return float(speed)
 
 
 def _scene(
-    motion: Motion, pace: float, frames: int | None, trail: str | None, fall: Mapping[str, ArrayLike]
+    motion: Motion, speed: float, frames: int | None, trail: str | None, fall: Mapping[str, ArrayLike]
 ) -> MovingScene:
+    """The scene with the given number of frames, or as many as the speed needs."""
     if frames is not None:
         return moving_scene(motion, frames, trail=trail, **fall)
-    count = min(max(math.ceil(_RATE * motion.duration / pace), 2), _MOST_FRAMES) + 1
+    count = min(max(math.ceil(_FRAME_RATE * motion.duration / speed), 2), _MAX_FRAMES) + 1
     scene = moving_scene(motion, count, trail=trail, **fall)
     if scene.largest_turn > 0.5 * math.pi:
         warnings.warn(
             f"from one frame to the next something turns by {math.degrees(scene.largest_turn):.0f} degrees and may "
-            f"seem to turn the other way; ask for more than {count} frames, or for a lower speed than {pace:.3g}",
+            f"seem to turn the other way; choose more than {count} frames, or a lower speed than {speed:.3g}",
             VisualWarning,
             stacklevel=3,
         )

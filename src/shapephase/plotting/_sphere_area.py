@@ -9,10 +9,16 @@ import numpy as np
 from .. import so3, sphere
 from ..arrays import Array, Integers
 
-_MOST_STRIPS = 1500
-_FEWEST_STRIPS = 120
-_LONGEST = 0.05
-MOST_TURNS = 3
+# Strips between meridians: limits the drawing of curves with many corners to some seconds.
+_MAX_STRIPS = 1500
+# Strips in any case, three degrees each, so that their chords stay within a line's width of the sphere's circles.
+_MIN_STRIPS = 120
+# Length of a cell's side along a meridian [rad]: likewise.
+_MAX_SIDE = 0.05
+# Azimuths nearer than this [rad] are the same meridian.
+_SAME_MERIDIAN = 1e-12
+# Winding numbers that have a shade of their own; more are shown as this.
+MAX_WINDING = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +28,7 @@ class AreaCells:
     Attributes
     ----------
     polygons : (m_k, 3) corners each, counterclockwise as seen from outside
-    windings : (K,) how often the curve goes round each, counterclockwise; not zero, three for more
+    windings : (K,) winding number of the curve about each, counterclockwise positive; not zero, at most three
     """
 
     polygons: list[Array]
@@ -31,21 +37,21 @@ class AreaCells:
     @property
     def area(self) -> float:
         """The sum of the cells' areas times their windings [sr]."""
-        sizes = [float(sphere.triangle_area(p[0], p[1:-1], p[2:]).sum()) for p in self.polygons]
-        return float(np.array(sizes) @ self.windings)
+        areas = [float(sphere.triangle_area(p[0], p[1:-1], p[2:]).sum()) for p in self.polygons]
+        return float(np.array(areas) @ self.windings)
 
 
 def enclosed_cells(corners: Array, reference: Array) -> AreaCells:
     """The cells inside a closed polygon of great-circle arcs.
 
-    The strips between meridians of `reference` through the corners are cut by the arcs that cross them. Walking in from
-    the point opposite, where the winding is zero, each arc adds its sense: the area is that of
-    `sphere.polygon_area`, counted from the region of the point opposite `reference`.
+    The strips between the meridians of `reference` through the corners are cut by the arcs that cross them. Starting at
+    the point opposite `reference`, where the winding number is zero, each arc adds its sense; so the area is that of
+    `sphere.polygon_area`, counted from that point.
 
     Parameters
     ----------
     corners : (N, 3) unit vectors, the last joined to the first
-    reference : (3,) its opposite is not on the curve
+    reference : (3,) unit vector whose opposite is not on the curve
     """
     first = so3.perpendicular(reference)
     basis = np.stack([first, np.cross(reference, first)])
@@ -58,39 +64,39 @@ def enclosed_cells(corners: Array, reference: Array) -> AreaCells:
         left, right = edges[strip], edges[(strip + 1) % len(edges)]
         sides = [np.cos(a) * basis[0] + np.sin(a) * basis[1] for a in (left, right)]
         outward = np.argsort(-heights.sum(axis=1), kind="stable")
-        winding = np.clip(np.cumsum(senses[outward]), -MOST_TURNS, MOST_TURNS)
-        # Where more turns are shown alike, the arcs between them bound nothing.
+        winding = np.clip(np.cumsum(senses[outward]), -MAX_WINDING, MAX_WINDING)
+        # Higher winding numbers are shown alike, so that the arcs between them bound no cell.
         kept = np.flatnonzero(np.diff(winding, prepend=0))
         bounds = np.concatenate([heights[outward][kept], np.zeros((1, 2))])
         for k, layer in enumerate(winding[kept]):
             if layer:
                 polygons.append(_cell(reference, sides, bounds[k], bounds[k + 1]))
                 windings.append(int(layer))
-    return AreaCells(polygons, np.array(windings, dtype=np.int64))
+    return AreaCells(polygons=polygons, windings=np.array(windings, dtype=np.int64))
 
 
 def _strip_edges(azimuth: Array) -> Array:
-    """Azimuths of the meridians, ascending in (-pi, pi]: those of the corners, or some of them if they are many."""
+    """Azimuths of the meridians, ascending in (-pi, pi]: those of the corners, or some of them if there are many."""
     own = np.unique(azimuth)
-    own = own[np.unique(np.linspace(0, len(own) - 1, min(len(own), _MOST_STRIPS)).astype(int))]
-    edges = np.union1d(own, np.linspace(-np.pi, np.pi, _FEWEST_STRIPS + 1)[1:])
-    return edges[np.diff(edges, prepend=-np.inf) > 1e-12]
+    own = own[np.unique(np.linspace(0, len(own) - 1, min(len(own), _MAX_STRIPS)).astype(int))]
+    edges = np.union1d(own, np.linspace(-np.pi, np.pi, _MIN_STRIPS + 1)[1:])
+    return edges[np.diff(edges, prepend=-np.inf) > _SAME_MERIDIAN]
 
 
 def _crossings(
     corners: Array, azimuth: Array, edges: Array, reference: Array, basis: Array
 ) -> dict[int, tuple[Array, Array]]:
-    """For each strip the polar angles at which arcs pass its two sides (M, 2), and their senses (M,)."""
+    """For each strip the polar angles at which arcs cross its two sides (M, 2), and their senses (M,)."""
     count = len(edges)
     turn = so3.wrap(np.roll(azimuth, -1) - azimuth)
     cell = np.searchsorted(edges, azimuth, side="right")
-    # Whole turns are counted in cells, so that an arc across the cut of the azimuth goes on.
+    # Full turns are counted in cells, so that an arc across the branch cut of the azimuth is continuous.
     following = np.roll(cell, -1)
     across = np.round((turn - (np.roll(azimuth, -1) - azimuth)) / (2.0 * np.pi)).astype(np.int64)
     steps = following + count * across - cell
     rows = np.repeat(np.arange(len(corners)), np.abs(steps))
     order = np.arange(len(rows)) - np.repeat(np.cumsum(np.abs(steps)) - np.abs(steps), np.abs(steps))
-    # Going up from cell c the edges c, c + 1, ... are passed; going down c - 1, c - 2, ...
+    # An arc that goes up from cell c passes the edges c, c + 1, ...; one that goes down c - 1, c - 2, ...
     passed = np.where(steps[rows] > 0, cell[rows] + order, cell[rows] - 1 - order) % count
     normal = np.cross(corners[rows], np.roll(corners, -1, axis=0)[rows])
     angle = edges[passed][:, None]
@@ -101,7 +107,7 @@ def _crossings(
     polar = np.arctan2(np.abs(outwards), upwards)
     last, sense = np.roll(passed, 1), np.sign(steps[rows])
     before = np.roll(sense, 1)
-    # A strip is crossed between two passings of different sides in one sense; else the curve has turned back in it.
+    # A strip is crossed if its two sides are passed in one sense; otherwise the curve has turned back inside it.
     whole = (before == sense) & ((passed - last) % count == sense % count)
     strip = np.where(sense > 0, last, passed)
     start = np.roll(polar, 1)
@@ -114,9 +120,9 @@ def _crossings(
 
 
 def _cell(reference: Array, sides: list[Array], outer: Array, inner: Array) -> Array:
-    """Between two meridians and two arcs: corners along the meridians every few degrees."""
+    """The polygon between two meridians and two arcs, with corners along the meridians every few degrees."""
     down, up = (
-        np.linspace(a, b, 2 + int(abs(a - b) / _LONGEST)) for a, b in ((inner[0], outer[0]), (outer[1], inner[1]))
+        np.linspace(a, b, 2 + int(abs(a - b) / _MAX_SIDE)) for a, b in ((inner[0], outer[0]), (outer[1], inner[1]))
     )
     left = np.cos(down)[:, None] * reference + np.sin(down)[:, None] * sides[0]
     right = np.cos(up)[:, None] * reference + np.sin(up)[:, None] * sides[1]

@@ -1,4 +1,4 @@
-"""A moving scene drawn through viser's interface: shapes, arrows, trail, floor and camera.
+"""A moving scene drawn through the interface of viser: shapes, arrows, trail, floor and camera.
 
 Nothing here imports viser; its scene and server come as arguments.
 """
@@ -15,30 +15,52 @@ from ..arrays import Array, Integers
 from ..body.appearance import Visual
 from ._moving_scene import MovingNode, MovingScene
 
-# The colours of Okabe and Ito: told apart by everybody, and dark or light in grey as well.
-_VERMILION, _PURPLE, _GREEN, _BLUE, _SKY = (213, 94, 0), (204, 121, 167), (0, 158, 115), (0, 114, 178), (86, 180, 233)
+# Colours of Okabe and Ito, RGB from 0 to 255: people with any colour vision can tell them apart, also in grey.
+_VERMILION = (213, 94, 0)
+_PURPLE = (204, 121, 167)
+_GREEN = (0, 158, 115)
+_BLUE = (0, 114, 178)
+_SKY = (86, 180, 233)
+# End of a trail, RGB: dark enough to differ from its light start.
 _DARK_BLUE = (0, 60, 110)
-_GHOST, _GHOST_OPACITY = (120, 120, 120), 0.25
-_CELL, _SECTION = (215, 215, 215), (170, 170, 170)
-_FIELD, _WIDTH, _MARGIN = math.radians(40.0), 1.25, 1.12
-_ARROW, _TRIAD = 1.2, 1.15
-"""Lengths of the arrows, of the reach of the body."""
+# The body at the start, RGB and opacity from 0 to 1: the moving body stays visible through it.
+_GHOST = (120, 120, 120)
+_GHOST_OPACITY = 0.25
+# Lines of the floor, RGB: of its cells, and darker those of every fifth.
+_CELL = (215, 215, 215)
+_SECTION = (170, 170, 170)
+# Vertical field of view [rad]: like that of a lens of 50 mm, without distortion at the edges.
+_FIELD_OF_VIEW = math.radians(40.0)
+# Width over height of the narrowest page in which all of the motion is visible.
+_ASPECT = 1.25
+# Distance of the camera over the least from which all is visible.
+_MARGIN = 1.12
+# Lengths of the momentum's arrow and of the base axes, over the reach of the body: both end outside it.
+_ARROW = 1.2
+_TRIAD = 1.15
+# Radii of the shafts of these arrows, over their lengths.
+_ARROW_RADIUS = 0.016
+_TRIAD_RADIUS = 0.012
+# Length and radius of an arrow's head, over the radius of its shaft.
+_HEAD_LENGTH = 8.0
+_HEAD_RADIUS = 2.6
+# Direction of the camera from the motion: in front, on the right and above, for a body that looks along x.
 _FROM = np.array([0.55, -0.75, 0.36])
-"""Where the camera is: in front, on the right, and above, for a body that looks along x."""
 
 
 class DrawnScene:
-    """A scene in viser, at one frame after the other.
+    """A scene in viser, shown one frame at a time.
 
     Attributes
     ----------
-    moving : what moves, with its places (F, 3) and quaternions w x y z (F, 4) in its parent
-    stretched : what changes its size, with its scales (F, 3)
+    speed : seconds of motion in a second of playing, for the clock's text
+    moving : handles that move, with their positions (F, 3) and quaternions w x y z (F, 4) in their parents
+    stretched : handles that are stretched, with their scales (F, 3)
     frame : the one that is shown
     """
 
-    def __init__(self, api: Any, scene: MovingScene, pace: float, ghost: bool) -> None:
-        self.api, self.scene, self.pace = api, scene, pace
+    def __init__(self, api: Any, scene: MovingScene, speed: float, ghost: bool) -> None:
+        self.api, self.scene, self.speed = api, scene, speed
         self.moving: list[tuple[Any, Array, Array]] = []
         self.stretched: list[tuple[Any, Array]] = []
         self.frame = 0
@@ -58,7 +80,7 @@ class DrawnScene:
         self.clock = api.add_label("/clock", self._time_text(), position=place, anchor="bottom-center")
 
     def show(self, frame: int) -> None:
-        """Move all that moves to where it is at a frame."""
+        """Show one frame."""
         before, self.frame = self.frame, frame
         for handle, places, quaternions in self.moving:
             if len(places) > 1 and not np.array_equal(places[before], places[frame]):
@@ -72,7 +94,7 @@ class DrawnScene:
             self.clock.text = self._time_text()
 
     def _time_text(self) -> str:
-        return f"t = {self.scene.times[self.frame]:.3g} s   (× {self.pace:.3g})"
+        return f"t = {self.scene.times[self.frame]:.3g} s   (× {self.speed:.3g})"
 
     def _follow(self, handle: Any, poses: Array) -> None:
         quaternions = _wxyz(poses[:, :3, :3])
@@ -88,38 +110,38 @@ class DrawnScene:
                 self.stretched.append((handle, node.scales))
 
     def _draw_momentum(self) -> None:
-        size = float(np.linalg.norm(self.scene.momentum))
-        if size == 0.0:
+        magnitude = float(np.linalg.norm(self.scene.momentum))
+        if magnitude == 0.0:
             return
-        tip = _ARROW * self.scene.reach * self.scene.momentum / size
+        tip = _ARROW * self.scene.reach * self.scene.momentum / magnitude
         node = self.api.add_frame("/momentum", show_axes=False)
-        _draw_arrow(self.api, "/momentum/arrow", tip, 0.016, _VERMILION)
-        text = f"angular momentum {size:.3g} kg m²/s"
+        _draw_arrow(self.api, "/momentum/arrow", tip, _ARROW_RADIUS, _VERMILION)
+        text = f"angular momentum {magnitude:.3g} kg m²/s"
         self.api.add_label("/momentum/label", text, position=tuple((1.03 * tip).tolist()), anchor="bottom-center")
         poses = np.broadcast_to(np.eye(4), (len(self.scene.times), 4, 4)).copy()
         poses[:, :3, 3] = self.scene.centre
         self._follow(node, poses)
 
     def _draw_trail(self) -> None:
-        way = self.scene.trail
-        if way is None:
+        points = self.scene.trail
+        if points is None:
             return
-        share = np.linspace(0.0, 1.0, len(way))[:, None]
+        share = np.linspace(0.0, 1.0, len(points))[:, None]
         shades = np.rint((1.0 - share) * np.array(_SKY) + share * np.array(_DARK_BLUE)).astype(np.uint8)
         self.api.add_line_segments(
             "/trail",
-            np.stack([way[:-1], way[1:]], axis=1),
+            np.stack([points[:-1], points[1:]], axis=1),
             np.stack([shades[:-1], shades[1:]], axis=1),
             thickness=3.0,
             thickness_units="screen",
         )
-        poses = np.broadcast_to(np.eye(4), (len(way), 4, 4)).copy()
-        poses[:, :3, 3] = way
+        poses = np.broadcast_to(np.eye(4), (len(points), 4, 4)).copy()
+        poses[:, :3, 3] = points
         self._follow(self.api.add_icosphere("/trail_now", 0.025 * self.scene.reach, _BLUE), poses)
 
 
 def _clock_place(scene: MovingScene) -> Array:
-    """On the floor and towards the camera, where nothing stands before it."""
+    """On the floor and towards the camera, where nothing hides it."""
     low, high = scene.bounds
     place = 0.5 * (low + high) + 0.4 * np.linalg.norm((high - low)[:2]) * so3.normalised(_FROM * [1.0, 1.0, 0.0])
     place[2] = low[2] - 0.05 * scene.reach
@@ -127,10 +149,10 @@ def _clock_place(scene: MovingScene) -> Array:
 
 
 def _draw_shape(api: Any, name: str, shape: Visual, scale: Array, colour: tuple[int, int, int] | None) -> Any:
-    """One visual, in its own colour or as a ghost in another; its handle."""
+    """Draw one visual, in its own colour or as a ghost in another; returns its handle."""
     red, green, blue, opacity = shape.colour
     opacity = opacity if colour is None else min(opacity, _GHOST_OPACITY)
-    size = shape.size
+    lengths = shape.size
     look: dict[str, Any] = {
         "color": colour or tuple(round(255 * value) for value in (red, green, blue)),
         "opacity": None if opacity >= 1.0 else opacity,
@@ -141,20 +163,20 @@ def _draw_shape(api: Any, name: str, shape: Visual, scale: Array, colour: tuple[
         "scale": tuple(scale.tolist()),
     }
     if shape.kind == "box":
-        return api.add_box(name, dimensions=size, **look)
+        return api.add_box(name, dimensions=lengths, **look)
     if shape.kind == "cylinder":
-        return api.add_cylinder(name, radius=size[0], height=size[1], **look)
+        return api.add_cylinder(name, radius=lengths[0], height=lengths[1], **look)
     if shape.kind == "sphere":
-        return api.add_icosphere(name, size[0], **look)
+        return api.add_icosphere(name, lengths[0], **look)
     if shape.kind == "ellipsoid":
-        look["scale"] = tuple((scale * size).tolist())
+        look["scale"] = tuple((scale * lengths).tolist())
         return api.add_icosphere(name, 1.0, **look)
-    vertices, faces = (shape.vertices, shape.faces) if shape.kind == "mesh" else _capsule(*size)
+    vertices, faces = (shape.vertices, shape.faces) if shape.kind == "mesh" else _capsule(*lengths)
     return api.add_mesh_simple(name, vertices.astype(np.float32), faces.astype(np.uint32), side="double", **look)
 
 
 def _capsule(radius: float, length: float) -> tuple[Array, Integers]:
-    """Vertices and faces, its axis along z: circles of latitude, each half moved out by half the barrel."""
+    """Vertices and faces of a capsule along z: circles of latitude, each half moved out by half the cylinder."""
     rings, around = 8, 24
     height = np.concatenate([np.linspace(-0.5, 0.0, rings + 1), np.linspace(0.0, 0.5, rings + 1)]) * np.pi
     angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
@@ -162,28 +184,30 @@ def _capsule(radius: float, length: float) -> tuple[Array, Integers]:
     across = radius * np.cos(height)[:, None]
     vertices = np.stack(np.broadcast_arrays(across * np.cos(angle), across * np.sin(angle), level[:, None]), axis=-1)
     here = np.arange(around * (2 * rings + 1)).reshape(-1, around)
-    there, above, beyond = np.roll(here, -1, axis=1), here + around, np.roll(here, -1, axis=1) + around
-    triangles = [np.stack([here, there, beyond], axis=-1), np.stack([here, beyond, above], axis=-1)]
+    there, above = np.roll(here, -1, axis=1), here + around
+    diagonal = there + around
+    triangles = [np.stack([here, there, diagonal], axis=-1), np.stack([here, diagonal, above], axis=-1)]
     return vertices.reshape(-1, 3), np.concatenate(triangles).reshape(-1, 3)
 
 
 def _draw_triad(api: Any, length: float) -> None:
-    """The axes of the base: x, y, z."""
+    """Draw the axes x, y, z of the base."""
     for letter, axis, colour in zip("xyz", np.eye(3), (_PURPLE, _GREEN, _BLUE)):
-        _draw_arrow(api, f"/body/axis_{letter}", length * axis, 0.012, colour)
+        _draw_arrow(api, f"/body/axis_{letter}", length * axis, _TRIAD_RADIUS, colour)
         api.add_label(f"/body/label_{letter}", letter, position=tuple(1.08 * length * axis), anchor="center-center")
 
 
 def _draw_arrow(api: Any, name: str, tip: Array, thickness: float, colour: tuple[int, int, int]) -> None:
-    """An arrow from the origin of its parent; the radius of its shaft is `thickness` of its length."""
+    """Draw an arrow from the origin of its parent; the radius of its shaft is `thickness` times its length."""
     length = float(np.linalg.norm(tip))
-    radius, head = thickness * length, 8.0 * thickness * length
+    radius = thickness * length
+    head = _HEAD_LENGTH * radius
     turn = so3.between(np.array([0.0, 0.0, 1.0]), tip / length)
     api.add_frame(name, show_axes=False, wxyz=_wxyz(turn))
     shaft = length - head
     api.add_cylinder(f"{name}/shaft", radius=radius, height=shaft, color=colour, position=(0.0, 0.0, 0.5 * shaft))
     angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    rim = 2.6 * radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=-1)
+    rim = _HEAD_RADIUS * radius * np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=-1)
     vertices = np.concatenate([rim, [[0.0, 0.0, head], [0.0, 0.0, 0.0]]]).astype(np.float32)
     here, there = np.arange(24), np.roll(np.arange(24), -1)
     sides = np.stack([here, there, np.full(24, 24)], axis=-1)
@@ -193,7 +217,7 @@ def _draw_arrow(api: Any, name: str, tip: Array, thickness: float, colour: tuple
 
 
 def _draw_floor(api: Any, scene: MovingScene) -> None:
-    """A grid below the lowest point of the motion, its cells a round number."""
+    """Draw a grid below the lowest point of the motion, with cells of a round length."""
     low, high = scene.bounds
     reach = float(max(np.max(high - low), scene.reach))
     decade = 10.0 ** math.floor(math.log10(reach / 4.0))
@@ -214,28 +238,28 @@ def _draw_floor(api: Any, scene: MovingScene) -> None:
 
 
 def set_camera(server: Any, scene: MovingScene) -> None:
-    """As near as it sees all of the motion, the arrow and the clock, in a page five wide and four high, or wider."""
+    """Place the camera as near as it sees all of the motion, the arrow and the clock, in a page 5 to 4 or wider."""
     points = np.concatenate([scene.corners.reshape(-1, 3), _clock_place(scene)[None]])
-    size = float(np.linalg.norm(scene.momentum))
-    if size:
-        points = np.concatenate([points, scene.centre + 1.1 * _ARROW * scene.reach * scene.momentum / size])
+    magnitude = float(np.linalg.norm(scene.momentum))
+    if magnitude:
+        points = np.concatenate([points, scene.centre + 1.1 * _ARROW * scene.reach * scene.momentum / magnitude])
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     back = so3.normalised(_FROM)
     right = so3.normalised(np.cross([0.0, 0.0, 1.0], back))
-    across = np.abs((points - middle) @ np.stack([right / _WIDTH, np.cross(back, right)]).T).max(axis=-1)
-    distance = _MARGIN * float(np.max((points - middle) @ back + across / math.tan(0.5 * _FIELD)))
+    across = np.abs((points - middle) @ np.stack([right / _ASPECT, np.cross(back, right)]).T).max(axis=-1)
+    distance = _MARGIN * float(np.max((points - middle) @ back + across / math.tan(0.5 * _FIELD_OF_VIEW)))
     camera = server.initial_camera
-    camera.fov = _FIELD
+    camera.fov = _FIELD_OF_VIEW
     camera.near, camera.far = 0.01 * distance, 100.0 * distance
     camera.look_at = middle
     camera.position = middle + distance * back
 
 
 def _wxyz(matrix: Array) -> Array:
-    """Viser's quaternions: (..., 3, 3) -> (..., 4)."""
+    """Quaternions w x y z, the order of viser: (..., 3, 3) -> (..., 4)."""
     return np.roll(so3.quat_from_matrix(matrix), 1, axis=-1)
 
 
 def _safe(name: str) -> str:
-    """A name for the tree of the scene, where a slash goes one level down."""
+    """A name without slashes, which would go one level down in the tree of the scene."""
     return name.replace("/", "_")

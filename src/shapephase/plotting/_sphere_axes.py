@@ -8,28 +8,37 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array, Mask, finite_array
+from ._sphere_area import MAX_WINDING, AreaCells
 from .plot_style import SMALL, finish
-from .sphere_area import MOST_TURNS, AreaCells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_HIDDEN = 0.25
+# Opacity of curves and points on the far side.
+_FAR_OPACITY = 0.25
+# Shades of areas by winding number 1, 2, 3: blue counterclockwise, orange clockwise.
 _POSITIVE = ("#BFDFF2", "#8CC4E6", "#5BA7D3")
 _NEGATIVE = ("#FBDDB0", "#F3BE73", "#E29C3C")
+# Hatching of clockwise areas, on the near side or not.
 _HATCH = {True: "#B36A00", False: "#E0BC88"}
-_FAINT = 0.55
+# Strength of an area's shade on the far side.
+_FAR_SHADE = 0.55
+# Of the order in depth: background curves are that much below the others of their side, and above those of the other.
 _BEHIND = 0.3
-_ROOM = 0.17
-_SEEN_AREA = 5e-3
+# Distance between texts [radii of the sphere] at which they do not touch.
+_TEXT_ROOM = 0.17
+# Area [sr] below which a winding number is not in the legend: it is hardly visible.
+_VISIBLE_AREA = 5e-3
+# Height over the plane of the limb [1] that is rounding: points on the limb are on the near side.
+_LIMB = -1e-9
 
 
 class SphereAxes:
-    """The unit sphere seen from afar; what is on its far side is dimmed.
+    """The unit sphere in parallel projection; what is on its far side is dimmed.
 
     Parameters
     ----------
-    ax : flat axes, or three-dimensional ones, seen from where they are
+    ax : flat axes, or three-dimensional ones, in the view they have
     view : elevation and azimuth of the eye [degrees], for flat axes
     """
 
@@ -49,24 +58,24 @@ class SphereAxes:
         self.named: dict[str, Any] = {}
         self.written: list[Array] = []
         if self.solid:
-            # What is nearer shall cover what is farther by the side of the sphere, not by the middle of a collection.
+            # Matplotlib would sort collections by their middles; the side of the sphere decides what covers what.
             self.ax.computed_zorder = False
         self.ax.plot(*self.seen(limb), color="0.6", linewidth=0.8, zorder=1)
 
     def curve(self, points: Array, label: str, *, behind: bool = False, **style: Any) -> None:
-        """A curve in pieces, those on the far side dimmed: (N, 3); `behind` the others of its side."""
-        for piece, near in _pieces(points, points @ self.eye >= -1e-9):
+        """Draw a curve (N, 3), dimmed on the far side; `behind` the others of its side."""
+        for piece, near in _pieces(points, points @ self.eye >= _LIMB):
             self._draw(piece, near, label, zorder=(3 if near else 2) - _BEHIND * behind, **style)
 
     def point(self, point: Array, label: str | None, *, behind: bool = False, **style: Any) -> None:
-        """A marker: (3,); without a label it is not in the legend."""
+        """Draw a marker at (3,); without a label it is not in the legend."""
         look = {"markersize": 5.5, "markeredgecolor": "white", "markeredgewidth": 0.6, "linestyle": "none"}
         self._draw(
-            point[None], bool(point @ self.eye >= -1e-9), label, zorder=5 - _BEHIND * behind, **{**look, **style}
+            point[None], bool(point @ self.eye >= _LIMB), label, zorder=5 - _BEHIND * behind, **{**look, **style}
         )
 
     def arrows(self, points: Array, places: Array, colour: str) -> None:
-        """Heads along a curve (N, 3) at some of its points, on the near side of flat axes."""
+        """Draw arrowheads along a curve (N, 3) at some of its points, on the near side of flat axes."""
         for k in np.asarray(places, dtype=int):
             if self.solid or points[k] @ self.eye < 0.1:
                 continue
@@ -78,15 +87,14 @@ class SphereAxes:
                 self.ax.annotate("", middle + step, middle - step, arrowprops=style, zorder=4)
 
     def area(self, cells: AreaCells) -> None:
-        """The area inside a curve, by how often and which way it is gone round; what counts negative is hatched."""
+        """Fill the area inside a curve, shaded by winding number; negative areas are hatched."""
         for winding in sorted(set(cells.windings.tolist())):
             chosen = [polygon for polygon, w in zip(cells.polygons, cells.windings.tolist()) if w == winding]
-            size = AreaCells(chosen, np.ones(len(chosen), dtype=np.int64)).area
+            covered = AreaCells(polygons=chosen, windings=np.ones(len(chosen), dtype=np.int64)).area
             shade = min(abs(winding), len(_POSITIVE)) - 1
             colour = (_POSITIVE if winding > 0 else _NEGATIVE)[shade]
-            name = f"winding {winding:+d}".replace("-", "−") + (" or more" if abs(winding) == MOST_TURNS else "")
-            # What is hardly seen is not explained.
-            label = name if size > _SEEN_AREA else None
+            name = f"winding {winding:+d}".replace("-", "−") + (" or more" if abs(winding) == MAX_WINDING else "")
+            label = name if covered > _VISIBLE_AREA else None
             for near in (False, True):
                 side = 1.0 if near else -1.0
                 parts = [part for part in (_clipped(polygon, side * self.eye) for polygon in chosen) if len(part) > 2]
@@ -94,11 +102,11 @@ class SphereAxes:
                     self._fill(parts, near, label, colour, winding)
 
     def keep_free(self, points: Array) -> None:
-        """No text on these points: (N, 3)."""
+        """Keep text away from these points: (N, 3)."""
         self.written.extend(points @ self.screen.T)
 
     def text(self, point: Array, text: str, distance: float, **style: Any) -> None:
-        """Beside a point of the sphere, away from the middle of the picture and from other text."""
+        """Write beside a point of the sphere, away from the middle of the picture and from other text."""
         box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
         flat = self.screen @ point
         outward = distance * _outward(flat)
@@ -106,14 +114,14 @@ class SphereAxes:
         turned = np.stack([np.cos(angles), np.sin(angles)], axis=-1) @ np.array([outward, [-outward[1], outward[0]]])
         near = np.array([np.zeros(2) - 10.0, *self.written])
         room = np.linalg.norm(flat + turned[:, None] - near, axis=-1).min(axis=1)
-        chosen = flat + turned[np.argmax(np.minimum(room, _ROOM))]
+        chosen = flat + turned[np.argmax(np.minimum(room, _TEXT_ROOM))]
         self.written.append(chosen)
         place = point + 1.5 * (chosen - flat) @ self.screen if self.solid else chosen
         look = {"fontsize": SMALL, "ha": "center", "va": "center", "zorder": 6, "bbox": box}
         self.ax.text(*place, text, **{**look, **style})
 
     def finish(self, name: str, title: str) -> None:
-        """Frame and legend; `name` is that of the coordinates in three-dimensional axes, with {} for the axis."""
+        """Draw frame and legend; `name` labels three-dimensional axes, with {} for the index of the axis."""
         if self.solid:
             for axis, index in zip("xyz", "₁₂₃"):
                 getattr(self.ax, f"set_{axis}label")(name.format(index), fontsize=SMALL, labelpad=-8.0)
@@ -122,13 +130,13 @@ class SphereAxes:
             self.ax.set_box_aspect((1.0, 1.0, 1.0))
             place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.06)}
         else:
-            # Room for the legend below the sphere, inside the axes: so it cannot be cut off.
+            # The legend is below the sphere but inside the axes, so that it cannot be cut off.
             lines = (len(self.named) + 1) // 2 + 1 + title.count("\n")
             self.ax.set(xlim=(-1.35, 1.35), ylim=(-1.3 - 0.13 * lines, 1.3), aspect="equal")
             self.ax.set_axis_off()
             place = {"loc": "lower center", "borderaxespad": 0.0}
         legend = finish(self.ax, handles=self.named.values(), labels=self.named.keys(), title=title, **place)
-        # Wider than the axes it would make the layout shrink them.
+        # A legend wider than the axes would make the layout shrink them.
         legend.set_in_layout(self.solid)
 
     def seen(self, points: Array) -> tuple[Array, ...]:
@@ -138,18 +146,18 @@ class SphereAxes:
     def _draw(self, points: Array, near: bool, label: str | None, **style: Any) -> None:
         from matplotlib.lines import Line2D
 
-        self.ax.plot(*self.seen(points), alpha=1.0 if near else _HIDDEN, **style)
+        self.ax.plot(*self.seen(points), alpha=1.0 if near else _FAR_OPACITY, **style)
         if label is not None:
-            # As on the near side, even if all of it is on the far one.
+            # The legend shows the style of the near side, even if all of the curve is on the far side.
             self.named.setdefault(label, Line2D([], [], alpha=1.0, **style))
 
     def _fill(self, parts: list[Array], near: bool, label: str | None, colour: str, winding: int) -> None:
-        """All cells of one kind as one path, so that no seams are seen between them."""
+        """Fill all cells of one kind as one path, so that there are no seams between them."""
         from matplotlib.colors import to_rgb
         from matplotlib.patches import Patch, PathPatch
         from matplotlib.path import Path
 
-        strength = 1.0 if near else _FAINT
+        strength = 1.0 if near else _FAR_SHADE
         face = tuple(1.0 - strength * (1.0 - np.array(to_rgb(colour))))
         gid = f"area {winding:+d} {'near' if near else 'far'}"
         depth = 1.5 if near else 1.2
@@ -163,7 +171,7 @@ class SphereAxes:
         else:
             paths = [Path(np.vstack([part, part[:1]]) @ self.screen.T, closed=True) for part in parts]
             whole = Path.make_compound_path(*paths)
-            # Not as a patch, whose every curve would be searched for the limits of the data.
+            # Added as an artist: as a patch, each of its curves would be searched for the limits of the data.
             self.ax.add_artist(PathPatch(whole, facecolor=face, linewidth=0.0, gid=gid, zorder=depth, **hatch))
         if label is not None:
             pattern = {**hatch, "edgecolor": _HATCH[True]} if hatch else {}
@@ -171,7 +179,7 @@ class SphereAxes:
 
 
 def _pieces(points: Array, near: Mask) -> list[tuple[Array, bool]]:
-    """A curve cut where it passes to the other side of the sphere; neighbours share the point of the cut."""
+    """A curve cut where it passes to the other side of the sphere; neighbouring pieces share the point of the cut."""
     cuts = np.flatnonzero(near[1:] != near[:-1]) + 1
     edges = [0, *cuts.tolist(), len(points)]
     return [(points[max(a - 1, 0) : b], bool(near[a])) for a, b in pairwise(edges)]
@@ -191,7 +199,7 @@ def _clipped(polygon: Array, towards: Array) -> Array:
         if inside[k]:
             corners.append(polygon[k])
         if inside[k] != inside[after]:
-            # In proportion to the heights, as the great circle crosses the plane.
+            # The great circle crosses the plane in proportion to the heights.
             crossing = height[k] * polygon[after] - height[after] * polygon[k]
             corners.append(crossing * np.sign(height[k]) / np.linalg.norm(crossing))
     return np.array(corners)
