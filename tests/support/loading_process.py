@@ -158,7 +158,10 @@ def work(memory: int) -> None:
 
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    import shapephase.cli.main  # noqa: F401
+    # What the commands import late, once for all the processes that are forked from this one.
+    import shapephase.cli.main
+    import shapephase.cli.motion
+    import shapephase.cli.text  # noqa: F401
 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

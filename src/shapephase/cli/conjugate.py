@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 from cyclopts import Parameter
 
-from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..files import write_whole
-from .text import Outcome, check_writable
+from .options import Json
+from .outcome import Outcome, check_writable
+
+if TYPE_CHECKING:
+    from ..arrays import Array
 
 _ENDINGS = (".svg", ".pdf", ".png")
 _PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
@@ -27,7 +28,7 @@ def conjugate_command(
     momenta: Annotated[tuple[float, ...], Parameter(consume_multiple=True, negative_iterable="")] = (),
     order: int = 1,
     out: Path | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+    json: Json = False,  # noqa: ARG001
 ) -> Outcome:
     """List conjugate points of the free rigid body's Serret-Andoyer metric, and draw their locus.
 
@@ -46,9 +47,10 @@ def conjugate_command(
         which conjugate point of each geodesic, 1 the first
     out
         write the figure to this file, .svg, .pdf or .png
-    json
-        print JSON
     """
+    import numpy as np
+
+    from ..arrays import finite_array
     from ..rigid_body.geodesics import serret_andoyer_metric
 
     check_writable(out, "--out", *_ENDINGS)
@@ -93,6 +95,7 @@ def conjugate_command(
 
 
 def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
+    from ..files import write_whole
     from ..plotting.geodesic_plots import plot_conjugate_locus
     from ..plotting.plot_style import axes_image, column_axes
 

@@ -8,38 +8,31 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-from cyclopts import Parameter
-
-from .. import so3
-from ..arrays import Array
-from ..body.body import Body
-from ..body.catalog import load_body
 from ..errors import PlanNotFound, ShapeError
-from ..phases.phases import split
-from ..shape_space.files.read import write_shape_path
+from .exit_codes import ExitCode
+from .options import BodyArgument, Json, Momentum, ReportFile
+from .outcome import Outcome, check_writable
 from .progress import Steps, steps
-from .text import Outcome, check_writable, rotation_line
 
 if TYPE_CHECKING:
+    from ..arrays import Array
+    from ..body.body import Body
     from ..optimal_control.plan import Plan, Progress
 
 # Samples of the file written: at 1 s they are 0.5 ms apart, far below the pieces of a plan.
 _SAMPLES = 2001
-# The exit code of a program that Ctrl-C ended, 128 + SIGINT.
-_STOPPED = 130
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def plan_command(
-    body: str,
+    body: BodyArgument,
     /,
     *,
     rotate: float | None = None,
     about: str = "x",
-    momentum: Annotated[tuple[float, float, float], Parameter(negative_iterable="")] = (0.0, 0.0, 0.0),
+    momentum: Momentum = (0.0, 0.0, 0.0),
     duration: float = 1.0,
     somersaults: float | None = None,
     half_twists: float | None = None,
@@ -47,8 +40,8 @@ def plan_command(
     starts: int = 1,
     seed: int = 0,
     out: Path | None = None,
-    html: Path | None = None,
-    json: Annotated[bool, Parameter(negative="")] = False,  # noqa: ARG001 (read in main, errors included)
+    html: ReportFile = None,
+    json: Json = False,  # noqa: ARG001
 ) -> Outcome:
     """Find the cheapest motion of the joints that turns a body by a rotation, and compute the resulting motion.
 
@@ -56,14 +49,10 @@ def plan_command(
 
     Parameters
     ----------
-    body
-        as for split
     rotate
         angle of the turn [degrees]
     about
         its axis, x, y or z of the base at the start, or three numbers with commas between them
-    momentum
-        angular momentum about the centre of mass, inertial axes [kg m^2/s]
     duration
         [s]; for the cost "time" the longest allowed
     somersaults
@@ -78,13 +67,15 @@ def plan_command(
         of the guesses
     out
         write the joint motion to this CSV file
-    html
-        write a report with animation and figures to this HTML file
-    json
-        print JSON
     """
+    import numpy as np
+
+    from .. import so3
+    from ..body.catalog import load_body
     from ..optimal_control.plan_options import Goal, Search
     from ..optimal_control.planning import plan_reorientation
+    from ..phases.phases import split
+    from ..shape_space.files.read import write_shape_path
 
     check_writable(out, "--out", ".csv")
     check_writable(html, "--html", ".html")
@@ -124,10 +115,12 @@ def plan_command(
             title = f"{loaded.name} turns itself"
             write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
     text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
-    return Outcome(text, data, code=_STOPPED if search.stopped else 0)
+    return Outcome(text, data, code=ExitCode.STOPPED if search.stopped else ExitCode.DONE)
 
 
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
+    from .text import rotation_line
+
     return "\n".join(
         [
             _heading(body, found.path.duration, momentum),
@@ -142,6 +135,8 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
 
 
 def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict[str, object]:
+    from .. import so3
+
     return {
         "body": body.name,
         "duration_s": found.path.duration,
@@ -206,6 +201,10 @@ def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) 
 
 
 def _axis(text: str) -> Array:
+    import numpy as np
+
+    from .. import so3
+
     if text in _AXES:
         return np.array(_AXES[text])
     try:

@@ -1,10 +1,9 @@
-"""What the command line says of its results, for people and for programs."""
+"""The results of commands as text for people and as plain data for programs."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -12,33 +11,12 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from ..errors import InputFileNotFoundError, UnknownNameError
 from ..phases.phases import PhaseSplit
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..reconstruction.recorded_base import base_difference
 from ..shape_space.files.read import RecordedMotion
 from ..shape_space.summaries import BodySummary, PathSummary
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a command has to say, for people and for programs, and its exit code."""
-
-    text: str
-    data: dict[str, Any]
-    judged: bool = False
-    code: int = 0
-
-
-def check_writable(out: Path | None, option: str, *endings: str) -> None:
-    """Before anything is computed."""
-    if out is None:
-        return
-    if out.suffix not in endings:
-        raise UnknownNameError(f"{option}: the file's name must end in {' or '.join(endings)}, got {str(out)!r}")
-    if not out.absolute().parent.is_dir():
-        raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
 
 
 def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> list[str]:
@@ -186,7 +164,7 @@ def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
     }
 
 
-def base_said(motion: Motion, recorded: RecordedMotion | None) -> tuple[list[str], dict[str, Any]]:
+def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple[list[str], dict[str, Any]]:
     """How far a base that was recorded is from the reconstructed one, for people and for programs."""
     if recorded is None or recorded.base_attitude is None:
         return [], {}

@@ -1,0 +1,31 @@
+"""`shapephase check`: what was read of a body and a motion, and whether it can be used."""
+
+from __future__ import annotations
+
+from .options import AS_RECORDED, BodyArgument, Json, MotionArgument, RecordingOptions
+from .outcome import Outcome
+
+
+def check_command(
+    body: BodyArgument,
+    motion: MotionArgument | None = None,
+    /,
+    *,
+    recording: RecordingOptions = AS_RECORDED,
+    json: Json = False,  # noqa: ARG001
+) -> Outcome:
+    """Check a body, and a joint motion for it: what was read, and whether it can be used."""
+    from ..body.catalog import load_body
+    from ..shape_space.summaries import body_summary, path_summary
+    from .motion import joint_motion
+    from .text import body_lines, path_data, path_lines, plain, record_data
+
+    loaded = load_body(body, isolate=True)
+    summary = body_summary(loaded)
+    lines, data = body_lines(summary), {"body": plain(summary)}
+    if motion is not None:
+        path, recorded = joint_motion(motion, loaded, recording)
+        moved = path_summary(loaded, path)
+        lines += ["", *path_lines(loaded, motion, moved, recorded)]
+        data["motion"] = path_data(moved) | record_data(loaded, recorded)
+    return Outcome("\n".join(lines), data, with_verdict=True)

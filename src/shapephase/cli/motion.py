@@ -1,0 +1,57 @@
+"""The body and the motion that a command is given, loaded and reconstructed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import so3
+from ..body.body import Body
+from ..body.catalog import load_body
+from ..deformation.deformation import articulated
+from ..errors import UnknownNameError
+from ..examples.scenarios import MOTIONS, named_motion
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.files.read import RecordedMotion, read_recorded_motion
+from ..shape_space.shape_path import ShapePath
+from .options import AS_RECORDED, FlightOptions, RecordingOptions
+
+DEFAULT_TOLERANCE = 1e-9
+"""Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """A reconstructed motion and what it is made of; `recorded` is None where the joints are not from a file."""
+
+    motion: Motion
+    body: Body
+    path: ShapePath
+    recorded: RecordedMotion | None
+
+
+def flight(
+    body: str,
+    motion: str,
+    options: FlightOptions,
+    recording: RecordingOptions,
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> Flight:
+    """The motion that the arguments and options of a command describe."""
+    loaded = load_body(body, isolate=True)
+    path, recorded = joint_motion(motion, loaded, recording)
+    start = so3.quat_argument(options.attitude, "attitude")
+    moved = reconstruct(articulated(loaded, path), options.momentum, start, tolerance=tolerance)
+    return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
+
+
+def joint_motion(
+    motion: str, body: Body, recording: RecordingOptions = AS_RECORDED
+) -> tuple[ShapePath, RecordedMotion | None]:
+    """The path of a motion, and its record if it comes from a file."""
+    if motion in MOTIONS and not Path(motion).is_file():
+        return named_motion(motion), None
+    if not Path(motion).exists() and not Path(motion).suffix:
+        raise UnknownNameError(f"unknown motion {motion!r}: neither a file nor one of {', '.join(MOTIONS)}")
+    recorded = read_recorded_motion(motion, body, smooth=recording.smooth, topic=recording.topic)
+    return recorded.path, recorded

@@ -1,0 +1,61 @@
+"""`shapephase orbits`: the motions whose shape and momentum close together."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .options import BodyArgument, Json
+from .outcome import Outcome
+from .progress import steps
+
+
+def orbits_command(
+    body: BodyArgument,
+    motion: str,
+    magnitude: float,
+    /,
+    *,
+    gauge: Annotated[
+        str, Parameter(help="where the momentum closes: horizontal, base, principal, mean_body or link:NAME")
+    ] = "horizontal",
+    json: Json = False,  # noqa: ARG001
+) -> Outcome:
+    """Find the motions whose shape and momentum close together, and split each.
+
+    Parameters
+    ----------
+    motion
+        a closed one, as for split
+    magnitude
+        magnitude of the angular momentum [kg m^2/s]
+    """
+    import numpy as np
+
+    from .. import so3
+    from ..body.catalog import load_body
+    from ..deformation.deformation import articulated
+    from ..deformation.gauge import named_gauge
+    from ..phases.phases import split
+    from ..phases.return_map import fixed_points
+    from ..reconstruction.reconstruction import reconstruct
+    from .motion import joint_motion
+    from .text import orbit_data, orbit_lines, rotation_line
+
+    with steps(3) as work:
+        work.begin("loading")
+        loaded = load_body(body, isolate=True)
+        path, _ = joint_motion(motion, loaded)
+        deformation = articulated(loaded, path)
+        seen = named_gauge(deformation, gauge)
+        work.begin("finding what closes")
+        found = fixed_points(seen, magnitude)
+        upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
+        work.begin("splitting")
+        moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=1e-11) for attitude in upright]
+        splits = [split(orbit, "base") for orbit in moved]
+        holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
+    result = (loaded, motion, gauge, found, found.directions @ seen.frame(0.0), splits)
+    lines = [*orbit_lines(*result), "", rotation_line("shape holonomy (base axes)", holonomy)]
+    return Outcome("\n".join(lines), orbit_data(*result) | {"holonomy": holonomy.tolist()})
