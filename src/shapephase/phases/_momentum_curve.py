@@ -72,14 +72,22 @@ class MomentumCurve:
 
     def attitudes(self, times: Array) -> Array:
         """Of the gauge's frame: (N,) -> (B, N, 3, 3)."""
-        return self.both_attitudes(times)[1]
-
-    def both_attitudes(self, times: Array) -> tuple[Array, Array]:
-        """Of the deformation's own frame and of the gauge's: (N,) -> (B, N, 3, 3), (B, N, 3, 3)."""
-        own = self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)
+        own = self._own_attitudes(times)
         if self.lift is not None:
-            return own, own @ so3.transpose(self.lift.rotation(times)[0])
-        return own, own if self.frames is None else own @ so3.transpose(self.frames(times)[0])
+            return own @ so3.transpose(self.lift.rotation(times)[0])
+        return own if self.frames is None else own @ so3.transpose(self.frames(times)[0])
+
+    @property
+    def end_attitudes(self) -> tuple[Array, Array]:
+        """Of the deformation's own frame and of the gauge's at both ends: (B, 2, 3, 3), (B, 2, 3, 3)."""
+        ends = self.edges[[0, -1]]
+        own = self._own_attitudes(ends)
+        if self.lift is not None:
+            return own, own @ so3.transpose(np.stack([np.eye(3), self.lift.end[0]]))
+        return own, own if self.frames is None else own @ so3.transpose(self.frames(ends)[0])
+
+    def _own_attitudes(self, times: Array) -> Array:
+        return self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)
 
 
 def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> MomentumCurve:
@@ -99,6 +107,7 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     # The integrator's steps are short enough for the base's frame and for the lift, which is stepped alike.
     follows = lift is not None or gauge == "base"
     frames = None if follows else _frames(motion, gauge)
+    edges = solution.times
     spatial = motion.momentum.reshape(-1, 3)
     magnitude = np.linalg.norm(spatial, axis=-1)
     without = magnitude == 0.0
@@ -121,11 +130,10 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
         rate = so3.apply(inverse, magnitude[:, None, None] * direction) - drift
         return (direction, rate) if turn is None else (so3.apply(turn, direction), so3.apply(turn, rate))
 
-    edges = solution.times
     found = _by_step(curve, edges)
     if not follows:
         edges, found = _refined(curve, edges, found)
-    references = np.array([sphere.far_reference(polygon) for polygon in found[2]])
+    references = np.array(list(map(sphere.far_reference, found[2])))
     if times is not None:
         edges = np.union1d(edges, times)
         edges, found = _clear(curve, edges, references)
