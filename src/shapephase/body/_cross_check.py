@@ -13,7 +13,9 @@ from ._link_tree import LinkTree
 from .body import Body
 
 _TOLERANCE = 1e-12
+"""Difference allowed between body and file, a share of the largest terms of the sums: thousands of roundings."""
 _SEED = 20060518
+"""Any number: the random shape is the same at every loading."""
 
 
 def check_against_file(body: Body, tree: LinkTree, where: str) -> None:

@@ -13,14 +13,28 @@ import numpy as np
 from ..arrays import Array
 from ..errors import ModelFileError, UnphysicalInertiaError, unknown_name
 
-# Pinocchio's work space grows with the cube of the joints: 0.3 GB for 200 of them.
-MOST_LINKS, MOST_JOINTS, MOST_DEPTH = 2000, 200, 200
-# Pinocchio's sums of inertias are wrong, without a word, for masses below the rounding of one.
+MOST_LINKS = 2000
+"""Links of a body, most of them fixed to others."""
+MOST_JOINTS = 200
+"""Moving joints: Pinocchio's work space grows with their cube, 0.3 GB for 200 of them."""
+MOST_DEPTH = 200
+"""Links from the root: parsers that recurse end with the stack, at 229 in a thread of 512 KiB."""
 LEAST_MASS = 1e-15
-# The squares of masses and moments are still numbers.
+"""[kg]; below the rounding of 1 kg, Pinocchio's sums of inertias are wrong without any message."""
 MOST_MASS = 1e30
-_TRIANGLE, _NEGATIVE, _ROUNDING = 1e-3, 1e-9, 1e-12
-_LEAST_RADIUS, _MOST_RADIUS, _HEAVY = 1e-4, 10.0, 1e5
+"""[kg], and [kg m^2] for moments: their squares are still finite numbers."""
+_TRIANGLE = 1e-3
+"""Share of the largest moment by which it may exceed the sum of the others: files round their moments."""
+_NEGATIVE = 1e-9
+"""Share of the largest moment by which another may be below zero: rounding of a rotated, thin body."""
+_ROUNDING = 1e-12
+"""Share of the largest moment of the whole body that rounding may leave of a vanishing one."""
+_LEAST_RADIUS = 1e-4
+"""Radius of gyration [m]; a smaller one suggests moments in other units than kg m^2."""
+_MOST_RADIUS = 10.0
+"""Radius of gyration [m]; a larger one suggests lengths in millimetres."""
+_HEAVY = 1e5
+"""Mass of a link [kg]; a larger one suggests grams."""
 
 
 @dataclass(frozen=True)

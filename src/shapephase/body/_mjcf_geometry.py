@@ -15,7 +15,10 @@ from ._xml_text import Node, number, numbers, quoted, vector
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
 _LONG = ("capsule", "cylinder", "box", "ellipsoid")
-_DENSITY, _LEAST_SIZE = "1000", 1e-9
+_DENSITY = "1000"
+"""MuJoCo's density of a geom that states none [kg/m^3]: that of water."""
+_LEAST_SIZE = 1e-9
+"""Sizes of a geom are above this [m]; smaller ones have masses that are lost in rounding."""
 
 
 @dataclass(frozen=True)

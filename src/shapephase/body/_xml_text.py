@@ -18,9 +18,20 @@ from xml.parsers import expat
 from ..errors import InputFileNotFoundError, ModelFileError
 
 _MOST_BYTES = 16 * 2**20
-_MOST_DEPTH, _MOST_ELEMENTS, _MOST_NAME, _MOST_QUOTED = 100, 200_000, 256, 60
+"""Size of a file [bytes]; the largest body of example-robot-data has a fifth of a MiB."""
+_MOST_DEPTH = 100
+"""Elements inside each other: a URDF nests a few, an MJCF as many as its longest chain of bodies."""
+_MOST_ELEMENTS = 200_000
+"""Elements of a file: a hundred for each of the 2000 links that are supported."""
+_MOST_NAME = 256
+"""Characters of a name, which appears whole in messages and tables."""
+_MOST_QUOTED = 60
+"""Characters of the file that a message quotes."""
 _MOST_ATTRIBUTES = 1000
-_LONG_TAG, _ATTRIBUTE = re.compile(rb"<[^<!?\s][^<]{5000,}"), re.compile(rb"=\s*[\"']")
+"""Attributes of one element; expat hands them over only when it has them all, so they are counted before it."""
+_LONG_TAG = re.compile(rb"<[^<!?\s][^<]{5000,}")
+"""A tag so long that its attributes are counted; 1000 of them take at least 5000 bytes."""
+_ATTRIBUTE = re.compile(rb"=\s*[\"']")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -112,7 +123,6 @@ def xml_tree(content: bytes, where: str) -> Node:
         line = content.count(b"\n", 0, zero) + 1
         raise ModelFileError(f"{where}:{line}: not UTF-8 text, a zero byte at {zero}; save the file as UTF-8")
     for piece in _LONG_TAG.finditer(content):
-        # Expat hands over an element's attributes only when it has them all.
         if len(_ATTRIBUTE.findall(piece.group())) > _MOST_ATTRIBUTES:
             line = content.count(b"\n", 0, piece.start()) + 1
             tag = quoted(piece.group()[1:70].decode(errors="replace").split()[0])

@@ -32,9 +32,13 @@ BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)
 _MUJOCO_GREY: Colour = (0.5, 0.5, 0.5, 1.0)
 _MESHES = (".stl", ".obj", ".dae", ".ply")
 _MOST_BYTES = 64 * 2**20
+"""Size of a mesh file [bytes]."""
 _MOST_NAMED = 10
+"""Faults that one warning lists."""
 _THINNEST = 0.01
+"""Edge of an inertia box, as a share of its longest: a flat box is still seen from the side."""
 _WATER = 1000.0
+"""Density of the ball that stands for a point mass [kg/m^3]."""
 # MuJoCo's own viewer shows these groups of geoms; the others are for collisions.
 _SHOWN_GROUPS = (0.0, 1.0, 2.0)
 

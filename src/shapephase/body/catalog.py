@@ -28,8 +28,12 @@ from ._xml_text import quoted, read_file, xml_tree
 from .body import Body
 
 _EXAMPLE = "example:"
-# The largest body takes 300 MiB.
-_CHILD_SECONDS, _CHILD_MEMORY, _NO_MEMORY = 20, 640 * 2**20, 3
+_CHILD_SECONDS = 20
+"""Time that a child process has for the imports and the file [s]; it only ends what would never end."""
+_CHILD_MEMORY = 640 * 2**20
+"""Memory that loading may take beyond that of the imports [bytes]; the largest body takes 300 MiB."""
+_NO_MEMORY = 3
+"""Exit code of a child that ran out of memory: neither 1, an uncaught error, nor 2, a wrong command line."""
 
 
 def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "error", isolate: bool = False) -> Body:

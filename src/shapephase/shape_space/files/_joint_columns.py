@@ -14,7 +14,10 @@ from ...errors import TrajectoryError, unknown_name
 from ._recording import Recording, warn
 
 _DEGREES = "_deg"
-_LONGEST_NAME, _MOST_SHOWN = 256, 200
+_LONGEST_NAME = 256
+"""Characters of a column's name, as of a joint's name in a body's file."""
+_MOST_SHOWN = 200
+"""Columns that an error about an unknown one lists."""
 _QUATERNIONS = (("qx", "qy", "qz", "qw"), ("base_qx", "base_qy", "base_qz", "base_qw"))
 _POSITION = ("base_x_m", "base_y_m", "base_z_m")
 # In the tables that `Motion.write_csv` writes; they follow from the rest.

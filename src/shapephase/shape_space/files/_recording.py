@@ -15,7 +15,9 @@ from ...arrays import Array
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 
 MOST_BYTES = 256 * 2**20
-_WILD_STEPS = 100.0
+"""Size of a motion file [bytes]; as numbers in memory it takes several times as much."""
+_UNEVEN_STEPS = 100.0
+"""A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,8 +173,8 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
     usual = float(np.median(steps))
     longest, shortest = int(np.argmax(steps)), int(np.argmin(steps))
     for i, odd, what in (
-        (longest, steps[longest] > _WILD_STEPS * usual, "a gap in the recording? The path is interpolated across it"),
-        (shortest, steps[shortest] * _WILD_STEPS < usual, "the same sample twice? Rates there may be far too large"),
+        (longest, steps[longest] > _UNEVEN_STEPS * usual, "a gap in the recording? The path is interpolated across it"),
+        (shortest, steps[shortest] * _UNEVEN_STEPS < usual, "the same sample twice? Rates there may be far too large"),
     ):
         if odd:
             warn(

@@ -18,11 +18,15 @@ from ._strict_yaml import Word, yaml_documents
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 _MOST_YAML = 16 * 2**20
+"""Size of a YAML file [bytes]; parsed entry by entry in Python, larger ones are slow."""
 _MOST_METADATA = 2**20
+"""Size of a bag's metadata.yaml [bytes]."""
 _NANO = 10**9
+"""Nanoseconds in a second."""
 # What goals and planners wrap around a trajectory.
 _WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")
-_SECONDS, _NANOSECONDS = ("sec", "secs"), ("nanosec", "nsecs", "nsec")
+_SECONDS = ("sec", "secs")
+_NANOSECONDS = ("nanosec", "nsecs", "nsec")
 
 
 class _State(NamedTuple):

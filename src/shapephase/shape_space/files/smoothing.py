@@ -14,11 +14,15 @@ from ..shape_path import ShapePath
 from ._recording import warn
 
 _FEWEST = 5
-# The gap of a loop is the difference of two samples: this many of its standard deviations.
+"""Samples; four determine a cubic, so that nothing could be smoothed."""
 _WIDEST_GAP = 5.0 * np.sqrt(2.0)
+"""Largest gap of a loop in noise levels: five standard deviations of the difference of two samples."""
 _OFF = 0.01
-# Of the spread: noise so small is none, noise so large leaves nothing.
-_EXACT, _ANY = 1e-9, 1e3
+"""Share by which the residual may exceed the noise level: what FITPACK's search for the smoothness leaves."""
+_EXACT = 1e-9
+"""Noise below this share of the samples' spread counts as none: the samples are interpolated."""
+_ANY = 1e3
+"""Noise above this many times the spread is cut to it: a single cubic is within either, and its square is finite."""
 
 
 def smoothed_path(
