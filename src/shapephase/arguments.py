@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import so3
-from .arrays import Array, finite_array
+from .arrays import Array, common_batch, finite_array
 from .errors import ShapeError, TrajectoryError, UnphysicalInertiaError, unknown_name
 from .inertia_tensor import inverse_inertia
 
@@ -164,12 +164,7 @@ def initial_state_arguments(momentum: ArrayLike, attitude: ArrayLike | None) -> 
     if attitude is None:
         return spatial, np.broadcast_to(_IDENTITY, (*spatial.shape[:-1], 3, 3)) if spatial.ndim > 1 else _IDENTITY
     start = so3.rotation_argument(attitude, "attitude")
-    try:
-        batch = np.broadcast_shapes(spatial.shape[:-1], start.shape[:-2])
-    except ValueError:
-        raise ShapeError(
-            f"momentum {spatial.shape} and attitude {start.shape}: their leading axes must broadcast"
-        ) from None
+    batch = common_batch(momentum=spatial.shape[:-1], attitude=start.shape[:-2])
     return np.broadcast_to(spatial, (*batch, 3)), np.broadcast_to(start, (*batch, 3, 3))
 
 

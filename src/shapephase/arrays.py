@@ -50,12 +50,21 @@ def check_reach(array: Array, name: str) -> None:
 
 
 def common_shape(**arrays: Array) -> tuple[int, ...]:
-    """The shape that arguments have together. Raises ShapeError, which names them, if they do not go together."""
+    """The shape that arguments broadcast to. Raises ShapeError, which names them, if they do not broadcast."""
+    return _broadcast("shapes", {name: array.shape for name, array in arrays.items()})
+
+
+def common_batch(**leading: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape that leading axes broadcast to. Raises ShapeError, which names their owners, if they do not."""
+    return _broadcast("leading axes", leading)
+
+
+def _broadcast(kind: str, shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     try:
-        return np.broadcast_shapes(*(array.shape for array in arrays.values()))
+        return np.broadcast_shapes(*shapes.values())
     except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
+        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise ShapeError(f"{listed}: the {kind} do not broadcast together") from None
 
 
 def real_array(value: Any, name: str, unit: str = "") -> Array:

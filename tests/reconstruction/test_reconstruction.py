@@ -288,7 +288,7 @@ def test_arguments_are_left_as_they_were():
         ({"attitude": np.eye(2)}, ShapeError, r"attitude: expected shape \(..., 3, 3\)"),
         ({"attitude": 1.1 * np.eye(3)}, ShapeError, "attitude: not a rotation"),
         ({"attitude": np.diag([1.0, 1.0, -1.0])}, ShapeError, "reflection"),
-        ({"momentum": np.ones((2, 3)), "attitude": np.tile(np.eye(3), (3, 1, 1))}, ShapeError, "must broadcast"),
+        ({"momentum": np.ones((2, 3)), "attitude": np.tile(np.eye(3), (3, 1, 1))}, ShapeError, "do not broadcast"),
         ({"method": "euler"}, UnknownNameError, "'euler'.*auto, collocation, closed_form, dop853"),
         ({"tolerance": 1e-3}, ShapeError, "tolerance: a number from 1e-13 to 0.0001"),
         ({"tolerance": 0.0}, ShapeError, "tolerance"),

@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arrays import Array, check_reach, finite_array
+from ..arrays import Array, check_reach, common_batch, finite_array
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
 from ._joint_map import JointMap
@@ -189,7 +189,7 @@ class Body:
         Raises as `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
         """
         r, v = self._checked(shape), self._checked(rate, "rate")
-        self._batch(r.shape[:-1], v.shape[:-1])
+        common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
         return (self.momentum_matrix(r) @ v[..., None])[..., 0]
 
     def inertia_gradient(self, shape: ArrayLike) -> Array:
@@ -226,7 +226,7 @@ class Body:
         """
         w = finite_array(base_rate, "base_rate", (3,), unit="rad/s")
         r, v = self._pair(shape, rate)
-        if self._batch(r.shape[:-1], w.shape[:-1]) != r.shape[:-1]:
+        if common_batch(shape=r.shape[:-1], base_rate=w.shape[:-1]) != r.shape[:-1]:
             raise ShapeError(f"base_rate: (3,) or one for each shape {r.shape} is needed, got {w.shape}")
         w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
         model, data = self._model, self._data()
@@ -323,7 +323,7 @@ class Body:
         """
         r, v = self._pair(shape, rate)
         omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
-        batch = self._batch(r.shape[:-1], omega.shape[:-1])
+        batch = common_batch(shape=r.shape[:-1], angular_velocity=omega.shape[:-1])
         r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
         model, data = self._model, self._data()
         rates = self._joints.velocities(self._rows(v))
@@ -392,14 +392,8 @@ class Body:
     def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
         """Shape and rate with the same leading axes."""
         r, v = self._checked(shape), self._checked(rate, "rate")
-        batch = self._batch(r.shape[:-1], v.shape[:-1])
+        batch = common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
         return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
-
-    def _batch(self, *shapes: tuple[int, ...]) -> tuple[int, ...]:
-        try:
-            return np.broadcast_shapes(*shapes)
-        except ValueError:
-            raise ShapeError(f"leading axes {' and '.join(map(str, shapes))} do not go together") from None
 
     def _rows(self, array: Array) -> Array:
         """(..., n) -> (N, n); a body without joints has rows too."""

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import inertia_argument
-from ..arrays import Array, Mask, finite_array
+from ..arrays import Array, Mask, common_batch, finite_array
 from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
 
@@ -384,7 +384,7 @@ def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
             f"gradient_f, gradient_g: expected 2n entries each, coordinates before momenta, "
             f"got {count} and {second.shape[-1]}"
         )
-    _same_batch(gradient_f=first, gradient_g=second)
+    common_batch(gradient_f=first.shape[:-1], gradient_g=second.shape[:-1])
     n = count // 2
     return _dot(first[..., :n], second[..., n:]) - _dot(first[..., n:], second[..., :n])
 
@@ -393,23 +393,14 @@ def _pair(angles: ArrayLike, other: ArrayLike, name: str, unit: str, first: str 
     """Two checked arguments (..., 3), broadcast together."""
     one = finite_array(angles, first, (3,), unit="rad" if first == "angles" else "kg m^2/s")
     two = finite_array(other, name, (3,), unit=unit)
-    shape = _same_batch(**{first: one, name: two})
+    shape = common_batch(**{first: one.shape[:-1], name: two.shape[:-1]})
     return np.broadcast_to(one, (*shape, 3)), np.broadcast_to(two, (*shape, 3))
 
 
 def _inertia(inertia: ArrayLike, vectors: Array) -> Array:
     tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
-    _same_batch(inertia=tensor[..., 0], angles=vectors)
+    common_batch(inertia=tensor.shape[:-2], angles=vectors.shape[:-1])
     return tensor
-
-
-def _same_batch(**arrays: Array) -> tuple[int, ...]:
-    """The shape of the leading axes together. Raises ShapeError when they do not go together."""
-    try:
-        return np.broadcast_shapes(*(array.shape[:-1] for array in arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape[:-1]}" for name, array in arrays.items())
-        raise ShapeError(f"{shapes}: the leading axes cannot be broadcast together") from None
 
 
 def _filled_forward(values: Array, unknown: Mask, start: Array) -> Array:

@@ -18,7 +18,7 @@ from scipy.integrate import DOP853, DenseOutput, OdeSolution
 
 from .. import so3
 from ..arguments import inertia_argument
-from ..arrays import Array, finite_array
+from ..arrays import Array, common_batch, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 
@@ -78,7 +78,7 @@ class HeavyTop:
         if np.any(np.abs(length - 1.0) > _UNIT):
             raise ShapeError(f"chi: must have length 1 (the distance belongs to mgl), got {np.ravel(length)[0]:.6g}")
         strength = finite_array(mgl, "mgl", unit="J")
-        _common(inertia=tensor.shape[:-2], mgl=strength.shape, chi=direction.shape[:-1])
+        common_batch(inertia=tensor.shape[:-2], mgl=strength.shape, chi=direction.shape[:-1])
         for name, value in (
             ("inertia", tensor),
             ("mgl", strength),
@@ -223,7 +223,7 @@ class HeavyTop:
             raise ShapeError(f"duration: one number above 0 s is needed, got {duration}")
         if requested.shape != () or not 1e-12 <= requested <= 1e-2:
             raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {tolerance}")
-        shape = _common(
+        shape = common_batch(
             inertia=self.inertia.shape[:-2],
             mgl=self.mgl.shape,
             chi=self.chi.shape[:-1],
@@ -429,13 +429,5 @@ def _difference(coarse: _Run, fine: _Run) -> Array:
 def _point(momentum: ArrayLike, gamma: ArrayLike) -> Pair:
     """A point of se(3)* as two arrays of one shape."""
     pi, up = finite_array(momentum, "momentum", (3,), unit="kg m^2/s"), finite_array(gamma, "gamma", (3,))
-    shape = _common(momentum=pi.shape, gamma=up.shape)
+    shape = common_batch(momentum=pi.shape, gamma=up.shape)
     return np.broadcast_to(pi, shape), np.broadcast_to(up, shape)
-
-
-def _common(**shapes: tuple[int, ...]) -> tuple[int, ...]:
-    try:
-        return np.broadcast_shapes(*shapes.values())
-    except ValueError:
-        listed = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
-        raise ShapeError(f"leading axes of {listed}: cannot be broadcast together") from None

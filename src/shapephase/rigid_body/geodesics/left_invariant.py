@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import inertia_argument, moments_argument
-from ...arrays import Array, finite_array, real_array
+from ...arrays import Array, common_batch, finite_array, real_array
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
 from ._conjugate_search import conjugate_times
@@ -173,12 +173,7 @@ class LeftInvariantMetric:
 
     def _flat(self, momentum: ArrayLike, t: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
         pi, times = self._principal(momentum), finite_array(t, "t", unit="s")
-        try:
-            batch = np.broadcast_shapes(pi.shape[:-1], times.shape)
-        except ValueError:
-            raise ShapeError(
-                f"momentum {pi.shape} and t {times.shape}: the axes before the three components do not broadcast"
-            ) from None
+        batch = common_batch(momentum=pi.shape[:-1], t=times.shape)
         return np.broadcast_to(pi, (*batch, 3)).reshape(-1, 3), np.broadcast_to(times, batch).reshape(-1), batch
 
 
