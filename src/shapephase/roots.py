@@ -15,7 +15,7 @@ _STEPS = 120
 _CLOSE = 6e-16
 
 
-def root(
+def safe_newton(
     step: Callable[[Array], tuple[Array, Array]], start: Array, low: Array, high: Array, floor: float = 0.0
 ) -> Array:
     """The x (N,) in [low, high] where increasing functions cross 0.

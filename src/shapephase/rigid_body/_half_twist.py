@@ -16,7 +16,7 @@ from ..arrays import Array, common_shape, finite_array
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import ascending_moments
-from ..roots import root
+from ..roots import safe_newton
 from ._momentum_orbit import momentum_orbit
 
 
@@ -143,7 +143,7 @@ def twist_defect(moments: ArrayLike) -> Array:
         slope = 1.0 - scale * np.sqrt(share) * sine * sine * cosine / (complement * np.tanh(w))
         return value, w - value / slope
 
-    w = root(newton, 0.5 * (lower + upper), lower, upper)
+    w = safe_newton(newton, 0.5 * (lower + upper), lower, upper)
     return np.arctan2(np.sqrt(a) * _reciprocal_sinh(w), np.sqrt(a + b))[()]
 
 

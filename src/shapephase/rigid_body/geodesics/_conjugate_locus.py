@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ...roots import ROUNDING, root
+from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
 from .surface_of_revolution import SurfaceOfRevolution
@@ -198,7 +198,7 @@ def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int
 
     limit = np.full(p.size, 0.5 * np.pi)
     guess = np.arctan2(here * sine0 + cosine0 * q * (whole - begin.bend), cosine0 * here)
-    xi = root(step, np.ravel(guess), -limit, limit, ROUNDING).reshape(p.shape)
+    xi = safe_newton(step, np.ravel(guess), -limit, limit, ROUNDING).reshape(p.shape)
     rest = surface.trusted_arcs(p, q, room, xi)
     end = Arcs(*(part + 2.0 * order * one for part, one in zip(rest, quarter)))
     # The phase is xi and whole half turns, each of which changes the sign of y.

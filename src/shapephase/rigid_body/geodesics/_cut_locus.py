@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ...roots import root
+from ...roots import safe_newton
 from ._conjugate_locus import conjugate_points
 from ._extremal import start_of
 from .surface_of_revolution import SurfaceOfRevolution
@@ -88,7 +88,7 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
         rate = magnitude / surface.equator * value / np.maximum(1.0 - square, np.finfo(float).tiny)
         return gained, chi - gained / np.maximum(rate, np.finfo(float).tiny)
 
-    chi = root(step, first + 0.9 * np.pi, first, first + np.pi)
+    chi = safe_newton(step, first + 0.9 * np.pi, first, first + np.pi)
     time = surface.trusted_arcs(magnitude, q, room, chi).time - begin.time
     conjugate = np.ravel(conjugate_points(surface, angle, 1, latitude).time)
     return np.where(straight, conjugate, time).reshape(angle.shape)[()]

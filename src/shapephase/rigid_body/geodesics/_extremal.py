@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from ...arrays import Array, finite_array
 from ...errors import AccuracyNotReached, ShapeError
-from ...roots import ROUNDING, root
+from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
@@ -68,7 +68,7 @@ class Extremal:
 
         start = 0.5 * np.pi * rest / quarter
         limit = np.full(p.size, 0.5 * np.pi)
-        return root(step, start.ravel(), -limit, limit, ROUNDING).reshape(p.shape) + turns * np.pi
+        return safe_newton(step, start.ravel(), -limit, limit, ROUNDING).reshape(p.shape) + turns * np.pi
 
     def state(self, times: ArrayLike) -> tuple[Array, Array, Array]:
         """Latitude phi, longitude theta (continuous) [rad] and p_phi = d phi/dt at times t.

@@ -24,7 +24,7 @@ from scipy.optimize import brentq
 from ... import so3
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ...roots import root
+from ...roots import safe_newton
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class AxisymmetricMetric:
             return value, rest - value / (1.0 + flat / (1.0 + (flat * (np.pi - rest)) ** 2))
 
         start = np.arctan(np.pi * flat)
-        rest = root(step, start, np.zeros_like(flat), start).reshape(np.shape(kappa))
+        rest = safe_newton(step, start, np.zeros_like(flat), start).reshape(np.shape(kappa))
         return (np.pi - rest) * unit_time
 
     def cut_time(self, momentum: ArrayLike) -> Array:
@@ -207,7 +207,7 @@ class AxisymmetricMetric:
             return value, tau - value / np.maximum(rate, np.finfo(float).tiny)
 
         latest = np.full(axial.shape, np.pi)
-        return root(step, latest, np.zeros(axial.shape), latest).reshape(shape)[()]
+        return safe_newton(step, latest, np.zeros(axial.shape), latest).reshape(shape)[()]
 
     def _direction(self, momentum: ArrayLike) -> tuple[Array, Array]:
         """p_3, and the time in which tau grows by 1 [s]."""

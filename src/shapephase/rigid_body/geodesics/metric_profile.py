@@ -17,7 +17,7 @@ from scipy.fft import dct
 
 from ...arrays import Array
 from ...errors import AccuracyNotReached, ShapeError
-from ...roots import root
+from ...roots import safe_newton
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 Profile = Callable[[Array], tuple[Array, Array]]
@@ -222,7 +222,7 @@ class _Sampler:
             return value, x - value / slope
 
         guess = self.reach * np.where(near, np.sqrt(square / self.depth), 1.0 - np.sqrt(rest / self.depth))
-        x = root(step, guess, zero, far)
+        x = safe_newton(step, guess, zero, far)
         _, slope = _values(self.profile, x)
         along = np.sqrt(_meridian_values(self.meridian, x))
         below = (1.0 - self.depth) + rest

@@ -37,7 +37,7 @@ from scipy.special import elliprd, hyp2f1
 from ... import elliptic
 from ...arrays import Array, Mask, finite_array
 from ...errors import ShapeError
-from ...roots import root
+from ...roots import safe_newton
 from ._checks import check_entries
 from ._serret_andoyer_constants import GeodesicClass, GeodesicConstants, moment_gaps
 
@@ -364,4 +364,4 @@ def _argument_of_level(a3: float, second_kind: Array, m1: Array, level: Array) -
 
     high = np.minimum(quarter, level / a3)
     # Not from the pole K itself, whose neighbourhood Newton's steps leave slowly.
-    return root(step, np.minimum(high, 0.9 * quarter), np.zeros(level.shape), high).reshape(shape)
+    return safe_newton(step, np.minimum(high, 0.9 * quarter), np.zeros(level.shape), high).reshape(shape)

@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
 from ...errors import AccuracyNotReached, ShapeError
-from ...roots import ROUNDING, root
+from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
 from ._checks import check_entries
 
@@ -119,7 +119,7 @@ class SurfaceOfRevolution:
             return value - distance, angle - (value - distance) / slope
 
         low, high = np.zeros_like(distance), np.full_like(distance, 0.5 * np.pi)
-        angle = root(step, 0.5 * np.pi * distance / reach, low, high, ROUNDING)
+        angle = safe_newton(step, 0.5 * np.pi * distance / reach, low, high, ROUNDING)
         return np.copysign(top * np.sin(angle).reshape(phi.shape), phi)[()]
 
     def latitude(self, height: ArrayLike) -> Array:
