@@ -4,7 +4,7 @@ from support.call_route import routes
 
 
 def test_the_routes_of_reconstruct_and_split_stay_short():
-    """Of a flat library `split` had 65 stops and 26 climbs, `reconstruct` 10 and 3; half of that is enough for `split`."""
+    """Of the flat library `split` had 65 stops and 26 climbs, `reconstruct` 10 and 3: `split` needs half of that."""
     found = routes()
     assert len(found["split"].rooms) <= 32
     assert found["split"].climbs <= 13

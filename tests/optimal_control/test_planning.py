@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import signal
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -25,6 +27,7 @@ from shapephase.optimal_control import (
     symbolic_body,
     wong_residual,
 )
+from shapephase.optimal_control.planning import _within_limits
 from support.bodies import joint, link, urdf
 from support.independent import apart, pinocchio_motion
 
@@ -501,3 +504,29 @@ def test_ctrl_c_is_not_taken_for_a_failed_search(seconds):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize(("offset", "kept"), [(0.05, True), (0.15, False), (0.9, False)])
+def test_a_polished_plan_whose_windings_have_gone_elsewhere_is_not_kept(offset: float, kept: bool):
+    """Windings further than a tenth of a radian from those demanded are other windings, though nearer than half a turn.
+
+    The somersault of an even turn about one axis is that turn's angle, which is the truth here.
+    """
+    angle = 2.0 * np.pi
+
+    def attitude(times: np.ndarray) -> np.ndarray:
+        return so3.exp((angle + offset) * times[:, None] * np.array([1.0, 0.0, 0.0]))
+
+    task = SimpleNamespace(
+        windings=np.array([angle, 0.0]),
+        duration=1.0,
+        rate_limit=np.ones(1),
+        counted_windings=lambda attitudes: np.array(
+            [np.unwrap(np.arctan2(-attitudes[:, 1, 2], attitudes[:, 2, 2]))[-1], 0.0]
+        ),
+    )
+    basis = SimpleNamespace(pieces=4, rate_control=np.zeros((1, 1)))
+    polished = SimpleNamespace(
+        path=SimpleNamespace(duration=1.0), motion=SimpleNamespace(attitude=attitude), control=np.zeros((1, 1))
+    )
+    assert _within_limits(cast(Any, task), cast(Any, basis), cast(Any, polished)) is kept
