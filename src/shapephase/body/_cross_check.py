@@ -30,9 +30,9 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
     if not body.mass > 0.0:
         first = next(iter(tree.links.values()))
         raise ModelFileError(f"{first.where}: link {first.name!r}: neither it nor any other link has mass")
-    wanted = {name for name in tree.links if name not in tree.frames}
+    expected = {name for name in tree.links if name not in tree.frames}
     moving = {joint.name for joint in tree.joints if joint.kind != "fixed"}
-    _compare_names(set(body.link_names), wanted, "links", where)
+    _compare_names(set(body.link_names), expected, "links", where)
     _compare_names(set(body.joint_names), moving - set(tree.mimics), "joints", where)
     mass = sum(link.mass for link in tree.links.values())
     if abs(body.mass - mass) > _TOLERANCE * mass:
@@ -134,13 +134,13 @@ def _about(axes: Array, angles: Array) -> Array:
     return cosine * np.eye(3) + (1.0 - cosine) * axes[:, :, None] * axes[:, None, :] + skew
 
 
-def _compare_names(found: set[str], wanted: set[str], what: str, where: str) -> None:
-    if found != wanted:
-        raise _differs(where, what, f"lost {sorted(wanted - found)}", f"gained {sorted(found - wanted)}")
+def _compare_names(found: set[str], expected: set[str], what: str, where: str) -> None:
+    if found != expected:
+        raise _differs(where, what, f"lost {sorted(expected - found)}", f"gained {sorted(found - expected)}")
 
 
-def _differs(where: str, what: str, found: object, wanted: object) -> ModelFileError:
+def _differs(where: str, what: str, found: object, expected: object) -> ModelFileError:
     return ModelFileError(
-        f"{where}:1: the body made from this file has another {what} than the file: {found} against {wanted}; "
+        f"{where}:1: the body made from this file has another {what} than the file: {found} against {expected}; "
         "please report this file"
     )

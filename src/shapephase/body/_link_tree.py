@@ -52,7 +52,7 @@ class Link:
 
     Attributes
     ----------
-    name, where : what it is called, and "file:line"
+    name, where : its name, and "file:line"
     mass : [kg]
     centre : (3,) centre of mass in link axes [m]
     inertia : (3, 3) about the centre of mass, link axes [kg m^2]
@@ -165,12 +165,12 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     return roots[0], tuple(sorted_joints)
 
 
-def inertia_warnings(links: Iterable[Link], on_unphysical: str, called: str = "link {!r}") -> list[str]:
+def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "link {!r}") -> list[str]:
     """What is doubtful about the inertia of links, one message for each kind.
 
     Negative moments; moments that break the triangle inequality by more than 0.1 %; a mass or a radius of gyration
     that speaks of wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
-    no fault. `called` is what people call the links.
+    no fault. `label` is how messages name a link.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, called: str = "l
     for link in links:
         if not (np.isfinite(link.mass) and np.isfinite(link.inertia).all() and link.mass >= 0.0):
             numbers = f"mass {link.mass} kg and inertia {link.inertia.tolist()} kg m^2"
-            raise UnphysicalInertiaError(f"{link.where}: {called.format(link.name)}: no real body has {numbers}")
+            raise UnphysicalInertiaError(f"{link.where}: {label.format(link.name)}: no real body has {numbers}")
     masses = np.array([link.mass for link in links])
     moments = np.linalg.eigvalsh(np.array([link.inertia for link in links]).reshape(-1, 3, 3))
     offsets = np.array([link.centre for link in links]).reshape(-1, 3)
@@ -191,10 +191,10 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, called: str = "l
     negative = moments[:, 0] < -_NEGATIVE * np.maximum(moments[:, 2], 0.0) - floor
     if negative.any() and on_unphysical == "error":
         first = int(np.argmax(negative))
-        others = [called.format(links[i].name) for i in np.flatnonzero(negative)[1:]]
+        others = [label.format(links[i].name) for i in np.flatnonzero(negative)[1:]]
         also = f" (also {_listed(others)})" if others else ""
         raise UnphysicalInertiaError(
-            f"{links[first].where}: {called.format(links[first].name)} has principal moments {moments[first]} "
+            f"{links[first].where}: {label.format(links[first].name)} has principal moments {moments[first]} "
             f"kg m^2, one of them negative{also}; mend the file, or load it with on_unphysical='warn'"
         )
     broken = ~negative & (moments[:, 2] - moments[:, 1] - moments[:, 0] > _TRIANGLE * moments[:, 2] + floor)
@@ -215,7 +215,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, called: str = "l
     for which, text in kinds:
         if which.any():
             bad = [links[i] for i in np.flatnonzero(which)]
-            found.append(f"{bad[0].where}: {_listed([called.format(link.name) for link in bad])}: {text}")
+            found.append(f"{bad[0].where}: {_listed([label.format(link.name) for link in bad])}: {text}")
     return found
 
 

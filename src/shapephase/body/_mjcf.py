@@ -1,7 +1,7 @@
 """MJCF: the tree and the inertias of a MuJoCo model, read by rules of our own that the tests hold against MuJoCo.
 
 Pinocchio's reader of MJCF is not used: it takes `axisangle`, extrinsic `eulerseq`, `inertiafromgeom="true"` and
-`<frame>` for something else than MuJoCo does, and of several bodies in the world it keeps one, without a word.
+`<frame>` for something else than MuJoCo does, and of several bodies in the world it silently keeps one.
 The motor inertia of joints (`armature`) belongs to no link and is left out; `<worldbody>` itself has no mass.
 """
 
@@ -98,7 +98,7 @@ def mjcf_tree(root: Node) -> LinkTree:
     """Check an MJCF from its root element.
 
     One body hangs in the world, by a free joint or none; hinges and slides anywhere below it. A joint without a name
-    is called after its body, "arm_joint1", a body without one by its number, "body3".
+    is named after its body, "arm_joint1", a body without one by its number, "body3".
 
     Raises
     ------
@@ -179,7 +179,7 @@ def _classes(root: Node) -> dict[str, dict[str, dict[str, str]]]:
         for child in node.all("default"):
             below = name_of(child, "class")
             if below in classes or any(below == other for _, other, _ in waiting):
-                raise child.fault(f"default class {below!r}", "two classes are called so; rename one")
+                raise child.fault(f"default class {below!r}", "two classes have this name; rename one")
             waiting.append((child, below, own))
     return classes
 
@@ -285,7 +285,7 @@ def _joints(reading: _Reading, node: Node, parent: str, body: str, pose: tuple[A
         start = place + turn @ joint.place if k == 0 else joint.place - moving[k - 1].place
         back = -joint.place if after == body else none
         if joint.name in reading.joints:
-            raise ModelFileError(f"{joint.where}: joint {joint.name!r}: two joints are called so; rename one")
+            raise ModelFileError(f"{joint.where}: joint {joint.name!r}: two joints have this name; rename one")
         reading.joints[joint.name] = Joint(
             *(joint.name, joint.where, joint.kind, before, after, start),
             turn if k == 0 else np.eye(3),

@@ -1,7 +1,7 @@
 """URDF: every element checked before Pinocchio sees it.
 
-Pinocchio drops what it cannot read (a mass with a unit behind it, an inertia without all six entries, links that hang
-on nothing) without a word. So every number is read here first, and Pinocchio gets a text written anew from what
+Pinocchio silently drops what it cannot read: a mass with a unit behind it, an inertia without all six entries, links
+that no joint connects to the rest. So every number is read here first, and Pinocchio gets a text written anew from what
 was read: links with their inertia and joints, nothing else.
 """
 
@@ -116,7 +116,7 @@ def _named(root: Node, kind: str) -> dict[str, Node]:
         if name in found:
             raise node.fault(
                 f"{kind} {name!r}",
-                f"two <{kind}> elements are called so, the first in line {found[name].line}; rename one",
+                f"two <{kind}> elements have this name, the first in line {found[name].line}; rename one",
             )
         found[name] = node
     return found
@@ -227,7 +227,7 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
 
 
 def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint]) -> None:
-    """Every leader exists and is of the follower's kind, and nobody follows itself."""
+    """Every leader exists and is of the follower's kind, and no joint follows itself."""
     for name, (element, rule) in mimics.items():
         owner, leader = f"joint {name!r}", joints.get(rule.leader)
         if leader is None:

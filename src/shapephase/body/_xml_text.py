@@ -253,14 +253,14 @@ def vector(node: Node, name: str, owner: str, count: int = 3, most: float = 1e6)
 
 def numbers(node: Node, name: str, count: int, owner: str, text: str | None, most: float) -> list[float]:
     """`count` numbers in the text of an attribute. Raises ModelFileError."""
-    wanted = "a finite number is needed" if count == 1 else f"{count} finite numbers are needed, with blanks between"
+    needed = "a finite number is needed" if count == 1 else f"{count} finite numbers are needed, with blanks between"
     if text is None:
-        raise node.fault(owner, f"<{node.tag}> has no {name}; {wanted}")
+        raise node.fault(owner, f"<{node.tag}> has no {name}; {needed}")
     # One word too many shows that there are too many, however long the rest is.
     words = text.split(maxsplit=count)
     values = [float(word) for word in words if _NUMBER.fullmatch(word)]
     if len(words) != count or len(values) != count or not all(map(math.isfinite, values)):
-        raise node.fault(owner, f"<{node.tag}> {name}={quoted(text)!r}: {wanted}")
+        raise node.fault(owner, f"<{node.tag}> {name}={quoted(text)!r}: {needed}")
     if any(abs(value) >= most for value in values):
         raise node.fault(owner, f"<{node.tag}> {name}={quoted(text)!r}: too large, less than {most:g} is needed")
     return values

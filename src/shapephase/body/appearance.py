@@ -291,7 +291,7 @@ def _mesh_pieces(path: Path, node: Node, owner: str) -> list[tuple[Array, Intege
         # A reader of foreign files fails in every way there is.
         raise node.fault(owner, f"the mesh {path.name} cannot be read ({type(error).__name__}: {error})") from None
     if not pieces or not all(np.isfinite(piece.vertices).all() for piece in pieces):
-        raise node.fault(owner, f"the mesh {path.name} has no faces, or vertices that are no numbers")
+        raise node.fault(owner, f"the mesh {path.name} has no faces, or vertices that are not finite")
     return [(np.asarray(p.vertices, float), np.asarray(p.faces, np.int64), _own_colour(p)) for p in pieces]
 
 

@@ -217,7 +217,7 @@ def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[W
 
 
 def _name_bare_parts(model: Any) -> None:
-    """A link for whatever a joint moves and nobody has named, called after the joint, so that it can be asked for."""
+    """A link, named after the joint, for whatever a joint moves without a link of its own, so that it has a pose."""
     import pinocchio
 
     pin: Any = pinocchio

@@ -1,4 +1,4 @@
-"""Columns of a recording find the joints of a body, by name, in SI units, with every doubt spoken out."""
+"""Columns of a recording matched to the joints of a body by name, in SI units; what is doubtful is warned of."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Matched(NamedTuple):
 
 
 def matched(recording: Recording, body: Body, names: Mapping[str, str | None] | None, degrees: bool | None) -> Matched:
-    """The shapes of a body that a recording tells.
+    """The shapes of a body that a recording holds.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def matched(recording: Recording, body: Body, names: Mapping[str, str | None] | 
         If a column is no joint of the body.
     TrajectoryError
         If a joint is missing or doubled, a value is no possible coordinate, a limited joint turns so far that its
-        angles look like degrees, or a quaternion is none.
+        angles look like degrees, or a quaternion is not of unit length.
 
     Warns
     -----
@@ -65,13 +65,13 @@ def matched(recording: Recording, body: Body, names: Mapping[str, str | None] | 
     found: dict[int, str] = {}
     base: dict[str, Array] = {}
     for name, values in recording.columns.items():
-        wanted = names.get(name, name) if names else name
-        if wanted is None:
+        target = names.get(name, name) if names else name
+        if target is None:
             continue
-        if wanted in _BASE and wanted not in body.joint_names:
-            base[wanted] = values
+        if target in _BASE and target not in body.joint_names:
+            base[target] = values
             continue
-        joint, factor = _joint_of(name, wanted, body, recording, degrees)
+        joint, factor = _joint_of(name, target, body, recording, degrees)
         if joint in found:
             raise TrajectoryError(
                 f"{recording.where}: columns {found[joint]!r} and {name!r} are the same joint; keep one"
@@ -90,14 +90,14 @@ def matched(recording: Recording, body: Body, names: Mapping[str, str | None] | 
     return Matched(shapes, attitude, position)
 
 
-def _joint_of(name: str, wanted: str, body: Body, recording: Recording, degrees: bool | None) -> tuple[int, float]:
+def _joint_of(name: str, target: str, body: Body, recording: Recording, degrees: bool | None) -> tuple[int, float]:
     """The joint of a column and the factor to SI units."""
-    plain = wanted if wanted in body.joint_names else wanted.removesuffix(_DEGREES)
+    plain = target if target in body.joint_names else target.removesuffix(_DEGREES)
     if plain not in body.joint_names:
-        raise unknown_name(f"column in {recording.where}; joint of {body.name}", wanted, body.joint_names)
+        raise unknown_name(f"column in {recording.where}; joint of {body.name}", target, body.joint_names)
     joint = body.joint_names.index(plain)
     # A column keeps its unit when it is given another name.
-    by_name = plain != wanted or (name != wanted and name.endswith(_DEGREES))
+    by_name = plain != target or (name != target and name.endswith(_DEGREES))
     if body.joint_units[joint] != "rad":
         if by_name:
             raise TrajectoryError(
@@ -123,7 +123,7 @@ def _check_joint(values: Array, joint: int, body: Body, recording: Recording, de
     if abs(values[largest]) > FARTHEST:
         raise TrajectoryError(
             f"{recording.place(largest)}: joint {name} is at {values[largest]:.6g} {unit}; up to {FARTHEST:g} {unit} "
-            "can be told to full accuracy"
+            "can be represented to full accuracy"
         )
     beyond = np.maximum(lower - values, values - upper)
     worst = int(np.argmax(beyond))

@@ -140,7 +140,7 @@ def _delimiter(data: bytes, where: Path) -> str:
     if len(found) > 1:
         kinds = " and ".join(_DELIMITERS[mark] for mark in found)
         raise TrajectoryError(
-            f"{where}: the header has {kinds}, so the columns cannot be told; separate by one of them"
+            f"{where}: the header has {kinds}, so it is unclear which separates the columns; use one of them only"
         )
     return found[0] if found else ","
 

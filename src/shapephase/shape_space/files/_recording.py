@@ -30,7 +30,7 @@ class Recording:
     format : the kind of file, for people
     times : (N,) from 0 [s]
     columns : name in the file -> (N,)
-    row : what a sample is called in messages, "row" or "point"
+    row : the word for a sample in messages, "row" or "point"
     rows : (N,) the numbers of the samples in messages
     degrees : whether turning joints are in degrees; None: the file ought to say so and does not
     base_quat_xyzw : (N, 4) as recorded, or None
@@ -142,7 +142,7 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
     Raises
     ------
     TrajectoryError
-        If there are fewer than two, they do not ascend, or their differences are no numbers.
+        If there are fewer than two, they do not ascend, or their differences are not finite.
 
     Warns
     -----
@@ -163,7 +163,7 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
         )
     if not np.isfinite(shifted[-1]) or np.any(np.diff(shifted) <= 0.0):
         raise TrajectoryError(
-            f"{where}: times from {times[0]:.9g} s to {times[-1]:.9g} s cannot be told apart as double numbers"
+            f"{where}: times from {times[0]:.9g} s to {times[-1]:.9g} s are not distinct in double precision"
         )
     if np.spacing(np.abs(times).max()) > 1e-6 * steps.min():
         warn(
