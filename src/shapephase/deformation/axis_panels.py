@@ -18,15 +18,29 @@ from ..chebyshev import chebyshev, exact_local_coordinate, inside
 from ..errors import GaugeError
 from .deformation import Deformation
 
-_NODES, COUNT = 25, 20  # nodes of a panel, and coefficients of each polynomial on it
-# Parts of a loop: panels narrower than the first may be less exact, than the second are few, than the third are none.
-_NARROW, _TINY, _LEAST_WIDTH = 1e-3, 1e-6, 1e-13
-# Parts of the trace: entries off the diagonal that are let pass on wide panels, and on narrow ones.
-_DIAGONAL, NEARLY_DIAGONAL = 2e-14, 2e-12
-EQUAL = 4e-13  # parts of the trace; moments nearer than that are equal
+# Nodes of a panel: five more than coefficients, so that a fit that misses something shows.
+_NODES = 25
+# Coefficients of each polynomial on a panel.
+COUNT = 20
+# Part of a loop: narrower panels may be less exact, since little time is spent on them.
+_NARROW = 1e-3
+# Part of a loop: only a limited number of panels may be narrower, lest a hopeless search fill the memory.
+_TINY = 1e-6
+# Part of a loop: no panel is narrower, for the digits of time end there.
+_LEAST_WIDTH = 1e-13
+# Part of the trace: entries off the diagonal that are allowed on wide panels, some hundred roundings.
+_DIAGONAL = 2e-14
+# Part of the trace: the same on narrow panels, where the axes turn fast.
+NEARLY_DIAGONAL = 2e-12
+# Part of the trace: moments nearer than that are equal, a few thousand roundings.
+EQUAL = 4e-13
 _ROUNDING = 1e-16
-_FASTEST = 2e8  # [rad] in a loop
-SEPARATE, SYMMETRIC, SPHERICAL = 0, 1, 2
+# [rad] in a loop: axes that turn faster are said to jump.
+_FASTEST = 2e8
+# Kinds of panels: all moments apart, two equal, all equal.
+SEPARATE = 0
+SYMMETRIC = 1
+SPHERICAL = 2
 _STILL = np.array([0.0, 0.0, 0.0, 1.0])
 _THIRD = np.array([0.0, 0.0, 1.0])
 

@@ -16,13 +16,22 @@ from ..inertia_tensor import triangle_defect
 _ROUNDING = 1e-9
 # As `inverse_inertia` has it: of I's least eigenvalue to its largest.
 _LINE = 1e-12
-_NODES, _MOST_PIECES_FINE, _LOWEST, _ZOOMS, _CHUNK = 64, 32, 16, 13, 4096
+# Chebyshev points of a piece, less one: far more than the swings of a shape motion between two breaks.
+_NODES = 64
+# Of more pieces than these each has fewer points, so that their number stays bounded.
+_MOST_PIECES_FINE = 32
+# Minima that the search goes on around.
+_LOWEST = 16
+# Each divides the interval by four: together by 7e7, beyond which the value no longer changes.
+_ZOOMS = 13
+# Times evaluated at once: the arrays of many particles stay small.
+_CHUNK = 4096
 
 
 def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float, float]:
     """The least value of a function that is smooth between breaks, and its time.
 
-    Asked at up to 65 Chebyshev points of every piece (fewer, but nine at least, where the pieces are many); around the
+    Evaluated at up to 65 Chebyshev points of every piece (fewer, but nine at least, where the pieces are many); around the
     sixteen lowest of these the search goes on to some 1e-9 of the piece. A dip narrower than the points can be missed.
 
     Parameters

@@ -19,6 +19,7 @@ from ..integrator.integrate import SteppedRotation, stepped_rotation
 from .body_path import check_closed, path_sampler
 from .shape_path import CLOSED, ShapePath
 
+# Sixteen points resolve a panel whose curvature swings a few times.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PIECES = (2, 4, 8, 16, 32, 64)
 
