@@ -31,7 +31,7 @@ _CHUNK = 4096
 def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float, float]:
     """The least value of a function that is smooth between breaks, and its time.
 
-    Evaluated at up to 65 Chebyshev points of every piece (fewer, but nine at least, where the pieces are many); around the
+    Evaluated at up to 65 Chebyshev points of every piece (fewer, but nine at least, where pieces are many); around the
     sixteen lowest of these the search goes on to some 1e-9 of the piece. A dip narrower than the points can be missed.
 
     Parameters
