@@ -72,10 +72,14 @@ class MomentumCurve:
 
     def attitudes(self, times: Array) -> Array:
         """Of the gauge's frame: (N,) -> (B, N, 3, 3)."""
-        own = self._own_attitudes(times)
+        own, frame = self._own_attitudes(times), self.frame(times)
+        return own if frame is None else own @ so3.transpose(frame)
+
+    def frame(self, times: Array) -> Array | None:
+        """The gauge's frame U(t) in the deformation's own: (N,) -> (N, 3, 3); None where they are the same."""
         if self.lift is not None:
-            return own @ so3.transpose(self.lift.rotation(times)[0])
-        return own if self.frames is None else own @ so3.transpose(self.frames(times)[0])
+            return self.lift.rotation(times)[0]
+        return None if self.frames is None else self.frames(times)[0]
 
     @property
     def end_attitudes(self) -> tuple[Array, Array]:

@@ -113,9 +113,9 @@ def plot_momentum_curve(
     if frozen_at is not None:
         time = times_argument(finite_array(frozen_at, "frozen_at", unit="s"), motion.duration).reshape(1)
         inertia = motion.deformation.description.sample(time)[0][0]
-        if curve.frames is not None:
-            turn = curve.frames(time)[0][0]
-            inertia = turn @ inertia @ turn.T
+        frame = curve.frame(time)
+        if frame is not None:
+            inertia = frame[0] @ inertia @ frame[0].T
         _portrait(drawn, inertia)
         title += f"\nbehind it: polhodes of the body frozen at t = {float(time[0]):.4g} s"
     drawn.finish("Π{}/|Π| [1]", title)
