@@ -103,7 +103,7 @@ def test_a_model_without_a_file_is_drawn_as_boxes_that_turn_as_heavily(name, rng
         for box in boxes:
             pose = body.link_pose(shape, box.link) @ box.pose
             turn, mass = pose[:3, :3], masses[box.link]
-            solids.append((mass, pose[:3, 3], turn @ solid_inertia("box", box.size, mass) @ turn.T))
+            solids.append((mass, pose[:3, 3], turn @ solid_inertia("box", box.dimensions, mass) @ turn.T))
         mass, centre, inertia = together(solids)
         assert mass == pytest.approx(body.mass, rel=1e-12)
         np.testing.assert_allclose(centre, body.centre_of_mass(shape), atol=1e-12)
@@ -125,7 +125,7 @@ def test_parts_that_nobody_has_named_are_called_after_their_joint():
     trunk, leg = visuals.visuals(body)
     assert (trunk.link, leg.link) == ("trunk", "hip")
     np.testing.assert_allclose(leg.pose[:3, 3], [0.0, 0.1, 0.0], atol=1e-15)
-    np.testing.assert_allclose(np.sqrt(0.06) * np.ones(3), leg.size, rtol=1e-12)
+    np.testing.assert_allclose(np.sqrt(0.06) * np.ones(3), leg.dimensions, rtol=1e-12)
     np.testing.assert_allclose(body.link_pose([0.5 * np.pi], "hip")[:3, 3], [0.0, 0.0, 0.5], atol=1e-15)
 
 
@@ -134,7 +134,7 @@ def test_a_point_mass_is_a_ball_of_water(load_urdf):
     body = load_urdf(urdf(BASE, point, joint("hip", "revolute", "base", "arm", (0, 1, 0))))
     (ball,) = shown(body)
     assert ball.kind == "sphere"
-    assert volume("sphere", ball.size) == pytest.approx(0.002, rel=1e-12)
+    assert volume("sphere", ball.dimensions) == pytest.approx(0.002, rel=1e-12)
     np.testing.assert_array_equal(ball.pose[:3, 3], [0.2, 0.1, 0.0])
 
 
@@ -161,7 +161,7 @@ def test_our_bodies_are_drawn_as_their_files_say(name):
             rgba = tuple(map(float, colours[visual.find("material").get("name")].split()))
             expected.append((element.get("name"), shape.tag, size, rgba, pose))
     found = visuals.visuals(body)
-    assert [(v.link, v.kind, v.size, v.colour) for v in found] == [each[:4] for each in expected]
+    assert [(v.link, v.kind, v.dimensions, v.colour) for v in found] == [each[:4] for each in expected]
     for shape, (*_, pose) in zip(found, expected, strict=True):
         np.testing.assert_allclose(shape.pose, pose, atol=1e-15)
 
@@ -176,7 +176,7 @@ def test_the_drawn_shapes_of_the_cat_have_the_inertia_of_its_links():
     for shape in single:
         part, turn = parts[shape.link], shape.pose[:3, :3]
         np.testing.assert_allclose(shape.pose[:3, 3], part.centre, atol=1e-12)
-        solid = turn @ solid_inertia(shape.kind, shape.size, part.mass) @ turn.T
+        solid = turn @ solid_inertia(shape.kind, shape.dimensions, part.mass) @ turn.T
         np.testing.assert_allclose(solid, part.inertia, rtol=0, atol=2e-4 * np.abs(part.inertia).max())
 
 
@@ -185,7 +185,7 @@ def test_capsules_colours_and_defaults(load_urdf):
     shape = "<geometry><capsule radius='0.1' length='0.5'/></geometry>"
     body = load_urdf(with_visual(f"<visual>{TURN}{shape}{own}</visual><visual>{shape}</visual>"))
     first, second = shown(body)
-    assert (first.kind, first.size, first.colour) == ("capsule", (0.1, 0.5), (0.1, 0.2, 0.3, 0.4))
+    assert (first.kind, first.dimensions, first.colour) == ("capsule", (0.1, 0.5), (0.1, 0.2, 0.3, 0.4))
     expected = Rotation.from_euler("xyz", [0.4, -0.5, 0.6]).as_matrix()
     np.testing.assert_allclose(first.pose[:3, :3], expected, atol=1e-15)
     np.testing.assert_array_equal(first.pose[:3, 3], [0.1, -0.2, 0.3])
@@ -224,7 +224,7 @@ def test_what_cannot_be_shown_is_said_and_drawn_as_a_box(load_urdf, visual, says
     assert "link 'arm'" in str(caught[0].message)
     assert (box.kind, box.colour) == ("box", visuals.BOX_COLOUR)
     expected = np.sort(np.sqrt(6.0 * np.array([0.05, 0.03, 0.01])))
-    np.testing.assert_allclose(np.sort(box.size), expected, rtol=1e-12)
+    np.testing.assert_allclose(np.sort(box.dimensions), expected, rtol=1e-12)
     np.testing.assert_allclose(box.pose[:3, 3], [0.2, 0.1, 0.0], atol=1e-15)
 
 
@@ -304,7 +304,7 @@ def test_meshes_are_found_around_the_urdf(tmp_path, filename, place, suffix):
     (package / "urdf").mkdir(exist_ok=True)
     (package / "urdf" / "wedge.urdf").write_text(with_visual(mesh))
     (shape,) = shown(sp.load_body(package / "urdf" / "wedge.urdf"))
-    assert (shape.kind, shape.size) == ("mesh", (0.1, -0.2, 0.3))
+    assert (shape.kind, shape.dimensions) == ("mesh", (0.1, -0.2, 0.3))
     assert shape.mesh.resolve() == package / (place + suffix)
     drawn = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
     # A positive volume: the faces of a mirrored mesh look outward, too.
@@ -428,7 +428,7 @@ def test_the_geoms_of_an_mjcf_are_where_mujoco_has_them(tmp_path):
         kind = kinds[int(model.geom_type[geom])]
         assert shape.kind == kind
         size = np.array(factors[kind]) * model.geom_size[geom, : len(factors[kind])]
-        np.testing.assert_allclose(shape.size, size, rtol=1e-14)
+        np.testing.assert_allclose(shape.dimensions, size, rtol=1e-14)
         np.testing.assert_allclose(shape.colour, model.geom_rgba[geom], atol=1e-7)
         turn = Rotation.from_quat(np.roll(model.geom_quat[geom], -1)).as_matrix()
         np.testing.assert_allclose(shape.pose[:3, :3], turn, atol=1e-12)
@@ -460,7 +460,7 @@ def test_what_an_mjcf_shows_not_is_a_box(tmp_path):
     path.write_text(MJCF)
     boxes = [shape for shape in visuals.visuals(sp.load_body(path)) if shape.colour == visuals.BOX_COLOUR]
     assert [box.link for box in boxes] == ["body4"]
-    np.testing.assert_allclose(boxes[0].size, math.sqrt(0.6), rtol=1e-12)
+    np.testing.assert_allclose(boxes[0].dimensions, math.sqrt(0.6), rtol=1e-12)
 
 
 def test_materials_of_an_mjcf(tmp_path):

@@ -176,7 +176,7 @@ def box_tensors(scene, mass):
     """Inertia of the drawn box in inertial axes: (F, 3, 3)."""
     (node,) = scene.nodes
     (cube,) = node.shapes
-    assert (cube.kind, cube.size) == ("box", (1.0, 1.0, 1.0))
+    assert (cube.kind, cube.dimensions) == ("box", (1.0, 1.0, 1.0))
     x, y, z = np.moveaxis(node.scales**2, -1, 0)
     moments = mass / 12.0 * np.stack([y + z, x + z, x + y], axis=-1)
     turn = scene.world_pose(node)[:, :3, :3]
@@ -251,7 +251,7 @@ def test_particles_are_balls_whose_volumes_are_as_their_masses():
     inertia = np.trace(moment, axis1=1, axis2=2)[:, None, None] * np.eye(3) - moment
     expected = attitude @ motion.deformation.inertia(scene.times) @ so3.transpose(attitude)
     np.testing.assert_allclose(inertia, expected, atol=1e-12)
-    radii = np.array([node.shapes[0].size[0] for node in scene.nodes])
+    radii = np.array([node.shapes[0].dimensions[0] for node in scene.nodes])
     np.testing.assert_allclose(radii**3 / radii[0] ** 3, masses, rtol=1e-12)
 
 
@@ -358,7 +358,7 @@ def test_every_shape_of_the_body_is_in_the_page_as_it_is(righting, cat_page):
             name = f"{node.name}_{place}/{shape.kind}_{count}"
             props, number = made[f"/body/{name}"], number + 1
             keys = {"box": ["dimensions"], "cylinder": ["radius", "height"], "sphere": ["radius"]}[shape.kind]
-            np.testing.assert_allclose(np.hstack([props[key] for key in keys]), shape.size, rtol=1e-6)
+            np.testing.assert_allclose(np.hstack([props[key] for key in keys]), shape.dimensions, rtol=1e-6)
             np.testing.assert_allclose(np.array(props["color"]) / 255.0, shape.colour[:3], atol=0.002)
             assert props["opacity"] is None
             assert 0.0 < made[f"/reference/{name}"]["opacity"] < 0.5

@@ -42,12 +42,12 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
     by_name = [dict(zip(body.joint_names, values, strict=True)) for values in (shape.tolist(), rate.tolist())]
     inertia, momentum, extent, motion = inertia_and_momentum(tree, *by_name)
     found = (body.locked_inertia(shape), body.internal_momentum(shape, rate))
-    for what, got, want, size in zip(
+    for what, got, expected, scale in zip(
         ("inertia", "momentum"), found, (inertia, momentum), (extent, motion), strict=True
     ):
         # A comparison that NaN fails.
-        if not np.all(np.abs(got - want) <= _TOLERANCE * size):
-            raise _differs(where, what + " at a random shape", got.tolist(), want.tolist())
+        if not np.all(np.abs(got - expected) <= _TOLERANCE * scale):
+            raise _differs(where, what + " at a random shape", got.tolist(), expected.tolist())
 
 
 def inertia_and_momentum(

@@ -122,8 +122,8 @@ def solid_of(geom: Node, orientation: Orientation, owner: str) -> Solid:
         )
     if geom.get("shellinertia", "false") != "false":
         raise geom.fault(owner, "inertia of a shell is not computed; give the body an <inertial>")
-    place, turn, size = placed_geom(geom, kind, orientation, owner)
-    volume, moments = _unit_solid(kind, size)
+    place, turn, dimensions = placed_geom(geom, kind, orientation, owner)
+    volume, moments = _unit_solid(kind, dimensions)
     mass = density * volume if mass is None else mass
     if not (LEAST_MASS < mass < MOST_MASS):
         raise geom.fault(owner, f"its mass is {mass:g} kg; between {LEAST_MASS:g} and {MOST_MASS:g} is needed")
@@ -139,7 +139,7 @@ def placed_geom(geom: Node, kind: str, orientation: Orientation, owner: str) -> 
         needed = 1
     if not needed <= given <= 3:
         raise geom.fault(owner, f"size={quoted(text)!r}: {needed} numbers are needed for a {kind}")
-    size = numbers(geom, "size", given, owner, text, 1e6)[:needed]
+    dimensions = numbers(geom, "size", given, owner, text, 1e6)[:needed]
     if not fromto:
         place = np.array(vector(geom, "pos", owner)) if geom.get("pos") is not None else np.zeros(3)
         turn = orientation.matrix(geom, owner)
@@ -152,22 +152,22 @@ def placed_geom(geom: Node, kind: str, orientation: Orientation, owner: str) -> 
         if length < 1e-9:
             raise geom.fault(owner, "fromto: both ends are the same point; move one")
         # As thick as wide: MuJoCo takes one size for both.
-        thickness = size * (_SIZES[kind] - 1)
-        place, turn, size = ends.mean(axis=0), least_turn(along / length), [*thickness, 0.5 * length]
-    if not all(value > _LEAST_SIZE for value in size):
+        thickness = dimensions * (_SIZES[kind] - 1)
+        place, turn, dimensions = ends.mean(axis=0), least_turn(along / length), [*thickness, 0.5 * length]
+    if not all(value > _LEAST_SIZE for value in dimensions):
         raise geom.fault(owner, f"size={quoted(text)!r}: sizes are positive, above {_LEAST_SIZE:g} m")
-    return place, turn, size
+    return place, turn, dimensions
 
 
-def _unit_solid(kind: str, size: list[float]) -> tuple[float, Array]:
+def _unit_solid(kind: str, dimensions: list[float]) -> tuple[float, Array]:
     """Volume, and principal moments for unit mass; the long axis is z."""
     if kind == "sphere":
-        return 4.0 / 3.0 * math.pi * size[0] ** 3, np.full(3, 0.4 * size[0] ** 2)
+        return 4.0 / 3.0 * math.pi * dimensions[0] ** 3, np.full(3, 0.4 * dimensions[0] ** 2)
     if kind in ("box", "ellipsoid"):
-        x, y, z = (value**2 for value in size)
+        x, y, z = (value**2 for value in dimensions)
         volume, factor = (8.0, 1.0 / 3.0) if kind == "box" else (4.0 / 3.0 * math.pi, 0.2)
-        return volume * math.prod(size), factor * np.array([y + z, x + z, x + y])
-    radius, half = size
+        return volume * math.prod(dimensions), factor * np.array([y + z, x + z, x + y])
+    radius, half = dimensions
     barrel = 2.0 * math.pi * radius**2 * half
     across, along = radius**2 / 4.0 + half**2 / 3.0, radius**2 / 2.0
     if kind == "cylinder":

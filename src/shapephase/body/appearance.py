@@ -51,8 +51,8 @@ class Visual:
     ----------
     link : the link that carries it
     kind : "box", "cylinder", "capsule", "sphere", "ellipsoid" or "mesh"
-    size : edges of a box; radius and length of a cylinder or of the barrel of a capsule, along z; radius of a sphere;
-        semi-axes of an ellipsoid [m]; scale of a mesh
+    dimensions : edges of a box; radius and length of a cylinder or of the barrel of a capsule, along z; radius of a
+        sphere; semi-axes of an ellipsoid [m]; scale of a mesh
     pose : (4, 4) from the axes of the shape to those of the link
     colour : red, green, blue, opacity, each from 0 to 1
     mesh : the file of a mesh, else None
@@ -61,7 +61,7 @@ class Visual:
 
     link: str
     kind: str
-    size: tuple[float, ...]
+    dimensions: tuple[float, ...]
     pose: Array
     colour: Colour
     mesh: Path | None = None
@@ -154,8 +154,8 @@ def _part_box(part: MovingPart) -> Visual:
         # A point mass has no box: a ball of water.
         radius = (0.75 * part.mass / (math.pi * _WATER)) ** (1.0 / 3.0)
         return Visual(part.links[0], "sphere", (radius,), pose, BOX_COLOUR)
-    size = tuple(np.maximum(edges, _THINNEST * longest).tolist())
-    return Visual(part.links[0], "box", size, pose, BOX_COLOUR)
+    dimensions = tuple(np.maximum(edges, _THINNEST * longest).tolist())
+    return Visual(part.links[0], "box", dimensions, pose, BOX_COLOUR)
 
 
 def _pose(place: Array, turn: Array) -> Array:
@@ -191,15 +191,15 @@ def _urdf_shape(link: Node, node: Node, materials: dict[str, Node], looks: _Look
         scale = np.array(vector(shape, "scale", owner)) if shape.get("scale") is not None else np.ones(3)
         empty = Visual(name, kind, tuple(scale.tolist()), pose, colour or PLAIN)
         return _mesh_shapes(shape, empty, colour, owner, looks)
-    size = {
+    dimensions = {
         "box": lambda: vector(shape, "size", owner),
         "sphere": lambda: [number(shape, "radius", owner)],
         "cylinder": lambda: [number(shape, key, owner) for key in ("radius", "length")],
         "capsule": lambda: [number(shape, key, owner) for key in ("radius", "length")],
     }[kind]()
-    if not all(value > 0.0 for value in size):
-        raise shape.fault(owner, f"<{kind}> of size {size}; sizes are above zero")
-    return [Visual(name, kind, tuple(size), pose, colour or PLAIN)]
+    if not all(value > 0.0 for value in dimensions):
+        raise shape.fault(owner, f"<{kind}> of size {dimensions}; sizes are above zero")
+    return [Visual(name, kind, tuple(dimensions), pose, colour or PLAIN)]
 
 
 def _geometry(node: Node, owner: str) -> tuple[Node, str]:
@@ -236,7 +236,7 @@ def _mesh_shapes(node: Node, empty: Visual, colour: Colour | None, owner: str, l
         raise node.fault(owner, f"the mesh {quoted(name)!r}: files {', '.join(_MESHES)} can be read")
     if path not in looks.meshes:
         looks.meshes[path] = _mesh_pieces(path, node, owner)
-    scale = np.array(empty.size)
+    scale = np.array(empty.dimensions)
     pieces = []
     for vertices, faces, own in looks.meshes[path]:
         # A mirror image has its faces the other way round.
@@ -360,12 +360,12 @@ def _geom_shape(placed: Any, geom: Node, link: str, orientation: Any, colours: d
         raise geom.fault(owner, "a geom that is a mesh is not shown")
     if kind not in ("sphere", "capsule", "cylinder", "box", "ellipsoid"):
         raise geom.fault(owner, f"a geom of type {quoted(kind)!r} is not shown")
-    place, turn, size = placed_geom(geom, kind, orientation, owner)
+    place, turn, dimensions = placed_geom(geom, kind, orientation, owner)
     if kind == "box":
-        size = [2.0 * value for value in size]
+        dimensions = [2.0 * value for value in dimensions]
     elif kind in ("capsule", "cylinder"):
-        size = [size[0], 2.0 * size[1]]
+        dimensions = [dimensions[0], 2.0 * dimensions[1]]
     source = geom if geom.get("rgba") is not None else colours.get(geom.get("material"))
     colour = _MUJOCO_GREY if source is None else _rgba(source, owner)
     pose = _pose(placed.place + placed.turn @ place, placed.turn @ turn)
-    return Visual(link, kind, tuple(float(value) for value in size), pose, colour)
+    return Visual(link, kind, tuple(float(value) for value in dimensions), pose, colour)

@@ -155,13 +155,13 @@ class _InterruptibleSearch:
 
     Attributes
     ----------
-    begun : whether an iteration has been reported, so that there is something to keep
+    reported : whether an iteration has been reported, so that there is something to keep
     stopped : whether Ctrl-C has been pressed since
     """
 
     def __init__(self, work: Steps) -> None:
         self._work = work
-        self.begun = self.stopped = False
+        self.reported = self.stopped = False
 
     def report(self, now: Progress) -> bool:
         """Show the progress of the search; returns whether to stop it."""
@@ -169,12 +169,12 @@ class _InterruptibleSearch:
         self._work.say(
             f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
         )
-        self.begun = True
+        self.reported = True
         return self.stopped
 
     def interrupted(self, *_: Any) -> None:
         """Ctrl-C: the search ends after this iteration; pressed again, at once."""
-        if self.stopped or not self.begun:
+        if self.stopped or not self.reported:
             raise KeyboardInterrupt
         self.stopped = True
         self._work.say("stopping, to keep the best so far (Ctrl-C again gives it up)")

@@ -185,8 +185,8 @@ def is_diagonal_at(deformation: Deformation, panels: AxisPanels, points: Array, 
     """Whether the panels' frames make the inertia diagonal at points (K,) of [-1, 1]."""
     times, inertia = inertia_in(deformation, panels.left, panels.right, points)
     local = exact_local_coordinate(times, panels.left[:, None], panels.right[:, None])
-    size = np.linalg.norm(panels.quats(local), axis=-1)
-    return _is_diagonal(_seen_from(panels, local, inertia), limit) & (size.min(axis=-1) > 0.5)
+    norm = np.linalg.norm(panels.quats(local), axis=-1)
+    return _is_diagonal(_seen_from(panels, local, inertia), limit) & (norm.min(axis=-1) > 0.5)
 
 
 def _separate_axes(low: Array, high: Array, axes: Array) -> tuple[Array, Array]:
@@ -242,10 +242,10 @@ def _without_spin(series: Array) -> Array:
     basis = chebyshev(panel_nodes(), COUNT)
     quats = basis @ series
     slope = basis[:, :-1] @ np.polynomial.chebyshev.chebder(series, axis=1)
-    size = np.linalg.norm(quats, axis=-1, keepdims=True)
-    rate = so3.apply(so3.matrix_from_quat(quats / size), so3.turn_of(quats, slope) / size**2)
+    norm = np.linalg.norm(quats, axis=-1, keepdims=True)
+    rate = so3.apply(so3.matrix_from_quat(quats / norm), so3.turn_of(quats, slope) / norm**2)
     spin = np.polynomial.chebyshev.chebint((to_series() @ rate[..., 2:])[:, :-1], axis=1)
-    return to_series() @ so3.quat_product(so3.quat_from_rotation_vector(-(basis @ spin) * _THIRD), quats / size)
+    return to_series() @ so3.quat_product(so3.quat_from_rotation_vector(-(basis @ spin) * _THIRD), quats / norm)
 
 
 def _least_squares(values: Array, weights: Array) -> Array:

@@ -75,9 +75,9 @@ def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> Frames:
         middle, half = 0.5 * (left + right), 0.5 * (right - left)
         times = np.clip(nodes_on(left, right, _DEGREE), left[:, None], right[:, None])
         series = values_to_coefficients(_DEGREE) @ turns(times.ravel()).reshape(len(left), _DEGREE + 1, 9)
-        sizes = np.linalg.norm(series, axis=-1)
-        fastest = max(fastest, float(np.max(sizes[:, 1] / half)))
-        doubt = _DEGREE**2 * sizes[:, -3:].max(axis=1) / half
+        norms = np.linalg.norm(series, axis=-1)
+        fastest = max(fastest, float(np.max(norms[:, 1] / half)))
+        doubt = _DEGREE**2 * norms[:, -3:].max(axis=1) / half
         rough = doubt > 1e-9 * fastest
         if np.any(rough & (half < shortest)):
             row = int(np.argmax(np.where(rough & (half < shortest), doubt, 0.0)))
@@ -132,12 +132,12 @@ def _check_rates(frames: Frames, breaks: Array) -> None:
     width = np.repeat(np.diff(breaks), 7)
     middle = (breaks[:-1, None] + np.diff(breaks)[:, None] * (np.arange(7) + 0.381) / 7.0).ravel()
     at, rates = frames(middle)
-    size = np.linalg.norm(rates, axis=-1)
-    # So short that a turn at this rate is told from its chord to a millionth.
-    step = np.minimum(1e-4 * width, 1e-3 / np.maximum(size, 1e-300))
+    speed = np.linalg.norm(rates, axis=-1)
+    # So short that a turn at this rate differs from its chord by less than a millionth.
+    step = np.minimum(1e-4 * width, 1e-3 / np.maximum(speed, 1e-300))
     before, after = (frames(t)[0] for t in (middle - step, middle + step))
     slope = so3.vee(so3.transpose(at) @ (after - before)) / (2.0 * step[:, None])
-    wrong = np.linalg.norm(slope - rates, axis=-1) > 1e-3 * (size + 1.0 / breaks[-1])
+    wrong = np.linalg.norm(slope - rates, axis=-1) > 1e-3 * (speed + 1.0 / breaks[-1])
     if wrong.any():
         row = int(np.argmax(wrong))
         raise ShapeError(
@@ -170,10 +170,10 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
 
     def frames(times: Array) -> tuple[Array, Array]:
         correlation, slope = deformation.description.correlation(times, time)
-        left, sizes, right = np.linalg.svd(correlation)
+        left, singular, right = np.linalg.svd(correlation)
         sign = np.sign(np.linalg.det(left @ right))
-        sizes[:, 2] *= sign
-        unique = sizes[:, 1] + sizes[:, 2] > 1e-6 * sizes[:, 0]
+        singular[:, 2] *= sign
+        unique = singular[:, 1] + singular[:, 2] > 1e-6 * singular[:, 0]
         if not unique.all():
             raise GaugeError(
                 f"at t = {times[np.argmin(unique)]:.9g} s no orientation of the body is nearest to that at "
@@ -181,8 +181,8 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
             )
         left[:, :, 2] *= sign[:, None]
         turned = so3.transpose(left @ right)
-        # U C = V diag(sizes) V^T with the rows of `right` for V^T.
-        inverse = 1.0 / (sizes.sum(axis=-1, keepdims=True) - sizes)
+        # U C = V diag(singular) V^T with the rows of `right` for V^T.
+        inverse = 1.0 / (singular.sum(axis=-1, keepdims=True) - singular)
         twisted = so3.apply(right, 2.0 * so3.vee(turned @ slope))
         spin = -so3.apply(so3.transpose(right), inverse * twisted)
         return turned, so3.apply(so3.transpose(turned), spin)

@@ -279,9 +279,9 @@ def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanel
     series = panels.series
     first, last = (so3.normalised(end) for end in _ends(series))
     turn = so3.rotation_vector_from_quat(so3.quat_product(first[1:], so3.quat_inverse(last[:-1])))
-    size = np.linalg.norm(turn, axis=-1)
-    if np.any(size > _JUMP):
-        return panels, np.where(size > _JUMP, size, 0.0)
+    gap = np.linalg.norm(turn, axis=-1)
+    if np.any(gap > _JUMP):
+        return panels, np.where(gap > _JUMP, gap, 0.0)
     # The side that knows an axis better yields less. Turning from the left keeps what one axis yields from the others.
     known = panels.strength**2 + 1e-40
     share = known[1:] / (known[:-1] + known[1:])
@@ -305,7 +305,7 @@ def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanel
     if len(rows):
         limit = _AT_JOINTS + _jumps_of_inertia(deformation, panels)[rows, None]
         wrong[rows] = ~is_diagonal_at(deformation, moved.kept(rows), points_between(), limit)
-    return moved, np.where(wrong[1:] | wrong[:-1], size, 0.0)
+    return moved, np.where(wrong[1:] | wrong[:-1], gap, 0.0)
 
 
 def _jumps_of_inertia(deformation: Deformation, panels: AxisPanels) -> Array:
@@ -330,8 +330,8 @@ def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
     distinct = freedom.axis @ axes
     farthest = np.eye(3)[np.argmin(np.round(np.abs(distinct), 9))]
     seen = axes @ (farthest - (farthest @ distinct) * distinct)
-    wanted = np.roll(np.abs(freedom.axis), 1)
-    angle = np.arctan2(np.cross(seen, wanted) @ freedom.axis, seen @ wanted)
+    target = np.roll(np.abs(freedom.axis), 1)
+    angle = np.arctan2(np.cross(seen, target) @ freedom.axis, seen @ target)
     return so3.quat_from_rotation_vector(angle * freedom.axis)
 
 
@@ -343,13 +343,13 @@ def _labels_at_start(deformation: Deformation, panels: AxisPanels, freedom: _Fre
     frames, _ = _track(panels)(times)
     moments = np.einsum("tij,tjk,tik->ti", frames, deformation.inertia(times), frames)
     moments /= moments.sum(axis=-1, keepdims=True)
-    size = np.abs(frames[0])
-    largest = np.argmax(size > size.max(axis=-1, keepdims=True) - 1e-9, axis=-1)
+    entries = np.abs(frames[0])
+    largest = np.argmax(entries > entries.max(axis=-1, keepdims=True) - 1e-9, axis=-1)
     above = np.zeros(3)
     for i, j in itertools.permutations(range(3), 2):
         apart = moments[:, i] - moments[:, j]
-        told = np.flatnonzero(np.abs(apart) > 10.0 * EQUAL)
-        above[i] += apart[told[0]] > 0.0 if len(told) else largest[i] > largest[j]
+        distinct = np.flatnonzero(np.abs(apart) > 10.0 * EQUAL)
+        above[i] += apart[distinct[0]] > 0.0 if len(distinct) else largest[i] > largest[j]
     order = np.argsort(above, kind="stable")
     rows = np.eye(3)[order]
     rows[:2] *= np.sign((rows @ frames[0])[[0, 1], largest[order[:2]]])[:, None]

@@ -164,8 +164,8 @@ def _continues(orbit: _Orbit, following: _Orbit, guess: Array, moved: Array, spa
         return False
     if orbit.excess * following.excess > 0.0:
         return True
-    pace, other = np.linalg.norm(orbit.drift), np.linalg.norm(following.drift)
-    return bool(np.linalg.norm(following.drift - orbit.drift) < 0.3 * (pace + other) + 1e-3 / span)
+    drift, other = np.linalg.norm(orbit.drift), np.linalg.norm(following.drift)
+    return bool(np.linalg.norm(following.drift - orbit.drift) < 0.3 * (drift + other) + 1e-3 / span)
 
 
 def _ending(passed: list[_Orbit], lost: float) -> tuple[str, float | None]:

@@ -35,7 +35,7 @@ class PhaseSplit:
     dynamical_rotation : (3, 3) R_D, what the momentum adds
     montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
     montgomery_angle : the same in (-pi, pi] [rad]
-    dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's size [rad]
+    dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's magnitude [rad]
     geometric_phase : minus the solid angle [rad]
     solid_angle : signed, of the momentum curve in this gauge, closed by the great circle; counted from the
         region of the sphere farthest from the curve [sr]
@@ -331,6 +331,6 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
     momentum = motion.body_momentum(times).reshape(-1, len(times), 3)
     whole, shape_only = description.kinetic_energy(times, turning), description.kinetic_energy(times, 0.0 * turning)
     along = 2.0 * (whole - shape_only) + np.sum(drift * (internal - momentum), axis=-1)
-    size = np.linalg.norm(motion.momentum.reshape(-1, 3), axis=-1)
-    phase = along @ weights.ravel() / np.where(size > 0.0, size, 1.0)
-    return np.where(size > 0.0, phase, 0.0).reshape(motion.batch)[()]
+    magnitude = np.linalg.norm(motion.momentum.reshape(-1, 3), axis=-1)
+    phase = along @ weights.ravel() / np.where(magnitude > 0.0, magnitude, 1.0)
+    return np.where(magnitude > 0.0, phase, 0.0).reshape(motion.batch)[()]

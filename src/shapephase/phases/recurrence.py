@@ -364,9 +364,9 @@ def _edge(curve: _Curve, inner: float, partner: float, outer: float, near: float
     for _ in range(50):
         middle = 0.5 * (known + outer)
         _, rates = curve.at(np.array([known, when]))
-        pace = float(np.sum(rates[0] * rates[1]) / max(np.sum(rates[1] ** 2), 1e-300))
+        ratio = float(np.sum(rates[0] * rates[1]) / max(np.sum(rates[1] ** 2), 1e-300))
         there = np.array([middle])
-        found, on = _on_curve(curve, there, curve.at(there), np.array([when + pace * (middle - known)]), near)
+        found, on = _on_curve(curve, there, curve.at(there), np.array([when + ratio * (middle - known)]), near)
         if on[0]:
             known, when = middle, float(found[0])
         else:

@@ -194,7 +194,9 @@ def _particle_nodes(description: ParticleDescription, times: Array) -> tuple[Mov
     for number, radius in enumerate(radii.tolist()):
         poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
         poses[:, :3, 3] = points[:, number]
-        ball = Visual(link=f"particle {number + 1}", kind="sphere", size=(radius,), pose=np.eye(4), colour=BOX_COLOUR)
+        ball = Visual(
+            link=f"particle {number + 1}", kind="sphere", dimensions=(radius,), pose=np.eye(4), colour=BOX_COLOUR
+        )
         nodes.append(MovingNode(name=ball.link, shapes=(ball,), poses=poses))
     return tuple(nodes)
 
@@ -210,7 +212,7 @@ def _inertia_node(deformation: Deformation, in_base: Array, times: Array) -> Mov
     edges = np.sqrt(12.0 * moments / mass)
     poses = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()
     poses[:, :3, :3], poses[:, :3, 3] = axes, in_base
-    cube = Visual(link="locked inertia", kind="box", size=(1.0, 1.0, 1.0), pose=np.eye(4), colour=BOX_COLOUR)
+    cube = Visual(link="locked inertia", kind="box", dimensions=(1.0, 1.0, 1.0), pose=np.eye(4), colour=BOX_COLOUR)
     thin = _MIN_THICKNESS * edges.max(axis=-1, keepdims=True)
     return MovingNode(name=cube.link, shapes=(cube,), poses=poses, scales=np.maximum(edges, thin))
 
@@ -228,16 +230,16 @@ def _corners(shape: Visual) -> Array:
     if shape.kind == "mesh":
         low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
         return 0.5 * (low + high) + 0.5 * (high - low) * _CORNERS
-    return _half_size(shape) * _CORNERS
+    return _half_extents(shape) * _CORNERS
 
 
-def _half_size(shape: Visual) -> Array:
-    size = shape.size
+def _half_extents(shape: Visual) -> Array:
+    dimensions = shape.dimensions
     halves: Mapping[str, tuple[float, ...]] = {
-        "sphere": size * 3,
-        "ellipsoid": size,
-        "box": tuple(0.5 * edge for edge in size),
-        "cylinder": (size[0], size[0], 0.5 * size[-1]),
-        "capsule": (size[0], size[0], 0.5 * size[-1] + size[0]),
+        "sphere": dimensions * 3,
+        "ellipsoid": dimensions,
+        "box": tuple(0.5 * edge for edge in dimensions),
+        "cylinder": (dimensions[0], dimensions[0], 0.5 * dimensions[-1]),
+        "capsule": (dimensions[0], dimensions[0], 0.5 * dimensions[-1] + dimensions[0]),
     }
     return np.array(halves[shape.kind])

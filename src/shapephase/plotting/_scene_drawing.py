@@ -152,7 +152,7 @@ def _draw_shape(api: Any, name: str, shape: Visual, scale: Array, colour: tuple[
     """Draw one visual, in its own colour or as a ghost in another; returns its handle."""
     red, green, blue, opacity = shape.colour
     opacity = opacity if colour is None else min(opacity, _GHOST_OPACITY)
-    lengths = shape.size
+    lengths = shape.dimensions
     look: dict[str, Any] = {
         "color": colour or tuple(round(255 * value) for value in (red, green, blue)),
         "opacity": None if opacity >= 1.0 else opacity,

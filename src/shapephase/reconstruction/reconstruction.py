@@ -156,8 +156,8 @@ class Motion:
         omega = self._differentiated(times)
         pi = self.body_momentum(times).reshape(-1, len(times), 3)
         defect = so3.apply(inertia[None], omega) + internal - pi
-        size = np.linalg.norm(pi, axis=-1).max() + np.linalg.norm(internal, axis=-1).max() + 1e-300
-        return (np.linalg.norm(defect, axis=-1).max(axis=-1) / size).reshape(self.batch)[()]
+        scale = np.linalg.norm(pi, axis=-1).max() + np.linalg.norm(internal, axis=-1).max() + 1e-300
+        return (np.linalg.norm(defect, axis=-1).max(axis=-1) / scale).reshape(self.batch)[()]
 
     @cached_property
     def _stepped(self) -> SteppedRotation:

@@ -19,8 +19,10 @@ from ..integrator.integrate import SteppedRotation, stepped_rotation
 from .body_path import check_closed, path_sampler
 from .shape_path import CLOSED, ShapePath
 
-# Sixteen points resolve a panel whose curvature swings a few times.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+# Points of the Gauss rule on a panel: they resolve a curvature that swings a few times there.
+_GAUSS_RULE = np.polynomial.legendre.leggauss(16)
+# Panels on each piece of the path, tried in turn until the integral changes no more; with 64 of them a result that
+# still changes comes from a break that was not declared.
 _PIECES = (2, 4, 8, 16, 32, 64)
 
 
@@ -229,8 +231,8 @@ def holonomy_derivative(
         bracket = so3.hat(turning) @ columns
         by_joint = lift.rotation(times)[0] @ (along - across + bracket)
         changes = _variation_at(variation, times, body.n_shape)
-        size = np.einsum("nak,nmk->n", np.abs(along) + np.abs(across) + np.abs(bracket), np.abs(changes))
-        return np.einsum("nak,nmk->nma", by_joint, changes), size
+        scale = np.einsum("nak,nmk->n", np.abs(along) + np.abs(across) + np.abs(bracket), np.abs(changes))
+        return np.einsum("nak,nmk->nma", by_joint, changes), scale
 
     return turned, moved_start + _integral(carried_curvature, route.breaks, goal)
 
@@ -245,18 +247,19 @@ def _variation_at(variation: Callable[[Array], ArrayLike], times: Array, n_shape
 def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, tolerance: float) -> Array:
     """The integral of a function smooth between breaks, by Gauss on ever shorter panels.
 
-    The function returns its values (N, m, 3), and the size of what they are differences of (N,): the tolerance is
+    The function returns its values (N, m, 3), and the magnitude of what they are differences of (N,): the tolerance is
     relative to the integral of that.
     """
+    nodes, weights_of_panel = _GAUSS_RULE
     last, change, goal = None, np.inf, 0.0
     for pieces in _PIECES:
         edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(breaks)] + [breaks[-1:]])
         half = 0.5 * np.diff(edges)
-        times = edges[:-1, None] + half[:, None] * (_NODES + 1.0)
-        weights = (half[:, None] * _WEIGHTS).ravel()
-        values, sizes = function(times.ravel())
+        times = edges[:-1, None] + half[:, None] * (nodes + 1.0)
+        weights = (half[:, None] * weights_of_panel).ravel()
+        values, scales = function(times.ravel())
         total = np.einsum("n,nma->ma", weights, values)
-        goal = tolerance * float(weights @ sizes)
+        goal = tolerance * float(weights @ scales)
         if last is not None:
             change = float(np.abs(total - last).max(initial=0.0))
         # Halving sixteen-point panels gains many digits: the change is the error of the coarser ones.
@@ -264,6 +267,6 @@ def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, t
             return total
         last = total
     raise AccuracyNotReached(
-        f"the derivative of the holonomy still changes by {change:.3g} rad where {goal:.3g} was asked; declare the "
+        f"the derivative of the holonomy still changes by {change:.3g} rad where {goal:.3g} is needed; declare the "
         "times where the variation jumps as breaks of the path, or loosen the tolerance"
     )

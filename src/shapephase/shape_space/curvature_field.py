@@ -62,8 +62,8 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
     columns, slopes = connection_slopes(body, places)
     crossed = np.cross(columns[..., :, None, :], columns[..., None, :, :])
     defect = np.linalg.norm(slopes - np.swapaxes(slopes, -2, -3) - crossed, axis=-1)
-    slope, size = np.linalg.norm(slopes, axis=-1), np.linalg.norm(columns, axis=-1)
-    terms = slope + np.swapaxes(slope, -1, -2) + size[..., :, None] * size[..., None, :]
+    slope, norm = np.linalg.norm(slopes, axis=-1), np.linalg.norm(columns, axis=-1)
+    terms = slope + np.swapaxes(slope, -1, -2) + norm[..., :, None] * norm[..., None, :]
     return bool(np.all(defect <= goal * terms + _rounding_of_slopes(body, places)))
 
 
@@ -205,11 +205,11 @@ class _Cone:
             block = max(1, _ROWS // pieces)
             blocks = [rough[k : k + block] for k in range(0, len(rough), block)]
             parts = [self._on_pieces(pieces, times[rows], arms[rows], rates[rows]) for rows in blocks]
-            density, lift, size = (np.concatenate(part) for part in zip(*parts, strict=True))
+            density, lift, scale = (np.concatenate(part) for part in zip(*parts, strict=True))
             change = self._route.duration * np.linalg.norm(density - densities[rough], axis=-1)
             change = np.maximum(change, np.abs(lift - lifts[rough]).max(axis=(-1, -2)))
             densities[rough], lifts[rough] = density, lift
-            rounding = 8.0 * _EPS * (1.0 + self._route.duration * size)
+            rounding = 8.0 * _EPS * (1.0 + self._route.duration * scale)
             good = change <= np.maximum(_SHARE * self._tolerance, rounding)
             self.worst = max(self.worst, float(change[good].max(initial=0.0)))
             if good.all():
@@ -217,12 +217,12 @@ class _Cone:
             rough, left = rough[~good], float(change[~good].max())
         raise AccuracyNotReached(
             f"the curvature along the ray from the centre to the shape at t = {times[rough[0]]:.9g} s still changes by "
-            f"{left:.3g} rad where {_SHARE * self._tolerance:.3g} was asked; loosen the tolerance or "
+            f"{left:.3g} rad where {_SHARE * self._tolerance:.3g} is needed; loosen the tolerance or "
             "choose another centre"
         )
 
     def _on_pieces(self, pieces: int, times: Array, arms: Array, rates: Array) -> tuple[Array, Array, Array]:
-        """a(t), T(1, t), and the size of what a(t) is the difference of, with 12 nodes on each piece of the rays."""
+        """a(t), T(1, t), and the magnitude of what a(t) is the difference of, 12 nodes on each piece of the rays."""
         nodes, weights, integrals = _collocation()
         along = ((np.arange(pieces)[:, None] + nodes) / pieces).ravel()
         shapes = self._centre + along[:, None] * arms[:, None]
@@ -230,7 +230,9 @@ class _Cone:
         flat = (len(times) * len(along), self._body.n_shape)
         places, outward, sideways = (part.reshape(flat) for part in (shapes, directions, changes))
         try:
-            field, turning, size = _curvature_along(self._body, places, outward, sideways, np.repeat(times, len(along)))
+            field, turning, scale = _curvature_along(
+                self._body, places, outward, sideways, np.repeat(times, len(along))
+            )
         except SingularInertiaError as error:
             raise SingularInertiaError(
                 f"on the ray from the centre to the shape of that time: {error}; or choose another centre"
@@ -248,13 +250,13 @@ class _Cone:
         for piece in range(pieces):
             density += so3.apply(lift, by_piece[:, piece])
             lift = lift @ whole[:, piece]
-        return density, lift, size.reshape(len(times), -1).mean(axis=1)
+        return density, lift, scale.reshape(len(times), -1).mean(axis=1)
 
 
 def _curvature_along(
     body: Body, shapes: Array, first: Array, second: Array, times: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """F(u, v) for two directions at each shape, A u, and the size of what F is the difference of.
+    """F(u, v) for two directions at each shape, A u, and the magnitude of what F is the difference of.
 
     (N, n) each -> (N, 3), (N, 3), (N,)
     """
@@ -265,8 +267,8 @@ def _curvature_along(
     onward = so3.apply(inverse, so3.apply(matrix_first, second) - so3.apply(inertia_first, turn_second))
     sideways = so3.apply(inverse, so3.apply(matrix_second, first) - so3.apply(inertia_second, turn_first))
     bracket = np.cross(turn_first, turn_second)
-    sizes = np.linalg.norm(np.stack([onward, sideways, bracket]), axis=-1)
-    return onward - sideways - bracket, turn_first, sizes.sum(axis=0)
+    norms = np.linalg.norm(np.stack([onward, sideways, bracket]), axis=-1)
+    return onward - sideways - bracket, turn_first, norms.sum(axis=0)
 
 
 @lru_cache(maxsize=1)

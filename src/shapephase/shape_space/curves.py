@@ -93,10 +93,12 @@ class Function:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
         shapes, rates = returned_pair(self.f(times))
-        wanted = (len(times), self.n_shape)
+        expected_shape = (len(times), self.n_shape)
         for name, part in (("shapes", shapes), ("rates", rates)):
-            if part.shape != wanted:
-                raise ShapeError(f"the path's function must return {name} {wanted} for these times, got {part.shape}")
+            if part.shape != expected_shape:
+                raise ShapeError(
+                    f"the path's function must return {name} {expected_shape} for these times, got {part.shape}"
+                )
             if not np.isfinite(part).all():
                 row = int(np.argwhere(~np.isfinite(part))[0, 0])
                 raise TrajectoryError(f"the path's function returned {name} that are not finite at {times[row]:.9g} s")
