@@ -189,6 +189,7 @@ class AssemblyDescription(UngaugedDescription):
     oscillations: float | None
     loops: int
     smooth_loop: bool
+    sparse: bool
 
     @property
     def mass(self) -> float:
@@ -239,7 +240,13 @@ class AssemblyDescription(UngaugedDescription):
 
     def smoothness(self, breaks: Array) -> Smoothness:
         """As `Description`."""
-        return Smoothness(breaks=breaks, oscillations=self.oscillations, loops=self.loops, smooth_loop=self.smooth_loop)
+        return Smoothness(
+            breaks=breaks,
+            oscillations=self.oscillations,
+            loops=self.loops,
+            smooth_loop=self.smooth_loop,
+            sparse=self.sparse,
+        )
 
 
 def rigid_part(
@@ -368,11 +375,16 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     together = len(loops) == 1
     swings = [path.oscillations and path.oscillations * (1 if together else path.loops) for path in paths]
     known = None if None in swings else max((swing for swing in swings if swing is not None), default=0.0)
-    smooth = all(path.smooth_loop for path in paths)
     count = loops.pop() if together else 1
-    still = np.zeros(3)
-    rough = AssemblyDescription(everything, still, known, count, smooth)
-    description = replace(rough, origin=rough.centre_of_mass(np.zeros(1))[0])
+    about_zero = AssemblyDescription(
+        parts=everything,
+        origin=np.zeros(3),
+        oscillations=known,
+        loops=count,
+        smooth_loop=all(path.smooth_loop for path in paths),
+        sparse=not together or any(path.sparse for path in paths),
+    )
+    description = replace(about_zero, origin=about_zero.centre_of_mass(np.zeros(1))[0])
     check_never_on_a_line(description.moment, breaks)
     gap = max((float(np.abs(path.gap).max()) for path in paths), default=0.0)
     closure = np.eye(3) if gap <= CLOSED else None

@@ -51,6 +51,7 @@ def sampler(
     oscillations: float | None = None,
     loops: int = 1,
     smooth_loop: bool = False,
+    sparse: bool = False,
     probe: Callable[[Array], Array] | None = None,
 ) -> Sampler:
     """The sampler that suits a deformation.
@@ -63,13 +64,18 @@ def sampler(
         None: unknown, then the interpolant is checked between the nodes
     loops : the interval is its first part, repeated this many times
     smooth_loop : that part ends smoothly where it starts and has no breaks
+    sparse : oscillations between none and the fastest are missing
     probe : a cheap stand-in for the deformation to check a black box, times (N,) -> (N, 2 n), shapes and then their
         rates; None: the deformation itself is evaluated
     """
     channels = Channels(evaluate)
-    ends = breaks[breaks <= breaks[-1] / loops * (1.0 + 1e-12)] if loops > 1 else breaks
+    period = float(breaks[-1]) / loops
     if smooth_loop and oscillations is not None:
-        return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations)
+        # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
+        if sparse:
+            return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe)
+        return LoopSampler(channels, period, loops, oscillations)
+    ends = breaks[breaks <= period * (1.0 + 1e-12)] if loops > 1 else breaks
     return PanelSampler(channels, ends, loops, oscillations, probe)
 
 

@@ -155,6 +155,7 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
         oscillations=route.oscillations,
         loops=route.loops,
         smooth_loop=route.smooth_loop,
+        sparse=route.sparse,
         probe=lambda times: np.concatenate(route.curve(times), axis=1),
     )
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)

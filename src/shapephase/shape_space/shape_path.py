@@ -40,6 +40,7 @@ class Smoothness:
     oscillations : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
     loops : the interval is its first part, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    sparse : whether harmonics below the highest are missing in a smooth loop
     probe : a cheap stand-in whose swings are those of the function, times (N,) -> (N, 2 n), shapes and then their
         rates; None: there is none
     """
@@ -48,6 +49,7 @@ class Smoothness:
     oscillations: float | None = None
     loops: int = 1
     smooth_loop: bool = False
+    sparse: bool = False
     probe: Callable[[Array], Array] | None = None
 
 
@@ -68,6 +70,7 @@ class ShapePath:
     oscillations : how often the path can swing between two breaks, an upper bound; None: unknown
     loops : the path is its first `duration / loops` seconds, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    sparse : whether harmonics below the highest are missing in a smooth loop
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     """
 
@@ -79,6 +82,7 @@ class ShapePath:
     oscillations: float | None = None
     loops: int = 1
     smooth_loop: bool = False
+    sparse: bool = False
     sha256: str | None = None
 
     @staticmethod
@@ -108,10 +112,21 @@ class ShapePath:
         for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
             check_reach(values, name)
         period = positive_argument(duration)
-        breaks = np.array([0.0, period])
-        names = _names(joint_names, len(middle))
-        curve = Fourier(middle, a, b, period)
-        return ShapePath(curve, period, breaks, len(middle), names, float(a.shape[1]), smooth_loop=True)
+        occupied = 1 + np.flatnonzero(np.any((a != 0.0) | (b != 0.0), axis=0))
+        # Harmonics that are all multiples of one number make a shorter loop, repeated.
+        loops = int(np.gcd.reduce(occupied)) if len(occupied) else 1
+        highest = int(occupied[-1]) // loops if len(occupied) else 0
+        return ShapePath(
+            Fourier(middle, a, b, period),
+            period,
+            breaks=np.array([0.0, period]),
+            n_shape=len(middle),
+            joint_names=_names(joint_names, len(middle)),
+            oscillations=float(highest),
+            loops=loops,
+            smooth_loop=True,
+            sparse=len(occupied) < highest,
+        )
 
     @staticmethod
     def spline(
@@ -205,6 +220,7 @@ class ShapePath:
             oscillations=self.oscillations,
             loops=self.loops,
             smooth_loop=self.smooth_loop,
+            sparse=self.sparse,
             probe=lambda times: np.concatenate(self.curve(times), axis=1),
         )
 
