@@ -24,7 +24,7 @@ CONSTANT, HARMONIC, GAUSSIAN, RAMP, BURST, BUMP = map(float, range(6))
 
 @dataclass(frozen=True)
 class Terms:
-    """A path as a sum of terms: rows of kind, coordinate, amplitude, centre [s], width [s], frequency [rad/s], phase."""
+    """A sum of terms: rows of kind, coordinate, amplitude, centre [s], width [s], frequency [rad/s], phase."""
 
     n_shape: int
     rows: np.ndarray
@@ -60,11 +60,15 @@ class Terms:
         return shapes, rates
 
 
+_NUMBERS = ("turn", "place", "axis", "slide", "mass", "centre", "inertia", "matrix", "offset")
+
+
 class _Body(ctypes.Structure):
     _fields_ = (
-        ("joints", ctypes.c_int), ("shapes", ctypes.c_int), ("parent", ctypes.c_void_p),
-        *((name, ctypes.c_void_p) for name in ("turn", "place", "axis", "slide", "mass", "centre", "inertia", "matrix", "offset")),
-    )  # fmt: skip
+        ("joints", ctypes.c_int),
+        ("shapes", ctypes.c_int),
+        *((name, ctypes.c_void_p) for name in ("parent", *_NUMBERS)),
+    )
 
 
 class _Path(ctypes.Structure):
@@ -100,7 +104,9 @@ class Truth:
         """
         terms, knots, series = _parts(path, self._n_shape)
         edges = np.ascontiguousarray(breaks, dtype=np.float64)
-        described = _Path(len(terms), len(series), max(len(knots) - 1, 0), terms.ctypes.data, knots.ctypes.data, series.ctypes.data)
+        described = _Path(
+            len(terms), len(series), max(len(knots) - 1, 0), terms.ctypes.data, knots.ctypes.data, series.ctypes.data
+        )
         out = np.empty((len(times), 4), dtype=np.longdouble)
         start, when = (np.ascontiguousarray(part, dtype=np.float64) for part in (body_momentum, times))
         error = _library().attitudes(

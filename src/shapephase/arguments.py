@@ -23,6 +23,8 @@ _ASYMMETRY = 1e-9
 # The least ratio of two principal moments: below it the inverse has no correct digits left.
 _LEAST_MOMENT_RATIO = 1e-12
 
+_LARGEST_MOMENTUM = 1e100
+"""[kg m^2/s]; squares of larger ones overflow."""
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
 
@@ -161,6 +163,10 @@ def initial_state_arguments(momentum: ArrayLike, attitude: ArrayLike | None) -> 
     Without an attitude it is the identity. Raises ShapeError.
     """
     spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
+    if spatial.size and np.abs(spatial).max() > _LARGEST_MOMENTUM:
+        raise ShapeError(
+            f"momentum: {np.abs(spatial).max():.3g} kg m^2/s; at most {_LARGEST_MOMENTUM:g} can be squared"
+        )
     if attitude is None:
         return spatial, np.broadcast_to(_IDENTITY, (*spatial.shape[:-1], 3, 3)) if spatial.ndim > 1 else _IDENTITY
     start = so3.rotation_argument(attitude, "attitude")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from importlib import import_module
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
+from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
 from shapephase.integrator.integrate import SteppedRotation, stepped_rotation
 from shapephase.integrator.sampling import Sampler
 from support.independent import (
@@ -288,6 +289,7 @@ def test_arguments_are_left_as_they_were():
         ({"attitude": np.eye(2)}, ShapeError, r"attitude: expected shape \(..., 3, 3\)"),
         ({"attitude": 1.1 * np.eye(3)}, ShapeError, "attitude: not a rotation"),
         ({"attitude": np.diag([1.0, 1.0, -1.0])}, ShapeError, "reflection"),
+        ({"momentum": [0.0, 1e200, 0.0]}, ShapeError, "at most 1e\\+100"),
         ({"momentum": np.ones((2, 3)), "attitude": np.tile(np.eye(3), (3, 1, 1))}, ShapeError, "do not broadcast"),
         ({"method": "euler"}, UnknownNameError, "'euler'.*auto, collocation, closed_form, dop853"),
         ({"tolerance": 1e-3}, ShapeError, "tolerance: a number from 1e-13 to 0.0001"),
@@ -366,3 +368,22 @@ def test_what_another_method_needs_of_the_integrator_is_integrated_once(monkeypa
         sp.running_phases(motion, 1.0, gauge)
     assert len(momenta) == 2
     assert momenta[1] == 0.0
+
+
+@pytest.mark.parametrize("magnitude", [1e6, 1e9, 1e99])
+def test_more_turns_than_can_be_stepped_are_refused_before_memory_is_taken(magnitude):
+    """The number of turns is known from the samples: the largest rate of turning times the duration bounds it."""
+    body = sp.load_body("cat")
+    path = random_loop(1, body.n_shape).path
+    deformation = sp.articulated(body, path)
+    tracemalloc.start()
+    try:
+        with pytest.raises(AccuracyNotReached, match=r"turns up to (.*) times in 2 s, .* shorten the motion") as raised:
+            sp.reconstruct(deformation, [0.0, 0.0, magnitude])
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    turns = float(str(raised.value).split("up to ")[1].split()[0])
+    least = np.linalg.eigvalsh(deformation.inertia(np.linspace(0.0, 2.0, 50))).min(axis=-1)
+    assert 0.3 <= turns / (magnitude * np.mean(1.0 / least) * 2.0 / (2.0 * np.pi)) <= 3.0
+    assert most < 50e6

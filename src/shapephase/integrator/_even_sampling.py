@@ -9,7 +9,15 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..chebyshev import unit_nodes, values_to_coefficients
-from ._spectral_error import EPS, Channels, estimate_tail, fourier_norms, unaveraged_share
+from ._spectral_error import (
+    EPS,
+    Channels,
+    TailEstimate,
+    estimate_tail,
+    fourier_norms,
+    spectral_norms,
+    unaveraged_share,
+)
 from .interpolant import Interpolant
 
 # Samples of a loop, beyond which panels need fewer.
@@ -20,6 +28,12 @@ _FIRST_COUNTS = ((1e-8, 64), (1e-11, 96), (0.0, 128))
 _HARMONICS = 4
 # Samples of the loop on each panel of the interpolant.
 _SAMPLES_A_PANEL = 16
+# Times, as shares of the loop, at which the series is compared with the deformation itself: never nodes, and spread.
+_TEST_SHARES = np.mod(0.2137 + 0.6180339887498949 * np.arange(3), 1.0)
+# The error between the nodes may be this many times what those few times show.
+_UNSEEN_BETWEEN = 2.0
+# Rounding of a sample may be this many times the floor of the spectrum, where it averages out.
+_ROUNDING_OF_TESTS = 4.0
 # Of the interpolant's panels: a Fourier series resolved by 16 samples is a Chebyshev series of this degree to rounding.
 _PANEL_DEGREE = 32
 
@@ -30,19 +44,23 @@ class EvenSampler:
     def __init__(self, channels: Channels, period: float, loops: int, oscillations: float) -> None:
         self._channels, self._period, self._loops, self._oscillations = channels, period, loops, oscillations
         self._values = np.empty((0, 9))
+        self._tests = np.empty((0, 9))
 
     def refine(self, momentum: float, tolerance: float) -> bool:
         """As `Sampler.refine`; False where that would take too many samples."""
         if not len(self._values):
             count = self._first_count(tolerance)
-            self._take(self._channels(self._times(np.arange(count), count)))
+            tests = _TEST_SHARES * self._period if count > 1 else np.empty(0)
+            values = self._channels(np.concatenate([self._times(np.arange(count), count), tests]))
+            self._tests = values[count:]
+            self._take(values[:count])
         while (error := self.error(momentum)) > tolerance and not self._at_rounding:
             count = len(self._values)
             missing = log(error / tolerance) / self._decay if self._decay > 0.0 else inf
             # Twice, three or four times as many samples, whichever is enough for this decay.
             factor = 2 if missing <= 0.55 * count else 3 if missing <= 1.1 * count else 4
             if factor * count > _MOST_SAMPLES:
-                return self._decay == inf
+                return self._decay == inf and not self._has_gaps
             index = np.arange(factor * count)
             fresh = index[index % factor != 0]
             values = np.empty((factor * count, 9))
@@ -62,7 +80,10 @@ class EvenSampler:
         inverse, drift = self._tails
         turn = self._period * (momentum * inverse.largest + drift.largest)
         share = unaveraged_share(inverse.converging and drift.converging, pi * len(self._values), turn)
-        return self._loops * 0.5 * self._period * (momentum * inverse.error + drift.error) * share
+        by_tails = (momentum * inverse.error + drift.error) * share
+        # What the tails cannot explain is no missing oscillation that averages out.
+        seen = momentum * _unexplained(self._gaps[0], inverse) + _unexplained(self._gaps[1], drift)
+        return self._loops * 0.5 * self._period * (by_tails + seen)
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
@@ -83,6 +104,10 @@ class EvenSampler:
     def _take(self, values: Array) -> None:
         self._values = values
         self._tails = [estimate_tail(norms, 2.0 * pi * EPS) for norms in fourier_norms(values)]
+        self._gaps = [0.0, 0.0]
+        if len(self._tests):
+            between = _even_to_shares(len(values)) @ values
+            self._gaps = (_UNSEEN_BETWEEN * spectral_norms(between - self._tests).max(axis=0)).tolist()
 
     @property
     def _decay(self) -> float:
@@ -90,7 +115,32 @@ class EvenSampler:
 
     @property
     def _at_rounding(self) -> bool:
-        return all(tail.at_rounding for tail in self._tails)
+        return all(tail.at_rounding for tail in self._tails) and not self._has_gaps
+
+    @property
+    def _has_gaps(self) -> bool:
+        """Whether the series misses, between the nodes, what its spectrum does not show."""
+        return any(_unexplained(gap, tail) for gap, tail in zip(self._gaps, self._tails, strict=True))
+
+
+def _unexplained(gap: float, tail: TailEstimate) -> float:
+    """The part of an error seen between the nodes that neither the tail of the spectrum nor rounding expects."""
+    return gap if gap > tail.error + _ROUNDING_OF_TESTS * tail.floor else 0.0
+
+
+@lru_cache(maxsize=32)
+def _even_to_shares(count: int) -> Array:
+    """Samples at `count` even times of a period -> values at `_TEST_SHARES` of it: (3, count)."""
+    return _periodic_sinc(2.0 * np.pi * (_TEST_SHARES[:, None] - np.arange(count) / count), count)
+
+
+def _periodic_sinc(angle: Array, count: int) -> Array:
+    """The sum of cos(k angle) for |k| < count/2 plus half the last term, over `count` (even): the shape of angle."""
+    half = count // 2
+    kernel = np.ones_like(angle)
+    for k in range(1, half):
+        kernel += 2.0 * np.cos(k * angle)
+    return (kernel + np.cos(half * angle)) / count
 
 
 @lru_cache(maxsize=32)
@@ -103,10 +153,4 @@ def _even_to_panel(count: int, panels: int, degree: int) -> Array:
         return np.ones((1, 1))
     phase = (2.0 * np.pi / panels) * (0.5 + 0.5 * unit_nodes(degree))
     angle = phase[:, None] - 2.0 * np.pi / count * np.arange(count)
-    half = count // 2
-    # The periodic sinc, sum of cos(k angle) for |k| < half plus half the last term.
-    kernel = np.ones_like(angle)
-    for k in range(1, half):
-        kernel += 2.0 * np.cos(k * angle)
-    kernel = (kernel + np.cos(half * angle)) / count
-    return values_to_coefficients(degree) @ kernel
+    return values_to_coefficients(degree) @ _periodic_sinc(angle, count)

@@ -82,6 +82,7 @@ class TailEstimate(NamedTuple):
     converging: bool
     at_rounding: bool
     largest: float
+    floor: float  # what rounding alone leaves
 
 
 def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
@@ -89,7 +90,9 @@ def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
     degree = len(norms) - 1
     largest = max(norms)
     if degree == 0:
-        return TailEstimate(error=0.0, decay=inf, converging=True, at_rounding=True, largest=largest)
+        return TailEstimate(
+            error=0.0, decay=inf, converging=True, at_rounding=True, largest=largest, floor=EPS * largest
+        )
     # The largest of a window: single coefficients are small by chance, or by the symmetry of a motion.
     tail, middle = max(norms[-max(2, degree // 10) :]), max(norms[degree // 2 - 1 : degree // 2 + 2])
     floor = _ROUNDING * largest + 4.0 * time_rounding * sum(map(mul, norms, range(degree + 1)))
@@ -103,6 +106,7 @@ def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
         # More samples of a loop cost little, and only they show what is truly rounding.
         at_rounding=tail <= 0.05 * floor,
         largest=largest,
+        floor=floor,
     )
 
 

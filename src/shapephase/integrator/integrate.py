@@ -314,7 +314,10 @@ class _Integration:
             planned = requirements.first_plan(margin * self._tolerance)
         else:
             planned = carried_over(interpolant, *self._refined)
-        many = interpolant.loops * np.maximum(planned, least).sum() > _MANY_STEPS
+        count = interpolant.loops * float(np.maximum(planned, least).sum())
+        if count > _MOST_STEPS:
+            raise _too_many_steps(count, requirements.whole_turn, interpolant)
+        many = count > _MANY_STEPS
         if self._largest > 0.0 and self._error_growth is None and (many or (requirements.far and not short)):
             self._error_growth = _error_growth_by_derivative(interpolant, self._momentum, self._magnitudes)
             # The errors of so many steps add up and are amplified: each must be that much smaller.
@@ -352,6 +355,16 @@ class _Integration:
         """Whether rounding alone takes up the tolerance."""
         rounding = attempt.rotation.rounding_error
         return attempt.is_informative and bool(np.any(rounding > _MOST_ROUNDING * self._tolerance))
+
+
+def _too_many_steps(count: float, turn: float, interpolant: Interpolant) -> AccuracyNotReached:
+    """The error of a motion that would take more steps than are taken, raised before any memory is."""
+    turns = turn / (2.0 * np.pi)
+    return AccuracyNotReached(
+        f"the body turns up to {turns:.3g} times in {interpolant.edges[-1]:.6g} s, which takes some {count:.3g} steps; "
+        f"at most {_MOST_STEPS} are taken, enough for about {turns * _MOST_STEPS / count:.3g} turns: shorten the "
+        "motion, or lower the momentum"
+    )
 
 
 def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
