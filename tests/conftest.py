@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 
 # The workers share the cores: threads of their own would get in each other's way.
@@ -13,6 +14,16 @@ import pytest
 import shapephase as sp
 from support.bodies import BODIES
 from support.browser import chromium  # noqa: F401 (a fixture)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect the tests without looking for garbage: millions of new objects, nearly all of which stay."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.fixture(scope="session", params=BODIES)
