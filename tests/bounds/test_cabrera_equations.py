@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.deformation._physical_validity import line_measure
 from shapephase.deformation.assemblies import assembly, boom, moving_mass, rigid_part
-from shapephase.deformation.physical_validity import line_measure
 from shapephase.errors import SingularInertiaError
 from shapephase.inertia_tensor import principal_axes, second_moment, triangle_defect
 from shapephase.rigid_body.euler_top import EulerTop

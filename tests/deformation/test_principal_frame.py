@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.deformation.principal_frame import principal_frames
+from shapephase.deformation._principal_frame import principal_frames
 from shapephase.errors import GaugeError
 from support.bodies import joint, link, random_loop, urdf
 

@@ -225,14 +225,14 @@ def test_all_three_kinds_occur():
 def test_a_finer_search_finds_no_more(name: str, monkeypatch: pytest.MonkeyPatch):
     found = points_of(name)
     monkeypatch.setattr("shapephase.phases.return_map._STARTS", (2562,))
-    monkeypatch.setattr("shapephase.phases.fixed_point_search._SAFETY_FACTOR", 6.0)
+    monkeypatch.setattr("shapephase.phases._fixed_point_search._SAFETY_FACTOR", 6.0)
     again = fixed_points(deformation_of(name), SIZES[name])
     np.testing.assert_allclose(again.directions, found.directions, rtol=0, atol=1e-9)
 
 
 def test_a_search_that_missed_some_is_done_again(monkeypatch: pytest.MonkeyPatch):
     for name, value in {"_SAFETY_FACTOR": 0.0, "_BEND": 10.0, "_WIDE": 10.0}.items():
-        monkeypatch.setattr(f"shapephase.phases.fixed_point_search.{name}", value)
+        monkeypatch.setattr(f"shapephase.phases._fixed_point_search.{name}", value)
     monkeypatch.setattr("shapephase.phases.return_map._STARTS", (8,))
     missed = fixed_points(deformation_of("cat"), SIZES["cat"])
     assert missed.index_sum != 2

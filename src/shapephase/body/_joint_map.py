@@ -11,7 +11,8 @@ from ..arrays import Array
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
 
-_BASE = 6  # velocities of the free-flyer in Pinocchio's order
+# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
+_BASE = 6
 
 
 class JointMap:

@@ -48,6 +48,7 @@ _NEUTRAL = {
     "alignfree": ("false",),
     "coordinate": ("local",),
 }
+# Attributes that are read of each element: one that is nearly spelt like them is taken for a slip and refused.
 _FRAME_READ = ("name", "childclass", "pos", *ORIENTATIONS)
 _BODY_READ = ("name", "childclass", "pos", "mocap", *ORIENTATIONS)
 _JOINT_READ = ("name", "class", "type", "pos", "axis", "range", "limited", "ref")

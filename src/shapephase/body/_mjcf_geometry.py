@@ -13,7 +13,9 @@ from ._link_tree import LEAST_MASS, MOST_MASS
 from ._xml_text import Node, number, numbers, quoted, vector
 
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+# How many numbers the size of each kind of geom has in MJCF.
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "box": 3, "ellipsoid": 3}
+# Kinds of geom that `fromto` can place.
 _LONG = ("capsule", "cylinder", "box", "ellipsoid")
 _DENSITY = "1000"
 """MuJoCo's density of a geom that states none [kg/m^3]: that of water."""

@@ -14,6 +14,7 @@ from ..arrays import Array
 from ..errors import ModelFileError
 from ._link_tree import Link, LinkTree, Mimic, inertia_warnings
 
+# Name of the joint that lets the base move: no file is likely to have one of this name.
 _ROOT = "shapephase_free_flyer"
 
 

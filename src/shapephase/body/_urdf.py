@@ -33,7 +33,8 @@ _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _ROBOT_PARTS = ("link", "joint")
 _LINK_PARTS = ("inertial", "visual", "collision")
 _JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
-_NONE = np.zeros(3)
+# The offset of an <origin> that states none [m].
+_NO_OFFSET = np.zeros(3)
 _FORMATS = {
     "sdf": "an SDF model; convert it to URDF first (sdf2urdf of the ROS package pysdf)",
     "html": "an HTML page, not the file itself; download the raw file",
@@ -183,7 +184,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
-    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NONE, limits)
+    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits)
 
 
 def _limits(node: Node, kind: str, owner: str) -> tuple[float, float]:
@@ -200,13 +201,13 @@ def _origin(node: Node, owner: str) -> tuple[Array, Array, str]:
     """Place, rotation and the element written anew."""
     origin = child_of(node, "origin", owner)
     if origin is None:
-        return _NONE, np.eye(3), ""
+        return _NO_OFFSET, np.eye(3), ""
     known_attributes(origin, ("xyz", "rpy"), owner)
     parts = {key: vector(origin, key, owner) for key in ("xyz", "rpy") if origin.get(key) is not None}
     written = " ".join(f'{key}="{_text(values)}"' for key, values in parts.items())
     rpy = parts.get("rpy")
     turn = np.eye(3) if rpy is None or not any(rpy) else rpy_matrix(np.array(rpy))
-    return np.array(parts.get("xyz", _NONE)), turn, f"<origin {written}/>"
+    return np.array(parts.get("xyz", _NO_OFFSET)), turn, f"<origin {written}/>"
 
 
 def _text(values: list[float]) -> str:

@@ -23,7 +23,8 @@ from ._joint_map import JointMap
 from ._link_tree import Mimic
 from .joint_chain import joint_chain
 
-_BASE = 6  # velocities of the free-flyer in Pinocchio's order
+# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
+_BASE = 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,8 @@ from ..arrays import Array
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
 
-_BASE = 1  # Pinocchio's number of the free-flyer
+# Pinocchio's number of the free-flyer: joint 0 is the universe.
+_BASE = 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+# [s] Work that takes longer shows a progress bar; what is done sooner leaves the terminal alone.
 _PATIENCE = 1.0
 
 

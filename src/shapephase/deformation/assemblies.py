@@ -17,9 +17,9 @@ from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from ..inertia_tensor import second_moment
 from ..shape_space.shape_path import CLOSED, ShapePath, Smoothness
+from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of
-from .physical_validity import check_never_on_a_line, check_triangle, least_over
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import Sampler, sampler
 from ..shape_space.body_path import path_gap
 from ..shape_space.shape_path import CLOSED, ShapePath
+from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from .descriptions import (
     ArticulatedDescription,
     Description,
@@ -26,7 +27,6 @@ from .descriptions import (
     RigidDescription,
     SampledDescription,
 )
-from .physical_validity import check_never_on_a_line, check_triangle, least_over
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
 from ..shape_space.shape_path import ShapePath, Smoothness
-from .physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
+from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 
 
 class Description(Protocol):

@@ -19,16 +19,17 @@ from ..chebyshev import PiecewiseChebyshev, inside, nodes_on, values_to_coeffici
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import sampler
+from ._principal_frame import Frames, principal_frames
 from .deformation import Deformation
-from .principal_frame import Frames, principal_frames
 
+# A gauge that is named so is the frame of a link: "link:torso".
 _LINK = "link:"
 _LIFT_TOLERANCE = 1e-12
 """[rad]; tighter than any motion that is seen from these frames."""
 _PIECES = 4
-"""Panels between two breaks, to begin with."""
+"""Panels between two breaks, to begin with: each is halved until the series on it converge."""
 _DEGREE = 16
-"""Of the Chebyshev series of U on a panel."""
+"""Of the Chebyshev series of U on a panel: of a smooth U it leaves rounding on a few panels."""
 _SHORTEST = 1e-4
 """The shortest panel, relative to the time between two breaks: below it differences lose too many digits."""
 

@@ -15,7 +15,9 @@ from ..errors import GaugeError
 from ..integrator.integrate import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 
+# Memory and time: a frame that needs more steps along the motion is refused.
 _MOST_STEPS = 20_000
+# Halvings of a step that passes by the point opposite the reference: then it is as short as times can tell apart.
 _HALVINGS = 30
 
 Gauge = str | Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]

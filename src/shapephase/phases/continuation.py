@@ -12,8 +12,9 @@ from ..arguments import direction_argument, magnitudes_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, TrajectoryError
-from .loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
+from ._loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
 
+# The inertial direction of the momentum.
 _UP = np.array([0.0, 0.0, 1.0])
 # [rad] The direction moves by this at most from one orbit to the next, so that Newton's method stays with it.
 _LARGEST_STEP = 0.1

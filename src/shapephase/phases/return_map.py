@@ -20,13 +20,18 @@ from ..deformation.deformation import Deformation
 from ..errors import ShapeError
 from ..integrator.integrate import SteppedRotation
 from ..reconstruction.reconstruction import Motion, reconstruct
-from .fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
-from .loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
+from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
+from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
 
+# The inertial direction of the momentum: the attitudes of `closed_orbits` are chosen for it.
 _UP = np.array([0.0, 0.0, 1.0])
+# Sum of the indices of all fixed points: the Lefschetz number of a map of the sphere that deforms to the identity.
 _LEFSCHETZ = 2
+# Directions that the search starts from, finer each time that the indices do not add up.
 _STARTS = (162, 642, 2562)
+# The least `most_directions`: with fewer even the first search would end before its cells are small.
 _FEWEST_DIRECTIONS = 1000
+# [rad] Fixed points nearer than this are one: far above what Newton's method leaves, far below their usual distance.
 _SAME = 1e-6
 
 

@@ -29,9 +29,13 @@ _SEED = 15
 _NO_LIMIT = 1e3
 # Rounding left no more than this of the curvature of 130 flat bodies.
 _ROUNDING = 16.0 * _EPS
+# Gauss nodes on each piece of a ray: twelve resolve it where the curvature swings about once.
 _NODES = 12
+# Pieces of a ray, tried in turn until the integral changes no more.
 _PIECES = (1, 2, 4, 8, 16, 32, 64)
+# Memory: rays, or pieces of rays, that are computed together.
 _ROWS = 2000
+# Of the tolerance: what the integral along one ray may contribute, so that the sum over the path keeps it.
 _SHARE = 0.01
 
 

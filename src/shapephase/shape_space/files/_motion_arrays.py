@@ -14,7 +14,9 @@ from ...arrays import Array, finite_array
 from ...errors import ShapeError, TrajectoryError
 from ._recording import MOST_BYTES, Recording, file_bytes, times_from_zero
 
+# Entries of a free joint in MuJoCo's qpos: a position and a quaternion.
 _FREE_JOINT = 7
+# Where the entries x, y, z, w stand in a quaternion that begins with its scalar part.
 _SCALAR_FIRST = [1, 2, 3, 0]
 
 

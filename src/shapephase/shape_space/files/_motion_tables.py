@@ -17,7 +17,9 @@ from ._recording import Recording, check_text, file_bytes, number, plain_numbers
 
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons"}
 _END = "endheader"
+# Lines of an OpenSim header: files have a dozen; more is another kind of file.
 _MOST_HEADER_LINES = 1000
+# Memory: lines of a table, more than an hour at 500 samples a second.
 _MOST_LINES = 2_000_000
 # SIMM's older words for what OpenSim calls nRows and nColumns.
 _COUNTS = {"nrows": "rows", "datarows": "rows", "ncolumns": "columns", "datacolumns": "columns"}

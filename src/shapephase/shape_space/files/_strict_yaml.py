@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 
 from ...errors import MissingExtraError, TrajectoryError
 
+# Lists and mappings inside each other: a ROS message nests half as many.
 _MOST_DEPTH = 16
+# Memory: events of the parser, about one for each value.
 _MOST_ENTRIES = 2_000_000
 
 

@@ -34,14 +34,19 @@ _DIAGONAL = 2e-14
 NEARLY_DIAGONAL = 2e-12
 # Part of the trace: moments nearer than that are equal, a few thousand roundings.
 EQUAL = 4e-13
+# Weight, beside certain values, with which the first coefficient is drawn to zero; of the last one it is 1e14 times it.
 _ROUNDING = 1e-16
 # [rad] in a loop: axes that turn faster are said to jump.
 _FASTEST = 2e8
-# Kinds of panels: all moments apart, two equal, all equal.
+# Kind of a panel on which all moments are apart.
 SEPARATE = 0
+# Kind of a panel on which two moments are equal.
 SYMMETRIC = 1
+# Kind of a panel on which all moments are equal.
 SPHERICAL = 2
-_STILL = np.array([0.0, 0.0, 0.0, 1.0])
+# The quaternion xyzw of no turn.
+_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
+# The third axis: the distinct one of a panel with two equal moments.
 _THIRD = np.array([0.0, 0.0, 1.0])
 
 
@@ -128,7 +133,7 @@ def _fitted(deformation: Deformation, left: Array, right: Array) -> tuple[AxisPa
     kind = np.where(np.all(np.minimum(low, high) <= EQUAL, axis=-1), SYMMETRIC, SEPARATE)
     kind[np.all(low + high <= EQUAL, axis=-1)] = SPHERICAL
     series = np.zeros((len(left), COUNT, 4))
-    series[:, 0] = _STILL
+    series[:, 0] = _NO_TURN
     for which, at_nodes in ((SEPARATE, _separate_axes), (SYMMETRIC, _distinct_axis)):
         rows = kind == which
         if rows.any():

@@ -18,7 +18,7 @@ from .. import so3
 from ..arrays import Array
 from ..chebyshev import PiecewiseChebyshev, chebyshev, exact_local_coordinate
 from ..errors import GaugeError
-from .axis_panels import (
+from ._axis_panels import (
     COUNT,
     EQUAL,
     NEARLY_DIAGONAL,
@@ -42,13 +42,21 @@ from .deformation import Deformation
 
 Frames = Callable[[Array], tuple[Array, Array]]
 
+# Panels that a loop begins with, at least: each is halved until its polynomials fit.
 _PANELS_OF_A_LOOP = 4
-_INTERVAL = 1e-4  # part of a loop; moments that are equal for less than that meet at an instant
-_AT_JOINTS = 1e-11  # part of the trace; entries off the diagonal that are let pass where panels meet
-_SLOPPY = 1e-7  # the largest jump of the inertia, per trace, that is laid to inexact data
-_JUMP = 0.1  # [rad]
+# Part of a loop: moments that are equal for less than that meet at an instant.
+_INTERVAL = 1e-4
+# Part of the trace: entries off the diagonal that are accepted where panels meet, where their polynomials are worst.
+_AT_JOINTS = 1e-11
+# Part of the trace: a jump of the inertia up to this is taken for inexact data, as of a loop read from a file.
+_SLOPPY = 1e-7
+# [rad] Neighbouring panels further apart than that are not joined: the axes jump there.
+_JUMP = 0.1
+# Points of a panel in [-1, 1] at which another loop is compared with the first: apart from nodes and from symmetry.
 _SPOT_CHECKS = np.array([-0.91, -0.43, 0.17, 0.71])
-_STILL = np.array([0.0, 0.0, 0.0, 1.0])
+# The quaternion xyzw of no turn.
+_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
+# The third axis: the distinct one of panels with two equal moments.
 _THIRD = np.array([0.0, 0.0, 1.0])
 
 
@@ -171,7 +179,7 @@ class _Orientation:
 
     def __init__(self, panels: AxisPanels, shortest: float) -> None:
         self._panels, self._shortest = panels, shortest
-        self.turns = np.tile(_STILL, (len(panels.left), 1))
+        self.turns = np.tile(_NO_TURN, (len(panels.left), 1))
         self.spins: list[tuple[_Stretch, Array]] = []
         self.freedom = _Freedom(int(panels.kind[0]), _THIRD)
         self._stretches: list[_Stretch] = []
@@ -325,7 +333,7 @@ def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
     if freedom.kind == SPHERICAL:
         return so3.quat_inverse(start)
     if freedom.kind == SEPARATE:
-        return _STILL
+        return _NO_TURN
     axes = so3.matrix_from_quat(start)
     distinct = freedom.axis @ axes
     farthest = np.eye(3)[np.argmin(np.round(np.abs(distinct), 9))]
@@ -338,7 +346,7 @@ def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
 def _labels_at_start(deformation: Deformation, panels: AxisPanels, freedom: _Freedom) -> Array:
     """The one of the 24 turns from the left that names the axes at t = 0 by the rule of `principal_frames`: (4,)."""
     if freedom.kind == SPHERICAL:
-        return _STILL
+        return _NO_TURN
     times = np.append(0.0, deformation.duration * 2.0 ** np.arange(-45.0, 0.5))
     frames, _ = _track(panels)(times)
     moments = np.einsum("tij,tjk,tik->ti", frames, deformation.inertia(times), frames)

@@ -7,7 +7,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers, Mask
 from ..sphere import fibonacci_directions
-from .loop_map import MomentumLoop, tangent_basis
+from ._loop_map import MomentumLoop, tangent_basis
 
 # [rad] Cells narrower than this are not divided: Newton's method starts from them as they are.
 _SMALLEST_CELL = 0.002
@@ -15,8 +15,10 @@ _SMALLEST_CELL = 0.002
 _MANY_SMALL_CELLS = 300
 # Newton's method starts from this many directions at most.
 _MOST_STARTS = 1000
+# [rad] Tolerance of the loops run while searching: cells are far wider, and Newton's method ends with exact runs.
 SEARCH_TOLERANCE = 1e-6
-FAMILY_SPACING = 0.3  # of points taken of a curve of fixed points [rad]
+# [rad] Distance of the points that represent a curve of fixed points: about twenty along a great circle.
+FAMILY_SPACING = 0.3
 # A cell is all but linear when its sides bend by less than this share of its width.
 _BEND = 0.06
 # Where the midpoints show how much the sides bend, this many times as much is allowed for.

@@ -14,6 +14,7 @@ from ..errors import OpenPathError
 from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.sampling import Sampler
 
+# Memory: directions that are run through the loop together.
 _ROWS_AT_ONCE = 2048
 
 
