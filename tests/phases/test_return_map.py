@@ -15,9 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 import shapephase as sp
-from shapephase.errors import OpenPathError, ShapeError, TrajectoryError
+from shapephase import so3
+from shapephase.errors import AccuracyNotReached, OpenPathError, ShapeError, TrajectoryError
+from shapephase.phases._loop_map import MomentumLoop
 from shapephase.phases.continuation import continued_orbits
-from shapephase.phases.return_map import FixedPoints, fixed_points, stroboscopic_map
+from shapephase.phases.return_map import FixedPoints, _first_reachable, fixed_points, stroboscopic_map
 from support.independent import (
     BODIES,
     apart,
@@ -620,3 +622,36 @@ def test_a_magnitude_is_one_number_above_zero(magnitude):
     for ask in (sp.closed_orbits, fixed_points):
         with pytest.raises(ShapeError, match="magnitude"):
             ask(deformation_of("cat_two_halves"), magnitude)
+
+
+@pytest.fixture(scope="module")
+def unstable():
+    """A loop along which errors grow some 300 times, and a magnitude of the momentum."""
+    body = sp.load_body("cat")
+    sines = np.random.default_rng(1).normal(size=(body.n_shape, 3)) * 0.3 / np.arange(1, 4)
+    path = sp.ShapePath.fourier(np.zeros(body.n_shape), 0.0 * sines, sines, 1.0)
+    return sp.articulated(body, path), 20.0 * np.trace(body.locked_inertia(np.zeros(body.n_shape))) / 3.0
+
+
+def test_along_an_unstable_loop_the_tolerance_is_what_can_be_met(unstable):
+    """1e-13 rad is out of reach; from a few starts, so that the search need not run."""
+    deformation, magnitude = unstable
+    starts = np.concatenate([np.eye(3), -np.eye(3)])
+    loop = MomentumLoop.of(deformation, 1e-13)
+    with pytest.raises(AccuracyNotReached):
+        _first_reachable(loop, (), magnitude, starts, exhausted=True)
+    found = _first_reachable(loop, (1e-12, 1e-11, 1e-10, 1e-9), magnitude, starts, exhausted=True)
+    assert 1e-13 < found.tolerance <= 1e-9
+
+
+@pytest.mark.full
+def test_fixed_points_of_an_unstable_loop_close_by_another_integrator(unstable):
+    deformation, magnitude = unstable
+    found = sp.fixed_points(deformation, magnitude, most_directions=1000)
+    assert found.tolerance > 1e-11
+    assert len(found.directions) >= 2
+    for direction, gap in zip(found.directions, found.gap, strict=True):
+        attitude = so3.between(direction, np.array([0.0, 0.0, 1.0]))
+        check = sp.reconstruct(deformation, [0.0, 0.0, magnitude], attitude, method="dop853", tolerance=1e-6)
+        end = check.body_momentum(1.0) / magnitude
+        assert so3.angle_between(end, direction) <= gap + float(check.error_estimate)

@@ -53,7 +53,7 @@ def orbits_command(
         found = fixed_points(seen, magnitude)
         upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
         work.begin("splitting")
-        moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=1e-11) for attitude in upright]
+        moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=found.tolerance) for attitude in upright]
         splits = [split(orbit, "base") for orbit in moved]
         holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
     result = (loaded, motion, gauge, found, found.directions @ seen.frame(0.0), splits)

@@ -87,7 +87,7 @@ def orbit_lines(
     certain = "all: their indices sum to 2" if found.complete else f"perhaps not all: indices sum to {found.index_sum}"
     lines = [
         f"{body.name} along {motion_name}, momentum {found.magnitude:g} kg m^2/s, {gauge} gauge: "
-        f"{len(splits)} closed orbits",
+        f"{len(splits)} closed orbits, attitudes to {found.tolerance:g} rad",
         certain,
         "",
         f"{'momentum at the start (base axes)':>36}{'index':>7}{'Montgomery [deg]':>20}{'dynamic':>14}{'geometric':>14}"
@@ -114,6 +114,7 @@ def orbit_data(
         "gauge": gauge,
         "complete": found.complete,
         "index_sum": found.index_sum,
+        "tolerance_rad": found.tolerance,
         "orbits": orbits,
     }
 

@@ -7,7 +7,8 @@ the shape.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +18,7 @@ from .. import so3
 from ..arguments import direction_argument, magnitude_argument
 from ..arrays import Array, Integers
 from ..deformation.deformation import Deformation
-from ..errors import ShapeError
+from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.integrate import SteppedRotation
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
@@ -25,6 +26,8 @@ from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tange
 
 # The inertial direction of the momentum: the attitudes of `closed_orbits` are chosen for it.
 _UP = np.array([0.0, 0.0, 1.0])
+# Tolerances [rad] tried one after the other where none is requested: points are then known to ten times as much.
+_REACHABLE = (1e-11, 1e-10, 1e-9, 1e-8)
 # Sum of the indices of all fixed points: the Lefschetz number of a map of the sphere that deforms to the identity.
 _LEFSCHETZ = 2
 # Directions that the search starts from, finer each time that the indices do not add up.
@@ -90,6 +93,7 @@ class FixedPoints:
     gap : (m,) angle between u(T) and u(0) [rad]
     index_sum : of the indices; 2 for every loop and magnitude when none is missing
     complete : whether the indices sum to 2, none is 0, and the search left no part of the sphere out
+    tolerance : of the attitudes by which they were found [rad]
     """
 
     magnitude: float
@@ -100,6 +104,7 @@ class FixedPoints:
     gap: Array
     index_sum: int
     complete: bool
+    tolerance: float
 
 
 def stroboscopic_map(
@@ -130,7 +135,7 @@ def stroboscopic_map(
 
 
 def fixed_points(
-    deformation: Deformation, magnitude: float, *, tolerance: float = 1e-11, most_directions: int = 100_000
+    deformation: Deformation, magnitude: float, *, tolerance: float | None = None, most_directions: int = 100_000
 ) -> FixedPoints:
     """Directions of the body momentum that close together with the shape, as many as a search finds.
 
@@ -148,7 +153,8 @@ def fixed_points(
     Parameters
     ----------
     magnitude : of the angular momentum, above 0 [kg m^2/s]
-    tolerance : of the attitude [rad]
+    tolerance : of the attitude [rad]; None: 1e-11, or where errors grow too much along the loop for that, the first of
+        1e-10, 1e-9 and 1e-8 that can be met; `FixedPoints.tolerance` says which
     most_directions : 1000 or more at which the map is evaluated, in each of the three searches; about ten seconds
         for 100 000
 
@@ -164,18 +170,31 @@ def fixed_points(
     magnitude = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
         raise ShapeError(f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {most_directions!r}")
-    loop = MomentumLoop.of(deformation, tolerance)
+    loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance)
+    looser = _REACHABLE[1:] if tolerance is None else ()
     starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)
-    found = _fixed_points_from(loop, magnitude, starts, exhausted=exhausted)
+    found = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
     for count in _STARTS[1:]:
         if found.index_sum == _LEFSCHETZ or not found.index.all() or exhausted:
             break
         starts, exhausted = search(loop, magnitude, count, most_directions)
-        found = _fixed_points_from(loop, magnitude, np.concatenate([found.directions, starts]), exhausted=exhausted)
+        starts = np.concatenate([found.directions, starts])
+        found = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
     return found
 
 
-def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: float = 1e-11) -> list[Motion]:
+def _first_reachable(
+    loop: MomentumLoop, looser: tuple[float, ...], magnitude: float, starts: Array, *, exhausted: bool
+) -> FixedPoints:
+    """The fixed points to the loop's tolerance, or to the first of the looser ones that can be met."""
+    for goal in looser:
+        with contextlib.suppress(AccuracyNotReached):
+            return _fixed_points_from(loop, magnitude, starts, exhausted=exhausted)
+        loop = replace(loop, goal=goal)
+    return _fixed_points_from(loop, magnitude, starts, exhausted=exhausted)
+
+
+def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: float | None = None) -> list[Motion]:
     """Motions (momentum along inertial z) whose body momentum closes in this deformation's gauge with the shape.
 
     The motions at the `fixed_points`, in their order, the highest first. Every loop and magnitude has at least two
@@ -184,7 +203,7 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     Parameters
     ----------
     magnitude : of the angular momentum, above 0 [kg m^2/s]
-    tolerance : of each motion's attitude [rad]
+    tolerance : of each motion's attitude [rad]; None: as for `fixed_points`; `Motion.tolerance` says which
 
     Raises
     ------
@@ -193,7 +212,7 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     """
     found = fixed_points(deformation, magnitude, tolerance=tolerance)
     momentum, attitudes = found.magnitude * _UP, _attitude_of(found.directions)
-    return [reconstruct(deformation, momentum, attitude, tolerance=tolerance) for attitude in attitudes]
+    return [reconstruct(deformation, momentum, attitude, tolerance=found.tolerance) for attitude in attitudes]
 
 
 def _attitude_of(direction: Array) -> Array:
@@ -227,6 +246,7 @@ def _fixed_points_from(loop: MomentumLoop, magnitude: float, starts: Array, *, e
         gap=closed.gap,
         index_sum=total,
         complete=total == _LEFSCHETZ and bool(index.all()) and not exhausted,
+        tolerance=loop.goal,
     )
 
 
