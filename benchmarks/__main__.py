@@ -4,7 +4,8 @@ For every case and tolerance: `reconstruct` as anybody calls it, against SciPy's
 body computed by Pinocchio (once with a right-hand side without waste, once as one writes it with NumPy), by MuJoCo and
 by Drake where these are installed. DOP853 runs at the loosest relative tolerance (on a grid of half decades) at which
 the final attitude is within the same error; it takes the same steps whoever computes the body. Each opponent runs in
-turn with ours, in one process with one thread, three times at a turn, as a program calls them again and again; medians.
+turn with ours, in one process with one thread, three times at a turn, as a program calls them again and again; medians
+of processor time.
 Ours runs twice: at the tolerance asked for, which the error stays far below; and, as DOP853 does, at the loosest at
 which the true error is within it ("tuned"). Errors are against DOP853 at 3e-14. Where there is a C compiler, our
 innermost loops are compiled first, as `shapephase compile` does, into a folder of their own; `--interpreted` leaves
@@ -18,7 +19,6 @@ import os
 for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_pool, "1")
 
-import subprocess
 import sys
 import tempfile
 import time
@@ -97,7 +97,6 @@ def print_tables(tolerances: list[float]) -> None:
             )
         print_summary(rows, names, tolerance)
     print_scaling()
-    print(f"\nimport shapephase: {import_seconds():.2f} s (target 0.6)")
 
 
 def print_summary(rows: list[Row], names: list[str], tolerance: float) -> None:
@@ -188,16 +187,9 @@ def our_loosest(case: Case, truth: np.ndarray, tolerance: float) -> float:
 
 def seconds(run: Callable[[], object]) -> float:
     """One run's time."""
-    start = time.perf_counter()
+    start = time.process_time()
     run()
-    return time.perf_counter() - start
-
-
-def import_seconds() -> float:
-    """Median import time of the package in new processes."""
-    code = "import time; t = time.perf_counter(); import shapephase; print(time.perf_counter() - t)"
-    runs = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(5)]
-    return float(np.median([float(run.stdout) for run in runs]))
+    return time.process_time() - start
 
 
 if __name__ == "__main__":
