@@ -1,4 +1,4 @@
-"""Links and joints as a file has them, whatever its format, and what no tree of real links can be.
+"""Links and joints as a file has them, whatever its format, and the checks that a tree of real links passes.
 
 A `LinkTree` is plain numbers: the model for Pinocchio is made from it, and the check of that model, too.
 """
@@ -160,7 +160,7 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     lost = [name for name in links if name not in reached]
     if lost:
         raise ModelFileError(
-            f"{links[lost[0]].where}: link {lost[0]!r}: links that hang on each other in a circle: {_listed(lost)}"
+            f"{links[lost[0]].where}: link {lost[0]!r}: links that form a closed chain: {_listed(lost)}"
         )
     return roots[0], tuple(sorted_joints)
 
@@ -169,7 +169,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     """What is doubtful about the inertia of links, one message for each kind.
 
     Negative moments; moments that break the triangle inequality by more than 0.1 %; a mass or a radius of gyration
-    that speaks of wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
+    that suggests wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
     no fault. `label` is how messages name a link.
 
     Raises
@@ -195,7 +195,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
         also = f" (also {_listed(others)})" if others else ""
         raise UnphysicalInertiaError(
             f"{links[first].where}: {label.format(links[first].name)} has principal moments {moments[first]} "
-            f"kg m^2, one of them negative{also}; mend the file, or load it with on_unphysical='warn'"
+            f"kg m^2, one of them negative{also}; correct the file, or load it with on_unphysical='warn'"
         )
     broken = ~negative & (moments[:, 2] - moments[:, 1] - moments[:, 0] > _TRIANGLE * moments[:, 2] + floor)
     # A radius from the largest moment: a rod may be as thin as it likes.
@@ -220,7 +220,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
 
 
 def massless_warning(tree: LinkTree) -> list[str]:
-    """The links that a joint moves although neither they nor anything that hangs on them has mass."""
+    """The links that a joint moves although neither they nor anything attached to them has mass."""
     carried = {name: link.mass for name, link in tree.links.items()}
     for joint in reversed(tree.joints):
         carried[joint.parent] += carried[joint.child]
@@ -231,7 +231,7 @@ def massless_warning(tree: LinkTree) -> list[str]:
         return []
     where = tree.links[idle[0]].where
     named = _listed([f"link {name!r}" for name in idle])
-    return [f"{where}: {named}: moved by a joint, but without mass, and nothing with mass hangs on it"]
+    return [f"{where}: {named}: moved by a joint, but without mass, and nothing with mass is attached to it"]
 
 
 def _listed(names: list[str]) -> str:

@@ -345,7 +345,7 @@ def _drawn(geoms: list[tuple[Any, Node]], owner: str) -> list[tuple[Any, Node]]:
     solid = [pair for pair in geoms if pair[1].get("type", "sphere") not in ("plane", "hfield")]
     seen = [pair for pair in solid if number(pair[1], "group", owner, default="0") in _SHOWN_GROUPS]
     primitive = [pair for pair in seen if not _is_mesh(pair[1])]
-    # Meshes are not read: what is there for collisions stands for them.
+    # Meshes are not read: the collision shapes are drawn in their place.
     return primitive or [pair for pair in solid if not _is_mesh(pair[1])] or seen
 
 

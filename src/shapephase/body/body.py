@@ -89,7 +89,7 @@ class Body:
 
     @property
     def moving_parts(self) -> tuple[MovingPart, ...]:
-        """The base and what each joint moves, in Pinocchio's order, as far as they have links."""
+        """The base and what each joint moves, in Pinocchio's order; only those that have links."""
         frames: dict[int, list[Any]] = {}
         for frame in self._model.frames:
             if frame.type == pin.FrameType.BODY:

@@ -141,7 +141,7 @@ def _path_of(source: str | bytes) -> tuple[Path, bool]:
 
 def _try_in_child(content: bytes, where: str, on_unphysical: str) -> None:
     """Load in a child process, with limits; what kills the child is named here, what it refuses the parent refuses."""
-    # The folder that the caller happens to be in is no place to import from.
+    # Nothing is to be imported from the current folder.
     path = os.pathsep.join(entry for entry in sys.path if entry)
     command = [sys.executable, "-P", "-c", "from shapephase.body import catalog; catalog.load_from_input()"]
     try:

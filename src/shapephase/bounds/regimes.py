@@ -45,7 +45,7 @@ class Regime(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class RegimeCertificate:
-    """Which axis Pi circles over an interval, as far as that is certain before the motion is computed.
+    """Which axis Pi circles over an interval, if that is certain before the motion is computed.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class RegimeCertificate:
     start : (3,) Pi/l at the start of the interval, zero without momentum
     bounds : of the energy, cell by cell
     plane : (K,) on each cell the energy that Pi would need to cross the plane [J]
-    why : the reason in words
+    why : the reason, as a sentence
     """
 
     regime: Regime

@@ -26,7 +26,7 @@ class Steps:
         self._task = None if display is None else display.add_task("", total=total)
 
     def begin(self, what: str) -> None:
-        """The next step begins, and the one before is done; `what` it does, in words."""
+        """The next step begins, and the one before is done; `what` it does is shown."""
         if self._display is None:
             return
         task = self._display.tasks[0]

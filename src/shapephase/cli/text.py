@@ -119,28 +119,28 @@ def orbit_data(
     }
 
 
-def body_lines(card: BodySummary) -> list[str]:
-    """The card of a body for people."""
-    width = max(map(len, ("joint", *(joint.name for joint in card.joints))))
+def body_lines(summary: BodySummary) -> list[str]:
+    """The summary of a body for people."""
+    width = max(map(len, ("joint", *(joint.name for joint in summary.joints))))
     lines = [
-        f"{card.name}: {card.mass:.6g} kg, {len(card.links)} links, {len(card.joints)} joints",
-        f"{'centre of mass':24}{_numbers(card.centre_of_mass)}   m, base axes, neutral shape",
-        f"{'principal moments':24}{_numbers(card.principal_moments)}   kg m^2",
-        f"{'sha256':24}{card.sha256 or 'none: not from a file'}",
+        f"{summary.name}: {summary.mass:.6g} kg, {len(summary.links)} links, {len(summary.joints)} joints",
+        f"{'centre of mass':24}{_numbers(summary.centre_of_mass)}   m, base axes, neutral shape",
+        f"{'principal moments':24}{_numbers(summary.principal_moments)}   kg m^2",
+        f"{'sha256':24}{summary.sha256 or 'none: not from a file'}",
         "",
         f"{'joint':<{width}}  {'kind':<10}{'lower':>12}{'upper':>12}",
     ]
-    for joint in card.joints:
+    for joint in summary.joints:
         limits = "".join(f"{_limit(value):>12}" for value in (joint.lower, joint.upper))
         lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {joint.unit}")
     return lines
 
 
-def path_lines(body: Body, name: str, card: PathSummary, recorded: RecordedMotion | None) -> list[str]:
-    """The card of a joint motion for people."""
-    worst = int(np.argmax(np.abs(card.gap))) if len(card.gap) else 0
-    closes = "yes" if card.is_loop else f"no: {body.joint_names[worst]} ends {card.gap[worst]:.6g} from its start"
-    lines = [f"{name}: {card.duration:g} s, {card.breaks} breaks", f"{'closes':24}{closes}"]
+def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMotion | None) -> list[str]:
+    """The summary of a joint motion for people."""
+    worst = int(np.argmax(np.abs(summary.gap))) if len(summary.gap) else 0
+    closes = "yes" if summary.is_loop else f"no: {body.joint_names[worst]} ends {summary.gap[worst]:.6g} from its start"
+    lines = [f"{name}: {summary.duration:g} s, {summary.breaks} breaks", f"{'closes':24}{closes}"]
     if recorded is not None:
         lines.insert(1, f"{'recorded':24}{len(recorded.times)} samples, {recorded.format}")
         if recorded.residual.any():
@@ -148,13 +148,13 @@ def path_lines(body: Body, name: str, card: PathSummary, recorded: RecordedMotio
             lines.append(f"{'largest residual':24}{recorded.residual[joint]:.3g} rms, {body.joint_names[joint]}")
         if recorded.base_attitude is not None:
             lines.append(f"{'base':24}recorded too")
-    for title, names in (("beyond their limits", card.joints_beyond_limits), ("at rest", card.still_joints)):
+    for title, names in (("beyond their limits", summary.joints_beyond_limits), ("at rest", summary.still_joints)):
         lines += [f"{title:24}{', '.join(names)}"] if names else []
     return lines
 
 
 def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
-    """What a file said of itself, for programs."""
+    """What is known of a recording, for programs."""
     if recorded is None:
         return {}
     return {

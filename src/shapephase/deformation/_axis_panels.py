@@ -24,7 +24,7 @@ _NODES = 25
 COUNT = 20
 # Part of a loop: narrower panels may be less exact, since little time is spent on them.
 _NARROW = 1e-3
-# Part of a loop: only a limited number of panels may be narrower, lest a hopeless search fill the memory.
+# Part of a loop: only a limited number of panels may be narrower, so that a hopeless search does not fill the memory.
 _TINY = 1e-6
 # Part of a loop: no panel is narrower, for the digits of time end there.
 _LEAST_WIDTH = 1e-13
@@ -36,7 +36,7 @@ NEARLY_DIAGONAL = 2e-12
 EQUAL = 4e-13
 # Weight, beside certain values, with which the first coefficient is drawn to zero; of the last one it is 1e14 times it.
 _ROUNDING = 1e-16
-# [rad] in a loop: axes that turn faster are said to jump.
+# [rad] in a loop: axes that turn faster count as a jump.
 _FASTEST = 2e8
 # Kind of a panel on which all moments are apart.
 SEPARATE = 0

@@ -20,7 +20,7 @@ _LINE = 1e-12
 _NODES = 64
 # Of more pieces than these each has fewer points, so that their number stays bounded.
 _MOST_PIECES_FINE = 32
-# Minima that the search goes on around.
+# Minima around which the search continues.
 _LOWEST = 16
 # Each divides the interval by four: together by 7e7, beyond which the value no longer changes.
 _ZOOMS = 13
@@ -32,7 +32,7 @@ def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float
     """The least value of a function that is smooth between breaks, and its time.
 
     Evaluated at up to 65 Chebyshev points of every piece (fewer, but nine at least, where pieces are many); around the
-    sixteen lowest of these the search goes on to some 1e-9 of the piece. A dip narrower than the points can be missed.
+    sixteen lowest of these the search continues to some 1e-9 of the piece. A dip between the points can be missed.
 
     Parameters
     ----------

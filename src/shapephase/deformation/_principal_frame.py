@@ -217,7 +217,7 @@ class _Orientation:
         return self._panels.right[stretch.last] - self._panels.left[stretch.first] >= self._shortest
 
     def _absorb(self, excess: Array, panel: int) -> None:
-        """Turn the frames before this panel by what is missing, as far as equal moments leave it open."""
+        """Turn the frames before this panel by what is missing, where equal moments leave it open."""
         part = _part(excess, self.freedom.kind, self.freedom.axis)
         if part is not None:
             self.turns[:panel] = so3.quat_product(part, self.turns[:panel])
@@ -259,7 +259,7 @@ def _part(turn: Array, kind: int, axis: Array) -> Array | None:
 
 
 def _oriented(panels: AxisPanels, shortest: float) -> tuple[AxisPanels, _Freedom]:
-    """The panels turned from the left, as far as they may be, so that each goes on where the one before ends.
+    """The panels turned from the left, where they may be, so that each continues where the one before ends.
 
     Moments that are equal for less than `shortest` [s] meet at an instant, in which the frame cannot turn.
     """
@@ -290,7 +290,7 @@ def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanel
     gap = np.linalg.norm(turn, axis=-1)
     if np.any(gap > _JUMP):
         return panels, np.where(gap > _JUMP, gap, 0.0)
-    # The side that knows an axis better yields less. Turning from the left keeps what one axis yields from the others.
+    # The side on which an axis is known better moves less. Turning from the left does not mix the axes.
     known = panels.strength**2 + 1e-40
     share = known[1:] / (known[:-1] + known[1:])
     common = so3.quat_product(so3.quat_from_rotation_vector(share * turn), last[:-1])

@@ -308,7 +308,7 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
     """A uniform boom of an assembly that comes out of the body, or goes in.
 
     What is not out is a point mass at rest at the root; what is out is a rod that moves along itself. Its mass is not
-    part of the spacecraft's: of a spacecraft weighed with the boom stowed, subtract `mass` at `root`.
+    part of the spacecraft's: if the spacecraft was measured with the boom stowed, subtract `mass` at `root`.
 
     Parameters
     ----------
@@ -398,6 +398,6 @@ def _columns(path: ShapePath, count: int, whose: str) -> ShapePath:
         raise TrajectoryError(f"{whose} needs a ShapePath of {count} columns [m], got {came}")
     if np.abs(path.gap).max() <= CLOSED:
         return path
-    # A path of joints that goes on by 2 pi in every loop is a loop; one of metres is not.
+    # A path of joints that advances by 2 pi in every loop is a loop; one of metres is not.
     swings = None if path.oscillations is None else path.oscillations * path.loops
     return replace(path, oscillations=swings, loops=1, smooth_loop=False)

@@ -45,7 +45,7 @@ class Deformation:
     shape_gap : how far the end shape is from the start shape [largest joint difference, or relative change]
     label : what it is, for people
     loops : the deformation is its first `duration / loops` seconds, this many times
-    inputs : SHA-256 of the files it was made from, "body" and "path", as far as there are any
+    inputs : SHA-256 of the files it was made from, "body" and "path", if it was made from files
     """
 
     description: Description

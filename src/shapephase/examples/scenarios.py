@@ -25,7 +25,7 @@ _TOLERANCE = 1e-11
 
 @dataclass(frozen=True)
 class NamedMotion:
-    """A motion that comes with the library: its body, the function that makes its path, and what it does in words."""
+    """A motion that comes with the library: its body, the function that makes its path, and a description."""
 
     body: str
     path: Callable[[], ShapePath]

@@ -110,7 +110,7 @@ class FinishedSampler:
         self._interpolant = interpolant
 
     def refine(self, momentum: float, tolerance: float) -> None:
-        """Nothing: what is there was sampled as finely as its own tolerance demanded."""
+        """No refinement: the samples are already as dense as their own tolerance demanded."""
 
     def error(self, momentum: float) -> float:  # noqa: ARG002
         """Zero: it is part of the error of what the samples were taken for."""

@@ -24,7 +24,7 @@ GOAL_TOLERANCE = 1e-8
 _CONVERGED = 5e-10
 # The most Newton steps: it converges quadratically, so more do not help.
 _STEPS = 8
-# Newton's method is not begun further from the goal [rad]: there the linear model says nothing.
+# Newton's method does not start further from the goal [rad]: the linear model is no guide there.
 _TOO_FAR = 1.0
 # Gauss nodes of a piece, for the derivative of the end: of order sixteen, so that the quadrature does not limit it.
 _NODES = 8

@@ -45,7 +45,7 @@ _SYMMETRY = 10.0
 _SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
 # The least relative decrease of the gap by a whole step, as in Armijo's rule; shares of a step have to give that share.
 _DECREASE = 0.1
-# Evaluations after which a trial is given up: its extremal whirls, and its end says nothing.
+# Evaluations after which a trial is given up: its extremal turns so fast that its end is no guide.
 _MOST_EVALUATIONS = 20_000
 
 

@@ -19,7 +19,7 @@ _MOST_STARTS = 1000
 SEARCH_TOLERANCE = 1e-6
 # [rad] Distance of the points that represent a curve of fixed points: about twenty along a great circle.
 FAMILY_SPACING = 0.3
-# A cell is all but linear when its sides bend by less than this share of its width.
+# A cell counts as linear when its sides bend by less than this share of its width.
 _BEND = 0.06
 # Where the midpoints show how much the sides bend, this many times as much is allowed for.
 _SAFETY_FACTOR = 3.0
@@ -87,7 +87,7 @@ def _examined(points: Array, shifts: Array) -> tuple[Mask, Mask, Mask, Array, Ar
 
     Returns
     -------
-    possible, linear, inside : (F,) whether a zero inside cannot be excluded, whether the shift is all but linear,
+    possible, linear, inside : (F,) whether a zero inside cannot be excluded, whether the shift is nearly linear,
         whether the linear one's zero is inside
     zero : (F, 3) where the linear one vanishes if that is inside or to be trusted, else the middle
     width : (F,)

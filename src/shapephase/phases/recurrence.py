@@ -17,7 +17,7 @@ from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
 from ..reconstruction.reconstruction import Motion
 
-# [rad] Length of a piece of the curve at most: two passages through one piece are told apart by its cubic.
+# [rad] Length of a piece of the curve at most: two passages through one piece are distinguished by its cubic.
 _LONGEST = 0.05
 # [rad] A piece turns by this at most, so that a cubic is right to a hundredth of its length.
 _BENT = 0.3
@@ -307,7 +307,7 @@ def _neighbours(curve: _Curve, pieces: _Pieces, near: float) -> tuple[Integers, 
 
 
 def _seems_along(pieces: _Pieces, first: Integers, second: Integers, near: float) -> tuple[Integers, Array]:
-    """The second pieces whose middles lie on cubics of first ones, as far as those can tell, and where on them (n,)."""
+    """The second pieces whose middles lie on cubics of first ones, as well as those show it, and where on them (n,)."""
     share = np.full(len(first), 0.5)
     point = pieces.point[second]
     for _ in range(4):
