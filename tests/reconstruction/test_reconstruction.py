@@ -5,6 +5,7 @@ from __future__ import annotations
 import tracemalloc
 from dataclasses import replace
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 import pytest
@@ -351,9 +352,9 @@ def test_what_another_method_needs_of_the_integrator_is_integrated_once(monkeypa
     module = import_module("shapephase.reconstruction.reconstruction")
     momenta: list[float] = []
 
-    def counted(sampler: Sampler, momentum: np.ndarray, tolerance: float) -> SteppedRotation:
+    def counted(sampler: Sampler, momentum: np.ndarray, tolerance: float, **further: Any) -> SteppedRotation:
         momenta.append(float(np.linalg.norm(momentum)))
-        return stepped_rotation(sampler, momentum, tolerance)
+        return stepped_rotation(sampler, momentum, tolerance, **further)
 
     monkeypatch.setattr(module, "stepped_rotation", counted)
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.3, 1.0, 0.2], method=method)

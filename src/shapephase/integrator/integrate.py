@@ -19,8 +19,9 @@ from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from ..errors import AccuracyNotReached
+from ._dense_output import DenseOutput
 from ._error_propagator import amplification, exact_propagators, momentum_slope
-from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned
+from ._rotation_step import STAGES, tableau
 from ._step_control import StepRequirements, carried_over, finer
 from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest
 from .interpolant import Interpolant
@@ -48,6 +49,8 @@ _INSIGNIFICANT_SHARE = 1e-3
 _INFORMATIVE_ERROR = 1e-2
 # Of the tolerance: with more rounding than this no refinement reaches it.
 _MOST_ROUNDING = 0.9
+# Of the error at the ends of the steps: what the polynomials between them may add.
+_DENSE_SHARE = 5e-3
 _BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
     "propagator",
@@ -106,6 +109,11 @@ class SteppedRotation:
     @property
     def error_estimate(self) -> Array:
         """Estimate of the largest attitude error over the interval, rounding included: (B,) [rad]."""
+        return (1.0 + _DENSE_SHARE) * self._error_at_ends
+
+    @property
+    def _error_at_ends(self) -> Array:
+        """The same at the ends of the steps: (B,) [rad]."""
         return self.sampling_error + self.stepping_error + self.rounding_error
 
     @cached_property
@@ -119,7 +127,8 @@ class SteppedRotation:
 
     def rotation(self, t: Array) -> Array:
         """S(t): (N,) -> (B, N, 3, 3)."""
-        return so3.matrix_from_quat(self._at(t)[0])
+        found, count = so3.matrix_from_quat(np.moveaxis(self._dense.quaternion(t), 0, -1)), len(self.momentum)
+        return found if len(found) == count else np.repeat(found, count, axis=0)
 
     @property
     def end(self) -> Array:
@@ -128,9 +137,8 @@ class SteppedRotation:
 
     def dynamic_phase(self, t: Array) -> Array:
         """The integral of omega . Pi/|Pi| from 0 to t: (N,) -> (B, N) [rad]; zero without momentum."""
-        index = self._step_of(t)
         before = np.cumsum(self.dynamics, axis=1) - self.dynamics
-        return (before[:, index] + self._at(t)[3]) * self._moving
+        return (before[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)) * self._moving
 
     def solid_angle(self, t: Array) -> Array:
         """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
@@ -141,14 +149,16 @@ class SteppedRotation:
         """
         if not self.directions.shape[1]:
             return np.zeros((len(self.momentum), len(t)))
-        index = self._step_of(t)
-        start, corners = self.directions[:, :1], self.directions
+        start, corners, index = self.directions[:, :1], self.directions, self._dense.step_of(t)
         fans = sphere.triangle_area(start, corners[:, :-1], corners[:, 1:]) + self.dynamics - self.turns
         before = np.cumsum(fans, axis=1) - fans
-        _, there, turn, dynamic = self._at(t)
-        return (
-            before[:, index] + sphere.triangle_area(start, corners[:, index], there) + dynamic - turn
-        ) * self._moving
+        attitude, near = self.rotation(t), corners[:, index]
+        there = so3.apply(so3.transpose(attitude), start)
+        # The turn about the direction at the step's start, the shortest rotation taken off.
+        steps = so3.transpose(so3.matrix_from_quat(self.quaternions[:, index])) @ attitude
+        turn = np.where(t == self.times[index], 0.0, so3.angle_about(steps @ so3.between(near, there), near))
+        part = sphere.triangle_area(start, near, there) + self._dense.dynamic_phase(t) - turn
+        return (before[:, index] + part) * self._moving
 
     @property
     def _moving(self) -> Array:
@@ -163,27 +173,20 @@ class SteppedRotation:
         """
         return momentum_slope(_stage_channels(self.interpolant, self.steps), self.momentum, self.interpolant.loops)
 
-    def _step_of(self, t: Array) -> Integers:
-        return np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
-
-    def _at(self, t: Array) -> tuple[Array, Array, Array, Array]:
-        """A step of the same formula from the step end before t: (N,) -> quaternion, direction, turn, dynamic phase."""
-        index = self._step_of(t)
-        lengths = t - self.times[index]
-        _, _, c = tableau()
-        channels = self.interpolant.channels(self.times[index, None] + c * lengths[:, None], self.panel[index])
-        stages = np.moveaxis(channels * lengths[:, None, None], 0, -1)
-        before = list(np.moveaxis(self.quaternions[:, index], -1, 0))
-        nothing = np.zeros((len(self.momentum), len(t)))
-        if not self.directions.shape[1]:
-            step, _ = rest_step(stages[:, 6:])
-            return _stacked(product(before, step)), np.zeros((*nothing.shape, 3)), nothing, nothing
-        start = list(np.moveaxis(self.directions[:, index], -1, 0))
-        magnitude = np.linalg.norm(self.momentum, axis=-1)[:, None]
-        end, turn, dynamic, _ = momentum_step(start, magnitude, stages)
-        half = 0.5 * turn
-        there = turned(before, start, end, (np.sin(half), np.cos(half)))
-        return _stacked(there), _stacked(end), turn, dynamic
+    @cached_property
+    def _dense(self) -> DenseOutput:
+        """The same rotation between the ends of the steps; without momentum it is one for the whole batch."""
+        rows = slice(None) if self.directions.shape[1] else slice(1)
+        return DenseOutput(
+            interpolant=self.interpolant,
+            steps=self.steps,
+            times=self.times,
+            quaternions=self.quaternions[rows],
+            directions=self.directions[rows],
+            dynamics=self.dynamics[rows],
+            magnitude=np.linalg.norm(self.momentum[rows], axis=-1),
+            goal=_DENSE_SHARE * float(self._error_at_ends.min(initial=np.inf)),
+        )
 
     def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:
         """The same steps with the rotations at their ends (B, K + 1, 3, 3) found by another method."""
@@ -203,24 +206,23 @@ class SteppedRotation:
         return self.interpolant.inverse_and_drift(t)
 
 
-def _stacked(parts: list[Array]) -> Array:
-    return np.stack(np.broadcast_arrays(*parts), axis=-1)
-
-
-def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> SteppedRotation:
+def stepped_rotation(
+    sampler: Sampler, momentum: Array, tolerance: float, *, subdivide: Integers | None = None
+) -> SteppedRotation:
     """Integrate the attitude equation to a tolerance, sampling the deformation as far as that needs.
 
     Parameters
     ----------
     momentum : (B, 3) body angular momentum at the start [kg m^2/s]
     tolerance : of the attitude over the whole interval [rad]
+    subdivide : (P,) steps on each panel of finished samples, whose ends are to be ends of steps
 
     Raises
     ------
     AccuracyNotReached
         If the estimate stays above the tolerance.
     """
-    return _Integration(sampler, momentum, tolerance).solution()
+    return _Integration(sampler, momentum, tolerance, subdivide).solution()
 
 
 class _ErrorGrowth(NamedTuple):
@@ -252,8 +254,9 @@ class _Attempt(NamedTuple):
 class _Integration:
     """The attitude equation solved in rounds: sample, plan the steps, take them, estimate the error, refine."""
 
-    def __init__(self, sampler: Sampler, momentum: Array, tolerance: float) -> None:
+    def __init__(self, sampler: Sampler, momentum: Array, tolerance: float, subdivide: Integers | None) -> None:
         self._sampler, self._momentum, self._tolerance = sampler, momentum, tolerance
+        self._subdivide = 1 if subdivide is None else subdivide
         self._magnitudes = np.sqrt((momentum * momentum).sum(axis=-1))
         self._largest = float(self._magnitudes.max(initial=0.0))
         share = _SAMPLING_SHARE if self._largest > 0.0 else _SAMPLING_SHARE_AT_REST
@@ -324,7 +327,7 @@ class _Integration:
             worst = float(np.nan_to_num(self._error_growth.amplification).max())
             share = 0.01 * planned.sum() * interpolant.loops * max(1.0, worst)
             planned = requirements.first_plan(max(self._tolerance / share, _LEAST_STEP_TOLERANCE))
-        return np.ceil(np.maximum(planned, least)).astype(int)
+        return self._subdivide * np.ceil(np.maximum(planned, least) / self._subdivide).astype(int)
 
     def _take_steps(self, interpolant: Interpolant, steps: Integers) -> StepRecord:
         """All steps of all loops and momenta."""

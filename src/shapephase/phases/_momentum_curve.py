@@ -12,6 +12,7 @@ from .. import so3, sphere
 from ..arrays import Array
 from ..deformation.frames import Frames, frames_argument, named_frames
 from ..errors import GaugeError
+from ..integrator.curve_integrals import curve_integrals
 from ..integrator.integrate import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 
@@ -19,6 +20,10 @@ from ..reconstruction.reconstruction import Motion
 _MOST_STEPS = 20_000
 # Halvings of a step that passes by the point opposite the reference: then it is as short as times can tell apart.
 _HALVINGS = 30
+# Of the motion's error estimate [rad]: what the integrals over its steps may add to phases.
+_SHARE = 5e-3
+# [rad] the same where the motion is as good as exact.
+_ROUNDING = 1e-14
 
 Gauge = str | Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
 
@@ -136,8 +141,15 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
         rate = so3.apply(inverse, magnitude[:, None, None] * direction) - drift
         return (direction, rate) if turn is None else (so3.apply(turn, direction), so3.apply(turn, rate))
 
-    found = _by_step(curve, edges)
-    if not follows:
+    found = None
+    if times is None and without.all():
+        still = np.zeros((len(spatial), len(edges) - 1))
+        found = still, still, np.repeat(start, len(edges), axis=1)
+    elif times is None and follows and isinstance(solution, SteppedRotation):
+        found = _from_steps(solution, lift)
+    if found is None:
+        found = _by_step(curve, edges)
+    if not (follows or without.all()):
         edges, found = _refined(curve, edges, found)
     references = np.array(list(map(sphere.far_reference, found[2])))
     if times is not None:
@@ -161,6 +173,14 @@ def _frames(motion: Motion, gauge: Gauge) -> Frames:
     if isinstance(gauge, str):
         return named_frames(motion.deformation, gauge)
     return frames_argument(gauge, motion.deformation.breaks)
+
+
+def _from_steps(solution: SteppedRotation, lift: SteppedRotation | None) -> tuple[Array, Array, Array] | None:
+    """As `_by_step`, from the ends of the steps alone, where that adds but little to the motion's error."""
+    found = curve_integrals(solution, lift)
+    if np.any(found.error > np.maximum(_SHARE * solution.error_estimate, _ROUNDING)):
+        return None
+    return found.dynamic, found.slivers, found.corners
 
 
 def _by_step(curve: sphere.Curve, edges: Array) -> tuple[Array, Array, Array]:

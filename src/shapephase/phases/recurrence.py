@@ -159,8 +159,7 @@ def momentum_crossings(motion: Motion) -> Crossings:
     first, second = _distinct(first[inside], second[inside], 1e-8 * length)
     here, heading = curve.at(first)
     there, other = curve.at(second)
-    across = np.linalg.norm(np.cross(heading, other), axis=-1)
-    angles = np.arctan2(across, np.sum(heading * other, axis=-1))
+    angles = _angles(heading, other)
     crossing = np.sin(angles) > _TANGENT
     return Crossings(
         first[crossing],
@@ -396,11 +395,18 @@ def _refined(curve: _Curve, pieces: _Pieces, pairs: Integers) -> tuple[Array, Ar
     for _ in range(6):
         times = _newton(*curve.at(times[0]), *curve.at(times[1]), times, 0.0, end)
     (here, heading), (there, other) = curve.at(times[0]), curve.at(times[1])
-    met = so3.angle_between(here, there) < _MET
+    # Where the curve goes along itself Newton's method has nothing to aim at, and its next step may lead anywhere.
+    met = (so3.angle_between(here, there) < _MET) & (np.sin(_angles(heading, other)) > _TANGENT)
     # A start that strayed from elsewhere may only just have come near, and would be taken for a pair already at
     # rounding. Newton's method squares an error: after one more step all of them are at rounding.
     times = (times[0][met], times[1][met])
     return _newton(here[met], heading[met], there[met], other[met], times, 0.0, end)
+
+
+def _angles(first: Array, second: Array) -> Array:
+    """Between vectors of any length: (n, 3), (n, 3) -> (n,) [rad]."""
+    across = np.linalg.norm(np.cross(first, second), axis=-1)
+    return np.arctan2(across, np.sum(first * second, axis=-1))
 
 
 def _newton(

@@ -172,10 +172,13 @@ class Motion:
     def horizontal_lift(self) -> SteppedRotation:
         """How the shape motion alone would turn the base, on the samples that the motion already has.
 
-        Integrated once, when it is first needed; every split and every gauge shares it.
+        Its steps end where those of the motion do. Integrated once, when it is first needed; every split and every
+        gauge shares it.
         """
         tolerance = min(self.tolerance, _LIFT_TOLERANCE)
-        return stepped_rotation(FinishedSampler(self.interpolant), np.zeros((1, 3)), tolerance)
+        return stepped_rotation(
+            FinishedSampler(self.interpolant), np.zeros((1, 3)), tolerance, subdivide=self._stepped.steps
+        )
 
     @property
     def interpolant(self) -> Interpolant:
