@@ -603,8 +603,17 @@ def test_fixed_points_are_marked_by_stability_and_index(motions):
     assert "indices sum to 2" in ax.get_legend().get_title().get_text()
     assert "3 kg m²/s" in ax.get_legend().get_title().get_text()
     assert "missing" not in ax.get_legend().get_title().get_text()
-    partial = sp.FixedPoints(3.0, points.directions[:1], points.trace[:1], np.zeros(1, int), ("parabolic",),
-                             points.gap[:1], 0, False)  # fmt: skip
+    partial = sp.FixedPoints(
+        magnitude=3.0,
+        directions=points.directions[:1],
+        trace=points.trace[:1],
+        index=np.zeros(1, int),
+        stability=("parabolic",),
+        gap=points.gap[:1],
+        index_sum=0,
+        complete=False,
+        tolerance=1e-11,
+    )
     ax = plots.plot_fixed_points(flat_axes(), partial, inertia=deformation.inertia(0.0))
     assert ax.texts[0].get_text() == "0"
     assert "some may be missing" in ax.get_legend().get_title().get_text()

@@ -361,11 +361,13 @@ def _trees() -> Iterator[Case]:
     body = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
     x, y = (f'<link name="{name}">{body}</link>' for name in "xy")
     ring = f"{x}\n{y}\n{fixed('k1', 'x', 'y')}\n{fixed('k2', 'y', 'x')}"
-    yield added("circle apart from the root", ring, "link 'x': .* circle: x, y")
+    yield added("circle apart from the root", ring, "link 'x': .* closed chain: x, y")
     only = f'<robot name="a">\n{ring}\n</robot>'
-    yield _case("circle alone", only, "link 'x': .* circle: x, y", x)
-    yield added("circle back to the root", fixed("k", "hand", "base"), "circle: base, arm, hand", '<link name="base"')
-    yield added("joint to itself", f"{x}\n{fixed('k', 'x', 'x')}", "link 'x': .* circle", x)
+    yield _case("circle alone", only, "link 'x': .* closed chain: x, y", x)
+    yield added(
+        "circle back to the root", fixed("k", "hand", "base"), "closed chain: base, arm, hand", '<link name="base"'
+    )
+    yield added("joint to itself", f"{x}\n{fixed('k', 'x', 'x')}", "link 'x': .* closed chain", x)
     yield added(
         "two parents", fixed("k", "base", "hand"), "link 'hand' has two parents, joints 'wrist' .*:29.* and 'k'"
     )
