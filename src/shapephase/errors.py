@@ -65,6 +65,14 @@ class OpenPathError(TrajectoryError):
     """
 
 
+class NoisyPathError(TrajectoryError):
+    """A path's function whose values scatter however near its times are: it has no rate.
+
+    Remedy: smooth the data, with `read_shape_path(..., smooth=)` or a spline through fewer samples. A function that is
+    merely rough is an `AccuracyNotReached`.
+    """
+
+
 class SingularInertiaError(ShapePhaseError, ArithmeticError):
     """The locked inertia is not positive definite: some axis has no inertia, so the rotation is undefined.
 
@@ -152,6 +160,10 @@ class CompiledCodeWarning(UserWarning):
 
 class TrajectoryWarning(UserWarning):
     """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns."""
+
+
+class UndeclaredBreakWarning(TrajectoryWarning):
+    """A path's function has kinks that were not declared as breaks; they were located, and are named."""
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:

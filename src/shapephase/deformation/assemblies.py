@@ -16,7 +16,8 @@ from ..arguments import on_unphysical_argument, positive_argument, vector_argume
 from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from ..inertia_tensor import second_moment
-from ..shape_space.shape_path import CLOSED, ShapePath, Smoothness
+from ..shape_space.shape_path import CLOSED, ShapePath
+from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of

@@ -17,7 +17,8 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
-from ..shape_space.shape_path import ShapePath, Smoothness
+from ..shape_space.shape_path import ShapePath
+from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 
 

@@ -13,6 +13,7 @@ from ..chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import AccuracyNotReached
 from ._spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_norms
 from .interpolant import Interpolant
+from .resolved import ResolvedPath
 
 # Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
 _FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
@@ -22,6 +23,8 @@ _HALF_DEGREE = 10
 _HIGHEST_DEGREE = 80
 # Panels before bisecting ends, besides 40 for every break: a motion that needs more is rough, not merely long.
 _MOST_PANELS = 4000
+# Of the tolerance: what the first panels may leave hidden of a path that is resolved.
+_HIDDEN_SHARE = 0.1
 # Of a panel, relative to the interval: narrower ones would consist of rounding.
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
@@ -112,9 +115,10 @@ class PanelSampler:
         loops: int,
         oscillations: float | None,
         probe: Callable[[Array], Array] | None,
+        resolved: ResolvedPath | None = None,
     ) -> None:
-        self._channels, self._probe, self._loops = channels, probe, loops
-        self._is_bandlimited = oscillations is not None
+        self._channels, self._probe, self._loops, self._resolved = channels, probe, loops, resolved
+        self._is_bandlimited = oscillations is not None or resolved is not None
         self._span = float(breaks[-1] - breaks[0])
         self._most_panels = _MOST_PANELS + 40 * len(breaks)
         pieces = 4 if oscillations is None else max(1, int(np.ceil(oscillations / 2.0)))
@@ -122,10 +126,15 @@ class PanelSampler:
         self._left, self._right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
         self._at_rest = oscillations == 0.0
         self._groups: dict[int, _Group] = {}
+        self._known_hidden: dict[int, tuple[_Group, Array, Array, Array]] = {}
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
-        if not self._groups:
+        if not self._groups and self._resolved is not None:
+            first = self._resolved.first_panels(_HIDDEN_SHARE * tolerance)
+            rows = [(int(d), first.degree == d) for d in np.unique(first.degree)]
+            self._add([_PanelsToSample(d, first.left[r], first.right[r], None) for d, r in rows])
+        elif not self._groups:
             of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
             at_rest = self._panels_at_rest()
             parts = ((0, at_rest), (of_many if len(self._left) > 4 else of_few, ~at_rest))
@@ -135,6 +144,10 @@ class PanelSampler:
         while True:
             errors = {d: g.estimate.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
             total = self._loops * sum(float(e.sum()) for e in errors.values())
+            hiding = {d: self._hidden(d, momentum)[0] > tolerance for d in self._groups}
+            if any(rows.any() for rows in hiding.values()):
+                self._refine_panels(hiding, errors, tolerance, total)
+                continue
             if total <= tolerance:
                 if self._is_bandlimited or not self._check_between_nodes():
                     return
@@ -147,9 +160,11 @@ class PanelSampler:
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
-        return self._loops * sum(
-            float(g.estimate.error(momentum, g.width, 2.0 * d).sum()) for d, g in self._groups.items()
-        )
+        total = 0.0
+        for degree, g in self._groups.items():
+            hidden, noise = self._hidden(degree, momentum)
+            total += float(np.maximum(g.estimate.error(momentum, g.width, 2.0 * degree), hidden).sum() + noise.sum())
+        return self._loops * total
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
@@ -202,6 +217,18 @@ class PanelSampler:
                 ends = np.concatenate([left, middle]), np.concatenate([middle, right])
                 to_sample.append(_PanelsToSample(_HALF_DEGREE, *ends, None))
         self._add(to_sample)
+
+    def _hidden(self, degree: int, momentum: float) -> tuple[Array, Array]:
+        """What of a resolved path lies beyond the nodes of the panels of a degree, and its noise there: (G,) [rad]."""
+        g = self._groups[degree]
+        if self._resolved is None or not degree:
+            return np.zeros(len(g.left)), np.zeros(len(g.left))
+        if self._known_hidden.get(degree, (None,))[0] is not g:
+            self._known_hidden[degree] = g, *self._resolved.hidden(g.left, g.right, degree)
+        _, shapes, rates, noise = self._known_hidden[degree]
+        # A shape that is off turns the body by the inertia, for as long as the panel lasts.
+        turn = momentum * g.estimate.inverse_norm * g.width
+        return shapes * turn + rates, noise * (1.0 + turn)
 
     def _panels_at_rest(self) -> Mask:
         """Panels on which nothing moves: one sample each is enough."""

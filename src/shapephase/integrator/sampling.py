@@ -17,6 +17,7 @@ from ._even_sampling import EvenSampler
 from ._panel_sampling import PanelSampler
 from ._spectral_error import Channels, Evaluate
 from .interpolant import Interpolant
+from .resolved import ResolvedPath
 
 # Panels to begin with for a loop too rough for even samples.
 _PANELS_OF_A_ROUGH_LOOP = 32
@@ -53,6 +54,7 @@ def sampler(
     smooth_loop: bool = False,
     sparse: bool = False,
     probe: Callable[[Array], Array] | None = None,
+    resolved: ResolvedPath | None = None,
 ) -> Sampler:
     """The sampler that suits a deformation.
 
@@ -67,6 +69,7 @@ def sampler(
     sparse : oscillations between none and the fastest are missing
     probe : a cheap stand-in for the deformation to check a black box, times (N,) -> (N, 2 n), shapes and then their
         rates; None: the deformation itself is evaluated
+    resolved : all of what the deformation depends on in the first loop, as series: nothing is checked between nodes
     """
     channels = Channels(evaluate)
     period = float(breaks[-1]) / loops
@@ -76,7 +79,7 @@ def sampler(
             return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe)
         return LoopSampler(channels, period, loops, oscillations)
     ends = breaks[breaks <= period * (1.0 + 1e-12)] if loops > 1 else breaks
-    return PanelSampler(channels, ends, loops, oscillations, probe)
+    return PanelSampler(channels, ends, loops, oscillations, probe, resolved)
 
 
 class LoopSampler:

@@ -153,15 +153,7 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
     check_closed(body, route)
     _check_no_turns(body, route)
     cone = _Cone(body, route, _mean_shape(route) if centre is None else _one_shape(body, centre, "centre"), goal)
-    carried = sampler(
-        cone.sample,
-        route.breaks,
-        oscillations=route.oscillations,
-        loops=route.loops,
-        smooth_loop=route.smooth_loop,
-        sparse=route.sparse,
-        probe=lambda times: np.concatenate(route.curve(times), axis=1),
-    )
+    carried = sampler(cone.sample, **vars(route.smoothness))
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
     _, (out, back) = cone.rays(np.array([0.0, route.duration]))
     estimate = float(round_loop.error_estimate[0]) + 3.0 * cone.worst

@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, Integers, check_reach, real_array
 from ..errors import ShapeError, TrajectoryError
 
+CLOSED = 1e-9
+"""[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
 _WHOLE_TURN = 2.0 * np.pi
 
 

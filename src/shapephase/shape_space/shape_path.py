@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import breaks_argument, positive_argument, times_argument
-from ..arrays import Array, check_finite, check_reach, finite_array
+from ..arrays import Array, check_reach, finite_array
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
+from ..integrator.resolved import joined
+from ._path_scan import PathScan, scanned_path
+from ._rate_check import check_rates
 from .curves import (
+    CLOSED,
     Curve,
     Fourier,
     Function,
@@ -24,33 +29,9 @@ from .curves import (
     Stretched,
     returned_pair,
 )
+from .smoothness import Smoothness
 
-CLOSED = 1e-9
-"""[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
 _WHOLE_TURN = 2.0 * np.pi
-
-
-@dataclass(frozen=True, eq=False)
-class Smoothness:
-    """What is known of a function of time before it is sampled, by which a way of sampling is chosen.
-
-    Attributes
-    ----------
-    breaks : (M,) times between which it is smooth, first and last the interval's ends [s]
-    oscillations : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
-    loops : the interval is its first part, this many times
-    smooth_loop : whether it also goes smoothly from the end of a loop to its start
-    sparse : whether harmonics below the highest are missing in a smooth loop
-    probe : a cheap stand-in whose swings are those of the function, times (N,) -> (N, 2 n), shapes and then their
-        rates; None: there is none
-    """
-
-    breaks: Array
-    oscillations: float | None = None
-    loops: int = 1
-    smooth_loop: bool = False
-    sparse: bool = False
-    probe: Callable[[Array], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +53,7 @@ class ShapePath:
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
     sparse : whether harmonics below the highest are missing in a smooth loop
     sha256 : of the file it was read from, whatever was done to it since; None without a file
+    scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
     """
 
     curve: Curve
@@ -84,6 +66,7 @@ class ShapePath:
     smooth_loop: bool = False
     sparse: bool = False
     sha256: str | None = None
+    scanner: Callable[[], PathScan] | None = None
 
     @staticmethod
     def fourier(
@@ -189,10 +172,14 @@ class ShapePath:
         ----------
         breaks : interior times where a derivative jumps [s]; the function is evaluated just inside them
 
+        Before a body follows it, the path is looked at once, at some 5,500 times (`scan`). Whatever is wider than
+        1/2,000 of the duration is found; what is narrower and leaves the shape as it was has to be declared as a
+        break. Kinks are located and taken as breaks, with a warning.
+
         Raises
         ------
         TrajectoryError
-            If the rates are not the derivatives of the shapes (checked at a few times).
+            If the rates are not the derivatives of the shapes (checked at a few times, and again by the scan).
         """
         period = positive_argument(duration)
         edges = breaks_argument(breaks, period)
@@ -201,7 +188,7 @@ class ShapePath:
             raise ShapeError(f"the function must return shapes (N, n) for times (N,); for N = 1 it gave {start.shape}")
         curve = Function(f, start.shape[1])
         path = ShapePath(curve, period, edges, start.shape[1], _names(joint_names, start.shape[1]))
-        _check_rates(path)
+        check_rates(curve, edges)
         return path
 
     def shape(self, t: ArrayLike) -> Array:
@@ -215,14 +202,49 @@ class ShapePath:
     @property
     def smoothness(self) -> Smoothness:
         """Of whatever depends smoothly on shapes and rates."""
+        scan = self.scan
+        breaks = self.breaks
+        if scan is not None and len(scan.found_breaks):
+            starts = self.duration / self.loops * np.arange(self.loops)
+            breaks = np.union1d(breaks, (starts[:, None] + scan.found_breaks).ravel())
         return Smoothness(
-            breaks=self.breaks,
+            breaks=breaks,
             oscillations=self.oscillations,
             loops=self.loops,
             smooth_loop=self.smooth_loop,
             sparse=self.sparse,
             probe=lambda times: np.concatenate(self.curve(times), axis=1),
+            resolved=scan.resolved if scan is not None else None,
         )
+
+    @property
+    def scan(self) -> PathScan | None:
+        """What one look at a path known only as a function found, and what it cost; None for the known kinds.
+
+        Of a path repeated, that of its first loop. Found once, when it is first needed, and kept: paths made of this
+        one do not look again.
+
+        Raises
+        ------
+        TrajectoryError
+            If the shape jumps, or the rate is not its derivative; the message has time and joint.
+        NoisyPathError, AccuracyNotReached
+            If the values carry noise, or are too rough for thousands of panels.
+
+        Warns
+        -----
+        UndeclaredBreakWarning
+            Of kinks that were not declared.
+        """
+        return self._scan if self.oscillations is None else None
+
+    @cached_property
+    def _scan(self) -> PathScan:
+        if self.scanner is not None:
+            return self.scanner()
+        period = self.duration / self.loops
+        edges = self.breaks[self.breaks <= period * (1.0 + 1e-12)]
+        return scanned_path(self.curve, edges, self.joint_names)
 
     @property
     def gap(self) -> Array:
@@ -234,7 +256,8 @@ class ShapePath:
         """The same shapes in the opposite order of time."""
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
-        return replace(self, curve=Reversed(self.curve, self.duration), breaks=breaks)
+        curve = Reversed(self.curve, self.duration)
+        return replace(self, curve=curve, breaks=breaks, scanner=lambda: self._scan.reversed())
 
     def stretched(self, factor: float) -> ShapePath:
         """The same shapes, `factor` times as slowly."""
@@ -242,7 +265,9 @@ class ShapePath:
         duration = self.duration * scale
         breaks = self.breaks * scale
         breaks[-1] = duration
-        return replace(self, curve=Stretched(self.curve, scale, self.duration), duration=duration, breaks=breaks)
+        curve = Stretched(self.curve, scale, self.duration)
+        scanner = lambda: self._scan.stretched(scale)  # noqa: E731
+        return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner)
 
     def then(self, other: ShapePath) -> ShapePath:
         """This path, and after it another.
@@ -268,7 +293,15 @@ class ShapePath:
         breaks = np.concatenate([self.breaks, self.duration + other.breaks[1:]])
         breaks[-1] = duration
         curve = Joined(self.curve, self.duration, other.curve, other.duration, offset)
-        return ShapePath(curve, duration, breaks, self.n_shape, names, _larger(self.oscillations, other.oscillations))
+        return ShapePath(
+            curve,
+            duration,
+            breaks,
+            self.n_shape,
+            names,
+            _larger(self.oscillations, other.oscillations),
+            scanner=lambda: _joined_scans([self, other]),
+        )
 
     def repeated(self, count: int) -> ShapePath:
         """The loop `count` times in a row.
@@ -291,7 +324,9 @@ class ShapePath:
             breaks = breaks[[0, -1]]
         curve = Repeated(self.curve, self.duration, int(count), turns)
         loops = self.loops * int(count)
-        return replace(self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops)
+        return replace(
+            self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops, scanner=lambda: self._scan
+        )
 
     @property
     def sample_times(self) -> Array:
@@ -328,7 +363,8 @@ class ShapePath:
         if self.joint_names == expected:
             return self
         order = np.array([self.joint_names.index(name) for name in expected])
-        return replace(self, curve=Reordered(self.curve, order), joint_names=expected)
+        curve = Reordered(self.curve, order)
+        return replace(self, curve=curve, joint_names=expected, scanner=lambda: self._scan.reordered(order))
 
     def _joint(self, column: int) -> str:
         return self.joint_names[column] if self.joint_names else f"number {column}"
@@ -397,29 +433,13 @@ def _larger(a: float | None, b: float | None) -> float | None:
     return None if a is None or b is None else max(a, b)
 
 
-def _check_rates(path: ShapePath) -> None:
-    """Compare the function's rates with differences of its shapes away from the breaks.
-
-    At two steps: where these disagree with each other, as on the flank of a burst, nothing follows from them.
-    """
-    left, width = path.breaks[:-1], np.diff(path.breaks)
-    middle = left + 0.381 * width
-    coarse, _, _ = _differences(path, middle, 1e-4 * width)
-    slope, rate, spread = _differences(path, middle, 1e-5 * width)
-    scale = np.abs(rate) + np.maximum(spread, 1e-9) / path.duration
-    wrong = np.abs(slope - rate) > 1e-3 * scale + 10.0 * np.abs(slope - coarse)
-    if wrong.any():
-        where, joint = (int(i) for i in np.argwhere(wrong)[0])
-        raise TrajectoryError(
-            f"the path's function gives the rate {rate[where, joint]:.6g} of joint number {joint} at "
-            f"{middle[where]:.6g} s, but its shapes change at {slope[where, joint]:.6g}; return (shapes, rates)"
-        )
-
-
-def _differences(path: ShapePath, middle: Array, step: Array) -> tuple[Array, Array, Array]:
-    """Slopes of the shapes by central differences of order four, rates as given, spread of the shapes."""
-    shapes, rates = path.curve(np.concatenate([middle + k * step for k in (-2, -1, 0, 1, 2)]))
-    check_finite(shapes, "shapes of the path's function")
-    a, b, _, d, e = shapes.reshape(5, len(middle), -1)
-    slopes = (a - 8 * b + 8 * d - e) / (12 * step[:, None])
-    return slopes, rates.reshape(5, len(middle), -1)[2], np.ptp(shapes, axis=0)
+def _joined_scans(paths: Sequence[ShapePath]) -> PathScan:
+    """Of paths one after another, each with all its loops."""
+    scans = [path._scan for path in paths]
+    whole = [joined([scan.resolved] * path.loops) for scan, path in zip(scans, paths, strict=True)]
+    found: list[Array] = []
+    start = 0.0
+    for scan, path in zip(scans, paths, strict=True):
+        found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
+        start += path.duration
+    return PathScan.of_several(scans, joined(whole), np.concatenate(found))

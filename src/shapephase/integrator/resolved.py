@@ -1,0 +1,187 @@
+"""A path that has been resolved in time: Chebyshev series on panels that halve, from which a sampler takes its own.
+
+A path is cheap and a body is not. What is known of the path says on which panels, and to which degree, a function of
+it must be sampled so that nothing of the path lies hidden between the nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Array, Integers, Mask
+from ..chebyshev import chebyshev, local_coordinate, unit_nodes, values_to_coefficients
+
+# Of the series of a panel: about what a sampler at 1e-9 rad asks for.
+DEGREE = 32
+# Of the series of a sampler's panel, from which its hidden part is read: above the degree of most panels.
+_TEST_DEGREE = 48
+# Degrees that panels are sampled at first; all of them can be doubled and trebled.
+_FIRST_DEGREES = (5, 7, 10, 12, 15, 18, 21, 24, 27, 30)
+# Stands for the degree of a panel that must be halved.
+_IMPOSSIBLE = 1_000_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class FirstPanels:
+    """Panels for a sampler to begin with: degree (P,), 0 where nothing moves; left and right ends (P,) [s]."""
+
+    degree: Integers
+    left: Array
+    right: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ResolvedPath:
+    """Shapes and rates as Chebyshev series on panels and on their halves, down to where they are right to rounding.
+
+    Attributes
+    ----------
+    left, right : (N,) ends of the panels [s]
+    coefficients : (N, DEGREE + 1, 2 n) of the shapes and of their rates
+    misfit : (N, 2) how far the path is from them: shapes, and rates times half the width; 0 for resolved panels
+    noise : (N,) of resolved panels, the larger of the same, where their series cannot follow noise
+    children : (N,) row of the left half, which the right one follows; -1: resolved
+    roots : (R,) rows of the widest panels, in the order of time
+    duration : [s]
+    """
+
+    left: Array
+    right: Array
+    coefficients: Array
+    misfit: Array
+    noise: Array
+    children: Integers
+    roots: Integers
+    duration: float
+
+    @property
+    def leaves(self) -> Integers:
+        """The rows of the resolved panels, in the order of time."""
+        rows = np.flatnonzero(self.children < 0)
+        return rows[np.argsort(self.left[rows])]
+
+    def first_panels(self, tolerance: float) -> FirstPanels:
+        """The panels and degrees with the fewest samples that leave less than `tolerance` [rad] of the path hidden."""
+        tails = self._tails(self.coefficients) + self.misfit.max(axis=1)[:, None]
+        least = np.array(_FIRST_DEGREES)
+        fits = tails[:, least] <= tolerance
+        fits[:, -1] |= self.children < 0
+        degree = np.where(fits.any(axis=1), least[np.argmax(fits, axis=1)], _IMPOSSIBLE)
+        moving = self.coefficients[:, :, self._n_shape :].any(axis=(1, 2)) | (self.misfit > 0.0).any(axis=1)
+        degree[~moving] = 0
+        cost, splits = degree + 1, np.zeros(len(degree), dtype=bool)
+        # Halves stand behind what they are halves of.
+        for row in np.flatnonzero(self.children >= 0)[::-1]:
+            child = self.children[row]
+            halves = cost[child] + cost[child + 1]
+            if halves < cost[row]:
+                cost[row], splits[row] = halves, True
+        kept: list[Integers] = []
+        rows = self.roots
+        while len(rows):
+            kept.append(rows[~splits[rows]])
+            halved = self.children[rows[splits[rows]]]
+            rows = np.concatenate([halved, halved + 1])
+        chosen = np.concatenate(kept)
+        return FirstPanels(degree[chosen], self.left[chosen], self.right[chosen])
+
+    def hidden(self, left: Array, right: Array, degree: int) -> tuple[Array, Array, Array]:
+        """What of the path lies beyond a degree on panels: shapes, rates times half the width, noise (P,) [rad]."""
+        rows = self._smallest_around(left, right)
+        nodes = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(_TEST_DEGREE)
+        local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])
+        values = chebyshev(local, DEGREE + 1) @ self.coefficients[rows]
+        series = np.abs(values_to_coefficients(_TEST_DEGREE) @ values)
+        beyond = series[:, degree + 1 :].sum(axis=1) if degree < _TEST_DEGREE else 0.0 * series[:, 0]
+        shapes, rates = beyond[:, : self._n_shape], beyond[:, self._n_shape :]
+        return (
+            shapes.max(axis=1, initial=0.0) + self.misfit[rows, 0],
+            0.5 * (right - left) * rates.max(axis=1, initial=0.0) + self.misfit[rows, 1],
+            self.noise[rows],
+        )
+
+    def reversed(self) -> ResolvedPath:
+        """Of the path in the opposite order of time."""
+        signs = np.where(np.arange(DEGREE + 1) % 2, -1.0, 1.0)[:, None]
+        coefficients = self.coefficients * signs
+        coefficients[:, :, self._n_shape :] *= -1.0
+        children = self.children
+        order = np.arange(len(children))
+        # The halves of a panel change places.
+        for first in children[children >= 0]:
+            order[[first, first + 1]] = order[[first + 1, first]]
+        ends = self.duration - self.right[order], self.duration - self.left[order]
+        return replace(
+            self,
+            left=ends[0],
+            right=ends[1],
+            coefficients=coefficients[order],
+            misfit=self.misfit[order],
+            noise=self.noise[order],
+            children=children[order],
+            roots=self.roots[::-1],
+        )
+
+    def stretched(self, factor: float) -> ResolvedPath:
+        """Of the path `factor` times as slowly."""
+        coefficients = self.coefficients.copy()
+        coefficients[:, :, self._n_shape :] /= factor
+        return replace(
+            self,
+            left=self.left * factor,
+            right=self.right * factor,
+            coefficients=coefficients,
+            duration=self.duration * factor,
+        )
+
+    def reordered(self, order: Integers) -> ResolvedPath:
+        """Of the path with its joints in another order."""
+        columns = np.concatenate([order, self._n_shape + order])
+        return replace(self, coefficients=self.coefficients[:, :, columns])
+
+    @property
+    def _n_shape(self) -> int:
+        return self.coefficients.shape[2] // 2
+
+    def _tails(self, coefficients: Array) -> Array:
+        """Sums of the coefficients beyond each degree, the worst of shapes and of rates times half the width."""
+        sizes = np.abs(coefficients)
+        sizes[:, :, self._n_shape :] *= 0.5 * (self.right - self.left)[:, None, None]
+        sums = np.cumsum(sizes[:, ::-1], axis=1)[:, ::-1]
+        beyond = np.zeros(sums.shape[:2])
+        beyond[:, :-1] = sums[:, 1:].max(axis=2, initial=0.0)
+        return beyond
+
+    def _smallest_around(self, left: Array, right: Array) -> Integers:
+        """The row of the smallest panel that holds each of others: (P,), (P,) -> (P,)."""
+        middle = 0.5 * (left + right)
+        rows = self.roots[np.clip(np.searchsorted(self.left[self.roots], middle, side="right") - 1, 0, None)]
+        while True:
+            first = self.children[rows]
+            half = np.where(middle >= self.left[first + 1], first + 1, first)
+            slack = 1e-9 * (right - left)
+            holds: Mask = (first >= 0) & (self.left[half] <= left + slack) & (self.right[half] >= right - slack)
+            if not holds.any():
+                return rows
+            rows = np.where(holds, half, rows)
+
+
+def joined(paths: Sequence[ResolvedPath]) -> ResolvedPath:
+    """Of several paths one after another."""
+    starts = np.cumsum([0.0, *(path.duration for path in paths)])
+    rows = np.cumsum([0, *(len(path.left) for path in paths)])
+    return ResolvedPath(
+        left=np.concatenate([path.left + start for path, start in zip(paths, starts, strict=False)]),
+        right=np.concatenate([path.right + start for path, start in zip(paths, starts, strict=False)]),
+        coefficients=np.concatenate([path.coefficients for path in paths]),
+        misfit=np.concatenate([path.misfit for path in paths]),
+        noise=np.concatenate([path.noise for path in paths]),
+        children=np.concatenate(
+            [np.where(p.children < 0, -1, p.children + row) for p, row in zip(paths, rows, strict=False)]
+        ),
+        roots=np.concatenate([path.roots + row for path, row in zip(paths, rows, strict=False)]),
+        duration=float(starts[-1]),
+    )

@@ -1,0 +1,438 @@
+"""A path known only as a function of time, looked at once: resolved to its rounding before any body is evaluated.
+
+The function is first sampled at some 5,200 unevenly spaced times with no gap above 1/4,000 of the duration. Chebyshev
+series on panels, halved where they disagree with these samples or with their own neighbours, then resolve shapes and
+rates. A panel that is halved without end holds a kink: it is located to rounding, by the series on its two sides.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..arrays import Array, Integers, Mask
+from ..chebyshev import derivative_matrix, nodes_on, unit_nodes
+from ..errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
+from ..integrator.resolved import DEGREE, ResolvedPath
+from ._kink_location import located_kink
+from ._scan_panels import (
+    CHECKS,
+    Looked,
+    Panels,
+    Piece,
+    check_matrix,
+    integral_matrix,
+    panels_of,
+    polynomials,
+    resolved_path,
+    sample_times,
+    transform,
+)
+from .curves import CLOSED, Curve
+
+_EPS = float(np.finfo(float).eps)
+# Panels of the only piece, of each of a few (up to four), and of each of many.
+_FIRST_PANELS = (4, 2, 1)
+# Rounding of a function's values, and of a series through them, in units of the largest.
+_ROUNDING = 32.0 * _EPS
+# Of the largest shape or rate of the path: a function that subtracts numbers as large as these is off by so much.
+_INNER_ROUNDING = 64.0 * _EPS
+# [rad or m], also of rates times half the width of a panel: steps within the function may be as high, by rounding as
+# of 1,000 + r - 1,000, or from piece to piece of what an integrator gave.
+_INNER_STEPS = 1e-12
+# Of what was left before a panel was halved: series gain digits by it, rounding stays.
+_STUBBORN = 0.2
+# In units of the rounding of the times: what shapes and rates change in that time is not theirs.
+_TIME_ROUNDING = 8.0
+# Of the duration: narrower panels would consist of rounding.
+_LEAST_WIDTH = 1e-13
+# Of the duration: from here on a panel that cannot be resolved is searched for a kink.
+_KINK_WIDTH = 2.0**-12
+# Panels before halving ends, besides 40 for every break: a path that needs more is rough, not merely long.
+_MOST_PANELS = 4000
+# [rad or m], of rates times half the width of a panel: noise up to this is left to the tolerance; more is refused.
+_MOST_NOISE = 1e-9
+# Of the scatter between neighbouring times: a series through values that scatter is off by so much.
+_NOISE_MARGIN = 16.0
+# Of a panel: where noise is looked for, which is no node and no half of anything.
+_NOISE_PLACE = 0.4142
+# Of them the scatter is the median, which a single jump does not move.
+_NOISE_TIMES = 10
+# In units of the rounding of times: so near to each other no function changes.
+_NOISE_STEP = 64.0
+# [rad or m]: an integral of the rates that differs by more from the shapes on a panel is an error of the rates.
+_RATE_DEFECT = 1e-9
+# Times named in a warning.
+_NAMED_TIMES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class PathScan:
+    """What one look at a path found.
+
+    Attributes
+    ----------
+    resolved : shapes and rates as series
+    found_breaks : (K,) times of kinks that were not declared [s]
+    evaluations : times at which the path's function was evaluated
+    calls : of the path's function
+    noise : of the shapes, and of the rates times half the width of a panel, as far as series meet it [rad or m]
+    rate_defect : largest difference between the integral of the rates and the shapes on a panel [rad or m]
+    """
+
+    resolved: ResolvedPath
+    found_breaks: Array
+    evaluations: int
+    calls: int
+    noise: float
+    rate_defect: float
+
+    @property
+    def panels(self) -> int:
+        """How many panels resolve the path to rounding."""
+        return len(self.resolved.leaves)
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.resolved.duration
+
+    def __str__(self) -> str:
+        found = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
+        return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{found}"
+
+    def reversed(self) -> PathScan:
+        """Of the path in the opposite order of time."""
+        found = (self.duration - self.found_breaks)[::-1]
+        return replace(self, resolved=self.resolved.reversed(), found_breaks=found)
+
+    def stretched(self, factor: float) -> PathScan:
+        """Of the path `factor` times as slowly."""
+        return replace(self, resolved=self.resolved.stretched(factor), found_breaks=factor * self.found_breaks)
+
+    def reordered(self, order: Integers) -> PathScan:
+        """Of the path with its joints in another order."""
+        return replace(self, resolved=self.resolved.reordered(order))
+
+    @staticmethod
+    def of_several(scans: Sequence[PathScan], resolved: ResolvedPath, found_breaks: Array) -> PathScan:
+        """Of paths one after another."""
+        return PathScan(
+            resolved=resolved,
+            found_breaks=found_breaks,
+            evaluations=sum(scan.evaluations for scan in scans),
+            calls=sum(scan.calls for scan in scans),
+            noise=max(scan.noise for scan in scans),
+            rate_defect=max(scan.rate_defect for scan in scans),
+        )
+
+
+def scanned_path(curve: Curve, breaks: Array, joint_names: tuple[str, ...] | None) -> PathScan:
+    """Look at a path of which only its values are known.
+
+    Parameters
+    ----------
+    breaks : (M,) times between which it is said to be smooth, first and last its ends [s]
+
+    Raises
+    ------
+    TrajectoryError
+        If the shape jumps, or the rate is not its derivative.
+    NoisyPathError
+        If the values carry noise.
+    AccuracyNotReached
+        If the path is too rough for some thousands of panels.
+
+    Warns
+    -----
+    UndeclaredBreakWarning
+        Of kinks that are not among the breaks.
+    """
+    scan = _Scan(curve, breaks, joint_names)
+    return scan.result()
+
+
+class _Scan:
+    """One look at a path."""
+
+    def __init__(self, curve: Curve, breaks: Array, joint_names: tuple[str, ...] | None) -> None:
+        self._curve, self._breaks, self._names = curve, breaks, joint_names
+        self._duration = float(breaks[-1])
+        self._tick = float(np.spacing(self._duration))
+        self._evaluations = self._calls = 0
+        self._noise = 0.0
+        self._found: list[float] = []
+        # Breaks at which an angle only goes on at another turn.
+        self._turned: set[float] = set()
+
+    def result(self) -> PathScan:
+        """Resolve all pieces, and those again that hold kinks."""
+        pieces = [Piece(a, b) for a, b in pairwise(self._breaks)]
+        few = _FIRST_PANELS[0] if len(pieces) == 1 else _FIRST_PANELS[1] if len(pieces) <= 4 else _FIRST_PANELS[2]
+        self._most_panels = _MOST_PANELS + 40 * len(self._breaks)
+        self._times = np.concatenate([sample_times(p.first, p.last, self._duration) for p in pieces])
+        first = self._first_panels(pieces, few)
+        nodes = nodes_on(first.left, first.right, DEGREE)
+        both = self._at(np.concatenate([self._times, nodes.ravel()]))
+        self._samples, values = both[: len(self._times)], both[len(self._times) :].reshape(*nodes.shape, -1)
+        self._n_shape = self._samples.shape[1] // 2
+        self._largest = np.abs(self._samples).max(axis=0, initial=0.0)
+        self._reach = np.abs(self._samples[:, : self._n_shape]).max(axis=0, initial=0.0)
+        done: list[Piece] = []
+        while pieces:
+            self._resolve(pieces, first, values)
+            done += [piece for piece in pieces if not piece.kinks]
+            pieces = [part for piece in pieces if piece.kinks for part in self._parts(piece)]
+            if pieces:
+                first = self._first_panels(pieces, _FIRST_PANELS[1])
+                values = None
+        done.sort(key=lambda piece: piece.left)
+        self._check_jumps(done)
+        defect = self._check_rates(done)
+        resolved = resolved_path(done, self._duration)
+        found = np.array(sorted(self._found))
+        kinks = np.array([time for time in found if time not in self._turned])
+        if len(kinks):
+            self._warn(kinks)
+        return PathScan(
+            resolved=resolved,
+            found_breaks=found,
+            evaluations=self._evaluations,
+            calls=self._calls,
+            noise=self._noise,
+            rate_defect=defect,
+        )
+
+    def _at(self, times: Array) -> Array:
+        """Shapes and rates side by side: (N,) -> (N, 2 n)."""
+        self._evaluations += len(times)
+        self._calls += 1
+        return np.concatenate(self._curve(times), axis=1)
+
+    def _first_panels(self, pieces: list[Piece], count: int) -> Panels:
+        rows: list[tuple[float, float, int, int]] = []
+        for number, piece in enumerate(pieces):
+            edges = np.linspace(piece.first, piece.last, count + 1)
+            for a, b in pairwise(edges):
+                piece.roots.append(piece.added(float(a), float(b)))
+                rows.append((float(a), float(b), number, piece.roots[-1]))
+        return panels_of(rows, np.full((len(rows), 1), np.inf))
+
+    # ---- Halving ----
+
+    def _resolve(self, pieces: list[Piece], panels: Panels, values: Array | None) -> None:
+        """Halve panels until all are resolved, or hold kinks that were located."""
+        level = resolved = 0
+        while len(panels.left):
+            looked = self._look(panels, values)
+            values, misfit, floor = None, looked.misfit, looked.floor
+            good: Mask = np.all(misfit <= floor, axis=1)
+            self._note(pieces, panels, looked, good)
+            resolved += int(good.sum())
+            bad, rounding = panels.of(~good), floor[~good]
+            if len(bad.left) + resolved > self._most_panels:
+                raise self._too_rough(float(bad.left[np.argmax(misfit[~good].max(axis=1))]))
+            smooth = self._without_kinks(pieces, bad, rounding, level)
+            bad, left_over = bad.of(smooth), misfit[~good][smooth]
+            narrow = bad.right - bad.left < _LEAST_WIDTH * self._duration
+            if narrow.any():
+                raise self._too_rough(float(bad.left[narrow][0]))
+            panels = self._halves(pieces, bad, left_over)
+            level += 1
+
+    def _note(self, pieces: list[Piece], panels: Panels, looked: Looked, good: Mask) -> None:
+        """Enter what was found of panels in the trees of their pieces."""
+        n, half = self._n_shape, 0.5 * (panels.right - panels.left)
+        shapes = looked.misfit[:, :n].max(axis=1, initial=0.0)
+        rates = half * looked.misfit[:, n:].max(axis=1, initial=0.0)
+        for row, (number, node) in enumerate(zip(panels.piece, panels.node, strict=True)):
+            piece = pieces[number]
+            piece.coefficients[node] = looked.coefficients[row]
+            if good[row]:
+                piece.noise[node] = float(looked.noise[row])
+            else:
+                piece.misfit[node] = float(shapes[row]), float(rates[row])
+
+    def _look(self, panels: Panels, values: Array | None) -> Looked:
+        """Series of panels, and how far the path is from them."""
+        left, right = panels.left, panels.right
+        count = len(left)
+        scatter: Array | float = 0.0
+        if values is None:
+            nodes = nodes_on(left, right, DEGREE)
+            checks = left[:, None] + (right - left)[:, None] * CHECKS
+            steps = np.minimum(_NOISE_STEP * self._tick, 0.01 * (right - left))[:, None] * np.arange(_NOISE_TIMES)
+            near = (left + _NOISE_PLACE * (right - left))[:, None] + steps
+            all_times = np.concatenate([nodes, checks, near], axis=1)
+            both = self._at(all_times.ravel()).reshape(*all_times.shape, -1)
+            values, checked = both[:, : DEGREE + 1], both[:, DEGREE + 1 : -_NOISE_TIMES]
+            misfit = np.abs(check_matrix() @ values - checked).max(axis=1, initial=0.0)
+            scatter = self._scatter(both[:, -_NOISE_TIMES:])
+        else:
+            misfit = np.zeros((count, values.shape[2]))
+        coefficients = transform() @ values
+        floor = self._floor(values, right - left)
+        np.maximum(misfit, 0.5 * np.abs(coefficients[:, -3:]).max(axis=1, initial=0.0), out=misfit)
+        starts, ends = np.searchsorted(self._times, left), np.searchsorted(self._times, right)
+        index = np.concatenate([np.arange(a, b) for a, b in zip(starts, ends, strict=True)])
+        if len(index):
+            row = np.repeat(np.arange(count), ends - starts)
+            local = (2.0 * self._times[index] - left[row] - right[row]) / (right - left)[row]
+            basis = polynomials(local)
+            stops = np.cumsum(ends - starts)
+            for panel in np.flatnonzero(ends > starts):
+                part = slice(int(stops[panel] - (ends - starts)[panel]), int(stops[panel]))
+                gap = basis[part] @ coefficients[panel] - self._samples[starts[panel] : ends[panel]]
+                np.maximum(misfit[panel], np.abs(gap).max(axis=0, initial=0.0), out=misfit[panel])
+        follows = (misfit > floor) & (misfit <= _NOISE_MARGIN * scatter)
+        follows &= np.all((misfit <= floor) | follows, axis=1)[:, None]
+        noise = self._allowed_noise(panels, follows, np.broadcast_to(scatter, misfit.shape))
+        # Where halving does not help, and no more is left than rounding within the function's own sums, this is it.
+        np.maximum(self._largest, np.abs(values).max(axis=(0, 1), initial=0.0), out=self._largest)
+        inner = _INNER_ROUNDING * self._largest
+        widths = np.where(np.arange(len(inner)) < self._n_shape, 1.0, 0.5 * (right - left)[:, None])
+        inner = inner + _INNER_STEPS / widths
+        inner = np.where(misfit > _STUBBORN * panels.before, inner, 0.0)
+        return Looked(coefficients, misfit, np.maximum(np.maximum(floor, inner), _NOISE_MARGIN * scatter), noise)
+
+    def _floor(self, values: Array, width: Array) -> Array:
+        """What rounding of values and of times leaves of shapes and rates on panels: (P, k, 2 n) -> (P, 2 n)."""
+        n = self._n_shape
+        largest = np.abs(values).max(axis=1, initial=0.0)
+        spread = np.ptp(values[:, :, n:], axis=1)
+        floor = _ROUNDING * largest
+        floor[:, :n] += _TIME_ROUNDING * (self._tick * largest[:, n:] + _EPS * self._reach)
+        floor[:, n:] += _TIME_ROUNDING * (self._tick * spread / width[:, None] + _EPS * self._reach / self._duration)
+        return floor
+
+    @staticmethod
+    def _halves(pieces: list[Piece], panels: Panels, misfit: Array) -> Panels:
+        rows: list[tuple[float, float, int, int]] = []
+        for left, right, number, node in zip(panels.left, panels.right, panels.piece, panels.node, strict=True):
+            middle = 0.5 * (left + right)
+            piece = pieces[number]
+            piece.children[node] = piece.added(left, middle)
+            piece.added(middle, right)
+            rows += [(left, middle, number, piece.children[node]), (middle, right, number, piece.children[node] + 1)]
+        return panels_of(rows, np.repeat(misfit, 2, axis=0))
+
+    # ---- Kinks, jumps, noise, roughness ----
+
+    def _without_kinks(self, pieces: list[Piece], bad: Panels, floor: Array, level: int) -> Mask:
+        """The panels in which no kink is located; where one is, the piece notes it."""
+        kept = np.ones(len(bad.left), dtype=bool)
+        for row in np.flatnonzero(bad.right - bad.left < _KINK_WIDTH * self._duration) if level % 2 else ():
+            piece = pieces[bad.piece[row]]
+            where = located_kink(
+                self._at, (float(bad.left[row]), float(bad.right[row])), (piece.first, piece.last), floor[row]
+            )
+            if where is None:
+                continue
+            kept[row] = False
+            if not any(abs(where - other) < 256.0 * self._tick for other in piece.kinks):
+                piece.kinks.append(where)
+        return kept
+
+    def _parts(self, piece: Piece) -> list[Piece]:
+        self._found += piece.kinks
+        return [Piece(a, b) for a, b in pairwise([piece.left, *sorted(piece.kinks), piece.right])]
+
+    def _check_jumps(self, pieces: list[Piece]) -> None:
+        """Raise TrajectoryError where the shape jumps at a break; an angle that goes on at another turn does not."""
+        if len(pieces) < 2:
+            return
+        n = self._n_shape
+        before = np.array([piece.last for piece in pieces[:-1]])
+        after = np.array([piece.first for piece in pieces[1:]])
+        both = self._at(np.concatenate([before, after]))
+        first, second = both[: len(before)], both[len(before) :]
+        gap = second[:, :n] - first[:, :n]
+        turns = np.round(gap / (2.0 * np.pi))
+        gap -= 2.0 * np.pi * turns
+        moved = 2.0 * (after - before)[:, None] * np.maximum(np.abs(first), np.abs(second))[:, n:]
+        jumps = np.abs(gap) > CLOSED * np.maximum(1.0, self._reach) + moved
+        if jumps.any():
+            row, joint = (int(i) for i in np.argwhere(jumps)[0])
+            raise TrajectoryError(
+                f"the path's function jumps: joint {self._joint(joint)} goes from {first[row, joint]:.9g} to "
+                f"{second[row, joint]:.9g} at {pieces[row].right:.12g} s; a shape must be continuous"
+            )
+        rate_jumps = np.abs(second - first)[:, n:] > CLOSED * np.maximum(1.0, self._largest[n:])
+        self._turned = {
+            piece.right for row, piece in enumerate(pieces[:-1]) if turns[row].any() and not rate_jumps[row].any()
+        }
+
+    def _scatter(self, values: Array) -> Array:
+        """How far values scatter over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
+
+        A function that is merely rough goes straight there; at a single jump most neighbours still do.
+        """
+        bends = np.abs(values[:, 2:] - 2.0 * values[:, 1:-1] + values[:, :-2])
+        # The median of a normal distribution's size, and the sum of its three squares.
+        return np.median(bends, axis=1) / (0.6745 * np.sqrt(6.0))
+
+    def _allowed_noise(self, panels: Panels, noisy: Mask, scatter: Array) -> Array:
+        """Of panels whose series follow noise, where it can be left to a tolerance: (P,) [rad]; else NoisyPathError."""
+        n = self._n_shape
+        half = 0.5 * (panels.right - panels.left)
+        weights = np.where(np.arange(2 * n) < n, 1.0, half[:, None])
+        sizes = np.where(noisy, scatter * weights, 0.0)
+        self._noise = max(self._noise, float(sizes.max(initial=0.0)))
+        loud = sizes > _MOST_NOISE * np.maximum(1.0, np.tile(self._reach, 2))
+        if loud.any():
+            row, worst = (int(i) for i in np.argwhere(loud)[0])
+            kind, unit = ("shape", "rad or m") if worst < n else ("rate", "rad/s or m/s")
+            raise NoisyPathError(
+                f"the path's function is noisy: the {kind} of joint {self._joint(worst % n)} scatters by "
+                f"{scatter[row, worst]:.2g} {unit} near t = {panels.left[row] + _NOISE_PLACE * 2.0 * half[row]:.9g} s, "
+                "however near the times; smooth the data first"
+            )
+        return sizes.max(axis=1, initial=0.0)
+
+    def _too_rough(self, where: float) -> AccuracyNotReached:
+        return AccuracyNotReached(
+            f"the path's function is rough near t = {where:.12g} s: {self._evaluations} evaluations do not resolve it; "
+            "declare the times of its jumps as breaks, or smooth the data"
+        )
+
+    def _check_rates(self, pieces: list[Piece]) -> float:
+        """Compare the integral of the rates on each panel with its shapes: the largest difference."""
+        rows = [(piece, node) for piece in pieces for node, first in enumerate(piece.children) if first < 0]
+        series = np.stack([piece.coefficients[node] for piece, node in rows])
+        left, right = np.array([piece.ends[node] for piece, node in rows]).T
+        n, half = self._n_shape, 0.5 * (right - left)
+        integrals = half[:, None, None] * (integral_matrix() @ series[:, :, n:])
+        apart = np.abs(integrals[:, 1:-1] - series[:, 1:, :n]).max(axis=1, initial=0.0)
+        fastest = np.abs(series[:, :, n:]).sum(axis=1)
+        allowed = _RATE_DEFECT * np.maximum(1.0, self._reach) + 2.0 * _TIME_ROUNDING * self._tick * fastest
+        wrong = apart > allowed + _NOISE_MARGIN * self._noise
+        if wrong.any():
+            panel, joint = (int(i) for i in np.unravel_index(np.argmax(np.where(wrong, apart, 0.0)), wrong.shape))
+            basis = polynomials(unit_nodes(DEGREE))
+            slopes = basis @ (derivative_matrix(DEGREE + 1) @ series[panel, :, joint]) / half[panel]
+            rates = basis @ series[panel, :, n + joint]
+            # The ends of a differentiated series are its least certain part.
+            place = 3 + int(np.argmax(np.abs(slopes - rates)[3:-3]))
+            where = nodes_on(left[panel : panel + 1], right[panel : panel + 1], DEGREE)[0, place]
+            raise TrajectoryError(
+                f"the path's function gives the rate {rates[place]:.9g} of joint {self._joint(joint)} at "
+                f"{where:.9g} s, but its shapes change at {slopes[place]:.9g}; return (shapes, rates)"
+            )
+        return float(apart.max(initial=0.0))
+
+    def _warn(self, found: Array) -> None:
+        named = ", ".join(f"{time:.15g}" for time in found[:_NAMED_TIMES])
+        more = f" and at {len(found) - _NAMED_TIMES} more times" if len(found) > _NAMED_TIMES else ""
+        warnings.warn(
+            f"the path's function has kinks that were not declared, at t = {named} s{more}; they are taken as breaks. "
+            "Declare them with breaks= to be certain",
+            UndeclaredBreakWarning,
+            stacklevel=2,
+        )
+
+    def _joint(self, column: int) -> str:
+        return self._names[column] if self._names else f"number {column}"

@@ -1,0 +1,34 @@
+"""What is known of a function of time before it is sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..arrays import Array
+from ..integrator.resolved import ResolvedPath
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothness:
+    """What is known of a function of time before it is sampled, by which a way of sampling is chosen.
+
+    Attributes
+    ----------
+    breaks : (M,) times between which it is smooth, first and last the interval's ends [s]
+    oscillations : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
+    loops : the interval is its first part, this many times
+    smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    sparse : whether harmonics below the highest are missing in a smooth loop
+    probe : a cheap stand-in whose swings are those of the function, times (N,) -> (N, 2 n), shapes and then their
+        rates; None: there is none
+    resolved : the first loop of what it depends on as series, where that is all there is to know; None: unknown
+    """
+
+    breaks: Array
+    oscillations: float | None = None
+    loops: int = 1
+    smooth_loop: bool = False
+    sparse: bool = False
+    probe: Callable[[Array], Array] | None = None
+    resolved: ResolvedPath | None = None
