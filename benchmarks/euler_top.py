@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import mpmath
 import numpy as np
 from scipy.integrate import solve_ivp
-from tests.euler_top_reference import DIGITS, truth
+from tests.support.euler_top_reference import DIGITS, truth
 
 from shapephase import so3
 from shapephase.rigid_body.euler_top import EulerTop

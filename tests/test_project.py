@@ -175,6 +175,13 @@ def test_nothing_refers_to_a_note_outside_the_repository():
             assert {name.lower() for name in page.findall(text)} <= inside, file.relative_to(ROOT)
 
 
+def test_every_benchmark_can_be_imported():
+    names = sorted(path.stem for path in (ROOT / "benchmarks").glob("[a-z]*.py"))
+    code = f"from importlib import import_module; print([import_module('benchmarks.' + n).__name__ for n in {names}])"
+    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT).stdout
+    assert said.count("benchmarks.") == len(names) >= 10
+
+
 def test_the_benchmark_s_opponent_still_stands_on_the_body():
     code = (
         "from benchmarks.cases import cases; from benchmarks.contestants import FloatingModel; "

@@ -26,7 +26,7 @@ import mpmath
 import numpy as np
 from mpmath import mpf
 
-from support.places import DATA
+from .places import DATA
 
 FILE = DATA / "euler_top_reference.npz"
 DIGITS = 120
