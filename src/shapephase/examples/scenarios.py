@@ -68,7 +68,7 @@ def cat_righting(duration: float = 0.5) -> ShapePath:
 
 
 def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
-    """One circle of both arms of the `astronaut`: 11.860224 degrees nose down at zero momentum.
+    """One circle of both arms of the `astronaut`: 11.825049 degrees nose down at zero momentum.
 
     The arms go up in front of the body, close together, and come down spread at the sides.
     In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
@@ -87,7 +87,7 @@ def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
 
 
 def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
-    """One swing of legs and trunk of the `astronaut`: 12.297356 degrees nose down at zero momentum.
+    """One swing of legs and trunk of the `astronaut`: 12.352775 degrees nose down at zero momentum.
 
     The legs swing forward stretched and come back bent, the trunk bends along.
     In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
