@@ -7,6 +7,8 @@ import os
 
 # The workers share the cores: threads of their own would get in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Machine code is tested where the fixture `fast` switches it on.
+os.environ["SHAPEPHASE_FAST"] = "0"
 
 import numpy as np
 import pytest
@@ -34,6 +36,13 @@ def body(request):
 @pytest.fixture
 def rng():
     return np.random.default_rng(20060518)
+
+
+@pytest.fixture
+def fast(monkeypatch):
+    """Machine code for the test that asks for it; skipped where Numba is not installed."""
+    pytest.importorskip("numba")
+    monkeypatch.setenv("SHAPEPHASE_FAST", "1")
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
+from .link_rows import LinkRows, link_rows
 
 # Pinocchio's number of the free-flyer: joint 0 is the universe.
 _BASE = 1
@@ -48,6 +50,11 @@ class JointChain:
     matrix: Array
     offset: Array
     link_frames: Mapping[str, tuple[int, Array]]
+
+    @cached_property
+    def rows(self) -> LinkRows:
+        """The same for loops in machine code, made when first needed."""
+        return link_rows(self)
 
 
 def joint_chain(model: Any, mimics: Mapping[str, Mimic]) -> JointChain:

@@ -119,7 +119,8 @@ class Deformation:
 
         Raises SingularInertiaError for particles that are on one line at some time.
         """
-        return sampler(self.description.sample, **vars(self.description.smoothness(self.breaks)))
+        known = self.description
+        return sampler(known.sample, **vars(known.smoothness(self.breaks)), directly=known.channels)
 
 
 def articulated(body: Body, path: ShapePath) -> Deformation:

@@ -17,6 +17,7 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
+from ..shape_space.body_path import channels_along
 from ..shape_space.shape_path import ShapePath
 from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
@@ -27,6 +28,10 @@ class Description(Protocol):
 
     def sample(self, times: Array, /) -> tuple[Array, Array]:
         """Locked inertia (N, 3, 3) [kg m^2] and internal momentum (N, 3) [kg m^2/s]."""
+        ...
+
+    def channels(self, times: Array, /) -> Array | None:
+        """I^-1 (xx yy zz yz xz xy) and I^-1 L_o in one call (N, 9), or None where only `sample` will do."""
         ...
 
     def inertia_rate(self, times: Array, /) -> Array:
@@ -67,6 +72,9 @@ class Description(Protocol):
 class UngaugedDescription:
     """The frame of a description that no gauge has turned, with its origin at the centre of mass; masses unknown."""
 
+    def channels(self, times: Array) -> Array | None:  # noqa: ARG002
+        return None
+
     def frame(self, times: Array) -> Array:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)).copy()
 
@@ -99,6 +107,9 @@ class ArticulatedDescription(UngaugedDescription):
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         return self.body.sample(*self.path.curve(times))
+
+    def channels(self, times: Array) -> Array | None:
+        return channels_along(self.body, self.path, times)
 
     def inertia_rate(self, times: Array) -> Array:
         return self.body.inertia_rate(*self.path.curve(times))

@@ -171,6 +171,9 @@ class _Gauged:
         turn, rate = self.frames(times)
         return turn @ inertia @ so3.transpose(turn), so3.apply(turn, so3.apply(inertia, rate) + momentum)
 
+    def channels(self, times: Array) -> Array | None:  # noqa: ARG002
+        return None
+
     def inertia_rate(self, times: Array) -> Array:
         inertia, _ = self.original.sample(times)
         turn, rate = self.frames(times)

@@ -16,6 +16,8 @@ from ..inertia_tensor import inverse_inertia
 from .casadi_calls import map_rows
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
+# The channels in one call, or None where that cannot be done: (N,) -> (N, 9).
+Directly = Callable[[Array], Array | None]
 
 EPS = float(np.finfo(float).eps)
 # Rounding of a coefficient, relative to the largest: samples are right to some ten units, and their sums to thirty.
@@ -37,14 +39,18 @@ _SQUARES_OF_PAIRS = np.repeat(_SQUARES, 2, axis=0)
 class Channels:
     """The deformation as channels, with a count of its evaluations."""
 
-    def __init__(self, evaluate: Evaluate) -> None:
-        self._evaluate = evaluate
+    def __init__(self, evaluate: Evaluate, directly: Directly | None = None) -> None:
+        self._evaluate, self._directly = evaluate, directly
         self.count = 0
 
     def __call__(self, times: Array) -> Array:
         """I^-1 (xx yy zz yz xz xy) and I^-1 L_o: (N,) -> (N, 9)."""
-        inertia, momentum = self._evaluate(times)
         self.count += len(times)
+        channels = None if self._directly is None else self._directly(times)
+        return self._inverted(times) if channels is None else channels
+
+    def _inverted(self, times: Array) -> Array:
+        inertia, momentum = self._evaluate(times)
         flat = np.empty((len(times), 12))
         flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
         channels = map_rows(inverse_channels, 12, flat)

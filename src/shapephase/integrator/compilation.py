@@ -22,6 +22,7 @@ import numpy as np
 
 from ..errors import CompiledCodeWarning, CompilerError
 from ..files import write_whole
+from .fast.cache_folder import code_folder
 
 # Contracting a product and a sum into one operation would round differently.
 _OPTIONS = ("-O2", "-ffp-contract=off", "-shared", "-fPIC")
@@ -30,16 +31,6 @@ _COMPILER_TIMEOUT = 120.0
 # Random arguments for which a compiled function must agree with the interpreted one: operations in another order, or
 # another function in the place of one, show in nearly every trial.
 _TRIALS = 20
-
-
-def code_folder() -> Path:
-    """Where compiled functions are kept: $XDG_CACHE_HOME/shapephase, or ~/.cache/shapephase.
-
-    Raises RuntimeError if the home directory cannot be determined.
-    """
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    # A relative path is to be ignored: XDG Base Directory Specification.
-    return (named if named.is_absolute() else Path.home() / ".cache") / "shapephase"
 
 
 @lru_cache(maxsize=64)

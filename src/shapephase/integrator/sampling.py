@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Array
 from ._even_sampling import EvenSampler
 from ._panel_sampling import PanelSampler
-from ._spectral_error import Channels, Evaluate
+from ._spectral_error import Channels, Directly, Evaluate
 from .interpolant import Interpolant
 from .resolved import ResolvedPath
 
@@ -55,6 +55,7 @@ def sampler(
     sparse: bool = False,
     probe: Callable[[Array], Array] | None = None,
     resolved: ResolvedPath | None = None,
+    directly: Directly | None = None,
 ) -> Sampler:
     """The sampler that suits a deformation.
 
@@ -70,8 +71,10 @@ def sampler(
     probe : a cheap stand-in for the deformation to check a black box, times (N,) -> (N, 2 n), shapes and then their
         rates; None: the deformation itself is evaluated
     resolved : all of what the deformation depends on in the first loop, as series: nothing is checked between nodes
+    directly : times (N,) -> I^-1 and I^-1 L_o (N, 9) as channels, sooner than by `evaluate`; None, or None as its
+        result: `evaluate` is asked
     """
-    channels = Channels(evaluate)
+    channels = Channels(evaluate, directly)
     period = float(breaks[-1]) / loops
     if smooth_loop and oscillations is not None:
         # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.

@@ -8,6 +8,7 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import OpenPathError
+from ..integrator.fast import engine
 from ..integrator.sampling import Sampler, sampler
 from .shape_path import CLOSED, ShapePath
 
@@ -35,4 +36,15 @@ def path_sampler(body: Body, path: ShapePath) -> Sampler:
     def evaluate(times: Array) -> tuple[Array, Array]:
         return body.sample(*path.curve(times))
 
-    return sampler(evaluate, **vars(path.smoothness))
+    def directly(times: Array) -> Array | None:
+        return channels_along(body, path, times)
+
+    return sampler(evaluate, **vars(path.smoothness), directly=directly)
+
+
+def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
+    """I^-1 (xx yy zz yz xz xy) and I^-1 L_o along a path, in machine code: (N,) -> (N, 9).
+
+    None without it, and where a tensor is nearly singular or a number is not finite.
+    """
+    return engine.tree_channels(body.chain.rows, *path.curve(times)) if engine.is_ready() else None

@@ -1,0 +1,40 @@
+"""How functions become machine code: the only place that imports Numba.
+
+Products and sums are never contracted and never reordered, so that a result does not depend on what is computed
+beside it, on how many lanes the processor has, or on threads.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+from numba.core import config
+
+from .cache_folder import kernel_folder
+
+# Without the interpreter's lock; a division by zero gives infinity, as in NumPy, and needs no branch.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+_config: Any = config
+_lock = threading.Lock()
+
+inline: Callable[[Any], Any] = njit(forceinline=True, **_OPTIONS)
+"""A part of kernels; not to be called from Python."""
+
+
+def kernel(function: Any) -> Any:
+    """What Python calls: compiled when first called, and kept for later processes where there is a safe folder."""
+    folder = kernel_folder()
+    if folder is None:
+        return njit(**_OPTIONS)(function)
+    with _lock:
+        # Numba asks where to keep a function once, here; what else uses Numba in this process has its own place.
+        before, _config.CACHE_DIR = _config.CACHE_DIR, str(folder)
+        try:
+            return njit(cache=True, **_OPTIONS)(function)
+        except RuntimeError:
+            return njit(**_OPTIONS)(function)
+        finally:
+            _config.CACHE_DIR = before

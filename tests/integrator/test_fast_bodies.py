@@ -1,0 +1,103 @@
+"""Inertia and momentum of a tree of links in machine code: right to rounding, and everything else as without it."""
+
+from __future__ import annotations
+
+import pickle
+import shutil
+
+import numpy as np
+import pytest
+from benchmarks.body_leaf import leaves
+
+import shapephase as sp
+from shapephase.errors import ShapeError, SingularInertiaError
+from shapephase.integrator._spectral_error import Channels
+from shapephase.integrator.fast import engine
+from support.bodies import joint, link, random_loop, random_shapes, urdf
+
+pytestmark = pytest.mark.usefixtures("fast")
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="the extended precision is compiled C")
+
+
+@needs_compiler
+def test_random_bodies_are_rounded_like_their_terms():
+    """Two hundred of the two thousand of `benchmarks/body_leaf.py`, half of them with joints 100 m away."""
+    found = leaves(200, 7)
+    assert max(leaf.joints for leaf in found) == 12
+    for leaf in found:
+        assert leaf.kernel <= leaf.allowed
+        assert leaf.pinocchio <= leaf.allowed
+    assert max(leaf.kernel for leaf in found) <= max(leaf.pinocchio for leaf in found)
+
+
+def test_the_kernel_agrees_with_pinocchio(body, rng):
+    """A joint's angle may be many turns: cosines of a million radians come from the usual functions."""
+    shapes, rates = random_shapes(body, rng, 21), rng.normal(size=(21, body.n_shape))
+    turning = np.array([unit == "rad" for unit in body.joint_units])
+    shapes[7] += 2.0 * np.pi * 1000.0 * turning
+    shapes[13] += 1e6 * turning
+    inertia, momentum = engine.tree_inertia_and_momentum(body.chain.rows, shapes, rates)
+    expected, expected_momentum = body.sample(shapes, rates)
+    # Pinocchio is given the same angles; both round some hundred terms.
+    size = np.abs(expected).max()
+    assert np.abs(inertia - expected).max() < 1e-14 * size
+    assert np.abs(momentum - expected_momentum).max() < 1e-13 * size
+    channels = engine.tree_channels(body.chain.rows, shapes, rates)
+    inverse = np.linalg.inv(expected)
+    assert np.allclose(channels[:, :6], inverse.reshape(-1, 9)[:, [0, 4, 8, 5, 2, 1]], rtol=0, atol=1e-12 / size)
+    assert np.allclose(channels[:, 6:], (inverse @ expected_momentum[..., None])[..., 0], rtol=0, atol=1e-11)
+
+
+def test_a_shape_s_result_does_not_depend_on_its_companions(body, rng):
+    shapes, rates = random_shapes(body, rng, 19), rng.normal(size=(19, body.n_shape))
+    whole = engine.tree_channels(body.chain.rows, shapes, rates)
+    alone = [engine.tree_channels(body.chain.rows, shapes[i : i + 1], rates[i : i + 1])[0] for i in range(19)]
+    assert np.array_equal(whole, alone)
+
+
+def test_a_motion_is_the_same_with_and_without_it(monkeypatch, body, rng):
+    deformation = sp.articulated(body, random_loop(body, rng))
+    momentum = 0.3 * float(np.trace(deformation.inertia(0.0))) * rng.normal(size=3)
+    with_it = sp.reconstruct(deformation, momentum, tolerance=1e-8)
+    monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+    without = sp.reconstruct(deformation, momentum, tolerance=1e-8)
+    times = np.linspace(0.0, without.duration, 7)
+    assert with_it.evaluations == without.evaluations
+    assert np.abs(with_it.attitude(times) - without.attitude(times)).max() < 1e-11
+
+
+def test_a_singular_body_is_the_same_error(monkeypatch, load_urdf):
+    rod = load_urdf(
+        urdf(
+            link("a", 1.0, (1e-18, 1.0, 1.0)), link("b", 1.0, (1e-18, 1.0, 1.0), com=(0.3, 0.0, 0.0)),
+            joint("hinge", "revolute", "a", "b", axis=(1.0, 0.0, 0.0)),
+        )
+    )  # fmt: skip
+    deformation = sp.articulated(rod, sp.ShapePath.fourier([0.0], [[0.1]], [[0.2]], 1.0))
+    said = []
+    for value in ("1", "0"):
+        monkeypatch.setenv("SHAPEPHASE_FAST", value)
+        with pytest.raises(SingularInertiaError) as raised:
+            sp.reconstruct(deformation, [0.1, 0.0, 0.0])
+        said.append(str(raised.value))
+    assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("rate", [np.nan, np.inf])
+def test_what_is_not_finite_is_left_to_slower_code(rate):
+    """Which says at what time."""
+    body = sp.load_body("cat_two_halves")
+    shapes, rates = np.zeros((3, 3)), np.zeros((3, 3))
+    rates[1] = rate
+    assert engine.tree_channels(body.chain.rows, shapes, rates) is None
+    channels = Channels(
+        lambda _: body.sample(shapes, rates), lambda _: engine.tree_channels(body.chain.rows, shapes, rates)
+    )
+    with pytest.raises(ShapeError, match=r"at t = 0.2 s is not finite"), np.errstate(all="ignore"):
+        channels(np.array([0.1, 0.2, 0.3]))
+
+
+def test_a_pickled_body_has_its_rows(body):
+    body.chain.rows  # noqa: B018 (kept from now on)
+    again = pickle.loads(pickle.dumps(body))
+    assert np.array_equal(again.chain.rows.rows, body.chain.rows.rows)

@@ -1,0 +1,41 @@
+"""When machine code is used, and that all is as before without Numba."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.examples.scenarios import MOTIONS
+from shapephase.integrator.fast import engine, switch
+
+
+def test_without_numba_all_is_as_before(monkeypatch):
+    monkeypatch.setenv("SHAPEPHASE_FAST", "1")
+    monkeypatch.setitem(sys.modules, "numba", None)
+    switch.is_installed.cache_clear()
+    try:
+        assert not engine.is_ready()
+        motion = sp.reconstruct(_cat_righting(), np.zeros(3))
+        assert motion.error_estimate < 1e-9
+    finally:
+        switch.is_installed.cache_clear()
+
+
+@pytest.mark.usefixtures("fast")
+@pytest.mark.parametrize(("momenta", "samples", "enough"), [(1, 4000, False), (1000, 4000, True), (1, 400_000, True)])
+def test_the_command_line_waits_for_large_work(monkeypatch, momenta, samples, enough):
+    monkeypatch.delenv("SHAPEPHASE_FAST")
+    monkeypatch.setattr(switch, "_waits_for_large_work", False)
+    assert switch.is_on()
+    switch.wait_for_large_work()
+    assert not switch.is_on()
+    switch.expect_work(momenta=momenta, samples=samples)
+    assert switch.is_on() == enough
+
+
+def _cat_righting():
+    named = MOTIONS["cat_righting"]
+    return sp.articulated(sp.load_body(named.body), named.path())
