@@ -11,6 +11,8 @@ import numpy as np
 import shapephase as sp
 from shapephase.examples.scenarios import cat_righting
 
+from .extended import as_polynomials
+
 
 @dataclass(frozen=True)
 class Case:
@@ -46,6 +48,17 @@ def move(body: sp.Body, seed: int, duration: float = 1.0) -> sp.ShapePath:
     scale = np.array([0.1 if unit == "m" else 1.0 for unit in body.joint_units])
     points = rng.normal(size=(3, body.n_shape)) * 0.4 * scale
     return sp.ShapePath.waypoints([0.0, 0.5 * duration, duration], points)
+
+
+def exact_path(path: sp.ShapePath) -> sp.ShapePath:
+    """The same path as the extended precision follows it."""
+    known = any(hasattr(path.curve, name) for name in ("knots", "sines"))
+    return path if known else as_polynomials(path)
+
+
+def as_function(path: sp.ShapePath) -> sp.ShapePath:
+    """The same path as a function of time about which only its breaks are known."""
+    return sp.ShapePath.function(path.curve, path.duration, path.breaks[1:-1])
 
 
 def cases() -> list[Case]:
