@@ -10,15 +10,19 @@ import ctypes
 import os
 import subprocess
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
 
 import shapephase as sp
+from shapephase.shape_space.curves import PiecewisePolynomial
 
 _TERM = 7
+_IDENTITY = np.array([0.0, 0.0, 0.0, 1.0], dtype=np.longdouble)
 CONSTANT, HARMONIC, GAUSSIAN, RAMP, BURST, BUMP = map(float, range(6))
 
 
@@ -75,7 +79,29 @@ class _Path(ctypes.Structure):
     _fields_ = (
         ("terms", ctypes.c_int), ("order", ctypes.c_int), ("pieces", ctypes.c_int),
         ("term", ctypes.c_void_p), ("knots", ctypes.c_void_p), ("series", ctypes.c_void_p),
+        ("origin", ctypes.c_double), ("pace", ctypes.c_double),
     )  # fmt: skip
+
+
+class TooLong(ArithmeticError):
+    """The extended precision would take longer than allowed."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A part of a motion: a curve followed at the times origin + pace t, t from 0 to `duration`.
+
+    Attributes
+    ----------
+    breaks : in the segment's own time, the first 0, the last its end [s]; of polynomials their knots
+    pace : 1, or -1 for a curve run through backwards (with `origin` at its end), or 1/2 for half as fast
+    """
+
+    path: sp.ShapePath | Terms
+    breaks: np.ndarray
+    duration: float
+    origin: float = 0.0
+    pace: float = 1.0
 
 
 class Truth:
@@ -102,20 +128,67 @@ class Truth:
         body_momentum : (3,) in base axes at the start [kg m^2/s]
         times : (N,) ascending [s]
         """
-        terms, knots, series = _parts(path, self._n_shape)
-        edges = np.ascontiguousarray(breaks, dtype=np.float64)
+        edges = np.asarray(breaks, dtype=np.float64)
+        return self.along([Segment(path, edges, float(edges[-1]))], body_momentum, times)
+
+    def along(
+        self, segments: Sequence[Segment], body_momentum: np.ndarray, times: np.ndarray, most_steps: float = 1e15
+    ) -> tuple[np.ndarray, float]:
+        """As `attitudes`, along segments one after another; a loop repeated is one segment many times.
+
+        Raises
+        ------
+        TooLong
+            If more than `most_steps` steps are needed.
+        """
+        starts = np.concatenate([[0.0], _starts(segments)])
+        number = np.minimum(np.searchsorted(starts, times, side="right") - 1, len(segments) - 1)
+        left, momentum = ctypes.c_long(int(most_steps)), np.ascontiguousarray(body_momentum, dtype=np.float64)
+        resting = not momentum.any()
+        loops: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        attitude, error, out = _IDENTITY.copy(), 0.0, np.empty((len(times), 4), dtype=np.longdouble)
+        for k, segment in enumerate(segments):
+            here = np.flatnonzero(number == k)
+            local = np.minimum(times[here] - starts[k], segment.breaks[-1])
+            if not resting:
+                out[here], added = self._integrated(segment, momentum, local, attitude, left)
+                error += added
+                continue
+            # At rest a loop does the same whatever the attitude, and is followed once.
+            if id(segment) not in loops:
+                same = [j for j, other in enumerate(segments) if other is segment]
+                whole = np.minimum(np.concatenate([times[number == j] - starts[j] for j in same]), segment.breaks[-1])
+                order, end = np.argsort(whole), _IDENTITY.copy()
+                found, added = self._integrated(segment, momentum, whole[order], end, left)
+                error += added * len(same)
+                kept = np.empty_like(found)
+                kept[order] = found
+                loops[id(segment)] = kept, end
+            kept, end = loops[id(segment)]
+            out[here], loops[id(segment)] = _product(attitude, kept[: len(here)]), (kept[len(here) :], end)
+            attitude = _product(attitude, end)
+        return out, 2.0 * error
+
+    def _integrated(
+        self, segment: Segment, momentum: np.ndarray, times: np.ndarray, attitude: np.ndarray, left: ctypes.c_long
+    ) -> tuple[np.ndarray, float]:
+        """Quaternions at ascending times of a segment, and their error; `attitude` goes to its end, `left` down."""
+        terms, knots, series = _parts(segment.path, self._n_shape)
+        edges, when = (np.ascontiguousarray(part, dtype=np.float64) for part in (segment.breaks, times))
         described = _Path(
-            len(terms), len(series), max(len(knots) - 1, 0), terms.ctypes.data, knots.ctypes.data, series.ctypes.data
-        )
-        out = np.empty((len(times), 4), dtype=np.longdouble)
-        start, when = (np.ascontiguousarray(part, dtype=np.float64) for part in (body_momentum, times))
-        error = _library().attitudes(
-            ctypes.byref(self._body), ctypes.byref(described), len(edges), _at(edges), _at(start), 1e-17,
-            len(when), _at(when), _at(out),
+            len(terms), len(series), max(len(knots) - 1, 0), terms.ctypes.data, knots.ctypes.data, series.ctypes.data,
+            segment.origin, segment.pace,
         )  # fmt: skip
+        out = np.empty((len(when), 4), dtype=np.longdouble)
+        error = _library().attitudes(
+            ctypes.byref(self._body), ctypes.byref(described), len(edges), _at(edges), _at(momentum), 1e-17,
+            len(when), _at(when), _at(out), _at(attitude), ctypes.byref(left),
+        )  # fmt: skip
+        if error == -2.0:
+            raise TooLong("the extended integrator needs too many steps")
         if error < 0.0:
             raise ArithmeticError("the steps of the extended integrator became too short")
-        return out, 2.0 * error
+        return out, error
 
     def inertia_and_momentum(self, shapes: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """I (9, row by row) and L_o (3) in long double: (N, n), (N, n) -> (N, 12)."""
@@ -140,6 +213,32 @@ def angles_between(quaternions: np.ndarray, rotations: np.ndarray) -> np.ndarray
     return 2.0 * np.arcsin(np.minimum(np.sqrt((gap * gap).sum(axis=(1, 2)) / 8.0), 1.0)).astype(float)
 
 
+def as_polynomials(path: sp.ShapePath, pieces: int = 64, order: int = 16) -> sp.ShapePath:
+    """A path of any kind as polynomials on even pieces, which the extended precision follows.
+
+    Of a path that is smooth on [0, duration] they differ from it by its rounding.
+    """
+    knots = np.linspace(0.0, path.duration, pieces + 1)
+    nodes = np.cos(np.pi * (np.arange(order) + 0.5) / order)
+    widths = np.diff(knots)
+    series = np.empty((order, pieces, path.n_shape))
+    for piece, (left, width) in enumerate(zip(knots[:-1], widths, strict=True)):
+        shapes = path.shape(left + 0.5 * width * (1.0 + nodes))
+        for joint in range(path.n_shape):
+            fit = Chebyshev.fit(nodes, shapes[:, joint], order - 1, domain=[-1.0, 1.0])
+            series[:, piece, joint] = _about_the_left(fit.coef, width)
+    return replace(
+        sp.ShapePath.waypoints(knots, path.shape(knots), joint_names=path.joint_names),
+        curve=PiecewisePolynomial(knots, series),
+    )
+
+
+def _about_the_left(coefficients: np.ndarray, width: float) -> np.ndarray:
+    """Of powers of t in [0, width], from those of Chebyshev polynomials on [-1, 1]."""
+    powers = Chebyshev(coefficients, domain=[0.0, width]).convert(kind=Polynomial).coef
+    return np.pad(powers, (0, len(coefficients) - len(powers)))
+
+
 def _parts(path: sp.ShapePath | Terms, n_shape: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     none = np.zeros(0), np.zeros((0, 0, n_shape))
     if isinstance(path, Terms):
@@ -156,6 +255,30 @@ def _parts(path: sp.ShapePath | Terms, n_shape: int) -> tuple[np.ndarray, np.nda
         rows += [(HARMONIC, i, b, 0.0, 0.0, frequency, 0.0) for i, b in enumerate(curve.sines[:, k])]
     kept = np.array(rows)
     return np.ascontiguousarray(kept[kept[:, 2] != 0.0]), *none
+
+
+def _starts(segments: Sequence[Segment]) -> np.ndarray:
+    """Where each segment ends [s]; loops begin at whole multiples, without the rounding of a sum."""
+    if all(segment is segments[0] for segment in segments):
+        return segments[0].duration * np.arange(1.0, len(segments) + 1.0)
+    return np.cumsum([segment.duration for segment in segments])
+
+
+def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Of quaternions x y z w: (4,) and (..., 4)."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, np.moveaxis(b, -1, 0)
+    parts = (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+    return np.stack(parts, axis=-1)
+
+
+def prepare() -> None:
+    """Compile the C code now, so that processes made of this one have it."""
+    _library()
 
 
 def _at(array: np.ndarray) -> ctypes.c_void_p:
@@ -175,7 +298,8 @@ def _library() -> ctypes.CDLL:
     library.attitudes.restype = ctypes.c_double
     pointer = ctypes.c_void_p
     library.attitudes.argtypes = [
-        pointer, pointer, ctypes.c_int, pointer, pointer, ctypes.c_double, ctypes.c_int, pointer, pointer
+        pointer, pointer, ctypes.c_int, pointer, pointer, ctypes.c_double, ctypes.c_int, pointer, pointer, pointer,
+        pointer,
     ]  # fmt: skip
     library.bodies.restype = None
     library.bodies.argtypes = [pointer, ctypes.c_int, pointer, pointer, pointer]

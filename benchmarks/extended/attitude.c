@@ -21,6 +21,7 @@ typedef struct {
     int terms, order, pieces;
     const double *term;          /* TERM numbers each: kind, coordinate, amplitude, centre or frequency, width, frequency, phase */
     const double *knots, *series; /* polynomials (order, pieces, shapes), on the piece that ends or begins at the break */
+    double origin, pace;          /* the curve is followed at origin + pace*t; backwards where the pace is negative */
 } Path;
 
 static void multiply(const real *a, const real *b, real *c)
@@ -39,9 +40,11 @@ static void cross(const real *a, const real *b, real *c)
     c[0] = a[1]*b[2] - a[2]*b[1]; c[1] = a[2]*b[0] - a[0]*b[2]; c[2] = a[0]*b[1] - a[1]*b[0];
 }
 
-/* Shapes and rates at t, on the piece of the path numbered `piece`. */
-static void follow(const Path *path, int shapes, int piece, real t, real *q, real *v)
+/* Shapes and rates at `time`, on the piece of the path numbered `piece`. */
+static void follow(const Path *path, int shapes, int piece, real time, real *q, real *v)
 {
+    real pace = path->pace, t = (real)path->origin + pace*time;
+    if (pace < 0) piece = path->pieces - 1 - piece;
     for (int i = 0; i < shapes; i++) q[i] = v[i] = 0;
     for (int k = 0; k < path->terms; k++) {
         const double *e = path->term + TERM*k;
@@ -57,16 +60,18 @@ static void follow(const Path *path, int shapes, int piece, real t, real *q, rea
         case BUMP: x = s/width; if (x*x < 1) { real d = 1 - x*x; g = a*expl(1 - 1/d); q[i] += g; v[i] -= g*2*x/(d*d*width); } break;
         }
     }
-    if (!path->order) return;
-    real s = t - (real)path->knots[piece];
-    for (int i = 0; i < shapes; i++) {
-        real value = 0, slope = 0;
-        for (int p = path->order - 1; p >= 0; p--) {
-            slope = slope*s + value;
-            value = value*s + (real)path->series[(p*path->pieces + piece)*shapes + i];
+    if (path->order) {
+        real s = t - (real)path->knots[piece];
+        for (int i = 0; i < shapes; i++) {
+            real value = 0, slope = 0;
+            for (int p = path->order - 1; p >= 0; p--) {
+                slope = slope*s + value;
+                value = value*s + (real)path->series[(p*path->pieces + piece)*shapes + i];
+            }
+            q[i] += value; v[i] += slope;
         }
-        q[i] += value; v[i] += slope;
     }
+    for (int i = 0; i < shapes; i++) v[i] *= pace;
 }
 
 /* Locked inertia and internal momentum about the centre of mass, axes of the base. */
@@ -185,11 +190,12 @@ static real leap(const Body *b, const Path *path, int piece, real t, real h, con
 }
 
 /* Quaternions (count, 4) at ascending `times` from `breaks[0]` on; the error per step stays below `tolerance`.
-   Returns the sum of the errors of all steps, or -1 where the steps became too short. */
+   `state` is the quaternion at the start, and then at the end; `steps` how many may be tried, and then are left.
+   Returns the sum of the errors of all steps, -1 where the steps became too short, or -2 where they were too many. */
 double attitudes(const Body *b, const Path *path, int breaks, const double *edge, const double *momentum, double tolerance,
-                 int count, const double *times, long double *out)
+                 int count, const double *times, long double *out, long double *state, long *steps)
 {
-    real state[4] = {0, 0, 0, 1}, next[4], start[3] = {momentum[0], momentum[1], momentum[2]}, total = 0, h = (real)(edge[1] - edge[0])/8, t = edge[0];
+    real next[4], start[3] = {momentum[0], momentum[1], momentum[2]}, total = 0, h = (real)(edge[1] - edge[0])/8, t = edge[0];
     int k = 0;
     while (k < count && times[k] <= edge[0]) { for (int i = 0; i < 4; i++) out[4*k + i] = state[i]; k++; }
     for (int piece = 0; piece + 1 < breaks; piece++) {
@@ -197,6 +203,7 @@ double attitudes(const Body *b, const Path *path, int breaks, const double *edge
         h = fminl(h, end - (real)edge[piece]);
         while (t < end) {
             real stop = k < count && times[k] < end ? (real)times[k] : end, step = fminl(h, stop - t);
+            if (--*steps < 0) return -2;
             real error = leap(b, path, piece, t, step, start, state, next);
             if (!(error <= tolerance)) {
                 h = step*(error > 0 && isfinite(error) ? fmaxl(0.2L, 0.8L*powl(tolerance/error, 1.0L/15)) : 0.2L);

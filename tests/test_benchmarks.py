@@ -1,0 +1,96 @@
+"""What the benchmarks stand on: the compiled peer, the attitudes in extended precision, the judged estimates."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+from benchmarks.cases import cases, exact_path
+from benchmarks.estimates import judged, judged_all, read_runs, summary
+from benchmarks.extended import CONSTANT, HARMONIC, Segment, Terms, TooLong, Truth, angles_between
+from benchmarks.peer import NoPeer, Peer
+
+import shapephase as sp
+from shapephase.examples.scenarios import cat_righting
+
+NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
+needs_compiler = pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
+
+
+@pytest.mark.full
+@needs_compiler
+@pytest.mark.parametrize("name", ["cat_two_halves loop", "cat righting, at rest", "diver samples_12"])
+def test_the_peer_agrees_with_extended_precision_and_with_the_library(name: str):
+    """A Fourier loop, the cat's righting and a spline: at 1e-11 within a hundred times that at every step."""
+    case = next(case for case in cases() if case.name == name)
+    exact = exact_path(case.path)
+    try:
+        steps = Peer(case.body, case.path, case.path.breaks, case.momentum).steps(1e-11)
+    except NoPeer as missing:
+        pytest.skip(str(missing))
+    truth, _ = Truth(case.body).attitudes(exact, exact.breaks, case.momentum, steps.times)
+    assert steps.error(truth) < 1e-9
+    motion = sp.reconstruct(sp.articulated(case.body, case.path), case.momentum, tolerance=1e-10)
+    assert angles_between(truth, motion.attitude(steps.times)).max() <= motion.error_estimate
+
+
+@needs_compiler
+def test_extended_precision_follows_segments_as_it_follows_the_whole():
+    """A loop three times, with momentum and at rest, is a loop of three periods; there and back leads home at rest."""
+    body = sp.load_body("cat_two_halves")
+    truth, times = Truth(body), np.linspace(0.1, 3.0, 7)
+    rng = np.random.default_rng(0)
+    rows = [(HARMONIC, i, 0.5, 0.0, 0.0, 2.0 * np.pi, phase) for i, phase in enumerate(rng.uniform(0.0, 6.0, 3))]
+    terms = Terms(3, np.array([*rows, (CONSTANT, 0, 0.3, 0.0, 0.0, 0.0, 0.0)]))
+    loop = Segment(terms, np.array([0.0, 1.0]), 1.0)
+    for momentum in (np.zeros(3), np.array([0.1, 0.3, -0.2])):
+        whole, bound = truth.attitudes(terms, np.array([0.0, 3.0]), momentum, times)
+        parts, of_parts = truth.along([loop, loop, loop], momentum, times)
+        gap = np.minimum(np.abs(whole - parts).max(axis=1), np.abs(whole + parts).max(axis=1))
+        # Times and frequencies are doubles; the phase of a loop is known to the rounding of its start.
+        assert gap.max() < bound + of_parts + 1e-14
+    back = Segment(terms, np.array([0.0, 0.6]), 0.6, origin=0.6, pace=-1.0)
+    home, _ = truth.along([Segment(terms, np.array([0.0, 0.6]), 0.6), back], np.zeros(3), np.array([0.6, 1.2]))
+    assert abs(float(home[1, 3])) == pytest.approx(1.0, abs=1e-16)
+    assert np.abs(home[1, :3]).max() < 1e-15 < 1e-3 < np.abs(home[0, :3]).max()
+    slow = Segment(terms, np.array([0.0, 5.0]), 5.0, pace=0.2)
+    late, _ = truth.along([slow], np.zeros(3), 5.0 * np.array([0.3, 1.0]))
+    soon, _ = truth.attitudes(terms, np.array([0.0, 1.0]), np.zeros(3), np.array([0.3, 1.0]))
+    assert np.abs(late - soon).max() < 1e-15
+    with pytest.raises(TooLong):
+        truth.along([loop] * 50, np.array([0.1, 0.3, -0.2]), np.array([50.0]), most_steps=20)
+
+
+@needs_compiler
+def test_polynomials_for_the_extended_precision_follow_the_cat():
+    """To the rounding of its path, whose roll is the angle of two numbers that nearly vanish together half way."""
+    path = cat_righting()
+    times, exact = np.linspace(0.0, path.duration, 301), exact_path(path)
+    np.testing.assert_allclose(exact.shape(times), path.shape(times), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(exact.rate(times), path.rate(times), rtol=0.0, atol=1e-8)
+
+
+@needs_compiler
+@pytest.mark.parametrize("family", ["harmonics", "mixed"])
+def test_no_error_is_above_its_estimate(family: str, tmp_path):
+    """A sample of `python -m benchmarks.estimates`, and that a file of runs is taken up where it ends."""
+    kept = tmp_path / "runs"
+    runs = list(judged_all(family, 12, seed=5, most=0.3, kept=kept))
+    assert not [run for run in runs if run.above > 1.0]
+    assert sum(run.outcome == "done" for run in runs) >= 8
+    kept.write_text(kept.read_text()[:-40])
+    again = list(judged_all(family, 12, seed=5, most=0.3, kept=kept))
+    assert len(read_runs(kept)) == len(again) == 12
+    assert {run.number: run.error for run in again} == pytest.approx({r.number: r.error for r in runs}, nan_ok=True)
+    assert summary(family, again).startswith(f"{family}, seed 5: 12 runs, ")
+
+
+@pytest.mark.full
+@needs_compiler
+@pytest.mark.parametrize("family", ["harmonics", "mixed"])
+def test_no_error_of_sixty_runs_is_above_its_estimate(family: str):
+    runs = [judged(family, 6, 1.0, number) for number in range(60)]
+    assert not [run for run in runs if run.above > 1.0]
+    assert sum(run.outcome == "done" for run in runs) >= 50
