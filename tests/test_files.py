@@ -1,19 +1,28 @@
-"""Files are written whole or not at all, whenever the writer dies."""
+"""Files are written whole or not at all, wherever they go and whenever the writer dies."""
 
 from __future__ import annotations
 
+import io
 import os
+import pty
+import resource
 import signal
+import socket
+import stat
 import subprocess
 import sys
+import threading
 import time
+import tty
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.files import write_whole
+from shapephase.errors import InputFileNotFoundError, OutputFileError
+from shapephase.files import size_text, write_whole
 
 # Writes one of two motions over and over; says so once it has begun.
 WRITER = """
@@ -34,6 +43,18 @@ while True:
             sp.write_shape_path(path[k], target)
 """
 
+# Writes one of two texts over and over, in small pieces; after `ready` it may die at any time.
+SHORT_WRITER = """
+import os, sys
+from shapephase.files import write_whole
+target = sys.argv[1]
+print("ready", flush=True)
+while True:
+    for letter in (b"a", b"b"):
+        write_whole(target, lambda stream: [stream.write(letter * 4096) for _ in range(64)])
+"""
+AS_NOBODY = 65534
+
 
 def sizes_in(target: Path, kind: str) -> float:
     """Which of the two motions a file holds; raises if it holds neither whole."""
@@ -45,6 +66,35 @@ def sizes_in(target: Path, kind: str) -> float:
         return float(np.round(3.0 * rows["omega_z_rad_s"][0], 9))
     assert rows["time"][-1] == 1.0
     return float(np.round(rows["hinge"][0] - 0.1, 9))
+
+
+def content(text: str):
+    """A writer of a text."""
+    return lambda stream: stream.write(text.encode())
+
+
+@contextmanager
+def someone_else():
+    """As another user than root, for whom permissions count."""
+    if os.geteuid():
+        yield
+        return
+    os.setegid(AS_NOBODY)
+    os.seteuid(AS_NOBODY)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+        os.setegid(0)
+
+
+@pytest.fixture
+def open_folder(tmp_path: Path):
+    """A folder that anyone may use, with its parents."""
+    for folder in (tmp_path, *tmp_path.parents[:3]):
+        if folder.stat().st_uid == os.getuid() and folder != Path("/tmp"):
+            folder.chmod(0o777)
+    return tmp_path
 
 
 @pytest.mark.parametrize("kind", ["save", *(pytest.param(kind, marks=pytest.mark.full) for kind in ("csv", "path"))])
@@ -68,6 +118,48 @@ def test_a_killed_writer_leaves_a_whole_file(kind: str, tmp_path: Path):
         assert sizes_in(target, kind) in (1.0, 2.0)
 
 
+@pytest.mark.parametrize("trials", [20, pytest.param(200, marks=pytest.mark.full)])
+def test_killed_at_random_times_a_writer_leaves_no_half_and_the_next_write_no_litter(trials: int, tmp_path: Path):
+    target = tmp_path / "whole.txt"
+    rng = np.random.default_rng(7)
+    littered = 0
+    for _ in range(trials):
+        writer = subprocess.Popen([sys.executable, "-c", SHORT_WRITER, str(target)], stdout=subprocess.PIPE)
+        assert writer.stdout is not None
+        assert writer.stdout.readline() == b"ready\n"
+        while not target.exists() and writer.poll() is None:
+            time.sleep(0.001)
+        time.sleep(rng.uniform(0.0, 0.02))
+        writer.send_signal(signal.SIGKILL)
+        writer.wait()
+        writer.stdout.close()
+        assert target.read_bytes() in (b"a" * 2**18, b"b" * 2**18)
+        littered += len(list(tmp_path.iterdir())) - 1
+    write_whole(target, content("last"))
+    assert list(tmp_path.iterdir()) == [target]
+    # Else the trial would show nothing of the cleaning.
+    assert littered > 0 or trials < 200
+
+
+def test_litter_of_a_dead_writer_goes_and_of_a_living_one_stays(tmp_path: Path):
+    target, inner = tmp_path / "data.csv", []
+    for name in (".data.csv.0123abcd.part", ".data.csv.tmp_1abc.part"):
+        (tmp_path / name).write_text("left by a dead writer")
+    others = [tmp_path / name for name in (".other.csv.0123abcd.part", ".data.csv.part", ".data.csv.long0123abcd.part")]
+    for other in others:
+        other.write_text("not ours")
+
+    def write(stream):
+        stream.write(b"outer")
+        write_whole(target, content("inner"))
+        inner.append(target.read_text())
+
+    write_whole(target, write)
+    assert inner == ["inner"]
+    assert target.read_text() == "outer"
+    assert {*tmp_path.iterdir()} == {target, *others}
+
+
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path):
     target = tmp_path / "kept.txt"
     target.write_text("old")
@@ -82,8 +174,206 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path)
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_permissions_are_those_of_any_new_file(tmp_path: Path):
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o000])
+def test_permissions_are_those_of_any_new_file(tmp_path: Path, mask: int):
     plain, whole = tmp_path / "plain", tmp_path / "whole"
-    plain.write_text("x")
-    write_whole(whole, lambda stream: stream.write(b"x"))
+    before = os.umask(mask)
+    try:
+        plain.write_text("x")
+        write_whole(whole, content("x"))
+    finally:
+        os.umask(before)
     assert whole.stat().st_mode == plain.stat().st_mode
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o755])
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path, mode: int):
+    target = tmp_path / "kept"
+    target.write_text("old")
+    target.chmod(mode)
+    write_whole(target, content("new"))
+    assert target.read_text() == "new"
+    assert stat.S_IMODE(target.stat().st_mode) == mode
+
+
+def test_the_umask_of_the_process_is_never_touched(tmp_path: Path):
+    """Eight threads write while others make files of their own: all have the mode that the umask leaves."""
+    before = os.umask(0o027)
+    done = threading.Event()
+    modes = set()
+
+    def make(k: int) -> None:
+        while not done.is_set():
+            made = tmp_path / f"made{k}"
+            made.write_text("x")
+            modes.add(stat.S_IMODE(made.stat().st_mode))
+            made.unlink()
+
+    def write(k: int) -> None:
+        for _ in range(100):
+            write_whole(tmp_path / f"written{k}", content("x"))
+
+    try:
+        makers = [threading.Thread(target=make, args=(k,)) for k in range(2)]
+        writers = [threading.Thread(target=write, args=(k,)) for k in range(8)]
+        for thread in (*makers, *writers):
+            thread.start()
+        for thread in writers:
+            thread.join()
+        done.set()
+        for thread in makers:
+            thread.join()
+        after = os.umask(before)
+    finally:
+        os.umask(before)
+    assert after == 0o027
+    assert modes == {0o640}
+    assert {stat.S_IMODE((tmp_path / f"written{k}").stat().st_mode) for k in range(8)} == {0o640}
+
+
+def test_a_symbolic_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    target, near, far = folder / "target.txt", tmp_path / "near", tmp_path / "far"
+    target.write_text("old")
+    target.chmod(0o600)
+    near.symlink_to("folder/target.txt")
+    far.symlink_to(near)
+    write_whole(far, content("new"))
+    assert far.is_symlink()
+    assert near.is_symlink()
+    assert target.read_text() == "new"
+    assert stat.S_IMODE(target.stat().st_mode) == 0o600
+    assert list(folder.iterdir()) == [target]
+    dangling = tmp_path / "dangling"
+    dangling.symlink_to(folder / "made.txt")
+    write_whole(dangling, content("made"))
+    assert dangling.is_symlink()
+    assert (folder / "made.txt").read_text() == "made"
+    loop = tmp_path / "loop"
+    loop.symlink_to(loop)
+    with pytest.raises(OutputFileError, match="loop"):
+        write_whole(loop, content("x"))
+
+
+def test_a_named_pipe_gets_the_bytes_and_stays_a_pipe(tmp_path: Path):
+    pipe, received = tmp_path / "pipe", []
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: received.append(pipe.read_bytes()))
+    reader.start()
+    sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), [0.1, 0.2, 0.3]).save(pipe)
+    reader.join()
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert list(tmp_path.iterdir()) == [pipe]
+    assert np.load(io.BytesIO(received[0]))["spatial_momentum"].tolist() == [0.1, 0.2, 0.3]
+
+
+def test_a_terminal_gets_the_bytes_and_stays_a_terminal():
+    reader, writer = pty.openpty()
+    tty.setraw(writer)
+    device = os.ttyname(writer)
+    before = os.stat(device)
+    write_whole(device, content("bytes for a terminal"))
+    assert os.read(reader, 100) == b"bytes for a terminal"
+    after = os.stat(device)
+    os.close(reader)
+    os.close(writer)
+    assert stat.S_ISCHR(after.st_mode)
+    assert (after.st_rdev, after.st_ino) == (before.st_rdev, before.st_ino)
+
+
+@pytest.mark.parametrize("name", ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"])
+@pytest.mark.parametrize("into", ["pipe", "file"])
+def test_standard_output_is_written_to_as_a_stream(tmp_path: Path, name: str, into: str):
+    """Also where the shell sent it to a file, which goes on after what was there before."""
+    source = f"""
+import sys
+from shapephase.files import write_whole
+print("before", flush=True)
+write_whole({name!r}, lambda stream: stream.write(b"within\\n"))
+print("after", flush=True)
+"""
+    if name.startswith("/proc") and not Path("/proc/self/fd").is_dir():
+        pytest.skip("no /proc on this system")
+    out = tmp_path / "out"
+    with out.open("wb") as file:
+        stdout = subprocess.PIPE if into == "pipe" else file
+        done = subprocess.run([sys.executable, "-c", source], stdout=stdout, check=True)
+    assert (done.stdout or out.read_bytes()) == b"before\nwithin\nafter\n"
+
+
+def test_a_pipe_that_nobody_reads_any_more_is_no_fault_of_the_file(tmp_path: Path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = threading.Thread(target=lambda: os.close(os.open(pipe, os.O_RDONLY)))
+    reader.start()
+    with pytest.raises(BrokenPipeError):
+        write_whole(pipe, lambda stream: stream.write(bytes(2**22)))
+    reader.join()
+
+
+def test_what_cannot_be_written_is_named_and_nothing_is_left(open_folder: Path):
+    folder = open_folder / "folder"
+    folder.mkdir()
+    with pytest.raises(OutputFileError, match="it is a folder"):
+        write_whole(folder, content("x"))
+    with pytest.raises(InputFileNotFoundError, match="no such folder"):
+        write_whole(open_folder / "none" / "x", content("x"))
+    with pytest.raises(OutputFileError, match="name too long"):
+        write_whole(open_folder / ("x" * 300), content("x"))
+    with pytest.raises(OutputFileError, match="null byte"):
+        write_whole("a\0b", content("x"))
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(str(open_folder / "socket"))
+        with pytest.raises(OutputFileError, match="neither a file nor a pipe"):
+            write_whole(open_folder / "socket", content("x"))
+    (open_folder / "socket").unlink()
+    closed, kept = open_folder / "closed", open_folder / "kept.txt"
+    closed.mkdir(mode=0o555)
+    kept.write_text("old")
+    kept.chmod(0o444)
+    with someone_else():
+        with pytest.raises(OutputFileError, match="nothing may be written to the folder"):
+            write_whole(closed / "x", content("x"))
+        with pytest.raises(OutputFileError, match="may not be written to"):
+            write_whole(kept, content("new"))
+    assert kept.read_text() == "old"
+    assert {*open_folder.iterdir()} == {folder, closed, kept}
+
+
+@pytest.mark.parametrize("length", [255, 250, 240])
+def test_the_longest_names_there_are_can_be_written(tmp_path: Path, length: int):
+    for letter in ("x", "ä"):
+        target = tmp_path / (letter * (length // len(letter.encode())))
+        write_whole(target, content("whole"))
+        assert target.read_text() == "whole"
+        target.unlink()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path):
+    """A limit of the size of files, as a full disk gives it: the system refuses half way through."""
+    target = tmp_path / "kept.txt"
+    target.write_text("old")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2**16, limits[1]))
+    try:
+        with pytest.raises(OutputFileError, match=r"cannot write .*kept\.txt: File too large"):
+            write_whole(target, lambda stream: [stream.write(bytes(4096)) for _ in range(100)])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_sizes_for_people(tmp_path: Path):
+    file = tmp_path / "file"
+    for size, text in (
+        (0, "0 bytes"),
+        (999, "999 bytes"),
+        (29_400, "29.4 kB"),
+        (512_000, "512 kB"),
+        (1_230_000, "1.2 MB"),
+    ):
+        file.write_bytes(bytes(size))
+        assert size_text(file) == text

@@ -1,5 +1,5 @@
 """`python -m shapephase`."""
 
-from .cli.main import main
+from .cli.start import run
 
-main()
+run()

@@ -49,11 +49,27 @@ class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
     """A file named by the user is not there or cannot be opened. Remedy: look at the path and its permissions."""
 
 
+class OutputFileError(ShapePhaseError, OSError):
+    """A file that cannot be written.
+
+    Causes: a folder of that name, no permission, a full disk, a name that is too long. Remedy: the message names the
+    file and the cause; another place. The old file, where there was one, is as it was.
+    """
+
+
 class TrajectoryError(ShapePhaseError, ValueError):
     """A trajectory that cannot be used as a function of time: its times, joints, values or ends.
 
     Remedy: the message names file, row and joint; times must ascend, every joint of the body must be there, angles
     are in radians unless the file says degrees.
+    """
+
+
+class UnknownColumnError(UnknownNameError, TrajectoryError):
+    """A column of a motion file that is no joint of the body.
+
+    Remedy: the message names the column, the joints and the nearest; `names={column: joint}` maps a column to a joint,
+    or to None to leave it out.
     """
 
 
@@ -166,10 +182,12 @@ class UndeclaredBreakWarning(TrajectoryWarning):
     """A path's function has kinks that were not declared as breaks; they were located, and are named."""
 
 
-def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
+def unknown_name(
+    kind: str, name: str, valid: Iterable[str], error: type[UnknownNameError] = UnknownNameError
+) -> UnknownNameError:
     """The error for a name that does not exist, with the nearest and all valid names."""
     choices = [str(v) for v in valid]
     near = difflib.get_close_matches(str(name), choices, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(choices) if choices else "none"
-    return UnknownNameError(f"unknown {kind} {name!r}.{hint} Valid: {listed}")
+    return error(f"unknown {kind} {name!r}.{hint} Valid: {listed}")

@@ -574,3 +574,41 @@ def test_capsules_are_closed_and_round(radius, length):
     assert drawn.volume == pytest.approx(exact, rel=0.04)
     np.testing.assert_allclose(drawn.bounds[1], [radius, radius, 0.5 * length + radius], atol=1e-12)
     np.testing.assert_allclose(drawn.bounds[0], -drawn.bounds[1], atol=1e-12)
+
+
+# ---- The streams of the process -------------------------------------------------------------------------------------
+
+
+def test_pages_are_made_in_two_threads_and_the_streams_of_the_process_stay_as_they_are(capfd, tmp_path):
+    """Nothing that a third thread prints meanwhile is lost, and nothing that viser prints is seen."""
+    import rich
+
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), [0.3, 0.2, 0.9])
+    rich.reconfigure()
+    stream, done, replaced, printed = sys.stdout, threading.Event(), [], 0
+
+    def watch():
+        while not done.is_set():
+            replaced.append(sys.stdout is not stream)
+
+    def make(k):
+        for n in range(3):
+            motion_page(motion, tmp_path / f"page{k}_{n}.html", frames=3)
+
+    watcher = threading.Thread(target=watch)
+    makers = [threading.Thread(target=make, args=(k,)) for k in range(2)]
+    for thread in (watcher, *makers):
+        thread.start()
+    while any(maker.is_alive() for maker in makers):
+        print(f"line {printed}")
+        rich.print(f"rich {printed}")
+        printed += 1
+        time.sleep(0.01)
+    done.set()
+    watcher.join()
+    time.sleep(0.2)
+    assert sys.stdout is stream
+    assert not any(replaced)
+    lines = capfd.readouterr().out.splitlines()
+    assert lines == [f"{kind} {k}" for k in range(printed) for kind in ("line", "rich")]
+    assert all((tmp_path / f"page{k}_{n}.html").stat().st_size > 10_000 for k in range(2) for n in range(3))

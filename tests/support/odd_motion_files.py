@@ -11,7 +11,13 @@ import zipfile
 
 import numpy as np
 
-from shapephase.errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning, UnknownNameError
+from shapephase.errors import (
+    InputFileNotFoundError,
+    TrajectoryError,
+    TrajectoryWarning,
+    UnknownColumnError,
+    UnknownNameError,
+)
 from support.motion_writers import STATE, states, trajectory, write_bag
 
 HEADER = "time,left_shoulder_abduction,right_shoulder_abduction\n"
@@ -126,6 +132,7 @@ def sparse(size):
 
 
 E, U, N, W = TrajectoryError, UnknownNameError, InputFileNotFoundError, TrajectoryWarning
+C = UnknownColumnError
 TAB = HEADER.replace(",", "\t") + ROWS.replace(",", "\t")
 
 # What it is: (name of the file, content: text, bytes or what writes it, outcome, words of its message).
@@ -158,8 +165,8 @@ ODD_FILES = {
         [f"{LEFT!r} and '{LEFT}_deg' are the same joint; keep one"],
     ),
     "joint missing": ("m.csv", f"time,{LEFT}\n0,0\n1,0\n", E, [f"no column for {RIGHT}", "zeros where"]),
-    "joint unknown": ("m.csv", csv_text().replace(LEFT, "knee"), U, ["'knee'", LEFT]),
-    "joint of a typing error": ("m.csv", csv_text().replace(LEFT, LEFT[:-1]), U, ["Did you mean", LEFT]),
+    "joint unknown": ("m.csv", csv_text().replace(LEFT, "knee"), C, ["'knee'", LEFT]),
+    "joint of a typing error": ("m.csv", csv_text().replace(LEFT, LEFT[:-1]), C, ["Did you mean", LEFT]),
     "a long name": ("m.csv", csv_text().replace(LEFT, "a" * 9999), E, ["name has 9999 characters"]),
     "columns twice, many": ("m.csv", "time" + ",a,b" * 99_999 + "\n", E, ["column a, b stands twice"]),
     "commas and semicolons": ("m.csv", csv_text().replace(",", ";", 1), E, ["commas and semicolons"]),
@@ -257,7 +264,7 @@ ODD_FILES = {
     "OpenSim, a muscle": (
         "m.sto",
         opensim(names=f"time {LEFT} /forceset/soleus/activation\n"),
-        U,
+        C,
         ["/forceset/soleus/activation"],
     ),
     "OpenSim, coordinate twice": (
@@ -291,7 +298,7 @@ ODD_FILES = {
     "YAML, not a number": ("m.yaml", points(("[0, .nan]", "0")), E, ["point 1 (line 3)", RIGHT, "'.nan'"]),
     "YAML, names nested": ("m.yaml", points(("[0, 0]", "0"), names="[[a]]"), E, ["joint_names: a list of joint"]),
     "YAML, joint twice": ("m.yaml", points(("[0, 0]", "0"), names=f"[{LEFT}, {LEFT}]"), E, [f"{LEFT} stands twice"]),
-    "YAML, other joints": ("m.yaml", points(("[0, 0]", "0"), ("[0, 0]", "1"), names=f"[{LEFT}, on]"), U, ["'on'"]),
+    "YAML, other joints": ("m.yaml", points(("[0, 0]", "0"), ("[0, 0]", "1"), names=f"[{LEFT}, on]"), C, ["'on'"]),
     "YAML, two trajectories": (
         "m.yaml",
         points(("[0, 0]", "0")) + "---\n" + points(("[0, 0]", "1")),

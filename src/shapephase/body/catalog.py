@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,13 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     for category, message in doubts:
         warnings.warn(message, category, stacklevel=2)
     return body
+
+
+def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
+    """What Pinocchio was built with, by the names of its own flags."""
+    import pinocchio
+
+    return {name: bool(getattr(pinocchio, name, False)) for name in names}
 
 
 def robots_folder() -> Path:

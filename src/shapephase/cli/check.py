@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .options import AS_RECORDED, BodyArgument, Json, MotionArgument, RecordingOptions
+from .options import AS_RECORDED, AS_TEXT, BodyArgument, MotionArgument, PrintOptions, RecordingOptions
 from .outcome import Outcome
 
 
@@ -12,7 +12,7 @@ def check_command(
     /,
     *,
     recording: RecordingOptions = AS_RECORDED,
-    json: Json = False,  # noqa: ARG001
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Check a body, and a joint motion for it: what was read, and whether it can be used."""
     from ..body.catalog import load_body

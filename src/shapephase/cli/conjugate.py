@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import Json
+from .options import AS_TEXT, PrintOptions
 from .outcome import Outcome, check_writable
+from .terminal import say_written
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -25,28 +26,30 @@ def conjugate_command(
     i3: float,
     /,
     *,
-    momenta: Annotated[tuple[float, ...], Parameter(consume_multiple=True, negative_iterable="")] = (),
+    momenta: Annotated[
+        tuple[float, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)
+    ] = (),
     order: int = 1,
     out: Path | None = None,
-    json: Json = False,  # noqa: ARG001
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """List conjugate points of the free rigid body's Serret-Andoyer metric, and draw their locus.
 
     Parameters
     ----------
     i1
-        principal moment about axis 1 [kg m^2]; the three must differ and may come in any order
+        Principal moment about axis 1, in kg m^2; the three must differ and may come in any order. For example `1`.
     i2
-        principal moment about axis 2 [kg m^2]
+        Principal moment about axis 2, in kg m^2; for example `2`.
     i3
-        principal moment about axis 3 [kg m^2]
+        Principal moment about axis 3, in kg m^2; for example `3`.
     momenta
-        p = |Pi|/sqrt(2 E) of the geodesics, above the square root of the middle moment, at most that of the largest;
-        without it six of them
+        Momenta of the geodesics, p = |Pi|/sqrt(2 E), above the square root of the middle moment and at most that of the
+        largest, in sqrt(kg) m; without it six of them. For example `--momenta 1.5 1.6`.
     order
-        which conjugate point of each geodesic, 1 the first
+        Which conjugate point of each geodesic, 1 the first; for example `--order 2`.
     out
-        write the figure to this file, .svg, .pdf or .png
+        Write the figure to this file, .svg, .pdf or .png; without it none is drawn. For example `--out locus.svg`.
     """
     import numpy as np
 
@@ -77,8 +80,6 @@ def conjugate_command(
         "",
         "p, T, time and phi in sqrt(kg) m; of geodesics that start upward, the others are mirror images",
     ]
-    if out is not None:
-        lines.append(f"wrote {out}")
     data = {
         "moments_kg_m2": [i1, i2, i3],
         "order": order,
@@ -99,5 +100,6 @@ def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: A
     from ..plotting.geodesic_plots import plot_conjugate_locus
     from ..plotting.plot_style import axes_image, column_axes
 
-    image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:])
+    image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:].lower())
     write_whole(out, lambda stream: stream.write(image))
+    say_written(out)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .options import Json
+from .options import AS_TEXT, PrintOptions
 from .outcome import Outcome
 from .progress import steps
 
 
-def robots_command(*, json: Json = False) -> Outcome:  # noqa: ARG001
+def robots_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
     """List the bodies and motions that come with the library."""
     from ..body.catalog import example_names, load_body, robot_names
     from ..examples.scenarios import MOTIONS
@@ -29,7 +29,7 @@ def robots_command(*, json: Json = False) -> Outcome:  # noqa: ARG001
     return Outcome("\n".join(lines), {"bodies": listed, "motions": motions, "examples": examples})
 
 
-def compile_command(*, json: Json = False) -> Outcome:  # noqa: ARG001
+def compile_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
     """Compile the innermost loops with this machine's C compiler: the same results, sooner.
 
     Once is enough for all later sessions. $CC names the compiler; what it writes is kept in $XDG_CACHE_HOME/shapephase,

@@ -1,4 +1,4 @@
-"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `conjugate`, `view`, `plot`, `robots`, `compile`.
+"""The command line: `shapephase split`, `plan`, `check`, `orbits`, `conjugate`, `view`, `plot`, `robots`, ...
 
 Here the commands are named, and errors, warnings and results become text, JSON and exit codes. The modules of the
 commands import what they compute with when they are called, so that `shapephase --help` does not wait for it.
@@ -8,28 +8,34 @@ from __future__ import annotations
 
 import json
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
-from typing import NoReturn
 
 from cyclopts import App, CycloptsError
 
-from ..errors import ShapePhaseError
+from ..errors import OutputFileError, ShapePhaseError
 from .check import check_command
 from .conjugate import conjugate_command
-from .exit_codes import ExitCode, exit_code_of
+from .doctor import doctor_command
+from .exit_codes import ExitCode, exit_code_list, exit_code_of
 from .library import compile_command, robots_command
 from .orbits import orbits_command
 from .outcome import Outcome
 from .pictures import plot_command, view_command
 from .plan import plan_command
 from .split import split_command
+from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
 
 app = App(
     name="shapephase",
     help="A free body changes its shape in a known way; how does it turn?",
+    help_epilogue=f"Exit codes:\n\n{exit_code_list()}",
+    help_format="markdown",
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 app.command(split_command, name="split")
 app.command(view_command, name="view")
@@ -40,49 +46,99 @@ app.command(check_command, name="check")
 app.command(orbits_command, name="orbits")
 app.command(robots_command, name="robots")
 app.command(compile_command, name="compile")
+app.command(doctor_command, name="doctor")
+app.register_install_completion_command(
+    help="Let the shell complete commands and options with the tabulator key; for bash, zsh and fish."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Failure:
+    """Why a command came to no result."""
+
+    message: str
+    code: ExitCode
+    kind: str
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0, or with one line on stderr 2 usage, 3 body, 4 trajectory, 5 numerics.
+    """Run the command line; a fault ends it with one line on stderr and one of `ExitCode`.
 
-    Warnings are lines on stderr too, and a list in what `--json` prints. Ctrl-C ends with 130.
+    Warnings are lines on stderr too, and a list in what `--json` prints.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
-    as_json = "--json" in tokens
-    outcome, failure = None, None
+    with spoken(tokens):
+        try:
+            code = _ran(tokens, as_json="--json" in tokens)
+        except BrokenPipeError:
+            # What reads the output wants no more of it.
+            for stream in (sys.stdout, sys.stderr):
+                abandon(stream)
+            code = ExitCode.BROKEN_PIPE
+        except KeyboardInterrupt:
+            say("shapephase: stopped", Verbosity.QUIET)
+            code = ExitCode.STOPPED
+    if code:
+        raise SystemExit(code)
+
+
+def _ran(tokens: list[str], *, as_json: bool) -> int:
+    """Run a command, print what it gives, and return the exit code."""
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
-        try:
-            outcome = app(tokens, exit_on_error=False, print_error=False)
-        except CycloptsError as error:
-            failure = (_one_line(error), ExitCode.USAGE, as_json, "usage")
-        except ShapePhaseError as error:
-            failure = (_one_line(error), exit_code_of(error), as_json, type(error).__name__)
-        except KeyboardInterrupt:
-            raise SystemExit(ExitCode.STOPPED) from None
-    messages = list(dict.fromkeys(_one_line(warning.message) for warning in raised))
+        outcome = _outcome(tokens)
+    messages = list(dict.fromkeys(one_line(warning.message) for warning in raised))
     for message in messages:
-        print(f"shapephase: warning: {message}", file=sys.stderr)
-    if failure:
-        _fail(*failure)
-    if isinstance(outcome, Outcome):
-        data, text = {"shapephase": version("shapephase"), **outcome.data, "warnings": messages}, outcome.text
-        if outcome.with_verdict:
-            many = "1 warning" if len(messages) == 1 else f"{len(messages)} warnings"
-            verdict = f"usable, with {many}" if messages else "no fault found"
-            listed = "".join(f"\nwarning: {message}" for message in messages)
-            data, text = data | {"verdict": verdict}, f"{text}\n{listed}\nverdict: {verdict}"
-        print(json.dumps(data, indent=2) if as_json else text)
-        if outcome.code:
-            raise SystemExit(outcome.code)
+        say(f"shapephase: warning: {message}")
+    if isinstance(outcome, _Failure):
+        return _reported(outcome, as_json=as_json)
+    if not isinstance(outcome, Outcome):
+        return ExitCode.DONE
+    data, text = {"shapephase": version("shapephase"), **outcome.data, "warnings": messages}, outcome.text
+    if outcome.with_verdict:
+        many = "1 warning" if len(messages) == 1 else f"{len(messages)} warnings"
+        verdict = f"usable, with {many}" if messages else "no fault found"
+        listed = "".join(f"\nwarning: {message}" for message in messages)
+        data, text = data | {"verdict": verdict}, f"{text}\n{listed}\nverdict: {verdict}"
+    try:
+        if as_json or text:
+            put(json.dumps(data, indent=2) if as_json else text, aside=outcome.aside)
+    except OutputFileError as error:
+        return _reported(_failure(error), as_json=False)
+    return outcome.code
 
 
-def _one_line(error: Warning | Exception | str) -> str:
-    return " ".join(str(error).split())
+def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
+    """What a command gives, or why it gives nothing."""
+    try:
+        return app(tokens, exit_on_error=False, print_error=False)
+    except CycloptsError as error:
+        return _Failure(message=one_line(error), code=ExitCode.USAGE, kind="usage")
+    except ShapePhaseError as error:
+        return _failure(error)
+    except MemoryError:
+        return _Failure(message="there is not enough memory for this", code=ExitCode.NUMERICS, kind="MemoryError")
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        if verbosity() is Verbosity.VERBOSE:
+            traceback.print_exc()
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        message = f"{type(error).__name__}: {one_line(error)} ({place.filename}:{place.lineno})"
+        hint = "this is a fault of shapephase, please report it"
+        return _Failure(message=f"{hint}: {message}", code=ExitCode.INTERNAL, kind=type(error).__name__)
 
 
-def _fail(message: str, code: ExitCode, as_json: bool, kind: str) -> NoReturn:
+def _failure(error: ShapePhaseError) -> _Failure:
+    return _Failure(message=one_line(error), code=exit_code_of(error), kind=type(error).__name__)
+
+
+def _reported(failure: _Failure, *, as_json: bool) -> ExitCode:
     if as_json:
-        print(json.dumps({"error": {"type": kind, "message": message, "exit_code": code}}))
-    print(f"shapephase: {message}", file=sys.stderr)
-    raise SystemExit(code)
+        described = {"type": failure.kind, "message": failure.message, "exit_code": failure.code}
+        try:
+            put(json.dumps({"error": described}))
+        except OutputFileError as error:
+            say(f"shapephase: {one_line(error)}", Verbosity.QUIET)
+    say(f"shapephase: {failure.message}", Verbosity.QUIET)
+    return failure.code

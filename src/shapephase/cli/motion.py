@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from .. import so3
 from ..body.body import Body
 from ..body.catalog import load_body
 from ..deformation.deformation import articulated
-from ..errors import UnknownNameError
+from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
@@ -18,6 +19,9 @@ from .options import AS_RECORDED, FlightOptions, RecordingOptions
 
 DEFAULT_TOLERANCE = 1e-9
 """Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
+
+# Characters of a name that an error repeats.
+_LONGEST_SHOWN = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +53,12 @@ def joint_motion(
     motion: str, body: Body, recording: RecordingOptions = AS_RECORDED
 ) -> tuple[ShapePath, RecordedMotion | None]:
     """The path of a motion, and its record if it comes from a file."""
-    if motion in MOTIONS and not Path(motion).is_file():
+    if motion in MOTIONS and not os.path.isfile(motion):
+        for option, given in (("--smooth", recording.smooth), ("--topic", recording.topic)):
+            if given is not None:
+                raise ShapeError(f"{option} is for recorded motions; {motion} is a motion of the library")
         return named_motion(motion), None
-    if not Path(motion).exists() and not Path(motion).suffix:
-        raise UnknownNameError(f"unknown motion {motion!r}: neither a file nor one of {', '.join(MOTIONS)}")
+    if not Path(motion).suffix and not os.path.exists(motion):
+        raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
     recorded = read_recorded_motion(motion, body, smooth=recording.smooth, topic=recording.topic)
     return recorded.path, recorded

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .options import BodyArgument, Json
+from .options import AS_TEXT, BodyArgument, PrintOptions
 from .outcome import Outcome
 from .progress import steps
 
@@ -18,18 +18,22 @@ def orbits_command(
     /,
     *,
     gauge: Annotated[
-        str, Parameter(help="where the momentum closes: horizontal, base, principal, mean_body or link:NAME")
+        str,
+        Parameter(
+            help="The frame in which the momentum closes: horizontal, base, principal, mean_body or link:NAME; for "
+            "example `--gauge base`."
+        ),
     ] = "horizontal",
-    json: Json = False,  # noqa: ARG001
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Find the motions whose shape and momentum close together, and split each.
 
     Parameters
     ----------
     motion
-        a closed one, as for split
+        A closed motion of the joints, a file or a name as for split; for example `cat_righting`.
     magnitude
-        magnitude of the angular momentum [kg m^2/s]
+        Of the angular momentum, in kg m^2/s; for example `0.02`.
     """
     import numpy as np
 

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputFileNotFoundError, UnknownNameError
+from ..errors import UnknownNameError
+from ..files import output_target
 from .exit_codes import ExitCode
+
+_STANDARD_OUTPUT = 1
 
 
 @dataclass(frozen=True)
@@ -20,19 +23,25 @@ class Outcome:
     data : for programs, printed with `--json`
     with_verdict : whether a line at the end says that no fault was found, or how many warnings there are
     code : the exit code
+    aside : whether standard output was taken by a file, so that the text goes to standard error
     """
 
     text: str
     data: dict[str, Any]
     with_verdict: bool = False
     code: ExitCode = ExitCode.DONE
+    aside: bool = False
 
 
-def check_writable(out: Path | None, option: str, *endings: str) -> None:
-    """Raise UnknownNameError or InputFileNotFoundError for what cannot be written, before anything is computed."""
+def check_writable(out: Path | None, option: str, *endings: str) -> bool:
+    """Look whether a file can be written, before anything is computed; returns whether it is standard output.
+
+    A pipe or a device needs no ending, where there is one kind of file only. Raises UnknownNameError,
+    InputFileNotFoundError, OutputFileError.
+    """
     if out is None:
-        return
-    if out.suffix not in endings:
+        return False
+    target = output_target(out)
+    if out.suffix.lower() not in endings and not (target.is_stream and len(endings) == 1):
         raise UnknownNameError(f"{option}: the file's name must end in {' or '.join(endings)}, got {str(out)!r}")
-    if not out.absolute().parent.is_dir():
-        raise InputFileNotFoundError(f"{out.parent}: there is no such folder to write {out.name} to")
+    return target.descriptor == _STANDARD_OUTPUT

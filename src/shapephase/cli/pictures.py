@@ -7,16 +7,19 @@ from pathlib import Path
 from ..errors import unknown_name
 from .options import (
     AS_RECORDED,
+    AS_TEXT,
     AT_REST,
     BodyArgument,
     FigureFile,
     FlightOptions,
     Gauge,
     MotionArgument,
+    PrintOptions,
     RecordingOptions,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
+from .terminal import put, say_written
 
 
 def view_command(
@@ -29,33 +32,37 @@ def view_command(
     trail: str | None = None,
     speed: float | None = None,
     recording: RecordingOptions = AS_RECORDED,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome | None:
     """Show a motion in 3-D: in a browser until Ctrl-C, or as one HTML file that opens offline.
 
     Parameters
     ----------
     html
-        write the animation to this HTML file, and serve nothing
+        Write the animation to this HTML file, and serve nothing; without it a browser is opened. For example
+        `--html fall.html`.
     trail
-        a link that leaves a trail
+        The link that leaves a trail; without it none does. For example `--trail head`.
     speed
-        seconds of motion in a second
+        Seconds of motion in a second of playing; without it 1, or such that playing takes from 4 to 20 s. For example
+        `--speed 0.1` for slow motion.
     """
     from ..plotting.viewer import motion_page, view
     from . import motion as motions
 
-    check_writable(html, "--html", ".html")
+    aside = check_writable(html, "--html", ".html")
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording)
         if html is not None:
             work.begin("recording the animation")
             motion_page(flown.motion, html, trail=trail, speed=speed)
-            return Outcome(f"wrote {html}", {"html": str(html)})
+            say_written(html)
+            return Outcome("", {"html": str(html)}, aside=aside)
     live = view(flown.motion, trail=trail, speed=speed, notebook=False)
     if live is not None:
         with live:
-            print(f"{live.url}  (Ctrl-C to stop)", flush=True)
+            put(f"{live.url}  (Ctrl-C to stop)")
             live.wait()
     return None
 
@@ -70,13 +77,14 @@ def plot_command(
     flight: FlightOptions = AT_REST,
     gauge: Gauge = "horizontal",
     recording: RecordingOptions = AS_RECORDED,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Draw one figure of a motion, one column wide.
 
     Parameters
     ----------
     kind
-        momentum, phases, attitude, shape, inertia, internal_momentum or energy
+        What is drawn: momentum, phases, attitude, shape, inertia, internal_momentum or energy; for example `phases`.
     """
     from ..plotting.named_figures import FIGURES, write_figure
     from . import motion as motions
@@ -84,6 +92,10 @@ def plot_command(
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     check_writable(out, "--out", ".svg", ".pdf", ".png")
-    flown = motions.flight(body, motion, flight, recording)
-    write_figure(kind, flown.motion, out, flown.path, gauge)
-    return Outcome(f"wrote {out}", {"figure": str(out)})
+    with steps(2) as work:
+        work.begin("loading and reconstructing")
+        flown = motions.flight(body, motion, flight, recording)
+        work.begin(f"drawing {kind.replace('_', ' ')}")
+        write_figure(kind, flown.motion, out, flown.path, gauge)
+        say_written(out)
+    return Outcome("", {"figure": str(out)})

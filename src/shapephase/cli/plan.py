@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 import warnings
@@ -12,9 +13,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 from ..errors import PlanNotFound, ShapeError
 from .exit_codes import ExitCode
-from .options import BodyArgument, Json, Momentum, ReportFile
+from .options import AS_TEXT, BodyArgument, Momentum, PrintOptions, ReportFile
 from .outcome import Outcome, check_writable
 from .progress import Steps, steps
+from .terminal import say_written
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -31,7 +33,7 @@ def plan_command(
     /,
     *,
     rotate: float | None = None,
-    about: str = "x",
+    about: str | None = None,
     momentum: Momentum = (0.0, 0.0, 0.0),
     duration: float = 1.0,
     somersaults: float | None = None,
@@ -41,32 +43,36 @@ def plan_command(
     seed: int = 0,
     out: Path | None = None,
     html: ReportFile = None,
-    json: Json = False,  # noqa: ARG001
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Find the cheapest motion of the joints that turns a body by a rotation, and compute the resulting motion.
 
-    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130.
+    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130. If the search finds
+    nothing, its best try is printed and written, and the exit code is 7.
 
     Parameters
     ----------
     rotate
-        angle of the turn [degrees]
+        Angle of the turn, in degrees; either this or --somersaults is needed. For example `--rotate 180`.
     about
-        its axis, x, y or z of the base at the start, or three numbers with commas between them
+        Axis of the turn: x, y or z of the base at the start, or three numbers with commas between them; x where
+        --rotate is given without it. For example `--about 0,1,1`.
     duration
-        [s]; for the cost "time" the longest allowed
+        Of the motion, in s; for the cost "time" the longest allowed. For example `--duration 0.8`.
     somersaults
-        instead of --rotate, turns about the momentum, with --half-twists about the z axis of the base
+        Turns about the momentum, instead of --rotate; 0 where only --half-twists is given. For example
+        `--somersaults 1.5 --momentum 0 40 0`.
     half_twists
-        see --somersaults
+        Half turns about the z axis of the base, with --somersaults; 0 where only that is given. For example
+        `--half-twists 2`.
     cost
-        kinetic, rate, acceleration or time
+        What is made least: kinetic, rate, acceleration or time; for example `--cost rate`.
     starts
-        searches from different guesses
+        Searches from different guesses, of which the cheapest plan is kept; for example `--starts 4`.
     seed
-        of the guesses
+        Of the random guesses, a whole number; for example `--seed 7`.
     out
-        write the joint motion to this CSV file
+        Write the joint motion to this CSV file; without it none is written. For example `--out plan.csv`.
     """
     import numpy as np
 
@@ -77,18 +83,20 @@ def plan_command(
     from ..phases.phases import split
     from ..shape_space.files.read import write_shape_path
 
-    check_writable(out, "--out", ".csv")
-    check_writable(html, "--html", ".html")
-    if (rotate is None) == (somersaults is None and half_twists is None):
-        raise ShapeError("give either --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
+    _check_goal(rotate, about, somersaults, half_twists)
+    if not 0.0 < duration < math.inf:
+        raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
+    aside = check_writable(out, "--out", ".csv")
+    aside = check_writable(html, "--html", ".html") or aside
     with steps(12 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, isolate=True)
         goal = (
             Goal(somersaults=somersaults, half_twists=half_twists)
             if rotate is None
-            else Goal(rotation=so3.exp(np.radians(rotate) * _axis(about)))
+            else Goal(rotation=so3.exp(np.radians(rotate) * _axis(about or "x")))
         )
+        code, status = ExitCode.DONE, ""
         work.begin("searching")
         with _stoppable(work) as search:
             try:
@@ -102,20 +110,40 @@ def plan_command(
                     iteration_callback=search.report,
                 )
             except PlanNotFound as failure:
-                if not search.stopped or failure.best is None:
+                if failure.best is None:
                     raise
-                found = cast("Plan", failure.best)
-                warnings.warn(str(failure), stacklevel=2)
+                found, code, status = cast("Plan", failure.best), ExitCode.NOT_FOUND, str(failure)
+        if search.stopped:
+            code = ExitCode.STOPPED
+        if status:
+            warnings.warn(status, stacklevel=2)
         if out is not None:
             # Dense samples: a reader that joins the ends of a closed path smoothly then changes next to nothing.
             write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
+            say_written(out)
         if html is not None:
             from ..plotting.report import write_report
 
             title = f"{loaded.name} turns itself"
             write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
+            say_written(html)
     text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
-    return Outcome(text, data, code=ExitCode.STOPPED if search.stopped else ExitCode.DONE)
+    return Outcome(text, data | {"status": status or "found"}, code=code, aside=aside)
+
+
+def _check_goal(rotate: float | None, about: str | None, somersaults: float | None, half_twists: float | None) -> None:
+    """Raise ShapeError for options that exclude or need one another, or are no numbers."""
+    winding = {"--somersaults": somersaults, "--half-twists": half_twists}
+    given = [option for option, value in winding.items() if value is not None]
+    if rotate is not None and given:
+        raise ShapeError(f"--rotate and {given[0]} each say how the body turns; give one of them")
+    if rotate is None and about is not None:
+        raise ShapeError("--about: the axis of --rotate DEGREES, which is not given")
+    if rotate is None and not given:
+        raise ShapeError("give either --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
+    for option, value in {"--rotate": rotate, **winding}.items():
+        if value is not None and not math.isfinite(value):
+            raise ShapeError(f"{option}: a finite number is needed, got {value:g}")
 
 
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:

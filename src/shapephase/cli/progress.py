@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from .terminal import Verbosity, say, verbosity
+
 # [s] Work that takes longer shows a progress bar; what is done sooner leaves the terminal alone.
 _PATIENCE = 1.0
 
@@ -27,6 +29,7 @@ class Steps:
 
     def begin(self, what: str) -> None:
         """The next step begins, and the one before is done; `what` it does is shown."""
+        say(f"shapephase: {what}", Verbosity.VERBOSE)
         if self._display is None:
             return
         task = self._display.tasks[0]
@@ -42,7 +45,7 @@ class Steps:
 @contextmanager
 def steps(total: int) -> Iterator[Steps]:
     """Show `total` steps on standard error once a second has passed; in a pipe or a file nothing is written."""
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty() or verbosity() is not Verbosity.NORMAL:
         yield Steps(total)
         return
     from rich.console import Console

@@ -6,17 +6,20 @@ from pathlib import Path
 
 from .options import (
     AS_RECORDED,
+    AS_TEXT,
     AT_REST,
     BodyArgument,
     FlightOptions,
     Gauge,
-    Json,
     MotionArgument,
+    PrintOptions,
     RecordingOptions,
     ReportFile,
+    Tolerance,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
+from .terminal import say_written
 
 
 def split_command(
@@ -26,38 +29,38 @@ def split_command(
     *,
     flight: FlightOptions = AT_REST,
     gauge: Gauge = "horizontal",
-    tolerance: float = 1e-9,
+    tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = AS_RECORDED,
     out: Path | None = None,
     html: ReportFile = None,
-    json: Json = False,  # noqa: ARG001
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase.
 
     Parameters
     ----------
-    tolerance
-        of the attitude [rad]
     out
-        write the motion to this NPZ file
+        Write the motion to this NPZ file, or to a pipe; without it none is written. For example `--out fall.npz`.
     """
     from ..phases.phases import split
     from . import motion as motions
     from .text import recorded_base_text, split_data, split_lines
 
-    check_writable(out, "--out", ".npz")
-    check_writable(html, "--html", ".html")
+    aside = check_writable(out, "--out", ".npz")
+    aside = check_writable(html, "--html", ".html") or aside
     with steps(12 if html else 2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, tolerance)
         result = split(flown.motion, gauge)
         if out is not None:
             flown.motion.save(out)
+            say_written(out)
         if html is not None:
             from ..plotting.report import write_report
 
             title = f"{flown.body.name} along {Path(motion).name}"
             write_report(flown.motion, result, html, shape_path=flown.path, title=title, begin=work.begin)
+            say_written(html)
     lines, data = recorded_base_text(flown.motion, flown.recorded)
     text = [*split_lines(flown.body, motion, flown.motion, result), *lines]
-    return Outcome("\n".join(text), split_data(flown.body, motion, flown.motion, result) | data)
+    return Outcome("\n".join(text), split_data(flown.body, motion, flown.motion, result) | data, aside=aside)

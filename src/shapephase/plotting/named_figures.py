@@ -136,5 +136,5 @@ def write_figure(
     gauge: Gauge = "horizontal",
 ) -> None:
     """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all. Raises as `figure_image`."""
-    image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix("."))
+    image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
     write_whole(out, lambda stream: stream.write(image))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import html
-import io
 import math
 import os
 import threading
@@ -22,6 +21,7 @@ from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
 from ._moving_scene import MovingScene, moving_scene
 from ._scene_drawing import DrawnScene, set_camera
+from ._silent_server import silence_thread_of, silenced
 
 if TYPE_CHECKING:
     import viser
@@ -182,7 +182,7 @@ class LiveView:
         """End the view and its server."""
         self._stopped.set()
         self._thread.join()
-        with _quiet():
+        with silenced():
             self.server.stop()
 
     def wait(self) -> None:
@@ -237,20 +237,15 @@ def _server() -> Iterator[viser.ViserServer]:
     try:
         yield server
     finally:
-        with _quiet():
+        with silenced():
             server.stop()
 
 
 def _started(host: str, port: int) -> viser.ViserServer:
-    with _quiet():
-        return viser_module().ViserServer(host=host, port=port, verbose=False)
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Suppress what viser prints when it starts and stops."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        yield
+    with silenced():
+        server = viser_module().ViserServer(host=host, port=port, verbose=False)
+    silence_thread_of(server)
+    return server
 
 
 def _playing_speed(motion: Motion, speed: float | None) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from ... import so3
 from ...arrays import FARTHEST, Array
 from ...body.body import Body
-from ...errors import TrajectoryError, unknown_name
+from ...errors import TrajectoryError, UnknownColumnError, unknown_name
 from ._recording import Recording, warn
 
 _DEGREES = "_deg"
@@ -94,7 +94,9 @@ def _joint_of(name: str, target: str, body: Body, recording: Recording, degrees:
     """The joint of a column and the factor to SI units."""
     plain = target if target in body.joint_names else target.removesuffix(_DEGREES)
     if plain not in body.joint_names:
-        raise unknown_name(f"column in {recording.where}; joint of {body.name}", target, body.joint_names)
+        raise unknown_name(
+            f"column in {recording.where}; joint of {body.name}", target, body.joint_names, UnknownColumnError
+        )
     joint = body.joint_names.index(plain)
     # A column keeps its unit when it is given another name.
     by_name = plain != target or (name != target and name.endswith(_DEGREES))

@@ -178,11 +178,11 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
 
 def _read(where: Path, body: Body, topic: str | None, timestep: float | None) -> Recording:
     suffix = where.suffix.lower()
-    bag = suffix in _BAGS or where.is_dir()
+    bag = suffix in _BAGS or os.path.isdir(where)
     if not bag and suffix not in (*_TABLES, *_ARRAYS, *_YAML):
         kinds = (".csv", ".npz", *_TABLES, *_ARRAYS, *_YAML, *_BAGS)
         raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
-    if not where.exists():
+    if not os.path.exists(where):
         raise InputFileNotFoundError(f"{where}: there is no such file")
     if topic is not None and not bag:
         raise TrajectoryError(f"{where}: topic={topic!r} is for bags; this file has no topics")
