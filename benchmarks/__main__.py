@@ -1,15 +1,15 @@
-"""Runs the benchmark: `make bench`, or `python -m benchmarks [--interpreted] [tolerance ...]`.
+"""Speed beside compiled C++: `make bench`, or `python -m benchmarks [--quick] [--against SRC]`.
 
-For every case and tolerance: `reconstruct` as anybody calls it, against SciPy's DOP853 on the same equation with the
-body computed by Pinocchio (once with a right-hand side without waste, once as one writes it with NumPy), by MuJoCo and
-by Drake where these are installed. DOP853 runs at the loosest relative tolerance (on a grid of half decades) at which
-the final attitude is within the same error; it takes the same steps whoever computes the body. Each opponent runs in
-turn with ours, in one process with one thread, three times at a turn, as a program calls them again and again; medians
-of processor time.
-Ours runs twice: at the tolerance asked for, which the error stays far below; and, as DOP853 does, at the loosest at
-which the true error is within it ("tuned"). Errors are against DOP853 at 3e-14. Where there is a C compiler, our
-innermost loops are compiled first, as `shapephase compile` does, into a folder of their own; `--interpreted` leaves
-that out.
+Seventeen motions, each as its known kind (Fourier loop, spline, moves) and as a black box (`ShapePath.function` of the
+same path, looked at before), beside peer.cpp: Pinocchio in Boost.odeint's Runge-Kutta-Fehlberg 7(8), which takes the
+motion as a function of time in C++, at the loosest relative tolerance (half decades) that keeps its own largest error
+at its steps within 1e-9. Ours runs at the tolerance asked for, 1e-9, and at the loosest that keeps the true error
+within 1e-9 at the same times ("same error"). Truth is in extended precision (`benchmarks.extended`). All take turns, in
+processes of one thread; times are processor time, ratios medians of the turns' ratios.
+
+Ours runs without Numba ("plain") and, where it is installed, with it ("fast"). `--against SRC` names the `src` folder
+of another checkout, which runs in the same turns, interpreted and compiled. SHAPEPHASE_FAST=0 leaves out what is fast.
+Then what follows a reconstruction, many momenta and bodies at once, threads, and recorded motions.
 """
 
 from __future__ import annotations
@@ -19,177 +19,239 @@ import os
 for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_pool, "1")
 
-import sys
+import argparse
 import tempfile
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 
-import shapephase as sp
-from shapephase import so3
-from shapephase.errors import CompilerError
+from .cases import Case, numbered_case
+from .contestant import Contestant, Setting, WorkloadFailed
+from .extended import Truth, angles_between, exact_path
+from .peer import FLAGS, NoPeer, Peer
+from .workloads import TOLERANCE
 
-from .cases import Case, cases
-from .contestants import solve_ivp_attitude
-from .scaling import print_scaling
-from .simulators import Contestant, ModelRefused, available
+RUNS = 3
+"""At a turn, after one that does not count."""
+_QUICK_CASES = (0, 2, 4, 7, 16)
+_PEER = "C++"
+_KINDS = ("loop", "move", "samples", "righting")
+"""In the names of the cases."""
+_GRID = np.arange(4.0, 13.1, 0.5)
+"""Tolerances on which the loosest are looked for, as negative powers of ten."""
 
-# How many times faster than the leanest opponent is asked for, and what a compiled program would be.
-TARGETS = {1e-6: None, 1e-9: (8, 14), 1e-12: (15, None)}
-TURNS, TURNS_OF_MORE, RUNS = 9, 3, 3
 
+@dataclass
+class Entry:
+    """One way of running one case: its tolerance and times [s], turn by turn."""
 
-@dataclass(frozen=True)
-class Row:
-    """One case at one tolerance: times [ms] of ours and of the others, evaluations, error and estimate [rad]."""
-
-    ours: float
-    tuned: float
-    tuned_to: float
-    others: tuple[float, ...]
+    tolerance: float
     evaluations: int
-    their_evaluations: int
     error: float
-    estimate: float
+    seconds: list[float] = field(default_factory=list)
+
+    @property
+    def median(self) -> float:
+        """[ms]."""
+        return 1e3 * float(np.median(self.seconds))
+
+
+Entries = dict[tuple[str, str, str], Entry]
+"""By contestant, "known" or "box", "asked" or "same error"; of the peer under ("C++", "", "")."""
 
 
 def main() -> None:
     """Print the tables."""
-    arguments = [argument for argument in sys.argv[1:] if argument != "--interpreted"]
+    asked = _arguments()
+    numbers = list(_QUICK_CASES if asked.quick else range(17))
     with tempfile.TemporaryDirectory() as folder:
-        os.environ["XDG_CACHE_HOME"] = folder
-        print(innermost_loops(interpreted="--interpreted" in sys.argv[1:]))
-        print_tables([float(argument) for argument in arguments] or list(TARGETS))
+        contestants = started(asked.against, folder)
+        try:
+            print_cases(contestants, numbers, turns=5 if asked.quick else 9)
+            print_workloads(contestants, numbers, quick=asked.quick)
+        finally:
+            for contestant in contestants:
+                contestant.close()
 
 
-def innermost_loops(*, interpreted: bool) -> str:
-    """Compile them unless told otherwise; what was done, in words."""
-    try:
-        if not interpreted:
-            sp.compile_steps()
-            return "innermost loops: compiled"
-    except CompilerError as error:
-        return f"innermost loops: interpreted ({error})"
-    return "innermost loops: interpreted"
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks")
+    parser.add_argument("--quick", action="store_true", help="five cases and fewer turns, in about a minute")
+    parser.add_argument("--against", type=Path, metavar="SRC", help="the src folder of another checkout")
+    return parser.parse_args()
 
 
-def print_tables(tolerances: list[float]) -> None:
-    """All of them."""
-    all_cases = cases()
-    truths = [so3.matrix_from_quat(solve_ivp_attitude(case, 3e-14, 1e-16)[0]) for case in all_cases]
-    names = ["lean", *(name for name, _ in available())]
-    for tolerance in tolerances:
-        print(f"\ntolerance {tolerance:g} rad; times in ms")
-        heads = "".join(f"{name:>9.8}" for name in names)
-        print(
-            f"{'case':38}{'ours':>6}{'tuned':>7}{'to':>8}{heads}{'ratio':>7}{'tuned':>7}{'evals':>7}{'ivp':>6}{'error':>9}"
-            f"{'estimate':>10}"
-        )
-        rows = [compared(case, truth, tolerance) for case, truth in zip(all_cases, truths, strict=True)]
-        for case, row in zip(all_cases, rows, strict=True):
-            times = "".join(f"{other:9.2f}" for other in row.others)
-            ratios = f"{row.others[0] / row.ours:7.1f}{row.others[0] / row.tuned:7.1f}"
-            print(
-                f"{case.name:38}{row.ours:6.2f}{row.tuned:7.2f}{row.tuned_to:8.0e}{times}{ratios}"
-                f"{row.evaluations:7d}{row.their_evaluations:6d}{row.error:9.1e}{row.estimate:10.1e}"
-            )
-        print_summary(rows, names, tolerance)
-    print_scaling()
+def started(against: Path | None, folder: str) -> list[Contestant]:
+    """The processes; what is compiled, is compiled first."""
+    settings = [Setting("plain", cache=f"{folder}/plain")]
+    compiled = []
+    if os.environ.get("SHAPEPHASE_FAST", "") != "0" and find_spec("numba") is not None:
+        compiled.append(Setting("fast", fast=True))
+    if against is not None:
+        settings.append(Setting("before", against.resolve(), cache=f"{folder}/interpreted"))
+        compiled.append(Setting("before, compiled", against.resolve(), cache=f"{folder}/compiled"))
+    contestants = [Contestant(setting) for setting in settings]
+    for setting in compiled:
+        contestant = Contestant(setting)
+        print(f"{setting.name}: {contestant('compiled')}", flush=True)
+        contestants.append(contestant)
+    return contestants
 
 
-def print_summary(rows: list[Row], names: list[str], tolerance: float) -> None:
-    """Medians and ratios."""
-    ours, tuned = np.array([r.ours for r in rows]), np.array([r.tuned for r in rows])
-    for place, name in enumerate(names):
-        theirs = np.array([r.others[place] for r in rows])
-        print(
-            f"  {name:18} median {np.nanmedian(theirs):6.2f} ms; ours {np.median(ours):.2f}: median of ratios "
-            f"{np.nanmedian(theirs / ours):5.1f}; ours at the same true error {np.median(tuned):.2f}: "
-            f"{np.nanmedian(theirs / tuned):5.1f}"
-        )
-    asked = TARGETS.get(tolerance)
-    if asked:
-        hoped = f", {asked[1]} if it can be" if asked[1] else ""
-        print(f"  asked at the same true error: {asked[0]} times the lean one{hoped}")
-    print(
-        f"  evaluations {np.median([r.evaluations for r in rows]):.0f} in the median (asked at 1e-9: 130); estimate "
-        f"over error {np.median([r.estimate / r.error for r in rows]):.0f} in the median (asked: 1000), error above "
-        f"the estimate in {sum(r.error > r.estimate for r in rows)} cases"
-    )
+# ---- Cases beside the peer ------------------------------------------------------------------------------------------
 
 
-def compared(case: Case, truth: np.ndarray, tolerance: float) -> Row:
-    """All contestants on one case, in turn."""
-    deformation = sp.articulated(case.body, case.path)
-    rtol = loosest(case, truth, tolerance)
-    _, their_evaluations = solve_ivp_attitude(case, rtol)
+def print_cases(contestants: list[Contestant], numbers: list[int], turns: int) -> None:
+    """A line for each case, known and as a black box, and the medians."""
+    all_cases = {number: numbered_case(number) for number in numbers}
+    ways = [(c.name, way, asked) for c in contestants for way in ("known", "box") for asked in ("asked", "same error")]
+    print(f"\ncompiled C++: {' '.join(FLAGS)}; tolerance {TOLERANCE:g} rad; processor time [ms]; ratios to C++\n")
+    heads = "".join(f"{c.name:>18.18}{'ratio':>7}{'same error':>11}{'evals':>7}" for c in contestants)
+    print(f"{'case':34}{'':7}{'C++':>8}{'to':>8}{'evals':>7}{heads}")
+    done: dict[int, Entries] = {}
+    for number in numbers:
+        done[number] = compared(all_cases[number], number, contestants, turns)
+        for way in ("known", "box"):
+            print(_row(all_cases[number], way, done[number], contestants), flush=True)
+    if (_PEER, "", "") in done[numbers[0]]:
+        print_medians({number: all_cases[number].name for number in numbers}, done, ways)
+    for ours, theirs in (("plain", "before"), ("fast", "before, compiled")):
+        names = {c.name for c in contestants}
+        if {ours, theirs} <= names:
+            print(f"\n{ours} / {theirs}, at the tolerance asked for")
+            for way in ("known", "box"):
+                print(f"  {way:7}{_ratios(done, numbers, (ours, way, 'asked'), (theirs, way, 'asked'))}")
 
-    def ours() -> sp.Motion:
-        return sp.reconstruct(deformation, case.momentum, tolerance=tolerance)
 
-    tuned_to = our_loosest(case, truth, tolerance)
+def print_medians(names: dict[int, str], done: dict[int, Entries], ways: list[tuple[str, str, str]]) -> None:
+    """Of the ratios to the peer, over all cases and by their kinds."""
+    kinds = [kind for kind in _KINDS if any(kind in name for name in names.values())]
+    print("\nmedians of the ratios to C++" + " " * 52 + "".join(f"{kind:>11}" for kind in kinds))
+    for way in ways:
+        medians = []
+        for kind in kinds:
+            chosen = [number for number, name in names.items() if kind in name]
+            medians.append(np.median([_paired(done[n][way], done[n][_PEER, "", ""]) for n in chosen]))
+        of_all = _ratios(done, list(names), way, (_PEER, "", ""))
+        print(f"  {way[0]:18}{way[1]:7}{way[2]:12}{of_all:41}" + "".join(f"{median:11.2f}" for median in medians))
 
-    def tuned() -> sp.Motion:
-        return sp.reconstruct(deformation, case.momentum, tolerance=tuned_to)
 
-    contestants = [solve_ivp_attitude, *(contestant for _, contestant in available())]
-    motion = ours()
-    ours_ms: list[tuple[float, float]] = []
-    others_ms: list[float] = []
+def _row(case: Case, way: str, entries: Entries, contestants: list[Contestant]) -> str:
+    peer = entries.get((_PEER, "", ""))
+    line = f"{case.name:34}{way:7}"
+    line += f"{peer.median:8.3f}{peer.tolerance:8.0e}{peer.evaluations:7d}" if peer else f"{'':23}"
     for contestant in contestants:
-
-        def theirs(contestant: Contestant = contestant) -> object:
-            return contestant(case, rtol)
-
-        if not works(theirs):
-            others_ms.append(np.nan)
-            continue
-        turns = TURNS if not others_ms else TURNS_OF_MORE
-        order = (ours, theirs, tuned, theirs)
-        runs = np.array([[[seconds(run) for _ in range(RUNS)] for run in order] for _ in range(turns)])
-        mine, other, eased, _ = 1e3 * np.median(runs, axis=(0, 2))
-        ours_ms.append((float(mine), float(eased)))
-        others_ms.append(float(other))
-    error = float(so3.angle(truth.T @ motion.final_attitude))
-    estimate = float(motion.error_estimate)
-    return Row(*ours_ms[0], tuned_to, tuple(others_ms), motion.evaluations, their_evaluations, error, estimate)
+        ours = entries[contestant.name, way, "asked"]
+        eased = entries[contestant.name, way, "same error"]
+        ratios = [_paired(entry, peer) if peer else np.nan for entry in (ours, eased)]
+        line += f"{ours.median:18.3f}{ratios[0]:7.2f}{ratios[1]:11.2f}{ours.evaluations:7d}"
+    return line
 
 
-def works(run: Callable[[], object]) -> bool:
-    """Whether a simulator accepts the body; the first run also builds its model."""
+def _paired(ours: Entry, theirs: Entry) -> float:
+    """The median of the ratios, turn by turn."""
+    return float(np.median(np.array(ours.seconds) / np.array(theirs.seconds)))
+
+
+def _ratios(
+    done: dict[int, Entries], numbers: list[int], ours: tuple[str, str, str], theirs: tuple[str, str, str]
+) -> str:
+    ratios = [_paired(done[number][ours], done[number][theirs]) for number in numbers]
+    return f"median {np.median(ratios):5.2f}   from {min(ratios):5.2f} to {max(ratios):5.2f}"
+
+
+def compared(case: Case, number: int, contestants: list[Contestant], turns: int) -> Entries:
+    """All contestants on one case, in turns."""
+    truth, exact = Truth(case.body), exact_path(case.path)
+    entries: Entries = {}
     try:
-        run()
-    except ModelRefused:
-        return False
-    return True
+        peer = Peer(case.body, case.path, case.path.breaks, case.momentum)
+    except NoPeer as missing:
+        print(f"  no peer: {missing}")
+        peer, times = None, np.linspace(0.0, case.path.duration, 31)[1:]
+    else:
+        entries[_PEER, "", ""], times = _loosest_peer(peer, truth, exact, case)
+    quaternions, _ = truth.attitudes(exact, exact.breaks, case.momentum, times)
+    for contestant in contestants:
+        for box, way in ((False, "known"), (True, "box")):
+            found = _errors(contestant, number, box, times, quaternions)
+            entries[contestant.name, way, "asked"] = found[TOLERANCE]
+            within = [entry for entry in found.values() if entry.error <= TOLERANCE]
+            eased = max(within, key=lambda entry: entry.tolerance, default=found[TOLERANCE])
+            entries[contestant.name, way, "same error"] = Entry(eased.tolerance, eased.evaluations, eased.error)
+    by_name = {contestant.name: contestant for contestant in contestants}
+    for _ in range(turns):
+        for (name, way, _), entry in entries.items():
+            if name == _PEER and peer is not None:
+                peer.seconds(entry.tolerance)
+                entry.seconds.append(peer.seconds(entry.tolerance, RUNS))
+            else:
+                run = by_name[name]
+                entry.seconds.append(run("reconstruction_seconds", number, way == "box", entry.tolerance, RUNS))
+    return entries
 
 
-def loosest(case: Case, truth: np.ndarray, tolerance: float) -> float:
-    """The loosest tolerance of DOP853 that meets the error."""
-    for exponent in np.arange(3.0, 13.6, 0.5):
-        rtol = max(10.0**-exponent, 3e-14)
-        if so3.angle(truth.T @ so3.matrix_from_quat(solve_ivp_attitude(case, rtol)[0])) <= tolerance:
-            return rtol
-    return 3e-14
+def _loosest_peer(peer: Peer, truth: Truth, exact: object, case: Case) -> tuple[Entry, np.ndarray]:
+    """The loosest tolerance of the peer whose errors stay within ours, and the times of its steps."""
+    for tolerance in 10.0**-_GRID:
+        steps = peer.steps(tolerance)
+        quaternions, _ = truth.attitudes(exact, exact.breaks, case.momentum, steps.times)
+        if (error := steps.error(quaternions)) <= TOLERANCE:
+            return Entry(tolerance, steps.evaluations, error), steps.times
+    raise ArithmeticError(f"{case.name}: the peer does not reach {TOLERANCE:g}")
 
 
-def our_loosest(case: Case, truth: np.ndarray, tolerance: float) -> float:
-    """Our loosest tolerance that meets the error."""
-    deformation = sp.articulated(case.body, case.path)
-    for exponent in np.arange(4.0, 12.6, 0.5):
-        motion = sp.reconstruct(deformation, case.momentum, tolerance=10.0**-exponent)
-        if so3.angle(truth.T @ motion.final_attitude) <= tolerance:
-            return float(10.0**-exponent)
-    return tolerance
+def _errors(
+    contestant: Contestant, number: int, box: bool, times: np.ndarray, quaternions: np.ndarray
+) -> dict[float, Entry]:
+    """By tolerance, from the loosest to the first that is within the error, and at the one asked for."""
+    found: dict[float, Entry] = {}
+    for tolerance in [float(f"1e-{exponent:g}") if exponent % 1 == 0 else 10.0**-exponent for exponent in _GRID]:
+        within = any(entry.error <= TOLERANCE for entry in found.values())
+        if within and tolerance != TOLERANCE:
+            continue
+        run = contestant("reconstructed", number, box, tolerance, times)
+        if run is None:
+            continue
+        attitudes, _, evaluations = run
+        found[tolerance] = Entry(tolerance, evaluations, float(angles_between(quaternions, attitudes).max()))
+        if TOLERANCE in found and (within or found[tolerance].error <= TOLERANCE):
+            break
+    return found
 
 
-def seconds(run: Callable[[], object]) -> float:
-    """One run's time."""
-    start = time.process_time()
-    run()
-    return time.process_time() - start
+# ---- Other workloads ------------------------------------------------------------------------------------------------
+
+
+def print_workloads(contestants: list[Contestant], numbers: list[int], *, quick: bool) -> None:
+    """A line for each number of each workload, a column for each contestant."""
+    turns, many, few, rows = (3, 2000, 100, 1000) if quick else (7, 10_000, 1000, 10_000)
+    print(f"\n{'':44}" + "".join(f"{c.name:>18.18}" for c in contestants))
+    print_table("a black box for the first time", contestants, "first_black_boxes", numbers)
+    print_table("after a reconstruction", contestants, "afterwards", turns, numbers)
+    print_table("recorded motions", contestants, "recorded", 3, rows)
+    print_table("many momenta", contestants, "many_momenta", many)
+    print_table("threads, by the clock", contestants, "threads", many)
+    print_table("many bodies", contestants, "inertia_variants", few)
+
+
+def print_table(title: str, contestants: list[Contestant], workload: str, *arguments: object) -> None:
+    """One workload."""
+    columns, faults = [], []
+    for contestant in contestants:
+        try:
+            columns.append(contestant(workload, *arguments))
+        except WorkloadFailed as failed:
+            columns.append({})
+            faults.append(str(failed))
+    print(title if any(columns) else f"{title}: not there", flush=True)
+    for name in dict.fromkeys(name for column in columns for name in column):
+        cells = (f"{column[name]:18.2f}" if name in column else f"{'':18}" for column in columns)
+        print(f"  {name:42}" + "".join(cells))
+    for fault in faults:
+        print(f"  {fault}")
 
 
 if __name__ == "__main__":

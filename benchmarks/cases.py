@@ -1,17 +1,16 @@
-"""Bodies and paths that every contestant runs."""
+"""Bodies and paths that every contestant runs; made with public names alone, also by older checkouts."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
 
 import numpy as np
 
 import shapephase as sp
-from shapephase.examples.scenarios import cat_righting
-
-from .extended import as_polynomials
 
 
 @dataclass(frozen=True)
@@ -50,12 +49,6 @@ def move(body: sp.Body, seed: int, duration: float = 1.0) -> sp.ShapePath:
     return sp.ShapePath.waypoints([0.0, 0.5 * duration, duration], points)
 
 
-def exact_path(path: sp.ShapePath) -> sp.ShapePath:
-    """The same path as the extended precision follows it."""
-    known = any(hasattr(path.curve, name) for name in ("knots", "sines"))
-    return path if known else as_polynomials(path)
-
-
 def as_function(path: sp.ShapePath) -> sp.ShapePath:
     """The same path as a function of time about which only its breaks are known."""
     return sp.ShapePath.function(path.curve, path.duration, path.breaks[1:-1])
@@ -63,18 +56,25 @@ def as_function(path: sp.ShapePath) -> sp.ShapePath:
 
 def cases() -> list[Case]:
     """Seventeen cases on twelve bodies: loops, recorded samples, moves; with momentum and without."""
+    return [numbered_case(number) for number in range(len(_CASES))]
+
+
+def numbered_case(number: int) -> Case:
+    """One of them."""
+    name, kind, momentum = _CASES[number]
+    body = _body(name)
+    path = kind(body, number)
+    axis = np.random.default_rng(100 + number).normal(size=3)
+    size = momentum * float(np.trace(body.locked_inertia(np.zeros(body.n_shape)))) / 3.0
+    still = "" if momentum else ", at rest"
+    return Case(f"{name} {kind.__name__}{still}", body, path, size * axis / np.linalg.norm(axis))
+
+
+@cache
+def _body(name: str) -> sp.Body:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        loaded = {name: sp.load_body(name) for name in _BODIES}
-    made = []
-    for number, (name, kind, momentum) in enumerate(_CASES):
-        body = loaded[name]
-        path = kind(body, number)
-        axis = np.random.default_rng(100 + number).normal(size=3)
-        size = momentum * float(np.trace(body.locked_inertia(np.zeros(body.n_shape)))) / 3.0
-        still = "" if momentum else ", at rest"
-        made.append(Case(f"{name} {kind.__name__}{still}", body, path, size * axis / np.linalg.norm(axis)))
-    return made
+        return sp.load_body(name)
 
 
 def loop(body: sp.Body, seed: int) -> sp.ShapePath:
@@ -94,7 +94,11 @@ def samples_12(body: sp.Body, seed: int) -> sp.ShapePath:
 
 def righting(_body: sp.Body, _seed: int) -> sp.ShapePath:
     """The cat's own."""
-    return cat_righting()
+    try:
+        scenarios = import_module("shapephase.examples.scenarios")
+    except ImportError:  # an older checkout, to compare with
+        scenarios = import_module("shapephase.scenarios")
+    return scenarios.cat_righting()
 
 
 Kind = Callable[[sp.Body, int], sp.ShapePath]
@@ -118,4 +122,3 @@ _CASES: list[tuple[str, Kind, float]] = [
     ("example:ur5_robot", samples_12, 0.0),
     ("example:anymal", move, 5.0),
 ]
-_BODIES = sorted({name for name, _, _ in _CASES})

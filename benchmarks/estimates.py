@@ -38,8 +38,10 @@ TIMES = 60
 FAMILIES = {"harmonics": harmonics, "mixed": mixed}
 _HARMLESS = 30.0
 """How far below the tolerance a truth has to be for its refusal to be a fault."""
-_JOINT_SECONDS = 2.5e-5
+_FRAME_SECONDS = 2.5e-5
 """[s] of processor time for a step of the extended integrator, for each frame of the body."""
+_TERM_SECONDS = 8e-6
+"""[s] as above, for each term of the path."""
 _MEASURED = 4.0
 """How many times the bound of its own error a true error has to be to be counted in the percentiles."""
 _WORST = 8
@@ -157,7 +159,8 @@ def judged(family: str, seed: int, most: float, number: int) -> Run:
         loosened = loosened or _attempt(trial, factor * trial.tolerance)[0]
     ended = time.process_time()
     try:
-        steps = most / (_JOINT_SECONDS * (len(body.chain.names) + 1))
+        terms = max(segment.terms for segment in trial.segments)
+        steps = most / (_FRAME_SECONDS * (len(body.chain.names) + 1) + _TERM_SECONDS * terms)
         exact, bound = _truth(body).along(trial.segments, trial.momentum, times, steps)
     except (TooLong, ArithmeticError):
         return run("left out", message=message, seconds=(ended - began, time.process_time() - ended))

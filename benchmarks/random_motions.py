@@ -21,6 +21,8 @@ _NARROWEST = 1.0 / 500.0
 _TAILS = 8.0
 """Widths that count as the support of a Gaussian or a hyperbolic tangent: beyond, less than 1e-7 of it is left."""
 _MOST_JOINTS = 12
+_THIN, _FAR = 0.1, 0.05
+"""Shares of random bodies that are long and thin, or that have joints up to 100 m apart."""
 _MOST_LOOPS = 400
 
 
@@ -84,8 +86,8 @@ def _trial(body: sp.Body, way: Way, rng: np.random.Generator, *, resting: bool, 
     if not resting:
         momentum = rng.normal(size=3)
         moment = float(np.trace(body.locked_inertia(way.path.shape(0.0)))) / 3.0
-        # [rad/s] 0.1 to 10 rad in a loop; slower in many loops, most of which no method could follow else.
-        speed = 10.0 ** rng.uniform(-1.0, 1.0) * np.sqrt(way.path.loops) / way.path.duration
+        # [rad/s] 0.1 to 30 rad in a loop; slower in many loops, most of which no method could follow else.
+        speed = 10.0 ** rng.uniform(-1.0, 1.5) * np.sqrt(way.path.loops) / way.path.duration
         momentum *= speed * moment / np.linalg.norm(momentum)
     segments = way.segments or (_whole(way.path),)
     what = f"{body.name} ({len(body.chain.names)} joints), {way.what}{', at rest' if resting else ''}"
@@ -102,9 +104,11 @@ def shipped(name: str) -> sp.Body:
 
 
 def random_body(rng: np.random.Generator) -> sp.Body:
-    """A tree of 1 to 12 joints, turning and sliding, about or along random axes, of links of 0.03 to 3 kg."""
+    """A tree of 1 to 12 joints, turning and sliding, of links of 0.03 to 3 kg; some long and thin, some far apart."""
     joints = int(np.exp(rng.uniform(0.0, np.log(_MOST_JOINTS + 1))))
-    chain_like = rng.random()
+    chain_like, kind = rng.random(), rng.random()
+    # Thin: all links nearly on one line, one moment of inertia far below the others. Far: up to 100 m apart.
+    spread = np.array([1.0, 1e-2, 1e-2]) if kind < _THIN else np.full(3, 100.0 if kind > 1.0 - _FAR else 1.0)
     model = pin.Model()
     model.name = "random tree"
     frames = [model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")]
@@ -115,7 +119,8 @@ def random_body(rng: np.random.Generator) -> sp.Body:
         if rng.random() < 0.5:
             axis = np.eye(3)[rng.integers(3)]
         turning, sliding = pin.JointModelRevoluteUnaligned(axis), pin.JointModelPrismaticUnaligned(axis)
-        place = pin.SE3(pin.exp3(rng.normal(size=3)), 10.0 ** rng.uniform(-1.5, 0.0) * rng.normal(size=3) / 2.0)
+        turn = pin.exp3((0.1 if kind < _THIN else 1.0) * rng.normal(size=3))
+        place = pin.SE3(turn, 10.0 ** rng.uniform(-1.5, 0.0) * rng.normal(size=3) / 2.0 * spread)
         parent = frames[-1] if rng.random() < chain_like else frames[rng.integers(len(frames))]
         frames.append(model.addJoint(parent, sliding if rng.random() < 0.15 else turning, place, f"joint_{number}"))
         model.appendBodyToJoint(frames[-1], _link(rng), pin.SE3(np.eye(3), 0.15 * rng.normal(size=3)))

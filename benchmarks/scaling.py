@@ -1,4 +1,4 @@
-"""How time and memory grow: with attitudes, with loops, with joints; what is asked of a motion afterwards."""
+"""How time and memory grow, with attitudes, with loops and with joints: `python -m benchmarks.scaling`."""
 
 from __future__ import annotations
 
@@ -20,12 +20,11 @@ RUNS = 9
 
 
 def print_scaling() -> None:
-    """Print the four tables; memory is what NumPy and Python hold at most, beyond what was there before."""
+    """Print the three tables; memory is what NumPy and Python hold at most, beyond what was there before."""
     case = next(c for c in cases() if c.name == "example:human loop")
     print_attitudes(case)
     print_loops(case)
     print_joints()
-    print_afterwards()
 
 
 def print_attitudes(case: Case) -> None:
@@ -69,21 +68,6 @@ def print_joints() -> None:
         )
 
 
-def print_afterwards() -> None:
-    """What follows a reconstruction, in its processor time (targets: split at most 2, 10,000 times at most 5)."""
-    print("\nafter a reconstruction at 1e-9 rad, in its processor time: split, and attitudes at 100 and 10,000 times")
-    rng = np.random.default_rng(0)
-    ratios = []
-    for case in cases():
-        once = partial(sp.reconstruct, sp.articulated(case.body, case.path), case.momentum, tolerance=1e-9)
-        few, many = (rng.uniform(0.0, case.path.duration, count) for count in (100, 10_000))
-        single = processor_seconds(lambda _, once=once: once(), once)
-        asked = (sp.split, lambda motion, t=few: motion.attitude(t), lambda motion, t=many: motion.attitude(t))
-        ratios.append([processor_seconds(what, once) / single for what in asked])
-        print(f"  {case.name:36}{1e3 * single:6.2f} ms" + "".join(f"{ratio:8.2f}" for ratio in ratios[-1]))
-    print(f"  {'median':45}" + "".join(f"{ratio:8.2f}" for ratio in np.median(ratios, axis=0)))
-
-
 def row(name: str, run: Callable[[], object], single: float) -> None:
     """One line: time, how many times the single run, and the memory peak."""
     taken = median_seconds(run, 3)
@@ -119,17 +103,6 @@ def median_seconds(run: Callable[[], object], runs: int = RUNS) -> float:
     return float(np.median(taken))
 
 
-def processor_seconds(run: Callable[[sp.Motion], object], motion: Callable[[], sp.Motion]) -> float:
-    """The median processor time of some runs, each on a motion that nothing was asked of yet, after one more."""
-    taken = []
-    for _ in range(RUNS + 1):
-        fresh = motion()
-        start = time.process_time()
-        run(fresh)
-        taken.append(time.process_time() - start)
-    return float(np.median(taken[1:]))
-
-
 def peak(run: Callable[[], object]) -> int:
     """The most memory that a run holds [bytes]."""
     tracemalloc.start()
@@ -137,3 +110,7 @@ def peak(run: Callable[[], object]) -> int:
     top = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return top
+
+
+if __name__ == "__main__":
+    print_scaling()

@@ -7,9 +7,10 @@ import shutil
 
 import numpy as np
 import pytest
-from benchmarks.cases import cases, exact_path
+from benchmarks.cases import as_function, numbered_case
+from benchmarks.contestant import Contestant, Setting, WorkloadFailed
 from benchmarks.estimates import judged, judged_all, read_runs, summary
-from benchmarks.extended import CONSTANT, HARMONIC, Segment, Terms, TooLong, Truth, angles_between
+from benchmarks.extended import CONSTANT, HARMONIC, Segment, Terms, TooLong, Truth, angles_between, exact_path
 from benchmarks.peer import NoPeer, Peer
 
 import shapephase as sp
@@ -21,10 +22,10 @@ needs_compiler = pytest.mark.skipif(NO_COMPILER, reason="the truth in extended p
 
 @pytest.mark.full
 @needs_compiler
-@pytest.mark.parametrize("name", ["cat_two_halves loop", "cat righting, at rest", "diver samples_12"])
-def test_the_peer_agrees_with_extended_precision_and_with_the_library(name: str):
+@pytest.mark.parametrize("number", [0, 1, 7])
+def test_the_peer_agrees_with_extended_precision_and_with_the_library(number: int):
     """A Fourier loop, the cat's righting and a spline: at 1e-11 within a hundred times that at every step."""
-    case = next(case for case in cases() if case.name == name)
+    case = numbered_case(number)
     exact = exact_path(case.path)
     try:
         steps = Peer(case.body, case.path, case.path.breaks, case.momentum).steps(1e-11)
@@ -94,3 +95,22 @@ def test_no_error_of_sixty_runs_is_above_its_estimate(family: str):
     runs = [judged(family, 6, 1.0, number) for number in range(60)]
     assert not [run for run in runs if run.above > 1.0]
     assert sum(run.outcome == "done" for run in runs) >= 50
+
+
+def test_a_contestant_reconstructs_in_its_own_process_what_is_reconstructed_here():
+    """Known and as a black box, to the two estimates, and faults come back as text."""
+    case, times = numbered_case(0), np.array([0.3, 1.0])
+    contestant = Contestant(Setting("plain"))
+    try:
+        for box in (False, True):
+            attitudes, estimate, evaluations = contestant("reconstructed", 0, box, 1e-9, times)
+            path = as_function(case.path) if box else case.path
+            motion = sp.reconstruct(sp.articulated(case.body, path), case.momentum, tolerance=1e-10)
+            gap = np.linalg.norm(attitudes - motion.attitude(times), axis=(1, 2)).max() / np.sqrt(2.0)
+            assert gap <= estimate + motion.error_estimate <= 1.1e-9
+            assert 10 < evaluations < 1000
+            assert contestant("reconstruction_seconds", 0, box, 1e-9, 1) > 0.0
+        with pytest.raises(WorkloadFailed, match=r"plain: AttributeError: .*no_such_thing"):
+            contestant("no_such_thing")
+    finally:
+        contestant.close()

@@ -103,6 +103,11 @@ class Segment:
     origin: float = 0.0
     pace: float = 1.0
 
+    @property
+    def terms(self) -> int:
+        """How many terms are added up at each time."""
+        return len(_parts(self.path, self.path.n_shape)[0])
+
 
 class Truth:
     """Extended-precision mechanics of one body."""
@@ -211,6 +216,12 @@ def angles_between(quaternions: np.ndarray, rotations: np.ndarray) -> np.ndarray
     ).reshape(-1, 3, 3)  # fmt: skip
     gap = rotations.astype(np.longdouble) - exact
     return 2.0 * np.arcsin(np.minimum(np.sqrt((gap * gap).sum(axis=(1, 2)) / 8.0), 1.0)).astype(float)
+
+
+def exact_path(path: sp.ShapePath) -> sp.ShapePath:
+    """The same path as the extended precision follows it: its own polynomials or harmonics, or polynomials along it."""
+    known = any(hasattr(path.curve, name) for name in ("knots", "sines"))
+    return path if known else as_polynomials(path)
 
 
 def as_polynomials(path: sp.ShapePath, pieces: int = 64, order: int = 16) -> sp.ShapePath:

@@ -1,0 +1,234 @@
+"""What `make bench` measures in each process, with public names alone, so that an older checkout can run it as well."""
+
+from __future__ import annotations
+
+import inspect
+import time
+import warnings
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import shapephase as sp
+
+from .cases import Case, as_function, fourier, numbered_case
+
+ROBOTS = Path(__file__).parents[1] / "robots"
+TOLERANCE = 1e-9
+_EXACT = 3e-11
+"""[rad]; what a momentum alone is integrated to, to judge it among others."""
+_SPEEDS = (0.4, 4.0, 12.0)
+"""Of the momenta on one path, as rates of turning [rad/s]."""
+
+
+def compiled() -> str:
+    """Compile or load what can be, ahead of all measurements; what was done, in words."""
+    began = time.perf_counter()
+    try:
+        sp.compile_steps()
+    except sp.ShapePhaseError as error:
+        return f"not compiled: {error}"
+    return f"compiled or loaded in {time.perf_counter() - began:.1f} s"
+
+
+_case = cache(numbered_case)
+_CAT_LOOP = 2
+"""Number of the case in which many momenta or bodies share one path."""
+
+
+@cache
+def _deformation(number: int, box: bool) -> sp.Deformation:
+    case = _case(number)
+    return sp.articulated(case.body, as_function(case.path) if box else case.path)
+
+
+def first_black_boxes(numbers: list[int]) -> dict[str, float]:
+    """Median processor time of a reconstruction on a path and a deformation just made, and of the second [ms]."""
+    _deformation.cache_clear()
+    taken = []
+    for number in numbers:
+        momentum = _case(number).momentum
+        taken.append([seconds(lambda n=number, m=momentum: sp.reconstruct(_deformation(n, True), m)) for _ in range(3)])
+    one, _, three = 1e3 * np.median(taken, axis=0)
+    return {"first reconstruction [ms]": one, "third [ms]": three}
+
+
+def reconstructed(number: int, box: bool, tolerance: float, times: np.ndarray) -> tuple[np.ndarray, float, int] | None:
+    """Attitudes at times, error estimate and evaluations of a case; None where it is refused."""
+    try:
+        motion = sp.reconstruct(_deformation(number, box), _case(number).momentum, tolerance=tolerance)
+    except sp.errors.AccuracyNotReached:
+        return None
+    return motion.attitude(times), float(motion.error_estimate), motion.evaluations
+
+
+def reconstruction_seconds(number: int, box: bool, tolerance: float, runs: int) -> float:
+    """Median processor time of some runs, after one that fills the caches [s]."""
+    deformation, momentum = _deformation(number, box), _case(number).momentum
+    return median_seconds(lambda: sp.reconstruct(deformation, momentum, tolerance=tolerance), runs)
+
+
+# ---- What follows a reconstruction ----------------------------------------------------------------------------------
+
+
+def afterwards(turns: int, numbers: list[int]) -> dict[str, float]:
+    """Median ratios to a reconstruction, and times [ms]: its split, its attitudes at 10,000 times."""
+    rows = []
+    for number in numbers:
+        case = _case(number)
+        deformation = _deformation(number, False)
+        many = np.random.default_rng(0).uniform(0.0, case.path.duration, 10_000)
+        taken = []
+        for _ in range(turns + 1):
+            began = time.process_time()
+            motion = sp.reconstruct(deformation, case.momentum, tolerance=TOLERANCE)
+            done = time.process_time()
+            motion.attitude(many)
+            looked = time.process_time()
+            # Of a motion of its own, which nothing was asked of yet.
+            fresh = sp.reconstruct(deformation, case.momentum, tolerance=TOLERANCE)
+            again = time.process_time()
+            sp.split(fresh)
+            taken.append((done - began, looked - done, time.process_time() - again))
+        rows.append(np.median(taken[1:], axis=0))
+    single, attitudes, split = np.array(rows).T
+    return {
+        "reconstruct [ms]": 1e3 * float(np.median(single)),
+        "split / reconstruct": float(np.median(split / single)),
+        "  at most": float((split / single).max()),
+        "10,000 attitudes / reconstruct": float(np.median(attitudes / single)),
+        "  at most [ms]": 1e3 * float(attitudes.max()),
+    }
+
+
+# ---- Many at once ---------------------------------------------------------------------------------------------------
+
+
+def many_momenta(count: int, checked: int = 10) -> dict[str, float]:
+    """Momenta on the cat's Fourier loop: processor time of each [us], and the largest error of some."""
+    case = _case(_CAT_LOOP)
+    deformation = sp.articulated(case.body, case.path)
+    rng = np.random.default_rng(0)
+    found: dict[str, float] = {}
+    for speed in _SPEEDS:
+        momenta = _momenta(case, speed, count, rng)
+        name = f"{count} momenta of {speed:g} rad/s, each [us]"
+        try:
+            sp.reconstruct(deformation, momenta[:300], tolerance=TOLERANCE)
+            began = time.process_time()
+            motion = sp.reconstruct(deformation, momenta, tolerance=TOLERANCE)
+            found[name] = 1e6 * (time.process_time() - began) / count
+        except sp.errors.AccuracyNotReached:
+            found[name] = np.nan
+            continue
+        final, errors = motion.final_attitude, []
+        for k in rng.integers(0, count, checked):
+            alone = sp.reconstruct(deformation, momenta[k], tolerance=_EXACT).final_attitude
+            errors.append(np.linalg.norm(alone - final[k]) / np.sqrt(2.0))
+        found[f"  error / tolerance{' ' * len(found)}"] = max(errors) / TOLERANCE
+    return found
+
+
+def _momenta(case: Case, speed: float, count: int, rng: np.random.Generator) -> np.ndarray:
+    axes = rng.normal(size=(count, 3))
+    moment = float(np.trace(case.body.locked_inertia(np.zeros(case.body.n_shape)))) / 3.0
+    return speed * moment * axes / np.linalg.norm(axes, axis=1, keepdims=True)
+
+
+def threads(count: int) -> dict[str, float]:
+    """How many times as fast two threads are as one, by the clock, on the same momenta."""
+    if "threads" not in inspect.signature(sp.reconstruct).parameters:
+        return {}
+    case = _case(_CAT_LOOP)
+    deformation = sp.articulated(case.body, case.path)
+    momenta = _momenta(case, 4.0, count, np.random.default_rng(0))
+    taken = [[_clock(_in_threads, deformation, momenta, number) for number in (1, 2)] for _ in range(5)]
+    return {"momenta, two threads / one": float(np.median([one / two for one, two in taken[1:]]))}
+
+
+def _in_threads(deformation: sp.Deformation, momenta: np.ndarray, number: int) -> object:
+    keywords: dict[str, Any] = {"threads": number}
+    return sp.reconstruct(deformation, momenta, tolerance=TOLERANCE, **keywords)
+
+
+def inertia_variants(count: int) -> dict[str, float]:
+    """One loop of the cat with the inertias of its links changed at random: time of each variant [ms]."""
+    case = _case(_CAT_LOOP)
+    make = getattr(case.body, "with_inertias", None)
+    chain = case.body.chain
+    if make is None:
+        return {}
+    rng = np.random.default_rng(0)
+    factors = np.exp(0.1 * rng.normal(size=(count, len(chain.masses))))
+    try:
+        bodies = make(
+            masses=factors * chain.masses, inertias=factors[..., None, None] * chain.inertias,
+            centres=np.broadcast_to(chain.centres, (count, *chain.centres.shape)),
+        )  # fmt: skip
+    except TypeError as error:
+        return {f"inertia variants: {error}": np.nan}
+    began = time.process_time()
+    sp.reconstruct(sp.articulated(bodies, case.path), case.momentum, tolerance=TOLERANCE)
+    return {f"{count} inertia variants, each [ms]": 1e3 * (time.process_time() - began) / count}
+
+
+# ---- Recorded motions -----------------------------------------------------------------------------------------------
+
+
+def recorded(turns: int, rows: int) -> dict[str, float]:
+    """The cat's recording, and an analytic loop recorded in 100 rows and in many, rounded or not; without reading."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        body = sp.load_body("cat")
+        righting = sp.read_shape_path(ROBOTS / "cat_righting.csv", body)
+    found = {}
+    momentum = np.array([0.05, 0.0, 0.1])
+    for words, path in (
+        ("cat_righting.csv", righting),
+        ("loop in 100 rows", _recording(body, 100)),
+        (f"loop in {rows} rows", _recording(body, rows)),
+        (f"loop in {rows} rows, rounded to 1e-6", _recording(body, rows, 1e-6)),
+    ):
+        deformation = sp.articulated(body, path)
+        try:
+            motion = sp.reconstruct(deformation, momentum, tolerance=TOLERANCE)
+        except sp.errors.AccuracyNotReached:
+            found[f"{words}: refused"] = np.nan
+            continue
+        run = partial(sp.reconstruct, deformation, momentum, tolerance=TOLERANCE)
+        found[f"{words} [ms]"] = 1e3 * median_seconds(run, turns)
+        found[f"  evaluations{' ' * len(found)}"] = motion.evaluations
+    return found
+
+
+def _recording(body: sp.Body, rows: int, rounding: float = 0.0) -> sp.ShapePath:
+    """A spline through samples of a loop of two harmonics."""
+    loop = fourier(body, 3, harmonics=2, duration=2.0)
+    times = np.linspace(0.0, 2.0, rows + 1)
+    shapes = loop.shape(times)
+    shapes[-1] = shapes[0]
+    return sp.ShapePath.spline(times, np.round(shapes / rounding) * rounding if rounding else shapes)
+
+
+# ---- Clocks ---------------------------------------------------------------------------------------------------------
+
+
+def seconds(run: Callable[[], object]) -> float:
+    """Processor time of one run [s]."""
+    began = time.process_time()
+    run()
+    return time.process_time() - began
+
+
+def median_seconds(run: Callable[[], object], runs: int) -> float:
+    """The median of some runs, after one that does not count [s]."""
+    return float(np.median([seconds(run) for _ in range(runs + 1)][1:]))
+
+
+def _clock(run: Callable[..., object], *arguments: object) -> float:
+    began = time.perf_counter()
+    run(*arguments)
+    return time.perf_counter() - began
