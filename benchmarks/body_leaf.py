@@ -20,7 +20,7 @@ import shapephase as sp
 from shapephase.body._link_tree import Mimic
 from shapephase.body.body import Body
 from shapephase.body.joint_chain import JointChain
-from shapephase.integrator.fast import engine
+from shapephase.integrator.fast.tree import tree_channels, tree_inertia_and_momentum
 
 from .extended import Truth
 
@@ -79,7 +79,7 @@ def leaf(body: sp.Body, rng: np.random.Generator, *, far: bool) -> Leaf:
     (exact,) = Truth(body).inertia_and_momentum(shape, rate)
     unit = np.repeat(extent(body.chain, shape[0], rate[0]), (9, 3)) * np.finfo(float).eps
     errors = []
-    for inertia, momentum in (body.sample(shape, rate), engine.tree_inertia_and_momentum(body.chain.rows, shape, rate)):
+    for inertia, momentum in (body.sample(shape, rate), tree_inertia_and_momentum(body.chain.rows, shape, rate)):
         gap = np.abs(np.concatenate([inertia.reshape(-1), momentum.reshape(-1)]) - exact)
         # Where there are no terms, there must be no error.
         errors.append(float(np.max(gap / np.where(unit > 0.0, unit, 1e-300))))
@@ -147,7 +147,7 @@ def _give_mass(model: pin.Model, number: int, rng: np.random.Generator) -> None:
 def timed(body: sp.Body, shapes: int = 400, runs: int = 21) -> tuple[float, float]:
     """Processor time of the kernel and of Pinocchio for one shape, medians of runs in turns [us]."""
     shape, rate = np.random.default_rng(2).normal(size=(2, shapes, body.n_shape))
-    calls = (lambda: engine.tree_channels(body.chain.rows, shape, rate), lambda: body.sample(shape, rate))
+    calls = (lambda: tree_channels(body.chain.rows, shape, rate), lambda: body.sample(shape, rate))
     spent = np.empty((2, runs))
     for call in calls:
         call()

@@ -12,7 +12,7 @@ from benchmarks.body_leaf import leaves
 import shapephase as sp
 from shapephase.errors import ShapeError, SingularInertiaError
 from shapephase.integrator._spectral_error import Channels
-from shapephase.integrator.fast import engine
+from shapephase.integrator.fast.tree import tree_channels, tree_inertia_and_momentum
 from support.bodies import joint, link, random_loop, random_shapes, urdf
 
 pytestmark = pytest.mark.usefixtures("fast")
@@ -36,13 +36,13 @@ def test_the_kernel_agrees_with_pinocchio(body, rng):
     turning = np.array([unit == "rad" for unit in body.joint_units])
     shapes[7] += 2.0 * np.pi * 1000.0 * turning
     shapes[13] += 1e6 * turning
-    inertia, momentum = engine.tree_inertia_and_momentum(body.chain.rows, shapes, rates)
+    inertia, momentum = tree_inertia_and_momentum(body.chain.rows, shapes, rates)
     expected, expected_momentum = body.sample(shapes, rates)
     # Pinocchio is given the same angles; both round some hundred terms.
     size = np.abs(expected).max()
     assert np.abs(inertia - expected).max() < 1e-14 * size
     assert np.abs(momentum - expected_momentum).max() < 1e-13 * size
-    channels = engine.tree_channels(body.chain.rows, shapes, rates)
+    channels = tree_channels(body.chain.rows, shapes, rates)
     inverse = np.linalg.inv(expected)
     assert np.allclose(channels[:, :6], inverse.reshape(-1, 9)[:, [0, 4, 8, 5, 2, 1]], rtol=0, atol=1e-12 / size)
     assert np.allclose(channels[:, 6:], (inverse @ expected_momentum[..., None])[..., 0], rtol=0, atol=1e-11)
@@ -50,8 +50,8 @@ def test_the_kernel_agrees_with_pinocchio(body, rng):
 
 def test_a_shape_s_result_does_not_depend_on_its_companions(body, rng):
     shapes, rates = random_shapes(body, rng, 19), rng.normal(size=(19, body.n_shape))
-    whole = engine.tree_channels(body.chain.rows, shapes, rates)
-    alone = [engine.tree_channels(body.chain.rows, shapes[i : i + 1], rates[i : i + 1])[0] for i in range(19)]
+    whole = tree_channels(body.chain.rows, shapes, rates)
+    alone = [tree_channels(body.chain.rows, shapes[i : i + 1], rates[i : i + 1])[0] for i in range(19)]
     assert np.array_equal(whole, alone)
 
 
@@ -89,10 +89,8 @@ def test_what_is_not_finite_is_left_to_slower_code(rate):
     body = sp.load_body("cat_two_halves")
     shapes, rates = np.zeros((3, 3)), np.zeros((3, 3))
     rates[1] = rate
-    assert engine.tree_channels(body.chain.rows, shapes, rates) is None
-    channels = Channels(
-        lambda _: body.sample(shapes, rates), lambda _: engine.tree_channels(body.chain.rows, shapes, rates)
-    )
+    assert tree_channels(body.chain.rows, shapes, rates) is None
+    channels = Channels(lambda _: body.sample(shapes, rates), lambda _: tree_channels(body.chain.rows, shapes, rates))
     with pytest.raises(ShapeError, match=r"at t = 0.2 s is not finite"), np.errstate(all="ignore"):
         channels(np.array([0.1, 0.2, 0.3]))
 

@@ -28,12 +28,18 @@ def test_without_numba_all_is_as_before(monkeypatch):
 @pytest.mark.parametrize(("momenta", "samples", "enough"), [(1, 4000, False), (1000, 4000, True), (1, 400_000, True)])
 def test_the_command_line_waits_for_large_work(monkeypatch, momenta, samples, enough):
     monkeypatch.delenv("SHAPEPHASE_FAST")
-    monkeypatch.setattr(switch, "_waits_for_large_work", False)
+    monkeypatch.setattr(switch, "_is_command", False)
+    monkeypatch.setattr(switch, "_is_large", False)
     assert switch.is_on()
-    switch.wait_for_large_work()
+    assert switch.may_compile()
+    switch.begin_command()
     assert not switch.is_on()
     switch.expect_work(momenta=momenta, samples=samples)
     assert switch.is_on() == enough
+    assert not switch.may_compile()
+    monkeypatch.setenv("SHAPEPHASE_FAST", "1")
+    assert switch.is_on()
+    assert switch.may_compile()
 
 
 def _cat_righting():

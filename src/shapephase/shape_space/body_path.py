@@ -9,6 +9,7 @@ from ..arrays import Array
 from ..body.body import Body
 from ..errors import OpenPathError
 from ..integrator.fast import engine
+from ..integrator.fast.tree import tree_channels
 from ..integrator.sampling import Sampler, sampler
 from .shape_path import CLOSED, ShapePath
 
@@ -47,4 +48,4 @@ def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
 
     None without it, and where a tensor is nearly singular or a number is not finite.
     """
-    return engine.tree_channels(body.chain.rows, *path.curve(times)) if engine.is_ready() else None
+    return tree_channels(body.chain.rows, *path.curve(times)) if engine.is_ready() else None

@@ -21,7 +21,9 @@ _config: Any = config
 _lock = threading.Lock()
 
 inline: Callable[[Any], Any] = njit(forceinline=True, **_OPTIONS)
-"""A part of kernels; not to be called from Python."""
+"""A part of kernels, put where it is called; not to be called from Python."""
+part: Callable[[Any], Any] = njit(**_OPTIONS)
+"""A part of kernels that exists once, however often it is called."""
 
 
 def kernel(function: Any) -> Any:

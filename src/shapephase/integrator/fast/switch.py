@@ -1,7 +1,8 @@
 """Whether machine code is used: where Numba is installed, unless $SHAPEPHASE_FAST says 0.
 
-In Python it is, from the first reconstruction on. A command line that runs for a second would wait for Numba longer
-than it gains, so there only large work switches it on, or SHAPEPHASE_FAST=1.
+In Python it is, from the first reconstruction on. A command that runs for a second would wait for Numba longer than it
+gains: there only large work switches it on, and nothing is compiled, which `shapephase compile` does. SHAPEPHASE_FAST=1
+is as in Python.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ from importlib.util import find_spec
 VARIABLE = "SHAPEPHASE_FAST"
 """Environment variable: 0 never, 1 always, else as described above."""
 _MANY_MOMENTA = 200
-"""Some 0.1 s without machine code, what importing Numba and loading the kernels takes."""
-_MANY_SAMPLES = 50_000
-"""Of the body, some 0.1 s with Pinocchio: a recording of five thousand rows."""
+"""Some 0.1 s without machine code, half of what importing Numba and loading the kernels takes."""
+_MANY_SAMPLES = 100_000
+"""Of the body, some 0.2 s with Pinocchio: a recording of twenty thousand rows."""
 
-_waits_for_large_work = False
+_is_command = False
+_is_large = False
 
 
 @lru_cache(maxsize=1)
@@ -28,27 +30,30 @@ def is_installed() -> bool:
 
 def is_allowed() -> bool:
     """Whether machine code may be used in this process."""
-    return os.environ.get(VARIABLE, "").strip() != "0" and is_installed()
+    return _asked() != "0" and is_installed()
 
 
 def is_on() -> bool:
     """Whether machine code is to be used now."""
-    return is_allowed() and (not _waits_for_large_work or os.environ.get(VARIABLE, "").strip() == "1")
+    return is_allowed() and (_is_large or may_compile())
 
 
-def wait_for_large_work() -> None:
-    """As the command line does: machine code is not used before `expect_work` says that it pays."""
-    global _waits_for_large_work
-    _waits_for_large_work = True
+def may_compile() -> bool:
+    """Whether kernels that this machine does not have yet are compiled."""
+    return not _is_command or _asked() == "1"
+
+
+def begin_command() -> None:
+    """From now on this process is a command: machine code is not used before `expect_work` says that it pays."""
+    global _is_command, _is_large
+    _is_command, _is_large = True, False
 
 
 def expect_work(*, momenta: int = 1, samples: int = 0) -> None:
     """Say what is to come: so many momenta on one motion, so many samples of the body."""
-    global _waits_for_large_work
-    if pays(momenta, samples):
-        _waits_for_large_work = False
+    global _is_large
+    _is_large = _is_large or momenta >= _MANY_MOMENTA or samples >= _MANY_SAMPLES
 
 
-def pays(momenta: int, samples: int) -> bool:
-    """Whether work is large enough to import Numba for."""
-    return momenta >= _MANY_MOMENTA or samples >= _MANY_SAMPLES
+def _asked() -> str:
+    return os.environ.get(VARIABLE, "").strip()

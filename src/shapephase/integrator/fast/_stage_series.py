@@ -1,0 +1,123 @@
+"""The channels at the stages of steps, from Chebyshev series: matrix products whose innermost loop is over stages.
+
+A segment is up to SEGMENT steps of one panel; its channels stand in rows of STRIDE numbers, one row for each channel,
+twelve numbers for each step. Row numbers are unsigned: the check for negative ones would keep a loop from becoming
+vectors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._dormand_prince import NODES, STAGES
+from ._jit import inline, part
+
+CHANNELS = 9
+SEGMENT = 16
+"""Steps."""
+STRIDE = SEGMENT * STAGES
+SIZE = CHANNELS * STRIDE
+"""Of the channels of a segment."""
+_VECTOR = 16
+"""Stages are filled up to a multiple of this, so that vectors have no remainder."""
+_ROUNDING = 3e-17
+"""Of the largest coefficient: the last ones, as long as their sum is below, change nothing."""
+_DRIFT = 6
+"""The first channel of I^-1 L_o."""
+
+
+@inline
+def room_for_basis(terms):
+    """Numbers in the matrix of Chebyshev polynomials at stages of a segment."""
+    return (terms + 4) * STRIDE
+
+
+@part
+def terms_that_count(series):
+    """How many terms of a panel's nine series (n * 9) matter."""
+    count = len(series) // CHANNELS
+    inverse = drift = inverse_tail = drift_tail = 0.0
+    for k in range(count):
+        for j in range(_DRIFT):
+            inverse = max(inverse, abs(series[k * CHANNELS + j]))
+        for j in range(_DRIFT, CHANNELS):
+            drift = max(drift, abs(series[k * CHANNELS + j]))
+    while count > 1:
+        for j in range(_DRIFT):
+            inverse_tail += abs(series[(count - 1) * CHANNELS + j])
+        for j in range(_DRIFT, CHANNELS):
+            drift_tail += abs(series[(count - 1) * CHANNELS + j])
+        if inverse_tail > _ROUNDING * inverse or drift_tail > _ROUNDING * drift:
+            break
+        count -= 1
+    return count
+
+
+@part
+def basis_at(first, count, steps, terms, basis):
+    """T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel -> numbers in a row."""
+    used = 0
+    for k in range(first, first + count):
+        for i in range(STAGES):
+            basis[STRIDE + used] = 2.0 * (k + NODES[i]) / steps - 1.0
+            used += 1
+    while used % _VECTOR:
+        basis[STRIDE + used] = 0.0
+        used += 1
+    for i in range(used):
+        basis[i] = 1.0
+    for k in range(2, terms):
+        b, b1, b2 = np.uint32(k * STRIDE), np.uint32((k - 1) * STRIDE), np.uint32((k - 2) * STRIDE)
+        for i in range(used):
+            basis[b + i] = 2.0 * basis[STRIDE + i] * basis[b1 + i] - basis[b2 + i]
+    return used
+
+
+@part
+def channels_at(series, terms, factor, basis, used, first_channel, scaled, out):
+    """Series (n * 9) times a factor at the stages of a segment; the channels from `first_channel` on, one of 0, 3, 6.
+
+    scaled: room for (terms + 3) * 9
+    """
+    for k in range(terms * CHANNELS):
+        scaled[k] = factor * series[k]
+    # Four terms at a time after the first.
+    rows = 1 + (terms + 2) // 4 * 4
+    for k in range(terms * CHANNELS, rows * CHANNELS):
+        scaled[k] = 0.0
+    for k in range(terms, rows):
+        for i in range(used):
+            basis[k * STRIDE + i] = 0.0
+    for j in range(first_channel, CHANNELS, 3):
+        o0, o1, o2 = np.uint32(j * STRIDE), np.uint32((j + 1) * STRIDE), np.uint32((j + 2) * STRIDE)
+        a0, a1, a2 = scaled[j], scaled[j + 1], scaled[j + 2]
+        for i in range(used):
+            out[o0 + i], out[o1 + i], out[o2 + i] = a0, a1, a2
+        for k in range(1, rows, 4):
+            b0, b1 = np.uint32(k * STRIDE), np.uint32((k + 1) * STRIDE)
+            b2, b3 = np.uint32((k + 2) * STRIDE), np.uint32((k + 3) * STRIDE)
+            c = scaled[k * CHANNELS + j :]
+            c00, c01, c02 = c[0], c[1], c[2]
+            c10, c11, c12 = c[CHANNELS], c[CHANNELS + 1], c[CHANNELS + 2]
+            c20, c21, c22 = c[2 * CHANNELS], c[2 * CHANNELS + 1], c[2 * CHANNELS + 2]
+            c30, c31, c32 = c[3 * CHANNELS], c[3 * CHANNELS + 1], c[3 * CHANNELS + 2]
+            for i in range(used):
+                t0, t1, t2, t3 = basis[b0 + i], basis[b1 + i], basis[b2 + i], basis[b3 + i]
+                out[o0 + i] = out[o0 + i] + c00 * t0 + c10 * t1 + c20 * t2 + c30 * t3
+                out[o1 + i] = out[o1 + i] + c01 * t0 + c11 * t1 + c21 * t2 + c31 * t3
+                out[o2 + i] = out[o2 + i] + c02 * t0 + c12 * t1 + c22 * t2 + c32 * t3
+
+
+@part
+def without_terms(series, shortened, terms, factor, basis, used, first_channel, whole, out):
+    """The same of series that differ in a few terms, from the channels of the whole ones."""
+    for j in range(first_channel, CHANNELS):
+        o = np.uint32(j * STRIDE)
+        for i in range(used):
+            out[o + i] = whole[o + i]
+        for k in range(terms):
+            lost = factor * (series[k * CHANNELS + j] - shortened[k * CHANNELS + j])
+            if lost != 0.0:
+                b = np.uint32(k * STRIDE)
+                for i in range(used):
+                    out[o + i] = out[o + i] - lost * basis[b + i]

@@ -1,0 +1,130 @@
+"""The march in machine code: many momenta side by side, in threads."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+
+from ...arrays import Array, Integers
+from ._plain import plain
+
+# Steps of a chunk, whose channels stay in the processor's cache: for many momenta, and where a loop is repeated.
+_SEGMENTS_OF_MANY = 8
+_SEGMENTS_OF_LOOPS = 64
+# Momenta for a thread of its own: some milliseconds of work.
+_LEAST_FOR_A_THREAD = 128
+
+
+@dataclass(frozen=True, eq=False)
+class MarchArrays:
+    """K steps for each of B momenta, and how far coarser marches come out from them.
+
+    Attributes
+    ----------
+    quaternions : (B, K + 1, 4) at the step ends, xyzw
+    directions : (B, K + 1, 3) of the momentum at the step ends
+    turns, dynamics : (B, K) of each step [rad]
+    propagators : (B, M, 3, 3) after the steps asked for
+    stepping : (B,) the largest angle between the steps and half as many [rad]
+    truncation : (B,) the largest angle between half as many steps on the whole series and on the shortened ones [rad]
+    """
+
+    quaternions: Array
+    directions: Array
+    turns: Array
+    dynamics: Array
+    propagators: Array
+    stepping: Array
+    truncation: Array
+
+
+def march_in_threads(
+    widths: Array,
+    coefficients: Array,
+    shortened: Array | None,
+    steps: Integers,
+    loops: int,
+    directions: Array,
+    magnitudes: Array,
+    *,
+    marks: Integers,
+    threads: int | None = None,
+) -> MarchArrays:
+    """All steps of all loops, starting at the identity; a momentum's results do not depend on the others.
+
+    Parameters
+    ----------
+    widths : (P,) of the panels [s]
+    coefficients, shortened : (P, n, 9) Chebyshev series of I^-1 and I^-1 L_o, and the same without some terms
+    steps : (P,) even, on each panel of one loop
+    directions : (B, 3) of the momenta at the start
+    magnitudes : (B,) of the momenta [kg m^2/s]
+    marks : (M,) after how many steps, ascending, the error propagators are kept; none: they are not integrated
+    threads : how many at most; None: one for each processor
+    """
+    batch, count = len(magnitudes), loops * int(steps.sum())
+    whole = MarchArrays(
+        quaternions=np.empty((batch, count + 1, 4)),
+        directions=np.empty((batch, count + 1, 3)),
+        turns=np.empty((batch, count)),
+        dynamics=np.empty((batch, count)),
+        propagators=np.empty((batch, len(marks), 3, 3)),
+        stepping=np.empty(batch),
+        truncation=np.empty(batch),
+    )
+    module = import_module("._march_kernel", __package__)
+    path = (
+        plain(widths),
+        plain(coefficients).reshape(len(widths), -1),
+        np.empty((0, 1)) if shortened is None else plain(shortened).reshape(len(widths), -1),
+        np.array(steps, dtype=np.int64),
+        loops,
+    )
+    starts, sizes, places = plain(directions), plain(magnitudes), np.array(marks, dtype=np.int64)
+    lanes = 1 if batch == 1 else module.LANES
+    segments = _SEGMENTS_OF_LOOPS if loops > 1 else 1 if batch == 1 else _SEGMENTS_OF_MANY
+    propagators = whole.propagators.reshape(batch, len(marks), 9)
+
+    def run(rows: slice) -> None:
+        module.march_momenta(
+            *path, starts[rows], sizes[rows], places, lanes, segments,
+            whole.quaternions[rows], whole.directions[rows], whole.turns[rows], whole.dynamics[rows],
+            propagators[rows], whole.stepping[rows], whole.truncation[rows],
+        )  # fmt: skip
+
+    parts = _parts(batch, module.LANES, threads)
+    if len(parts) == 1:
+        run(parts[0])
+    else:
+        with ThreadPoolExecutor(len(parts)) as pool:
+            list(pool.map(run, parts))
+    return whole
+
+
+def quaternions_at_rest(widths: Array, coefficients: Array, steps: Integers) -> Array:
+    """At the ends of all steps of one loop without momentum, from the identity: (K + 1, 4)."""
+    module = import_module("._march_kernel", __package__)
+    quaternions = np.empty((int(steps.sum()) + 1, 4))
+    series = plain(coefficients).reshape(len(widths), -1)
+    module.march_at_rest(plain(widths), series, np.array(steps, dtype=np.int64), quaternions)
+    return quaternions
+
+
+def warm() -> None:
+    """Call the kernels with the least that they take."""
+    width, series, steps = np.ones(1), np.zeros((1, 1, 9)), np.array([2])
+    direction, none = np.array([[0.0, 0.0, 1.0]]), np.zeros(0, dtype=np.int64)
+    march_in_threads(width, series, None, steps, 1, direction, np.ones(1), marks=none)
+    quaternions_at_rest(width, series, steps)
+
+
+def _parts(batch: int, lanes: int, threads: int | None) -> list[slice]:
+    """The rows for each thread, whole groups of lanes."""
+    most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    count = max(1, min(most if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
+    each = -(-batch // (count * lanes)) * lanes
+    return [slice(first, min(first + each, batch)) for first in range(0, max(batch, 1), each or 1)]

@@ -1,0 +1,199 @@
+"""The march in machine code: closed forms, the steps in plain Python, and that momenta do not see each other."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from numpy.polynomial import chebyshev
+from scipy.integrate import DOP853, solve_ivp
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
+from shapephase.integrator.fast.march import MarchArrays, march_in_threads, quaternions_at_rest
+
+pytestmark = pytest.mark.usefixtures("fast")
+NONE = np.zeros(0, dtype=int)
+EPS = np.finfo(float).eps
+
+
+class Path:
+    """Random series of a body that changes: three panels of different widths, degree eleven."""
+
+    def __init__(self, rng, terms=12):
+        self.widths = np.array([0.7, 0.2, 0.5])
+        decay = 0.4 ** np.arange(terms)[None, :, None]
+        self.series = 0.2 * rng.normal(size=(3, terms, 9)) * decay
+        self.series[:, 0, :3] += [1.0, 0.8, 0.5]
+        self.steps = np.array([6, 2, 40])
+
+    def channels(self, panel, x, series=None):
+        return chebyshev.chebval(x, (self.series if series is None else series)[panel])
+
+    def stages(self, steps, series=None):
+        """Of every step its channels at the stages, times its length: (K, 12, 9)."""
+        for panel, (count, width) in enumerate(zip(steps, self.widths, strict=True)):
+            for k in range(count):
+                x = 2.0 * (k + DOP853.C[:STAGES]) / count - 1.0
+                yield width / count * self.channels(panel, x, series).T
+
+    def march(self, directions, magnitudes, *, loops=1, marks=NONE, shortened=None, threads=None, steps=None):
+        steps = self.steps if steps is None else steps
+        return march_in_threads(
+            self.widths, self.series, shortened, steps, loops, directions, magnitudes, marks=marks, threads=threads
+        )
+
+
+@pytest.fixture
+def path(rng):
+    return Path(rng)
+
+
+def momenta(rng, count, largest=6.0):
+    directions = rng.normal(size=(count, 3))
+    return directions / np.linalg.norm(directions, axis=1)[:, None], rng.uniform(0.1, largest, count)
+
+
+def in_python(path, direction, magnitude, steps, series=None, loops=1):
+    """The same steps, one operation after another."""
+    quaternion, found, turns, dynamics = [0.0, 0.0, 0.0, 1.0], [[0.0, 0.0, 0.0, 1.0]], [], []
+    directions = [list(direction)]
+    for channels in [*path.stages(steps, series)] * loops:
+        end, turn, dynamic = momentum_step(directions[-1], magnitude, channels.tolist())[:3]
+        quaternion = turned(quaternion, directions[-1], end, (np.sin(0.5 * turn), np.cos(0.5 * turn)))
+        found.append(quaternion)
+        directions.append(end)
+        turns.append(turn)
+        dynamics.append(dynamic)
+    return np.array(found), np.array(directions), np.array(turns), np.array(dynamics)
+
+
+@pytest.mark.parametrize("count", [1, 3, 19])
+def test_the_steps_are_those_in_plain_python(path, rng, count):
+    directions, magnitudes = momenta(rng, count)
+    found = path.march(directions, magnitudes, loops=2)
+    for row in range(count):
+        expected = in_python(path, directions[row], magnitudes[row], path.steps, loops=2)
+        quaternions, ends, turns, dynamics = expected
+        # Some ninety steps of a few hundred operations, whose errors grow a few times.
+        assert np.abs(found.quaternions[row] - quaternions).max() < 2000.0 * EPS
+        assert np.abs(found.directions[row] - ends).max() < 2000.0 * EPS
+        assert np.abs(found.turns[row] - turns).max() < 500.0 * EPS
+        assert np.abs(found.dynamics[row] - dynamics).max() < 500.0 * EPS
+
+
+def test_the_differences_are_those_of_the_coarser_marches(path, rng):
+    directions, magnitudes = momenta(rng, 9)
+    shortened = path.series.copy()
+    shortened[:, -2:] = 0.0
+    shortened[1, 5] = 0.0
+    found = path.march(directions, magnitudes, shortened=shortened)
+    for row in range(9):
+        start = directions[row], magnitudes[row]
+        whole, half = in_python(path, *start, path.steps)[0], in_python(path, *start, path.steps // 2)[0]
+        cut = in_python(path, *start, path.steps // 2, shortened)[0]
+        assert angle(whole[::2], half) == pytest.approx(found.stepping[row], rel=1e-9, abs=4000.0 * EPS)
+        assert angle(half, cut) == pytest.approx(found.truncation[row], rel=1e-9, abs=4000.0 * EPS)
+    assert found.truncation.min() > 1e-6
+    assert not path.march(directions, magnitudes).truncation.any()
+
+
+def angle(a, b):
+    """Largest angle between quaternions, by the rotation between them."""
+    between = so3.matrix_from_quat(a).transpose(0, 2, 1) @ so3.matrix_from_quat(b)
+    return np.linalg.norm(between - np.eye(3), axis=(1, 2)).max() / np.sqrt(2.0)
+
+
+def test_a_rigid_body_turns_as_the_closed_form_says():
+    """The Euler top."""
+    moments, momentum = np.array([1.0, 2.0, 2.5]), np.array([0.3, 1.1, 0.4])
+    series = np.zeros((1, 1, 9))
+    series[0, 0, :3] = 1.0 / moments
+    size = float(np.linalg.norm(momentum))
+    found = march_in_threads(
+        np.array([20.0]), series, None, np.array([600]), 1, momentum[None] / size, np.array([size]), marks=NONE
+    )
+    top = sp.EulerTop(np.diag(moments), momentum)
+    times = np.linspace(0.0, 20.0, 601)
+    assert np.abs(so3.matrix_from_quat(found.quaternions[0]) - top.attitude(times)).max() < 1e-12
+    assert found.stepping[0] < 1e-9
+
+
+def test_propagators_are_derivatives_of_the_attitude(path, rng):
+    """Of the variational equation, by SciPy: along short steps the middle of each stands for it."""
+    (direction,), (magnitude,) = momenta(rng, 1)
+    steps = 40 * path.steps
+    marks = np.array([0, 3, int(steps.sum()) // 2, int(steps.sum())])
+    found = path.march(direction[None], np.array([magnitude]), steps=steps, marks=marks)
+    assert np.array_equal(found.propagators[0, 0], np.eye(3))
+    propagator, quaternion = np.eye(3), np.array([0.0, 0.0, 0.0, 1.0])
+    for panel, width in enumerate(path.widths):
+
+        def slope(t, state, panel=panel, width=width):
+            channels = path.channels(panel, 2.0 * t / width - 1.0)
+            momentum = so3.matrix_from_quat(so3.normalised(state[:4])).T @ (magnitude * direction)
+            inverse = channels[[0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(3, 3)
+            omega = inverse @ momentum - channels[6:]
+            q, w = state[:3], state[3]
+            growth = np.array(variation(momentum.tolist(), channels.tolist())) @ state[4:].reshape(3, 3)
+            return np.concatenate([0.5 * (w * omega + np.cross(q, omega)), [-0.5 * q @ omega], growth.ravel()])
+
+        start = np.append(quaternion, propagator)
+        end = solve_ivp(slope, (0.0, width), start, "DOP853", rtol=1e-11, atol=1e-12)
+        quaternion, propagator = end.y[:4, -1], end.y[4:, -1].reshape(3, 3)
+    assert np.abs(found.quaternions[0, -1] - quaternion).max() < 1e-9
+    assert np.abs(found.propagators[0, -1] - propagator).max() < 1e-3 * np.abs(propagator).max()
+
+
+@pytest.mark.parametrize("loops", [1, 3])
+def test_momenta_do_not_see_each_other_nor_threads(path, rng, loops):
+    directions, magnitudes = momenta(rng, 300)
+    count = loops * int(path.steps.sum())
+    options = {"loops": loops, "marks": np.arange(5) * count // 4, "shortened": 0.999 * path.series}
+    together = path.march(directions, magnitudes, threads=1, **options)
+    in_threads = path.march(directions, magnitudes, threads=2, **options)
+    for field in fields(MarchArrays):
+        assert np.array_equal(getattr(together, field.name), getattr(in_threads, field.name))
+    for row in (0, 7, 8, 131, 299):
+        alone = path.march(directions[row : row + 1], magnitudes[row : row + 1], **options)
+        for field in fields(MarchArrays):
+            assert np.array_equal(getattr(together, field.name)[row], getattr(alone, field.name)[0])
+
+
+def test_without_momentum_a_constant_drift_is_one_rotation():
+    """Each channel of I^-1 L_o constant: S = exp(-hat(drift) t), also over panels of many steps."""
+    series = np.zeros((3, 4, 9))
+    series[:, 0, 6:] = [0.3, -0.8, 0.5]
+    widths, steps = np.array([0.5, 1.0, 0.25]), np.array([6, 50, 2])
+    found = quaternions_at_rest(widths, series, steps)
+    step = np.repeat(widths / steps, steps)
+    times = np.append(0.0, np.cumsum(step))
+    expected = so3.exp(-times[:, None] * series[0, 0, 6:])
+    assert np.abs(so3.matrix_from_quat(found) - expected).max() < 1e-12
+
+
+def test_without_momentum_the_march_is_that_of_a_momentum_of_zero(path):
+    """Whose direction shows the rotation: three of them, the whole of it."""
+    found = quaternions_at_rest(path.widths, path.series, 4 * path.steps)
+    marched = path.march(np.eye(3), np.zeros(3), steps=4 * path.steps)
+    for row in range(3):
+        assert np.abs(marched.quaternions[row] - found).max() < 1e-10
+
+
+def test_steps_far_too_long_are_told():
+    series = np.zeros((1, 1, 9))
+    series[0, 0, :3] = [1.0, 0.5, 0.3]
+    directions = np.array([[0.6, 0.0, 0.8]])
+    found = march_in_threads(np.array([1.0]), series, None, np.array([2]), 1, directions, np.array([1e12]), marks=NONE)
+    assert not found.stepping[0] < 0.1
+
+
+def test_arrays_of_any_kind_are_taken(path):
+    """Read-only, integers, every other row."""
+    directions = np.zeros((2, 6), dtype=np.int64)[:, ::2]
+    directions[:, 2] = 1
+    directions.setflags(write=False)
+    expected = path.march(np.array([[0.0, 0.0, 1.0]] * 2), np.array([1.0, 2.0]))
+    assert np.array_equal(path.march(directions, np.array([1, 2])).quaternions, expected.quaternions)
