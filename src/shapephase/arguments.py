@@ -14,6 +14,10 @@ TIGHTEST_TOLERANCE = 1e-13
 """[rad]; a few hundred roundings, below which no attitude of many steps can be promised."""
 LOOSEST_TOLERANCE = 1e-4
 """[rad]; the error estimates are first order and hold for small errors only."""
+LEAST_SIZE = 1e-60
+"""Of times [s], masses [kg] and the like: fifth powers of smaller ones vanish."""
+LARGEST_SIZE = 1e60
+"""Of times [s], masses [kg] and the like: fifth powers of larger ones overflow."""
 ON_UNPHYSICAL = ("allow", "warn", "error")
 
 # How far outside [0, T] a time may lie, relative to T: rounding of a user's own arithmetic.
@@ -50,11 +54,23 @@ def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
 
 
 def positive_argument(value: float, name: str = "duration", unit: str = "a time in s") -> float:
-    """A user's number, checked to be finite and above 0. Raises TrajectoryError, ShapeError."""
+    """A user's number, checked to be above 0 and no size that overflows. Raises TrajectoryError, ShapeError."""
     number = finite_array(value, name)
     if number.ndim or number <= 0.0:
         raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value!r}")
+    if not LEAST_SIZE <= number <= LARGEST_SIZE:
+        raise TrajectoryError(f"{name}: {unit} from {LEAST_SIZE:g} to {LARGEST_SIZE:g} is needed, got {value!r}")
     return float(number)
+
+
+def check_time_steps(times: Array, where: str = "") -> None:
+    """Raise TrajectoryError for ascending times (N,) [s] whose steps or sum overflow; `where` begins the message."""
+    steps = np.diff(times)
+    if not (np.all(steps >= LEAST_SIZE) and times[-1] - times[0] <= LARGEST_SIZE):
+        raise TrajectoryError(
+            f"{where}times: steps of {LEAST_SIZE:g} s or more, over {LARGEST_SIZE:g} s or less, are needed; got "
+            f"steps from {steps.min():.3g} s over {times[-1] - times[0]:.3g} s"
+        )
 
 
 def tolerance_argument(tolerance: float) -> float:

@@ -1,4 +1,4 @@
-"""Files out: written whole or not at all, wherever they go."""
+"""Files out, written whole or not at all wherever they go; and NumPy's arrays in, whose headers are not believed."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ import os
 import re
 import secrets
 import stat
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import numpy as np
 
 from .errors import InputFileNotFoundError, OutputFileError
 
@@ -118,6 +121,44 @@ def size_text(path: str | os.PathLike[str]) -> str:
             return f"{size:.0f} {unit}" if unit == "bytes" or size >= 100.0 else f"{size:.1f} {unit}"
         size /= 1000.0
     return f"{size:.1f} GB"
+
+
+def npz_arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
+    """The arrays of an NPZ file, by name. Raises ValueError for what cannot be read, or unpacks to more than that."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            entries = archive.infolist()
+            # A small file can unpack to any size.
+            if sum(entry.file_size for entry in entries) > most_bytes:
+                raise ValueError(f"more than {most_bytes >> 20} MiB when unpacked")
+            names = [entry.filename.removesuffix(".npy") for entry in entries]
+            if len(set(names)) != len(names):
+                raise ValueError("an array stands twice in the file")
+            return {name: npy_array(archive.read(entry)) for name, entry in zip(names, entries, strict=True)}
+    except ValueError:
+        raise
+    except Exception as error:  # a damaged archive fails in the decoders in many ways
+        raise ValueError(f"no NPZ file that can be read ({error})") from None
+
+
+def npy_array(data: bytes) -> Any:
+    """The array of an NPY file. Raises ValueError for what cannot be read; Python objects are never."""
+    try:
+        stream = io.BytesIO(data)
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(stream)
+    except Exception as error:  # a damaged header fails in NumPy's parser in many ways
+        raise ValueError(f"no array that can be read ({error})") from None
+    if dtype.hasobject:
+        raise ValueError("an array of Python objects; such files can run code and are never read")
+    # The header may promise more than there is, and the memory, or for entries without bytes the time, would be taken.
+    if float(np.prod(shape, dtype=np.float64)) * max(dtype.itemsize, 1) > len(data):
+        raise ValueError(f"an array of shape {shape} and type {dtype} does not fit into the file; it is cut off")
+    try:
+        return np.load(io.BytesIO(data), allow_pickle=False)
+    except Exception as error:  # as above
+        raise ValueError(f"no array that can be read ({error})") from None
 
 
 def _followed(path: Path) -> tuple[Path, int | None]:

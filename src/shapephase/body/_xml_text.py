@@ -31,6 +31,11 @@ _MOST_ATTRIBUTES = 1000
 """Attributes of one element; expat hands them over only when it has them all, so they are counted before it."""
 _LONG_TAG = re.compile(rb"<[^<!?\s][^<]{5000,}")
 """A tag so long that its attributes are counted; 1000 of them take at least 5000 bytes."""
+_DECLARED = re.compile(r"""<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
+"""The encoding that the first line says."""
+_UTF_8 = re.compile("utf-?8", re.IGNORECASE)
+_WITH_ASCII = re.compile("(us-)?ascii|iso-?8859-[0-9]+|latin-?[0-9]+|(windows-|cp)125[0-9]", re.IGNORECASE)
+"""Encodings in which a file of ASCII letters alone is the same as in UTF-8."""
 _ATTRIBUTE = re.compile(rb"=\s*[\"']")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -118,6 +123,11 @@ def xml_tree(content: bytes, where: str) -> Node:
         raise ModelFileError(
             f"{where}:{line}: not UTF-8 text, byte {error.start} cannot be read; save the file as UTF-8"
         ) from None
+    declared = _DECLARED.match(text)
+    if declared and not (_UTF_8.fullmatch(declared[1]) or (content.isascii() and _WITH_ASCII.fullmatch(declared[1]))):
+        raise ModelFileError(
+            f"{where}:1: it says that it is {declared[1]:.40}, and it is UTF-8; correct its first line"
+        )
     zero = content.find(b"\0")
     if zero >= 0:
         line = content.count(b"\n", 0, zero) + 1

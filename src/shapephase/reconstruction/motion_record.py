@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +17,7 @@ from ..arrays import Array
 from ..chebyshev import nodes_on, values_to_coefficients
 from ..deformation.deformation import Deformation, sampled_deformation
 from ..errors import InputFileNotFoundError, ResultFileError
-from ..files import write_whole
+from ..files import npz_arrays, write_whole
 from ..integrator.integrate import SteppedRotation
 from ..integrator.interpolant import Interpolant
 
@@ -39,8 +36,8 @@ _STEPS = (
 )
 _SAMPLES = ("edges", "coefficients")
 _CENTRE_DEGREE = 24
-# What a damaged archive raises: its directory, checksums, compression, headers of arrays, or text.
-_UNREADABLE = (OSError, ValueError, EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
+# What a motion's file may unpack to [bytes]: a hundred times the longest in use.
+_MOST_BYTES = 2**31
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,13 +101,9 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
     if not where.is_file():
         raise InputFileNotFoundError(f"{where}: there is no such file")
     try:
-        with zipfile.ZipFile(where) as archive:
-            arrays = {
-                name.removesuffix(".npy"): np.lib.format.read_array(BytesIO(archive.read(name)), allow_pickle=False)
-                for name in archive.namelist()
-            }
+        arrays = npz_arrays(where.read_bytes(), _MOST_BYTES)
         header = json.loads(str(arrays["header"]))
-    except (*_UNREADABLE, KeyError) as error:
+    except (OSError, ValueError, KeyError, RecursionError) as error:
         raise ResultFileError(f"{where}: no motion that can be read ({error})") from None
     if not isinstance(header, dict) or "format" not in header:
         raise ResultFileError(f"{where}: no motion; its header says {str(header)[:80]!r}")

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import breaks_argument, positive_argument, times_argument
+from ..arguments import breaks_argument, check_time_steps, positive_argument, times_argument
 from ..arrays import Array, check_reach, finite_array
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from ..integrator.resolved import joined
@@ -402,6 +402,7 @@ def _samples(times: ArrayLike, shapes: ArrayLike) -> tuple[Array, Array]:
     if len(late):
         row = int(late[0]) + 1
         raise TrajectoryError(f"times must ascend: sample {row} at {t[row]:.9g} s follows {t[row - 1]:.9g} s")
+    check_time_steps(t - t[0])
     return t - t[0], r
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ import numpy as np
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, TrajectoryError
+from ...files import npy_array, npz_arrays
 from ._recording import MOST_BYTES, Recording, file_bytes, times_from_zero
 
 # Entries of a free joint in MuJoCo's qpos: a position and a quaternion.
@@ -130,34 +129,13 @@ def _names(stored: Any, where: Path) -> list[str]:
 
 def _members(data: bytes, where: Path) -> dict[str, Any]:
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            # A small file can unpack to any size.
-            if sum(entry.file_size for entry in entries) > 4 * MOST_BYTES:
-                raise TrajectoryError(f"{where}: more than {4 * MOST_BYTES // 2**20} MiB when unpacked")
-            names = [entry.filename.removesuffix(".npy") for entry in entries]
-            if len(set(names)) != len(names):
-                raise TrajectoryError(f"{where}: an array stands twice in the file")
-            return {name: _loaded(archive.read(entry), where) for name, entry in zip(names, entries, strict=True)}
-    except TrajectoryError:
-        raise
-    except Exception as error:  # a damaged archive fails in the decoders in many ways
-        raise TrajectoryError(f"{where}: no NPZ file that can be read ({error})") from None
+        return npz_arrays(data, 4 * MOST_BYTES)
+    except ValueError as error:
+        raise TrajectoryError(f"{where}: {error}") from None
 
 
 def _loaded(data: bytes, where: Path) -> Any:
     try:
-        stream = io.BytesIO(data)
-        version = np.lib.format.read_magic(stream)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(stream)
-        if dtype.hasobject:
-            raise TrajectoryError(f"{where}: an array of Python objects; such files can run code and are never read")
-        # The header may promise more than there is, and the memory would be taken first.
-        if float(np.prod(shape, dtype=np.float64)) * dtype.itemsize > len(data):
-            raise TrajectoryError(f"{where}: an array of shape {shape} does not fit into the file; it is cut off")
-        return np.load(io.BytesIO(data), allow_pickle=False)
-    except TrajectoryError:
-        raise
-    except Exception as error:  # a damaged header fails in NumPy's parser in many ways
-        raise TrajectoryError(f"{where}: no array that can be read ({error})") from None
+        return npy_array(data)
+    except ValueError as error:
+        raise TrajectoryError(f"{where}: {error}") from None

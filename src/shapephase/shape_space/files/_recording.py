@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arguments import check_time_steps
 from ...arrays import Array
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 
@@ -165,6 +166,7 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
         raise TrajectoryError(
             f"{where}: times from {times[0]:.9g} s to {times[-1]:.9g} s are not distinct in double precision"
         )
+    check_time_steps(shifted, f"{where}: ")
     if np.spacing(np.abs(times).max()) > 1e-6 * steps.min():
         warn(
             f"{where}: times near {times[-1]:.9g} s resolve only {np.spacing(np.abs(times).max()):.2g} s of steps of "

@@ -312,6 +312,8 @@ def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
             if not _is(point, key):
                 raise TrajectoryError(f"{place} has no {key}")
         times.append(_yaml_time(point["time_from_start"], f"{place}: time_from_start"))
+        if times[-1][0] + _NANO * times[-1][1] < 0.0:
+            raise TrajectoryError(f"{place}: time_from_start is before the start; no trajectory has such times")
         positions.append(_yaml_numbers(point["positions"], place, "positions", names))
     return _Trajectory(_yaml_stamp(document, where), names, [t[0] for t in times], [t[1] for t in times], positions)
 
@@ -337,6 +339,8 @@ def _yaml_stamp(document: dict[str, Any], where: Path) -> int:
     if not isinstance(header, dict) or "stamp" not in header:
         return 0
     whole, part = _yaml_time(header["stamp"], f"{where}: header stamp")
+    if whole + _NANO * part < 0.0:
+        raise TrajectoryError(f"{where}: header stamp: no clock has a time below zero")
     return whole + round(part * _NANO)
 
 

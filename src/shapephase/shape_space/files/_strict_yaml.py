@@ -8,6 +8,8 @@ from ...errors import MissingExtraError, TrajectoryError
 
 # Lists and mappings inside each other: a ROS message nests half as many.
 _MOST_DEPTH = 16
+# A key whose value YAML 1.1 takes for part of the mapping around it.
+_MERGE = "<<"
 # Memory: events of the parser, about one for each value.
 _MOST_ENTRIES = 2_000_000
 
@@ -62,6 +64,8 @@ def yaml_documents(text: str, where: str) -> list[Any]:
             if stack and isinstance(stack[-1], dict) and keys[-1] is None:
                 if not isinstance(value, Word):
                     raise TrajectoryError(f"{place}: a key must be a plain word")
+                if value.text == _MERGE:
+                    raise TrajectoryError(f"{place}: merge keys ({_MERGE}) are not read; write the values out")
                 if value.text in stack[-1]:
                     raise TrajectoryError(f"{place}: {value.text!r:.60} stands twice")
                 keys[-1] = value.text
