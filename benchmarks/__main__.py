@@ -109,7 +109,7 @@ def print_cases(contestants: list[Contestant], numbers: list[int], turns: int) -
     ways = [(c.name, way, asked) for c in contestants for way in ("known", "box") for asked in ("asked", "same error")]
     print(f"\ncompiled C++: {' '.join(FLAGS)}; tolerance {TOLERANCE:g} rad; processor time [ms]; ratios to C++\n")
     heads = "".join(f"{c.name:>18.18}{'ratio':>7}{'same error':>11}{'evals':>7}" for c in contestants)
-    print(f"{'case':34}{'':7}{'C++':>8}{'to':>8}{'evals':>7}{heads}")
+    print(f"{'case':38}{'':7}{'C++':>8}{'to':>8}{'evals':>7}{heads}")
     done: dict[int, Entries] = {}
     for number in numbers:
         done[number] = compared(all_cases[number], number, contestants, turns)
@@ -140,7 +140,7 @@ def print_medians(names: dict[int, str], done: dict[int, Entries], ways: list[tu
 
 def _row(case: Case, way: str, entries: Entries, contestants: list[Contestant]) -> str:
     peer = entries.get((_PEER, "", ""))
-    line = f"{case.name:34}{way:7}"
+    line = f"{case.name:38}{way:7}"
     line += f"{peer.median:8.3f}{peer.tolerance:8.0e}{peer.evaluations:7d}" if peer else f"{'':23}"
     for contestant in contestants:
         ours = entries[contestant.name, way, "asked"]
@@ -232,7 +232,7 @@ def print_workloads(contestants: list[Contestant], numbers: list[int], *, quick:
     print_table("a black box for the first time", contestants, "first_black_boxes", numbers)
     print_table("after a reconstruction", contestants, "afterwards", turns, numbers)
     print_table("recorded motions", contestants, "recorded", 3, rows)
-    print_table("many momenta", contestants, "many_momenta", many)
+    print_table("many momenta", contestants, "many_momenta", many, 20 if quick else 100)
     print_table("threads, by the clock", contestants, "threads", many)
     print_table("many bodies", contestants, "inertia_variants", few)
 

@@ -107,7 +107,7 @@ def afterwards(turns: int, numbers: list[int]) -> dict[str, float]:
 # ---- Many at once ---------------------------------------------------------------------------------------------------
 
 
-def many_momenta(count: int, checked: int = 10) -> dict[str, float]:
+def many_momenta(count: int, checked: int) -> dict[str, float]:
     """Momenta on the cat's Fourier loop: processor time of each [us], and the largest error of some."""
     case = _case(_CAT_LOOP)
     deformation = sp.articulated(case.body, case.path)
