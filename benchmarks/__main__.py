@@ -248,7 +248,7 @@ def print_table(title: str, contestants: list[Contestant], workload: str, *argum
             faults.append(str(failed))
     print(title if any(columns) else f"{title}: not there", flush=True)
     for name in dict.fromkeys(name for column in columns for name in column):
-        cells = (f"{column[name]:18.2f}" if name in column else f"{'':18}" for column in columns)
+        cells = (f"{column[name]:18.4g}" if name in column else f"{'':18}" for column in columns)
         print(f"  {name:42}" + "".join(cells))
     for fault in faults:
         print(f"  {fault}")
