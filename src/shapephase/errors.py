@@ -137,8 +137,8 @@ class ResultFileError(ShapePhaseError, ValueError):
 class CompilerError(ShapePhaseError, RuntimeError):
     """The steps could not be compiled.
 
-    Causes: no C compiler, one that fails or rounds otherwise, a folder that cannot be written to. Remedy: another
-    compiler in $CC, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps.
+    Causes: a Numba that does not go with this NumPy, no folder that only this user may write to. Remedy: another
+    version of Numba, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps.
     """
 
 
@@ -171,7 +171,7 @@ class VisualWarning(UserWarning):
 
 
 class CompiledCodeWarning(UserWarning):
-    """Compiled steps were found but cannot be used; the interpreted ones give the same results."""
+    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results."""
 
 
 class TrajectoryWarning(UserWarning):

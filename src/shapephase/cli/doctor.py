@@ -30,6 +30,7 @@ def doctor_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
         "optional_packages": _versions(_PACKAGES[1]),
         "pinocchio_features": _features(),
         "compiler": _compiler(),
+        "machine_code": _machine_code(),
         "cache": _cache(),
         "browser": _browser(),
     }
@@ -39,7 +40,7 @@ def doctor_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
         lines += [f"{name:<{width}}  {found or 'not installed'}" for name, found in data[kind].items()]
     words = {True: "yes", False: "no"}
     lines += [f"{f'pin {name}':<{width}}  {words[has]}" for name, has in data["pinocchio_features"].items()]
-    lines += [f"{name:<{width}}  {data[name] or 'none'}" for name in ("compiler", "cache", "browser")]
+    lines += [f"{name:<{width}}  {data[name] or 'none'}" for name in ("compiler", "machine_code", "cache", "browser")]
     return Outcome("\n".join(lines), data)
 
 
@@ -78,13 +79,22 @@ def _compiler() -> str | None:
     return f"{' '.join(command)}: {said[0] if said else 'version unknown'}"
 
 
+def _machine_code() -> str:
+    """Whether the innermost loops are machine code in Python."""
+    from ..integrator.fast.switch import VARIABLE, is_allowed, is_installed
+
+    if not is_installed():
+        return "no, Numba is not installed"
+    return "yes, by Numba" if is_allowed() else f"no, {VARIABLE} is 0"
+
+
 def _cache() -> str | None:
     """The folder of compiled functions, and how many it holds."""
-    from ..integrator.compilation import code_folder
+    from ..integrator.fast.cache_folder import code_folder
 
     try:
         folder = code_folder()
-        return f"{folder}: {sum(1 for _ in folder.glob('*.so'))} compiled functions"
+        return f"{folder}: {sum(1 for _ in folder.rglob('*.nbc'))} compiled functions"
     except (OSError, RuntimeError):
         return None
 

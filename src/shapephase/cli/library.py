@@ -30,14 +30,14 @@ def robots_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
 
 
 def compile_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
-    """Compile the innermost loops with this machine's C compiler: the same results, sooner.
+    """Compile the innermost loops with Numba (pip install 'shapephase[fast]'): the same results, sooner.
 
-    Once is enough for all later sessions. $CC names the compiler; what it writes is kept in $XDG_CACHE_HOME/shapephase,
-    or ~/.cache/shapephase.
+    Once is enough for all later sessions: what is compiled is kept in $XDG_CACHE_HOME/shapephase, or
+    ~/.cache/shapephase. In Python the first reconstruction does it by itself.
     """
     from ..integrator.compiled_steps import compile_steps
 
     with steps(1) as work:
         work.begin("compiling")
         written = compile_steps()
-    return Outcome(f"compiled: {len(written)} functions in {written[0].parent}", {"files": [str(p) for p in written]})
+    return Outcome(f"compiled: {len(written)} files in {written[0].parent}", {"files": [str(p) for p in written]})

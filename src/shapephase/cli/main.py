@@ -17,6 +17,7 @@ from importlib.metadata import version
 from cyclopts import App, CycloptsError
 
 from ..errors import OutputFileError, ShapePhaseError
+from ..integrator.fast.switch import begin_command
 from .check import check_command
 from .conjugate import conjugate_command
 from .doctor import doctor_command
@@ -67,6 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Warnings are lines on stderr too, and a list in what `--json` prints.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
+    begin_command()
     with spoken(tokens):
         try:
             code = _ran(tokens, as_json="--json" in tokens)

@@ -12,11 +12,14 @@ from ..body.catalog import load_body
 from ..deformation.deformation import articulated
 from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
+from ..integrator.fast.switch import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
 from .options import AS_RECORDED, FlightOptions, RecordingOptions
 
+_SAMPLES_A_BREAK = 5
+"""Of the body between two knots of a recording, or more."""
 DEFAULT_TOLERANCE = 1e-9
 """Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
 
@@ -45,6 +48,7 @@ def flight(
     loaded = load_body(body, isolate=True)
     path, recorded = joint_motion(motion, loaded, recording)
     start = so3.quat_argument(options.attitude, "attitude")
+    expect_work(samples=_SAMPLES_A_BREAK * len(path.breaks))
     moved = reconstruct(articulated(loaded, path), options.momentum, start, tolerance=tolerance)
     return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
 

@@ -10,6 +10,9 @@ from .options import AS_TEXT, BodyArgument, PrintOptions
 from .outcome import Outcome
 from .progress import steps
 
+_MOMENTA = 1000
+"""About as many are integrated to search all directions."""
+
 
 def orbits_command(
     body: BodyArgument,
@@ -41,6 +44,7 @@ def orbits_command(
     from ..body.catalog import load_body
     from ..deformation.deformation import articulated
     from ..deformation.gauge import named_gauge
+    from ..integrator.fast.switch import expect_work
     from ..phases.phases import split
     from ..phases.return_map import fixed_points
     from ..reconstruction.reconstruction import reconstruct
@@ -54,6 +58,7 @@ def orbits_command(
         deformation = articulated(loaded, path)
         seen = named_gauge(deformation, gauge)
         work.begin("finding what closes")
+        expect_work(momenta=_MOMENTA)
         found = fixed_points(seen, magnitude)
         upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
         work.begin("splitting")

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from .compilation import compiled_or_interpreted
 
 Formula = Callable[[list[Any]], list[Any]]
 # Functions of one thread; a buffer holds a few kilobytes, and a computation uses a few dozen.
@@ -62,7 +61,7 @@ def map_rows(formula: Formula, entries: int, values: Array) -> Array:
 
 @lru_cache(maxsize=512)
 def _mapped(formula: Formula, entries: int, count: int) -> Any:
-    return compiled_or_interpreted(row_function(formula, entries)).map(count)
+    return row_function(formula, entries).map(count)
 
 
 @lru_cache(maxsize=32)
@@ -72,8 +71,3 @@ def row_function(formula: Formula, entries: int) -> Any:
 
     row = casadi.SX.sym("row", entries)
     return casadi.Function(formula.__name__, [row], [casadi.vertcat(*formula(casadi.vertsplit(row)))])
-
-
-def forget_functions() -> None:
-    """Build the functions of many rows anew when next needed."""
-    _mapped.cache_clear()

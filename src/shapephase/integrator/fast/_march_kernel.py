@@ -139,8 +139,8 @@ def _begin(states, directions, magnitudes, lanes):
     for group in range(len(states)):
         for i in range(LANES):
             row = min(group * lanes + min(i, lanes - 1), len(magnitudes) - 1)
-            for march in range(3):
-                s = states[group, march]
+            for which in range(3):
+                s = states[group, which]
                 for j in range(9, 22):
                     s[j * LANES + i] = 1.0 if j in (12, 13, 17, 21) else 0.0
                 s[_MAGNITUDE + i] = magnitudes[row]

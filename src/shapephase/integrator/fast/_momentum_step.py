@@ -30,48 +30,48 @@ _INNER_STAGES = 5, 8
 
 
 @inline
-def _rate(c, i, size, p0, p1, p2, d0, d1, d2):
+def _rate(c, i, magnitude, p0, p1, p2, d0, d1, d2):
     """Rate of the direction at p, of the dynamic phase and of the turn from d, at stage i."""
-    w0 = size * (c[i] * p0 + c[5 * STRIDE + i] * p1 + c[4 * STRIDE + i] * p2) - c[6 * STRIDE + i]
-    w1 = size * (c[5 * STRIDE + i] * p0 + c[STRIDE + i] * p1 + c[3 * STRIDE + i] * p2) - c[7 * STRIDE + i]
-    w2 = size * (c[4 * STRIDE + i] * p0 + c[3 * STRIDE + i] * p1 + c[2 * STRIDE + i] * p2) - c[8 * STRIDE + i]
+    w0 = magnitude * (c[i] * p0 + c[5 * STRIDE + i] * p1 + c[4 * STRIDE + i] * p2) - c[6 * STRIDE + i]
+    w1 = magnitude * (c[5 * STRIDE + i] * p0 + c[STRIDE + i] * p1 + c[3 * STRIDE + i] * p2) - c[7 * STRIDE + i]
+    w2 = magnitude * (c[4 * STRIDE + i] * p0 + c[3 * STRIDE + i] * p1 + c[2 * STRIDE + i] * p2) - c[8 * STRIDE + i]
     y = p0 * w0 + p1 * w1 + p2 * w2
     t = (y + d0 * w0 + d1 * w1 + d2 * w2) / (1.0 + d0 * p0 + d1 * p1 + d2 * p2)
     return p1 * w2 - p2 * w1, p2 * w0 - p0 * w2, p0 * w1 - p1 * w0, y, t
 
 
 @inline
-def momentum_step(c, b, size, u, v, w):
+def momentum_step(c, b, magnitude, u, v, w):
     """The direction (u, v, w) after a step whose channels begin at c[b], its turn and its dynamic phase."""
-    x0, y0, z0, g0, t0 = _rate(c, b, size, u, v, w, u, v, w)
+    x0, y0, z0, g0, t0 = _rate(c, b, magnitude, u, v, w, u, v, w)
     p, q, r = u + sum_1(x0), v + sum_1(y0), w + sum_1(z0)
-    x1, y1, z1, _, _ = _rate(c, b + 1, size, p, q, r, u, v, w)
+    x1, y1, z1, _, _ = _rate(c, b + 1, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_2(x0, x1), v + sum_2(y0, y1), w + sum_2(z0, z1)
-    x2, y2, z2, _, _ = _rate(c, b + 2, size, p, q, r, u, v, w)
+    x2, y2, z2, _, _ = _rate(c, b + 2, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_3(x0, x2), v + sum_3(y0, y2), w + sum_3(z0, z2)
-    x3, y3, z3, _, _ = _rate(c, b + 3, size, p, q, r, u, v, w)
+    x3, y3, z3, _, _ = _rate(c, b + 3, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_4(x0, x2, x3), v + sum_4(y0, y2, y3), w + sum_4(z0, z2, z3)
-    x4, y4, z4, _, _ = _rate(c, b + 4, size, p, q, r, u, v, w)
+    x4, y4, z4, _, _ = _rate(c, b + 4, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_5(x0, x3, x4), v + sum_5(y0, y3, y4), w + sum_5(z0, z3, z4)
-    x5, y5, z5, g5, t5 = _rate(c, b + 5, size, p, q, r, u, v, w)
+    x5, y5, z5, g5, t5 = _rate(c, b + 5, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_6(x0, x3, x4, x5), v + sum_6(y0, y3, y4, y5), w + sum_6(z0, z3, z4, z5)
-    x6, y6, z6, g6, t6 = _rate(c, b + 6, size, p, q, r, u, v, w)
+    x6, y6, z6, g6, t6 = _rate(c, b + 6, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_7(x0, x3, x4, x5, x6), v + sum_7(y0, y3, y4, y5, y6), w + sum_7(z0, z3, z4, z5, z6)
-    x7, y7, z7, g7, t7 = _rate(c, b + 7, size, p, q, r, u, v, w)
+    x7, y7, z7, g7, t7 = _rate(c, b + 7, magnitude, p, q, r, u, v, w)
     p, q, r = u + sum_8(x0, x3, x4, x5, x6, x7), v + sum_8(y0, y3, y4, y5, y6, y7), w + sum_8(z0, z3, z4, z5, z6, z7)
-    x8, y8, z8, g8, t8 = _rate(c, b + 8, size, p, q, r, u, v, w)
+    x8, y8, z8, g8, t8 = _rate(c, b + 8, magnitude, p, q, r, u, v, w)
     p = u + sum_9(x0, x3, x4, x5, x6, x7, x8)
     q = v + sum_9(y0, y3, y4, y5, y6, y7, y8)
     r = w + sum_9(z0, z3, z4, z5, z6, z7, z8)
-    x9, y9, z9, g9, t9 = _rate(c, b + 9, size, p, q, r, u, v, w)
+    x9, y9, z9, g9, t9 = _rate(c, b + 9, magnitude, p, q, r, u, v, w)
     p = u + sum_10(x0, x3, x4, x5, x6, x7, x8, x9)
     q = v + sum_10(y0, y3, y4, y5, y6, y7, y8, y9)
     r = w + sum_10(z0, z3, z4, z5, z6, z7, z8, z9)
-    x10, y10, z10, g10, t10 = _rate(c, b + 10, size, p, q, r, u, v, w)
+    x10, y10, z10, g10, t10 = _rate(c, b + 10, magnitude, p, q, r, u, v, w)
     p = u + sum_11(x0, x3, x4, x5, x6, x7, x8, x9, x10)
     q = v + sum_11(y0, y3, y4, y5, y6, y7, y8, y9, y10)
     r = w + sum_11(z0, z3, z4, z5, z6, z7, z8, z9, z10)
-    x11, y11, z11, g11, t11 = _rate(c, b + 11, size, p, q, r, u, v, w)
+    x11, y11, z11, g11, t11 = _rate(c, b + 11, magnitude, p, q, r, u, v, w)
     p = u + sum_b(x0, x5, x6, x7, x8, x9, x10, x11)
     q = v + sum_b(y0, y5, y6, y7, y8, y9, y10, y11)
     r = w + sum_b(z0, z5, z6, z7, z8, z9, z10, z11)

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import march, tree
+from . import marches, tree
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, may_compile
 
@@ -107,4 +107,4 @@ def _announced() -> Iterator[None]:
 def _warm() -> None:
     """Call every kernel, so that it is loaded, or compiled and kept."""
     tree.warm()
-    march.warm()
+    marches.warm()

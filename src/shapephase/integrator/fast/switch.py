@@ -30,7 +30,7 @@ def is_installed() -> bool:
 
 def is_allowed() -> bool:
     """Whether machine code may be used in this process."""
-    return _asked() != "0" and is_installed()
+    return _setting() != "0" and is_installed()
 
 
 def is_on() -> bool:
@@ -40,7 +40,7 @@ def is_on() -> bool:
 
 def may_compile() -> bool:
     """Whether kernels that this machine does not have yet are compiled."""
-    return not _is_command or _asked() == "1"
+    return not _is_command or _setting() == "1"
 
 
 def begin_command() -> None:
@@ -55,5 +55,5 @@ def expect_work(*, momenta: int = 1, samples: int = 0) -> None:
     _is_large = _is_large or momenta >= _MANY_MOMENTA or samples >= _MANY_SAMPLES
 
 
-def _asked() -> str:
+def _setting() -> str:
     return os.environ.get(VARIABLE, "").strip()

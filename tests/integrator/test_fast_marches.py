@@ -12,7 +12,7 @@ from scipy.integrate import DOP853, solve_ivp
 import shapephase as sp
 from shapephase import so3
 from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
-from shapephase.integrator.fast.march import MarchArrays, march_in_threads, quaternions_at_rest
+from shapephase.integrator.fast.marches import MarchArrays, march_in_threads, quaternions_at_rest
 
 pytestmark = pytest.mark.usefixtures("fast")
 NONE = np.zeros(0, dtype=int)
