@@ -39,10 +39,10 @@ class Path:
                 x = 2.0 * (k + DOP853.C[:STAGES]) / count - 1.0
                 yield width / count * self.channels(panel, x, series).T
 
-    def march(self, directions, magnitudes, *, loops=1, marks=NONE, shortened=None, threads=None, steps=None):
+    def march(self, directions, magnitudes, *, loops=1, marks=NONE, perturbed=None, threads=None, steps=None):
         steps = self.steps if steps is None else steps
         return march_in_threads(
-            self.widths, self.series, shortened, steps, loops, directions, magnitudes, marks=marks, threads=threads
+            self.widths, self.series, perturbed, steps, loops, directions, magnitudes, marks=marks, threads=threads
         )
 
 
@@ -84,26 +84,33 @@ def test_the_steps_are_those_in_plain_python(path, rng, count):
         assert np.abs(found.dynamics[row] - dynamics).max() < 500.0 * EPS
 
 
-def test_the_differences_are_those_of_the_coarser_marches(path, rng):
+@pytest.mark.parametrize("what", ["last terms left out", "all terms", "three terms more", "five terms more"])
+def test_the_differences_are_those_of_the_coarser_marches(path, rng, what):
     directions, magnitudes = momenta(rng, 9)
-    shortened = path.series.copy()
-    shortened[:, -2:] = 0.0
-    shortened[1, 5] = 0.0
-    found = path.march(directions, magnitudes, shortened=shortened)
+    perturbed = path.series.copy()
+    if what == "last terms left out":
+        perturbed[:, -2:] = 0.0
+        perturbed[1, 5] = 0.0
+    elif what == "all terms":
+        perturbed *= 1.0 + 1e-3 * rng.normal(size=perturbed.shape)
+    else:
+        path.series[:, 9 if what == "three terms more" else 7 :] = 0.0
+    found = path.march(directions, magnitudes, perturbed=perturbed)
     for row in range(9):
         start = directions[row], magnitudes[row]
         whole, half = in_python(path, *start, path.steps)[0], in_python(path, *start, path.steps // 2)[0]
-        cut = in_python(path, *start, path.steps // 2, shortened)[0]
+        other = in_python(path, *start, path.steps // 2, perturbed)[0]
         assert angle(whole[::2], half) == pytest.approx(found.stepping[row], rel=1e-9, abs=4000.0 * EPS)
-        assert angle(half, cut) == pytest.approx(found.truncation[row], rel=1e-9, abs=4000.0 * EPS)
+        assert angle(half, other) == pytest.approx(found.truncation[row], rel=1e-9, abs=4000.0 * EPS)
     assert found.truncation.min() > 1e-6
     assert not path.march(directions, magnitudes).truncation.any()
 
 
 def angle(a, b):
-    """Largest angle between quaternions, by the rotation between them."""
+    """Largest angle between quaternions by the rotation between them, as the length of a chord in their sphere."""
     between = so3.matrix_from_quat(a).transpose(0, 2, 1) @ so3.matrix_from_quat(b)
-    return np.linalg.norm(between - np.eye(3), axis=(1, 2)).max() / np.sqrt(2.0)
+    half = np.arcsin(np.linalg.norm(between - np.eye(3), axis=(1, 2)).max() / np.sqrt(8.0))
+    return 4.0 * np.sin(0.5 * half)
 
 
 def test_a_rigid_body_turns_as_the_closed_form_says():
@@ -151,7 +158,7 @@ def test_propagators_are_derivatives_of_the_attitude(path, rng):
 def test_momenta_do_not_see_each_other_nor_threads(path, rng, loops):
     directions, magnitudes = momenta(rng, 300)
     count = loops * int(path.steps.sum())
-    options = {"loops": loops, "marks": np.arange(5) * count // 4, "shortened": 0.999 * path.series}
+    options = {"loops": loops, "marks": np.arange(5) * count // 4, "perturbed": 0.999 * path.series}
     together = path.march(directions, magnitudes, threads=1, **options)
     in_threads = path.march(directions, magnitudes, threads=2, **options)
     for field in fields(MarchArrays):

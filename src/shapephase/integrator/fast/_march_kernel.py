@@ -21,7 +21,8 @@ from ._stage_series import (
     channels_at,
     room_for_basis,
     terms_that_count,
-    without_terms,
+    terms_that_differ,
+    with_few_others,
 )
 from ._trigonometry import cos_sin
 
@@ -38,6 +39,8 @@ _STATE = 22 * LANES
 _RECORD = 9 * LANES
 """Of a step what is kept: direction, turn, dynamic phase and quaternion at its end."""
 _STAGES = 12
+_FEW_TERMS = 4
+"""Up to so many terms of a perturbed series are added one by one."""
 
 
 @inline
@@ -149,21 +152,28 @@ def _begin(states, directions, magnitudes, lanes):
 
 
 @part
-def _tabulate(first, last, panels, starts, widths, series, shortened, steps, basis, scaled, tables, lengths):
-    """The channels of segments `first` to `last`: of the steps, of half as many, of these on shortened series."""
+def _tabulate(first, last, panels, starts, widths, series, perturbed, steps, basis, scaled, tables, lengths):
+    """The channels of segments `first` to `last`: of the steps, of half as many, of these on perturbed series."""
     for segment in range(first, last):
         panel, place = panels[segment], segment - first
         count = min(SEGMENT, steps[panel] - starts[segment])
         lengths[0, place], lengths[1, place] = count, count // 2
         c, factor = series[panel], widths[panel] / steps[panel]
         terms = terms_that_count(c)
+        few = True
+        if len(perturbed):
+            few = terms_that_differ(c, perturbed[panel]) <= _FEW_TERMS
+            terms = max(terms, terms_that_count(perturbed[panel]))
         used = basis_at(starts[segment], count, steps[panel], terms, basis)
         channels_at(c, terms, factor, basis, used, 0, scaled, tables[0, place])
         used = basis_at(starts[segment] // 2, count // 2, steps[panel] // 2, terms, basis)
         channels_at(c, terms, 2.0 * factor, basis, used, 0, scaled, tables[1, place])
-        if len(shortened):
-            less = shortened[panel]
-            without_terms(c, less, terms, 2.0 * factor, basis, used, 0, tables[1, place], tables[2, place])
+        if len(perturbed):
+            other, out = perturbed[panel], tables[2, place]
+            if few:
+                with_few_others(c, other, terms, 2.0 * factor, basis, used, 0, tables[1, place], out)
+            else:
+                channels_at(other, terms, 2.0 * factor, basis, used, 0, scaled, out)
 
 
 @part
@@ -180,13 +190,13 @@ def _segments(steps, panels, starts):
 
 @kernel
 def march_momenta(
-    widths, series, shortened, steps, loops, directions, magnitudes, marks, lanes, most_segments,
+    widths, series, perturbed, steps, loops, directions, magnitudes, marks, lanes, most_segments,
     quaternions, ends, turns, dynamics, propagators, stepping, truncation,
 ):  # fmt: skip
-    """All steps of all loops, half as many, and these on the shortened series; arguments after `lanes` are filled.
+    """All steps of all loops, half as many, and these on the perturbed series; arguments after `lanes` are filled.
 
     widths: (P,) [s]
-    series, shortened: (P, n * 9) times one second; no rows of the latter: not marched on
+    series, perturbed: (P, n * 9) times one second; no rows of the latter: not marched on
     steps: (P,) even
     marks: after how many steps propagators are kept, (M,)
     lanes: 1 or LANES
@@ -199,7 +209,7 @@ def march_momenta(
     panels, starts = np.empty(total, np.int64), np.empty(total, np.int64)
     _segments(steps, panels, starts)
     room = min(total, most_segments)
-    terms, grows, cuts = series.shape[1] // _CHANNELS, propagators.shape[1] > 0, len(shortened) > 0
+    terms, grows, perturbs = series.shape[1] // _CHANNELS, propagators.shape[1] > 0, len(perturbed) > 0
     basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * _CHANNELS)
     tables, lengths = np.empty((3, room, SIZE)), np.empty((2, room), np.int64)
     record = np.empty((room * SEGMENT, _RECORD))
@@ -221,7 +231,7 @@ def march_momenta(
         for first in range(0, total, room):
             last = min(first + room, total)
             if loop == 0 or total > room:
-                _tabulate(first, last, panels, starts, widths, series, shortened, steps, basis, scaled, tables, lengths)
+                _tabulate(first, last, panels, starts, widths, series, perturbed, steps, basis, scaled, tables, lengths)
             counts, halves = lengths[0, : last - first], lengths[1, : last - first]
             count = 0
             for segment in range(last - first):
@@ -230,12 +240,12 @@ def march_momenta(
                 state = states[group]
                 _march_lanes(tables[0], counts, state[0], lanes, record, grows, done, marks, kept)
                 _march_lanes(tables[1], halves, state[1], lanes, half, False, 0, none, kept)
-                if cuts:
+                if perturbs:
                     _march_lanes(tables[2], halves, state[2], lanes, cut, False, 0, none, kept)
                 for lane in range(min(lanes, rows - group * lanes)):
                     row = group * lanes + lane
                     stepping[row] = _apart(count // 2, 2, record, half, lane, stepping[row])
-                    if cuts:
+                    if perturbs:
                         truncation[row] = _apart(count // 2, 1, half, cut, lane, truncation[row])
                     for k in range(count):
                         for i in range(3):

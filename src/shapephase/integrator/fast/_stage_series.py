@@ -109,15 +109,27 @@ def channels_at(series, terms, factor, basis, used, first_channel, scaled, out):
 
 
 @part
-def without_terms(series, shortened, terms, factor, basis, used, first_channel, whole, out):
-    """The same of series that differ in a few terms, from the channels of the whole ones."""
+def terms_that_differ(series, other):
+    """In how many terms two panels' nine series differ."""
+    count = 0
+    for k in range(0, len(series), CHANNELS):
+        for j in range(CHANNELS):
+            if series[k + j] != other[k + j]:
+                count += 1
+                break
+    return count
+
+
+@part
+def with_few_others(series, other, terms, factor, basis, used, first_channel, whole, out):
+    """As `channels_at` for series that differ in a few terms from those whose channels are `whole`."""
     for j in range(first_channel, CHANNELS):
         o = np.uint32(j * STRIDE)
         for i in range(used):
             out[o + i] = whole[o + i]
         for k in range(terms):
-            lost = factor * (series[k * CHANNELS + j] - shortened[k * CHANNELS + j])
-            if lost != 0.0:
+            change = factor * (other[k * CHANNELS + j] - series[k * CHANNELS + j])
+            if change != 0.0:
                 b = np.uint32(k * STRIDE)
                 for i in range(used):
-                    out[o + i] = out[o + i] - lost * basis[b + i]
+                    out[o + i] = out[o + i] + change * basis[b + i]

@@ -30,7 +30,7 @@ class MarchArrays:
     turns, dynamics : (B, K) of each step [rad]
     propagators : (B, M, 3, 3) after the steps asked for
     stepping : (B,) the largest angle between the steps and half as many [rad]
-    truncation : (B,) the largest angle between half as many steps on the whole series and on the shortened ones [rad]
+    truncation : (B,) the largest angle between half as many steps on the whole series and on the perturbed ones [rad]
     """
 
     quaternions: Array
@@ -45,7 +45,7 @@ class MarchArrays:
 def march_in_threads(
     widths: Array,
     coefficients: Array,
-    shortened: Array | None,
+    perturbed: Array | None,
     steps: Integers,
     loops: int,
     directions: Array,
@@ -59,7 +59,8 @@ def march_in_threads(
     Parameters
     ----------
     widths : (P,) of the panels [s]
-    coefficients, shortened : (P, n, 9) Chebyshev series of I^-1 and I^-1 L_o, and the same without some terms
+    coefficients, perturbed : (P, n, 9) Chebyshev series of I^-1 and I^-1 L_o, and the same with some terms changed;
+        None: not marched on
     steps : (P,) even, on each panel of one loop
     directions : (B, 3) of the momenta at the start
     magnitudes : (B,) of the momenta [kg m^2/s]
@@ -80,7 +81,7 @@ def march_in_threads(
     path = (
         plain(widths),
         plain(coefficients).reshape(len(widths), -1),
-        np.empty((0, 1)) if shortened is None else plain(shortened).reshape(len(widths), -1),
+        np.empty((0, 1)) if perturbed is None else plain(perturbed).reshape(len(widths), -1),
         np.array(steps, dtype=np.int64),
         loops,
     )
