@@ -12,7 +12,7 @@ from scipy.integrate import DOP853, solve_ivp
 import shapephase as sp
 from shapephase import so3
 from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
-from shapephase.integrator.fast.marches import MarchArrays, march_in_threads, quaternions_at_rest
+from shapephase.integrator.fast.marches import MarchArrays, amplifications, march_in_threads, quaternions_at_rest
 
 pytestmark = pytest.mark.usefixtures("fast")
 NONE = np.zeros(0, dtype=int)
@@ -152,6 +152,23 @@ def test_propagators_are_derivatives_of_the_attitude(path, rng):
         quaternion, propagator = end.y[:4, -1], end.y[4:, -1].reshape(3, 3)
     assert np.abs(found.quaternions[0, -1] - quaternion).max() < 1e-9
     assert np.abs(found.propagators[0, -1] - propagator).max() < 1e-3 * np.abs(propagator).max()
+
+
+def test_the_largest_growth_is_about_the_largest_singular_value(path, rng):
+    """Between any two marks, from the sum of squares as if the three were s, 1 and 1/s, which they are nearly."""
+    directions, magnitudes = momenta(rng, 12)
+    count = int(path.steps.sum())
+    propagators = path.march(directions, magnitudes, marks=np.arange(6) * count // 5).propagators
+    found = amplifications(propagators)
+    for row, matrices in enumerate(propagators):
+        between = [matrices[j] @ np.linalg.inv(matrices[i]) for j in range(1, 6) for i in range(j)]
+        half = max(1.0, 0.5 * (max(np.linalg.norm(one) for one in between) ** 2 - 1.0))
+        assert found[row] == pytest.approx(np.sqrt(half + np.sqrt(half**2 - 1.0)), rel=1e-3)
+        assert found[row] == pytest.approx(max(np.linalg.norm(one, 2) for one in between), rel=0.1)
+    assert found.max() > 1.2
+    propagators[3, 2, 1, 1] = np.nan
+    propagators[4] *= 1e200
+    assert np.array_equal(np.flatnonzero(np.isinf(amplifications(propagators))), [3, 4])
 
 
 @pytest.mark.parametrize("loops", [1, 3])

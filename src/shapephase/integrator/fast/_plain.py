@@ -12,4 +12,6 @@ def plain(array: Array) -> Array:
 
     Numba takes any other kind for another argument, and would compile the kernel once more for it.
     """
-    return np.require(array, np.float64, ("C", "W"))
+    flags = array.flags
+    fits = flags.c_contiguous and flags.writeable and flags.aligned and array.dtype == np.float64
+    return array if fits else np.array(array, dtype=np.float64, order="C")

@@ -17,7 +17,12 @@ from . import marches, tree
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, may_compile
 
-_KERNELS = {"sample_tree": "._tree_kernel", "march_momenta": "._march_kernel", "march_at_rest": "._march_kernel"}
+_KERNELS = {
+    "sample_tree": "._tree_kernel",
+    "march_momenta": "._march_kernel",
+    "march_at_rest": "._march_kernel",
+    "largest_growths": "._growth_kernel",
+}
 """And the modules that they are in."""
 # A version of Numba that does not go with this NumPy or this Python says so in many ways.
 _NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -77,7 +79,7 @@ def march_in_threads(
         stepping=np.empty(batch),
         truncation=np.empty(batch),
     )
-    module = import_module("._march_kernel", __package__)
+    module = _kernels()
     path = (
         plain(widths),
         plain(coefficients).reshape(len(widths), -1),
@@ -108,11 +110,27 @@ def march_in_threads(
 
 def quaternions_at_rest(widths: Array, coefficients: Array, steps: Integers) -> Array:
     """At the ends of all steps of one loop without momentum, from the identity: (K + 1, 4)."""
-    module = import_module("._march_kernel", __package__)
     quaternions = np.empty((int(steps.sum()) + 1, 4))
     series = plain(coefficients).reshape(len(widths), -1)
-    module.march_at_rest(plain(widths), series, np.array(steps, dtype=np.int64), quaternions)
+    _kernels().march_at_rest(plain(widths), series, np.array(steps, dtype=np.int64), quaternions)
     return quaternions
+
+
+def amplifications(propagators: Array) -> Array:
+    """The largest growth of an error from one mark to a later one; not known is infinite: (B, M, 3, 3) -> (B,)."""
+    growths = np.empty(len(propagators))
+    _growth_kernel().largest_growths(plain(propagators).reshape(*propagators.shape[:2], 9), growths)
+    return growths
+
+
+@lru_cache(maxsize=1)
+def _kernels() -> Any:
+    return import_module("._march_kernel", __package__)
+
+
+@lru_cache(maxsize=1)
+def _growth_kernel() -> Any:
+    return import_module("._growth_kernel", __package__)
 
 
 def warm() -> None:
@@ -121,11 +139,17 @@ def warm() -> None:
     direction, none = np.array([[0.0, 0.0, 1.0]]), np.zeros(0, dtype=np.int64)
     march_in_threads(width, series, None, steps, 1, direction, np.ones(1), marks=none)
     quaternions_at_rest(width, series, steps)
+    amplifications(np.zeros((1, 1, 3, 3)))
 
 
 def _parts(batch: int, lanes: int, threads: int | None) -> list[slice]:
     """The rows for each thread, whole groups of lanes."""
-    most = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    count = max(1, min(most if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
+    count = max(1, min(_processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
     each = -(-batch // (count * lanes)) * lanes
     return [slice(first, min(first + each, batch)) for first in range(0, max(batch, 1), each or 1)]
+
+
+@lru_cache(maxsize=1)
+def _processors() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from importlib import import_module
 from typing import Any, Protocol
 
@@ -65,7 +66,7 @@ def warm() -> None:
 
 
 def _sampled(tree: LinkRows, shapes: Array, rates: Array, *, inverted: bool) -> tuple[Array, bool]:
-    module = import_module("._tree_kernel", __package__)
+    module = _kernel()
     values = np.empty((len(shapes), 9))
     coordinates, speeds = tree.coordinates(shapes, rates)
     reliable = module.sample_tree(
@@ -73,6 +74,11 @@ def _sampled(tree: LinkRows, shapes: Array, rates: Array, *, inverted: bool) -> 
         inverted, module.LANES, values,
     )  # fmt: skip
     return values, bool(reliable)
+
+
+@lru_cache(maxsize=1)
+def _kernel() -> Any:
+    return import_module("._tree_kernel", __package__)
 
 
 class _OneLink:
