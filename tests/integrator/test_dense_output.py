@@ -12,7 +12,8 @@ from shapephase import so3, sphere
 from shapephase.integrator import _dense_output
 from shapephase.integrator._dense_output import TERMS, hermite_matrix
 from shapephase.integrator.curve_integrals import curve_integrals
-from shapephase.integrator.integrate import SteppedRotation
+from shapephase.integrator.integrate import SteppedRotation, stepped_rotation
+from shapephase.integrator.sampling import FinishedSampler
 from support.independent import BODIES, body_of, random_loop, random_vector
 
 NAMES = ("cat", "astronaut", "example:human")
@@ -64,12 +65,14 @@ def test_the_estimate_holds_between_the_steps(name: str, tolerance: float, momen
 @pytest.mark.parametrize("momentum", [0.0, 1.0])
 @pytest.mark.parametrize("name", NAMES)
 def test_between_the_steps_the_error_is_that_at_their_ends(name: str, momentum: float):
-    """The polynomials add a hundredth of the estimate at most."""
-    motion, truth = motion_of(name, 1e-9, momentum), motion_of(name, 1e-12, momentum)
-    ends, times = motion.solution.times, some_times(motion)
-    at_ends = apart(motion.attitude(ends), truth.attitude(ends))
-    between = apart(motion.attitude(times), truth.attitude(times))
-    assert between <= at_ends + 0.01 * motion.error_estimate + truth.error_estimate
+    """The polynomials add a hundredth of the estimate at most, on the samples that the motion has."""
+    motion = motion_of(name, 1e-9, momentum)
+    solution = solution_of(motion)
+    truth = stepped_rotation(FinishedSampler(solution.interpolant), solution.momentum, 1e-12)
+    ends, times = solution.times, some_times(motion)
+    at_ends = apart(solution.rotation(ends), truth.rotation(ends))
+    between = apart(solution.rotation(times), truth.rotation(times))
+    assert between <= at_ends + 0.01 * motion.error_estimate + float(truth.error_estimate[0])
 
 
 def test_the_ends_of_steps_are_what_was_stepped():
@@ -86,7 +89,7 @@ def test_the_ends_of_steps_are_what_was_stepped():
 
 @pytest.mark.parametrize("momentum", [0.0, 1.0])
 def test_a_few_steps_at_once_give_the_same(monkeypatch: pytest.MonkeyPatch, momentum: float):
-    """Motions of so many steps that their polynomials are not kept."""
+    """Motions of so many steps that their polynomials are not kept; then other steps may be halved for these."""
     loops = motion_of("cat", 1e-7, momentum).deformation
     often = sp.articulated(body_of("cat"), random_loop(1, body_of("cat").n_shape).path.repeated(3))
     assert loops.duration < often.duration
@@ -95,9 +98,10 @@ def test_a_few_steps_at_once_give_the_same(monkeypatch: pytest.MonkeyPatch, mome
     times = some_times(kept)
     attitudes, phases, areas = kept.attitude(times), kept.dynamic_phase(times), kept.solid_angle(times)
     monkeypatch.setattr(_dense_output, "_MOST_PIECES", 7)
-    assert apart(attitudes, anew.attitude(times)) < 1e-13
-    np.testing.assert_allclose(anew.dynamic_phase(times), phases, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(anew.solid_angle(times), areas, rtol=0, atol=1e-12)
+    near = 0.02 * float(kept.error_estimate.max())
+    assert apart(attitudes, anew.attitude(times)) < near
+    np.testing.assert_allclose(anew.dynamic_phase(times), phases, rtol=0, atol=near)
+    np.testing.assert_allclose(anew.solid_angle(times), areas, rtol=0, atol=2.0 * near)
 
 
 def test_steps_are_halved_where_polynomials_are_not_near_enough(monkeypatch: pytest.MonkeyPatch):

@@ -360,7 +360,7 @@ def test_what_another_method_needs_of_the_integrator_is_integrated_once(monkeypa
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.3, 1.0, 0.2], method=method)
     assert momenta == []
     for _ in range(3):
-        _ = motion.interpolant, motion.amplification, motion.propagator, motion.sensitivity
+        _ = motion.interpolant, motion.amplification, motion.sensitivity
         motion.dynamic_phase(1.0), motion.solid_angle(1.0)
     assert len(momenta) == 1
     assert momenta[0] > 0.0

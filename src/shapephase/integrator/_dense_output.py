@@ -167,11 +167,11 @@ class DenseOutput:
         stages = np.moveaxis(channels * lengths[:, None, None], 0, -1)
         before = list(np.moveaxis(self.quaternions[:, step], -1, 0))
         if not self.directions.shape[1]:
-            turn, _ = rest_step(stages[:, 6:])
+            turn = rest_step(stages[:, 6:])
             nothing = np.zeros((len(self.magnitude), len(step)))
             return product(before, turn), [nothing] * 3, [nothing]
         start = list(np.moveaxis(self.directions[:, step], -1, 0))
-        end, turn, dynamic, _ = momentum_step(start, self.magnitude[:, None], stages)
+        end, turn, dynamic = momentum_step(start, self.magnitude[:, None], stages)
         return turned(before, start, end, (np.sin(0.5 * turn), np.cos(0.5 * turn))), end, [dynamic]
 
 

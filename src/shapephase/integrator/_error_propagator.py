@@ -9,25 +9,21 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ._march import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
 from ._rotation_step import STAGES, attitude_step
-from ._step_loop import BLOCK, adjugate_of, matrix_product, momentum_step_function
 from .casadi_calls import call_casadi, map_rows
 from .compilation import compiled_or_interpreted
 
-# Times between which the growth of errors is compared: 28 pairs.
-CHECKPOINTS = 8
-
 
 def amplification(propagators: Array) -> Array:
-    """Largest growth of an error from one time to a later one, from error propagators: (B, K + 1, 3, 3) -> (B,).
+    """Largest growth of an error from one time to a later one, from propagators: (B, CHECKPOINTS, 3, 3) -> (B,).
 
-    Between eight times. A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
+    A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
     values as s, 1, 1/s, the sum of their squares gives the largest.
     """
-    count = propagators.shape[1]
-    if count == 0:
+    if propagators.shape[1] == 0:
         return np.ones(1)
-    chosen = propagators[:, np.arange(CHECKPOINTS) * (count - 1) // (CHECKPOINTS - 1)].reshape(len(propagators), -1)
+    chosen = propagators.reshape(len(propagators), -1)
     largest = map_rows(largest_amplification, 9 * CHECKPOINTS, chosen)[:, 0]
     # Where steps were so long that they overflowed, the growth is unknown.
     return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
@@ -48,20 +44,28 @@ def largest_amplification(entries: Any) -> list[Any]:
 
 
 def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loops: int) -> Array:
-    """Error propagators at the step ends: (B, K + 1, 3, 3). Parameters as `integrate_steps`.
+    """Error propagators by the derivative of the steps: (B, CHECKPOINTS, 3, 3).
 
     A turn delta of the start is carried over as S^T delta, and changes the momentum's direction by p x delta.
+
+    Parameters
+    ----------
+    channels : (K, 108) at the stages of the steps of one loop
     """
-    propagators = np.empty((len(magnitudes), loops * len(channels) + 1, 3, 3))
-    propagators[:, 0] = np.eye(3)
+    propagators = np.empty((len(magnitudes), CHECKPOINTS, 3, 3))
+    propagators[:] = np.eye(3)
+    marks = checkpoint_steps(loops * len(channels))
     for row, (direction, magnitude) in enumerate(zip(directions, magnitudes, strict=True)):
         first = so3.perpendicular(direction)
         basis = np.stack([first, np.cross(direction, first)])
         seeds = np.zeros((2, 8))
         seeds[:, :3] = np.cross(direction, basis)
-        for place, quaternions, slopes in _derivatives(channels, direction, float(magnitude), loops, seeds):
-            rotation = so3.transpose(so3.matrix_from_quat(quaternions))
-            propagators[row, place] = rotation + so3.transpose(slopes) @ basis
+        for done, quaternions, slopes in _derivatives(channels, direction, float(magnitude), loops, seeds):
+            reached = np.flatnonzero((marks > done) & (marks <= done + len(quaternions)))
+            if len(reached):
+                there = marks[reached] - done - 1
+                rotation = so3.transpose(so3.matrix_from_quat(quaternions[there]))
+                propagators[row, reached] = rotation + so3.transpose(slopes[there]) @ basis
     return propagators
 
 
@@ -84,7 +88,7 @@ def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
 
 
 def _derivatives(channels: Array, direction: Array, magnitude: float, loops: int, seeds: Array) -> Any:
-    """Block by block: its rows, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after its steps.
+    """Block by block: the steps before it, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after each.
 
     `seeds` (s, 8) are changes of direction, quaternion and magnitude at the start.
     """
@@ -97,7 +101,7 @@ def _derivatives(channels: Array, direction: Array, magnitude: float, loops: int
             (states,) = call_casadi(_derivative_function(len(block), columns), len(block), state, block)
             quaternions = states[:, 3:7]
             slopes = so3.turn_of(quaternions[:, None], states[:, 8:].reshape(-1, columns, 8)[:, :, 3:7])
-            yield slice(done + 1, done + len(block) + 1), quaternions, slopes
+            yield done, quaternions, slopes
             state, done = states[-1], done + len(block)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..chebyshev import unit_nodes, values_to_coefficients
+from ._last_terms import Perturbed
 from ._spectral_error import (
     EPS,
     Channels,
@@ -16,6 +17,7 @@ from ._spectral_error import (
     estimate_tail,
     fourier_norms,
     spectral_norms,
+    tail_length,
     unaveraged_share,
 )
 from .interpolant import Interpolant
@@ -87,16 +89,34 @@ class EvenSampler:
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
-        count = len(self._values)
-        panels = max(1, count // _SAMPLES_A_PANEL)
+        panels, count = self._panels, len(self._values)
+        edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
+        edges[-1] = self._period * self._loops
+        return Interpolant(edges, self._series(count // 2), self._loops, self._channels.count)
+
+    def perturbed(self, momentum: float) -> Perturbed:
+        """As `Sampler.perturbed`: the harmonics that stand for those that are missing, changed by as much."""
+        inverse, drift = self._tails
+        missing, last = (momentum * inverse.error + drift.error, momentum * inverse.tail + drift.tail)
+        seen = momentum * _unexplained(self._gaps[0], inverse) + _unexplained(self._gaps[1], drift)
+        highest = len(self._values) // 2
+        whole, without = self._series(highest), self._series(highest - tail_length(highest))
+        share = missing / last if last > 0.0 else 0.0
+        return Perturbed(whole + share * (without - whole), self._loops * 0.5 * self._period * seen)
+
+    @property
+    def _panels(self) -> int:
+        return max(1, len(self._values) // _SAMPLES_A_PANEL)
+
+    def _series(self, highest: int) -> Array:
+        """Chebyshev coefficients (P, n, 9) of the Fourier series up to a harmonic."""
+        count, panels = len(self._values), self._panels
         degree = _PANEL_DEGREE if count > 1 else 0
         # Panels differ only in where their samples begin: in two copies of the loop each finds its own contiguous.
         two_loops = np.concatenate([self._values, self._values])
         row, number = two_loops.strides
         from_each = np.ndarray((panels, count, 9), buffer=two_loops, strides=(count // panels * row, row, number))
-        edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
-        edges[-1] = self._period * self._loops
-        return Interpolant(edges, _even_to_panel(count, panels, degree) @ from_each, self._loops, self._channels.count)
+        return _even_to_panel(count, panels, degree, highest) @ from_each
 
     def _times(self, index: Integers, count: int) -> Array:
         return (self._period / count) * index.astype(np.float64)
@@ -134,23 +154,26 @@ def _even_to_shares(count: int) -> Array:
     return _periodic_sinc(2.0 * np.pi * (_TEST_SHARES[:, None] - np.arange(count) / count), count)
 
 
-def _periodic_sinc(angle: Array, count: int) -> Array:
-    """The sum of cos(k angle) for |k| < count/2 plus half the last term, over `count` (even): the shape of angle."""
+def _periodic_sinc(angle: Array, count: int, highest: int | None = None) -> Array:
+    """The sum of cos(k angle) for |k| < count/2 plus half the last term, over `count` (even): the shape of angle.
+
+    `highest`: only up to this k.
+    """
     half = count // 2
     kernel = np.ones_like(angle)
-    for k in range(1, half):
+    for k in range(1, half if highest is None else min(half, highest + 1)):
         kernel += 2.0 * np.cos(k * angle)
-    return (kernel + np.cos(half * angle)) / count
+    return (kernel + np.cos(half * angle) if highest is None or highest >= half else kernel) / count
 
 
 @lru_cache(maxsize=32)
-def _even_to_panel(count: int, panels: int, degree: int) -> Array:
+def _even_to_panel(count: int, panels: int, degree: int, highest: int) -> Array:
     """Samples at `count` even times of a period -> Chebyshev coefficients on the first of even panels.
 
-    (degree + 1, count). Through the Fourier series, whose highest term is halved (count even).
+    (degree + 1, count). Through the Fourier series up to a harmonic, whose last term is halved (count even).
     """
     if count == 1:
         return np.ones((1, 1))
     phase = (2.0 * np.pi / panels) * (0.5 + 0.5 * unit_nodes(degree))
     angle = phase[:, None] - 2.0 * np.pi / count * np.arange(count)
-    return values_to_coefficients(degree) @ _periodic_sinc(angle, count)
+    return values_to_coefficients(degree) @ _periodic_sinc(angle, count, highest)

@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Array, Integers, Mask
 from ..chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import AccuracyNotReached
+from ._last_terms import Perturbed, perturbed
 from ._spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_norms
 from .interpolant import Interpolant
 from .resolved import ResolvedPath
@@ -182,6 +183,19 @@ class PanelSampler:
             starts = edges[-1] * np.arange(self._loops)
             edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
         return Interpolant(edges, coefficients[order], self._loops, self._channels.count)
+
+    def perturbed(self, momentum: float) -> Perturbed:
+        """As `Sampler.perturbed`."""
+        degrees = np.concatenate([np.full(len(g.left), d) for d, g in self._groups.items()])
+        left = np.concatenate([g.left for g in self._groups.values()])
+        hidden = 0.0
+        for degree, g in self._groups.items():
+            between, noise = self._hidden(degree, momentum)
+            seen = 0.5 * g.width * (np.nan_to_num(g.gaps) @ np.array([momentum, 1.0]))
+            hidden += float((between + noise + seen).sum())
+        interpolant, order = self.interpolant(), np.argsort(left)
+        widths = np.diff(interpolant.edges[: len(left) + 1])
+        return perturbed(interpolant.coefficients, degrees[order], widths, momentum, self._loops * hidden)
 
     def _refine_panels(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""

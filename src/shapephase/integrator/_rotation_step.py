@@ -17,8 +17,6 @@ from ..arrays import Array
 
 Scalars = Any  # numbers, arrays or symbols, one for each component
 STAGES = 12
-# Keeps the ratio of two estimates defined where both are zero; its square root is far below any turn [rad^2].
-_TINY = 1e-200
 
 
 @lru_cache(maxsize=1)
@@ -29,15 +27,7 @@ def tableau() -> tuple[Array, Array, Array]:
     return DOP853.A[:STAGES, :STAGES], DOP853.B[:STAGES], DOP853.C[:STAGES]
 
 
-@lru_cache(maxsize=1)
-def _differences() -> tuple[Array, Array]:
-    """Weights (12,) of the differences to the formulas of fifth and third order on the same stages."""
-    from scipy.integrate import DOP853
-
-    return DOP853.E5[:STAGES], DOP853.E3[:STAGES]
-
-
-def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tuple[list[Any], Any, Any, list[Any]]:
+def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tuple[list[Any], Any, Any]:
     """A step with momentum.
 
     Parameters
@@ -52,10 +42,8 @@ def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tupl
     direction : at the end of the step, of length one
     turn : angle about the starting direction, to be followed by the shortest rotation between the directions [rad]
     dynamic : the step's dynamic phase, the integral of omega . Pi/|Pi| [rad]
-    differences : to formulas of order five and three, three components and the turn each
     """
     a, b, _ = tableau()
-    fifth, third = _differences()
     slopes: list[list[Any]] = []
     turns: list[list[Any]] = []
     dynamics: list[list[Any]] = []
@@ -63,7 +51,7 @@ def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tupl
         p = _combination(direction, a[stage, :stage], slopes)
         omega = turn_rate([magnitude * component for component in p], channels[stage])
         slopes.append(_cross(p, omega))
-        if b[stage] == 0.0 and fifth[stage] == 0.0 and third[stage] == 0.0:
+        if b[stage] == 0.0:
             turns.append([0.0])
             dynamics.append([0.0])
             continue
@@ -72,29 +60,23 @@ def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tupl
         dynamics.append([along])
     end = unit(_combination(direction, b, slopes))
     (turn,), (dynamic,) = _combination([0.0], b, turns), _combination([0.0], b, dynamics)
-    nothing = [0.0, 0.0, 0.0, 0.0]
-    both = [[*slope, *turn_slope] for slope, turn_slope in zip(slopes, turns, strict=True)]
-    differences = _combination(nothing, fifth, both) + _combination(nothing, third, both)
-    return end, turn, dynamic, differences
+    return end, turn, dynamic
 
 
-def rest_step(drifts: Scalars) -> tuple[list[Any], list[Any]]:
-    """A step without momentum: the quaternion of its rotation, and its differences to orders five and three.
+def rest_step(drifts: Scalars) -> list[Any]:
+    """A step without momentum: the quaternion of its rotation.
 
     Parameters
     ----------
     drifts : for each of the 12 stage times the step length times I^-1 L_o, three entries
     """
     a, b, _ = tableau()
-    fifth, third = _differences()
     slopes: list[list[Any]] = []
     for stage in range(STAGES):
         x, y, z, w = _combination([0.0, 0.0, 0.0, 1.0], a[stage, :stage], slopes)
         p, q, r = (-0.5 * drift for drift in drifts[stage])
         slopes.append([w * p + y * r - z * q, w * q + z * p - x * r, w * r + x * q - y * p, -(x * p + y * q + z * r)])
-    nothing = [0.0, 0.0, 0.0, 0.0]
-    differences = _combination(nothing, fifth, slopes) + _combination(nothing, third, slopes)
-    return unit(_combination([0.0, 0.0, 0.0, 1.0], b, slopes)), [2.0 * part for part in differences]
+    return unit(_combination([0.0, 0.0, 0.0, 1.0], b, slopes))
 
 
 def attitude_step(quat_xyzw: Scalars, momentum: Scalars, channels: Scalars) -> list[Any]:
@@ -111,17 +93,6 @@ def attitude_step(quat_xyzw: Scalars, momentum: Scalars, channels: Scalars) -> l
         half = [0.5 * rate for rate in turn_rate(seen, channels[stage])]
         slopes.append(product(q, [*half, 0.0]))
     return unit(_combination(quat_xyzw, b, slopes))
-
-
-def local_error(differences: Scalars) -> Any:
-    """Error estimate of a step from its differences to orders five and three [rad].
-
-    Hairer's combination of the two falls with the eighth power of the step, like the error itself, and is large
-    where the step is too long for either to mean anything.
-    """
-    fifth = sum(part * part for part in differences[:4])
-    third = sum(part * part for part in differences[4:])
-    return fifth / (fifth + 0.01 * third + _TINY) ** 0.5
 
 
 def turned(quat_xyzw: Scalars, start: Scalars, end: Scalars, half_turn: tuple[Any, Any]) -> list[Any]:

@@ -89,6 +89,12 @@ class TailEstimate(NamedTuple):
     at_rounding: bool
     largest: float
     floor: float  # what rounding alone leaves
+    tail: float  # the largest of the last coefficients
+
+
+def tail_length(degree: int) -> int:
+    """How many of the last coefficients are looked at: single ones are small by chance, or by a motion's symmetry."""
+    return max(2, degree // 10)
 
 
 def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
@@ -97,10 +103,9 @@ def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
     largest = max(norms)
     if degree == 0:
         return TailEstimate(
-            error=0.0, decay=inf, converging=True, at_rounding=True, largest=largest, floor=EPS * largest
+            error=0.0, decay=inf, converging=True, at_rounding=True, largest=largest, floor=EPS * largest, tail=0.0
         )
-    # The largest of a window: single coefficients are small by chance, or by the symmetry of a motion.
-    tail, middle = max(norms[-max(2, degree // 10) :]), max(norms[degree // 2 - 1 : degree // 2 + 2])
+    tail, middle = max(norms[-tail_length(degree) :]), max(norms[degree // 2 - 1 : degree // 2 + 2])
     floor = _ROUNDING * largest + 4.0 * time_rounding * sum(map(mul, norms, range(degree + 1)))
     decay = log(middle / tail) * 2.0 / degree if middle > tail > 0.0 else 0.0
     beyond_tail = 2.0 * tail / expm1(decay) if decay > 0.0 else inf
@@ -113,6 +118,7 @@ def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
         at_rounding=tail <= 0.05 * floor,
         largest=largest,
         floor=floor,
+        tail=tail,
     )
 
 
@@ -176,7 +182,7 @@ def estimate_spectrum(norms: Array, time_rounding: Array | float) -> SpectralEst
             drift_norm=norms[:, 0, 1],
             floor=norms[:, 0] * EPS,
         )
-    centre, last_tenth = degree // 2, degree + 1 - max(2, degree // 10)
+    centre, last_tenth = degree // 2, degree + 1 - tail_length(degree)
     parts = np.maximum.reduceat(norms, (0, centre - 1, centre + 2, last_tenth), axis=1)
     largest, middle, tail = parts.max(axis=1), parts[:, 1], parts[:, 3]
     floor = _ROUNDING * largest + (4.0 * np.reshape(time_rounding, (-1, 1))) * (np.arange(degree + 1) @ norms)

@@ -1,15 +1,15 @@
 """From sampled I^-1 and I^-1 L_o to rotations: the one integrator of the library.
 
 The deformation is sampled first (`sampling`), without regard to the rotation; then the attitude equation is
-stepped on the interpolant, as finely as the rotation needs. An embedded formula estimates each step's error, and the
-linearised equation, integrated along with it, shows how errors grow.
+stepped on the interpolant, as finely as the rotation needs. Errors are measured: by half as many steps, and by half as
+many on series with errors like those they probably have. The linearised equation, integrated along with it, shows how
+rounding grows.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
-from itertools import groupby
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -17,43 +17,45 @@ import numpy as np
 from .. import so3, sphere
 from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
-from ..chebyshev import chebyshev
 from ..errors import AccuracyNotReached
 from ._dense_output import DenseOutput
 from ._error_propagator import amplification, exact_propagators, momentum_slope
-from ._rotation_step import STAGES, tableau
-from ._step_control import StepRequirements, carried_over, finer
-from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest
+from ._march import FEW, Marches, march, march_at_rest, stage_channels
+from ._step_control import StepRequirements, even_steps
 from .interpolant import Interpolant
 from .sampling import Sampler
 
 _EPS = np.finfo(float).eps
 # Steps of one motion: some ten seconds, and a gigabyte of results.
 _MOST_STEPS = 4_000_000
-# Rounds of refinement; most motions need one, and after twelve the error is at its floor.
+# Rounds of refinement; most motions need one.
 _MOST_ROUNDS = 12
 # Steps of one motion from which on propagators are not integrated along: the derivative of coarser steps costs less.
 _MANY_STEPS = 4000
-# Of the tolerance, for sampling at first: errors grow by a factor not yet known, and samples are cheaper than a second
-# round.
-_SAMPLING_SHARE = 0.05
-# The same without momentum, where errors do not grow.
-_SAMPLING_SHARE_AT_REST = 0.3
-# Of the tolerance, for the first plan of many momenta at once.
+# Of the tolerance, for what the samplers say of themselves at first; it is ten to a hundred times the truth.
+_SAMPLING_SHARE = 0.3
+# Of the tolerance: what the samplers say, amplified, is not worth a march of its own below.
+_NEGLIGIBLE = 0.005
+# What errors are expected to grow by for each radian turned, and at most, before it is known.
+_EXPECTED_GROWTH = 0.5
+_MOST_EXPECTED_GROWTH = 30.0
+# Of the room that rounding leaves: what stepping and sampling may take up, and what a further round aims at.
+_MOST_STEPPING = 0.5
+_MOST_SAMPLING = 0.4
+_AIM = 0.2
+# The order of the steps.
+_ORDER = 8.0
+# Of the tolerance, for the plan of many momenta at once: some need more steps than most, and a second round would
+# repeat them all.
 _MARGIN_OF_MANY = 0.1
-# [rad] for a single step: it is far below rounding, and a stricter plan would only waste steps.
-_LEAST_STEP_TOLERANCE = 1e-18
-# Of the tolerance: Chebyshev degrees that the plan neglects.
-_INSIGNIFICANT_SHARE = 1e-3
-# [rad] sum of local errors up to which the propagators of the steps are trusted.
-_INFORMATIVE_ERROR = 1e-2
+# [rad] distance of coarser steps up to which the propagators of the steps are trusted.
+_INFORMATIVE_ERROR = 0.1
 # Of the tolerance: with more rounding than this no refinement reaches it.
 _MOST_ROUNDING = 0.9
 # Of the error at the ends of the steps: what the polynomials between them may add.
 _DENSE_SHARE = 5e-3
 _BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
-    "propagator",
 )  # fmt: skip
 
 
@@ -72,8 +74,6 @@ class SteppedRotation:
     dynamics : (B, K) dynamic phase of each step [rad]
     sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
-    propagator : (B, 3, 3) how a small turn of the start, S exp(hat(delta)) in base axes, reaches the end; to a few
-        thousandths, enough to judge errors and to steer a search
     """
 
     interpolant: Interpolant
@@ -86,7 +86,6 @@ class SteppedRotation:
     sampling_error: Array
     stepping_error: Array
     amplification: Array
-    propagator: Array
 
     @cached_property
     def panel(self) -> Integers:
@@ -169,9 +168,11 @@ class SteppedRotation:
     def momentum_slope(self) -> Array:
         """How the end turns, S exp(hat(slope dPi)), by a change dPi of the body momentum at the start: (B, 3, 3).
 
-        The derivative of steps like those that were taken.
+        The derivative of steps half as long as those that were taken.
         """
-        return momentum_slope(_stage_channels(self.interpolant, self.steps), self.momentum, self.interpolant.loops)
+        # The error of a derivative is larger than that of the steps: twice as many make it smaller.
+        channels = stage_channels(self.interpolant, 2 * self.steps)
+        return momentum_slope(channels, self.momentum, self.interpolant.loops)
 
     @cached_property
     def _dense(self) -> DenseOutput:
@@ -225,30 +226,16 @@ def stepped_rotation(
     return _Integration(sampler, momentum, tolerance, subdivide).solution()
 
 
-class _ErrorGrowth(NamedTuple):
-    """How errors grow along the motions of a batch."""
-
-    amplification: Array  # (B,) from one time to a later one
-    propagator: Array  # (B, 3, 3) from the start to the end
-
-
 class _Attempt(NamedTuple):
     """One round of steps with its error estimates."""
 
     rotation: SteppedRotation
-    local_errors: Array  # (B, K) of each step [rad]
+    stepping: Array  # (B,) distance of half as many steps [rad]
 
     @property
     def is_informative(self) -> bool:
         """Whether it shows how errors grow; steps that are still far too long do not."""
-        small = self.local_errors.sum(axis=1).max() < _INFORMATIVE_ERROR
-        return bool(small and np.isfinite(self.rotation.amplification).all())
-
-    def panel_errors(self) -> Array:
-        """The sums of the local errors on each panel, the worst of all loops and momenta: (P,) [rad]."""
-        steps, loops = self.rotation.steps, self.rotation.interpolant.loops
-        by_loop = self.local_errors.reshape(len(self.local_errors), loops, -1).sum(axis=1)
-        return np.add.reduceat(by_loop, np.cumsum(steps) - steps, axis=1).max(axis=0)
+        return bool(self.stepping.max() < _INFORMATIVE_ERROR and np.isfinite(self.rotation.amplification).all())
 
 
 class _Integration:
@@ -259,100 +246,105 @@ class _Integration:
         self._subdivide = 1 if subdivide is None else subdivide
         self._magnitudes = np.sqrt((momentum * momentum).sum(axis=-1))
         self._largest = float(self._magnitudes.max(initial=0.0))
-        share = _SAMPLING_SHARE if self._largest > 0.0 else _SAMPLING_SHARE_AT_REST
-        self._sampling_target = share * tolerance
-        # What earlier rounds found out: how errors grow where only the derivative shows it, and a finer plan.
-        self._error_growth: _ErrorGrowth | None = None
-        self._refined: tuple[Array, Integers] | None = None  # panel ends [s], steps on each panel
+        # What earlier rounds found out: how much finer samples and steps must be, and how errors grow.
+        self._sampling_target = _SAMPLING_SHARE * tolerance
+        self._finer = 1.0
+        self._amplification: float | None = None
+        # The same for every momentum, where only the derivative of the steps shows it.
+        self._amplifications: Array | None = None
 
     def solution(self) -> SteppedRotation:
         """The first attempt whose error estimate is within the tolerance for every momentum."""
-        number = 0
+        number, best = 0, np.inf
         while True:
             self._sampler.refine(self._largest, self._sampling_target)
             attempt = self._attempt(self._sampler.interpolant())
-            if (attempt.rotation.error_estimate <= self._tolerance).all():
+            estimate = float(attempt.rotation.error_estimate.max(initial=0.0))
+            if estimate <= self._tolerance:
                 return _for_whole_batch(attempt.rotation, self._momentum)
-            steps = self._refine(attempt, number)
             number += 1
-            if number == _MOST_ROUNDS or steps > _MOST_STEPS or self._is_hopeless(attempt):
+            # Finer steps and samples that bring nothing twice: what is left is rounding.
+            stuck = number > 2 and estimate > 0.9 * best and attempt.is_informative
+            if number == _MOST_ROUNDS or stuck or self._is_hopeless(attempt):
                 raise _not_reached(self._tolerance, attempt.rotation)
+            best = min(best, estimate)
+            self._refine(attempt)
 
     def _attempt(self, interpolant: Interpolant) -> _Attempt:
         """Steps as planned, and the error estimates of the result."""
+        expected = self._sampler.error(self._largest)
         requirements = StepRequirements.from_interpolant(interpolant, self._largest, self._tolerance)
+        growth = self._amplification
+        if growth is None:
+            turn = requirements.whole_turn if self._largest else 0.0
+            growth = min(1.0 + _EXPECTED_GROWTH * turn, _MOST_EXPECTED_GROWTH)
+        perturbed = None
+        if expected * growth > _NEGLIGIBLE * self._tolerance:
+            perturbed = self._sampler.perturbed(self._largest)
         steps = self._plan(interpolant, requirements)
-        record = self._take_steps(interpolant, steps)
-        local = requirements.safety_factor(steps) * record.errors
-        total = local.sum(axis=1)
-        if not np.isfinite(total).all():
-            # Steps so long that they overflowed: as wrong as an attitude can be.
-            local = np.where(np.isfinite(local), local, np.pi)
-            total = local.sum(axis=1)
-        error_growth = self._error_growth or _ErrorGrowth(amplification(record.propagators), _end_propagator(record))
+        marches = self._march(interpolant, None if perturbed is None else perturbed.coefficients, steps)
+        stepping = np.where(np.isfinite(marches.stepping), marches.stepping, np.pi)
+        amplifications = self._amplifications
+        if amplifications is None:
+            amplifications = amplification(marches.propagators)
+        sampling = amplifications * expected
+        if perturbed is not None:
+            measured = marches.truncation + amplifications * perturbed.hidden
+            sampling = np.fmin(sampling, measured)
         rotation = SteppedRotation(
             interpolant=interpolant,
             momentum=self._momentum,
             steps=steps,
-            quaternions=record.quaternions,
-            directions=record.directions,
-            turns=record.turns,
-            dynamics=record.dynamics,
-            sampling_error=error_growth.amplification * self._sampler.error(self._largest),
-            # Degrees that the plan took for insignificant count too.
-            stepping_error=error_growth.amplification * total + _INSIGNIFICANT_SHARE * self._tolerance,
-            amplification=error_growth.amplification,
-            propagator=error_growth.propagator,
+            quaternions=marches.quaternions,
+            directions=marches.directions,
+            turns=marches.turns,
+            dynamics=marches.dynamics,
+            sampling_error=sampling,
+            stepping_error=requirements.part_of_coarser(steps) * stepping,
+            amplification=amplifications,
         )
-        return _Attempt(rotation, local)
+        return _Attempt(rotation, stepping)
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> Integers:
         """Steps on each panel: (P,). Finds the growth of errors first where the steps themselves will not show it."""
-        # The derivative for each of many momenta would take too long; with steps this short it is not needed.
-        short = requirements.far and len(self._momentum) > FEW
-        least = requirements.least_steps(short=short)
-        if self._refined is None:
-            # Among many momenta some need more steps than most, and a second round would repeat them all.
-            margin = 1.0 if len(self._momentum) <= FEW else _MARGIN_OF_MANY
-            planned = requirements.first_plan(margin * self._tolerance)
-        else:
-            planned = carried_over(interpolant, *self._refined)
-        count = interpolant.loops * float(np.maximum(planned, least).sum())
+        few = len(self._momentum) <= FEW
+        # The derivative for each of many momenta would take too long; with short steps it is not needed.
+        short = requirements.far and not few
+        goal = self._tolerance * (1.0 if few else _MARGIN_OF_MANY)
+        planned = self._finer * requirements.plan(goal, short=short)
+        count = interpolant.loops * float(planned.sum())
         if count > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         many = count > _MANY_STEPS
-        if self._largest > 0.0 and self._error_growth is None and (many or (requirements.far and not short)):
-            self._error_growth = _error_growth_by_derivative(interpolant, self._momentum, self._magnitudes)
-            # The errors of so many steps add up and are amplified: each must be that much smaller.
-            worst = float(np.nan_to_num(self._error_growth.amplification).max())
-            share = 0.01 * planned.sum() * interpolant.loops * max(1.0, worst)
-            planned = requirements.first_plan(max(self._tolerance / share, _LEAST_STEP_TOLERANCE))
-        return self._subdivide * np.ceil(np.maximum(planned, least) / self._subdivide).astype(int)
+        if self._largest > 0.0 and (many or (requirements.far and not short)):
+            if self._amplifications is None:
+                self._amplifications = _amplification_by_derivative(interpolant, self._momentum, self._magnitudes)
+            # Errors will be amplified: each must be that much smaller.
+            worst = max(1.0, float(np.nan_to_num(self._amplifications).max()))
+            planned = self._finer * requirements.plan(goal / worst, short=short)
+        return even_steps(planned, self._subdivide)
 
-    def _take_steps(self, interpolant: Interpolant, steps: Integers) -> StepRecord:
+    def _march(self, interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> Marches:
         """All steps of all loops and momenta."""
-        channels = _stage_channels(interpolant, steps)
         if not self._magnitudes.any():
-            return integrate_steps_at_rest(channels, interpolant.loops)
+            return march_at_rest(interpolant, perturbed, steps)
         directions = _directions(self._momentum, self._magnitudes)
-        with_propagators = self._error_growth is None
-        return integrate_steps(
-            channels, directions, self._magnitudes, interpolant.loops, with_propagators=with_propagators
-        )
+        with_propagators = self._amplifications is None
+        with np.errstate(over="ignore", invalid="ignore"):
+            return march(interpolant, perturbed, steps, directions, self._magnitudes, with_propagators=with_propagators)
 
-    def _refine(self, attempt: _Attempt, number: int) -> int:
-        """Finer steps and samples for the next round, after round `number` from 0; the steps of all its loops."""
+    def _refine(self, attempt: _Attempt) -> None:
+        """Finer steps and samples for the next round."""
         rotation = attempt.rotation
-        worst = float(rotation.amplification.max()) if attempt.is_informative else 1.0
-        left = max(self._tolerance - float(rotation.rounding_error.max()), 0.1 * self._tolerance)
-        # Less in every round: where one of the errors is at its floor, the others must make room for it.
-        budget = 0.6 * 0.8**number * left / worst
-        steps, errors = rotation.steps, attempt.panel_errors()
-        if errors.sum() > budget:
-            steps = finer(steps, errors, budget)
-        self._refined = rotation.interpolant.edges[: len(steps) + 1], steps
-        self._sampling_target = min(self._sampling_target, 0.5 * budget)
-        return int(steps.sum()) * rotation.interpolant.loops
+        room = max(self._tolerance - float(rotation.rounding_error.max()), 0.1 * self._tolerance)
+        stepping, sampling = float(rotation.stepping_error.max()), float(rotation.sampling_error.max())
+        if stepping > _MOST_STEPPING * room:
+            self._finer *= float(np.clip((stepping / (_AIM * room)) ** (1.0 / _ORDER), 1.1, 4.0))
+        if attempt.is_informative:
+            self._amplification = float(rotation.amplification.max())
+        if sampling > _MOST_SAMPLING * room and attempt.is_informative:
+            expected = self._sampler.error(self._largest)
+            self._sampling_target = min(self._sampling_target, expected * _AIM * room / sampling)
 
     def _is_hopeless(self, attempt: _Attempt) -> bool:
         """Whether rounding alone takes up the tolerance."""
@@ -379,30 +371,23 @@ def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
     )
 
 
-def _error_growth_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> _ErrorGrowth:
-    """How errors grow along a long motion, by the derivative of coarse steps.
+def _amplification_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> Array:
+    """The largest growth of errors along long motions, by the derivative of coarse steps: (B,).
 
     Propagators that are only nearly right would drift off over many turns; the steps' own derivative does not.
     """
     largest = float(magnitudes.max())
-    least = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE).least_steps()
-    steps = np.ceil(np.maximum(least, 1.0)).astype(int)
-    channels, directions = _stage_channels(interpolant, steps), _directions(momentum, magnitudes)
-    error_growth = _ErrorGrowth(np.empty(len(magnitudes)), np.empty((len(magnitudes), 3, 3)))
+    requirements = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE)
+    steps = even_steps(requirements.plan(LOOSEST_TOLERANCE), 1)
+    channels, directions = stage_channels(interpolant, steps), _directions(momentum, magnitudes)
+    found = np.empty(len(magnitudes))
     with np.errstate(all="ignore"):
         for row in range(len(magnitudes)):
             part = slice(row, row + 1)
-            propagators = exact_propagators(channels, directions[part], magnitudes[part], interpolant.loops)
-            error_growth.amplification[part] = amplification(propagators)
-            error_growth.propagator[part] = propagators[:, -1]
-    return error_growth
-
-
-def _end_propagator(record: StepRecord) -> Array:
-    """How a small turn of the start reaches the end: (B, 3, 3)."""
-    if record.propagators.shape[1]:
-        return record.propagators[:, -1]
-    return so3.transpose(so3.matrix_from_quat(record.quaternions[:, -1]))
+            found[part] = amplification(
+                exact_propagators(channels, directions[part], magnitudes[part], interpolant.loops)
+            )
+    return found
 
 
 def _directions(momentum: Array, magnitudes: Array) -> Array:
@@ -420,30 +405,3 @@ def _for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotat
         return solution
     shared = {name: getattr(solution, name) for name in _BATCHED_FIELDS}
     return replace(solution, **{name: np.broadcast_to(v, (count, *v.shape[1:])) for name, v in shared.items()})
-
-
-def _stage_channels(interpolant: Interpolant, steps: Integers) -> Array:
-    """Channels at the 12 stages of each step of the first loop, times the step's length: (K, 108)."""
-    widths = np.diff(interpolant.edges[: len(steps) + 1])
-    coefficients = interpolant.coefficients * widths[:, None, None]
-    degrees = coefficients.shape[1]
-    channels = np.empty((int(steps.sum()) * STAGES, 9))
-    panel = row = 0
-    for count, run in groupby(steps.tolist()):
-        panels = len(list(run))
-        stop = row + panels * count * STAGES
-        out = channels[row:stop].reshape(panels, count * STAGES, 9)
-        np.matmul(_stage_matrix(degrees, count), coefficients[panel : panel + panels], out=out)
-        panel, row = panel + panels, stop
-    return channels.reshape(-1, 9 * STAGES)
-
-
-@lru_cache(maxsize=512)
-def _stage_matrix(degree_count: int, count: int) -> Array:
-    """Chebyshev coefficients of a panel -> values at all stages of its steps, times the step's share of it.
-
-    (12 count, degrees)
-    """
-    _, _, c = tableau()
-    x = 2.0 * (np.arange(count)[:, None] + c) / count - 1.0
-    return chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(STAGES * count, degree_count) / count

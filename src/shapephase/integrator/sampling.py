@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Array
 from ._even_sampling import EvenSampler
+from ._last_terms import Perturbed
 from ._panel_sampling import PanelSampler
 from ._spectral_error import Channels, Directly, Evaluate
 from .interpolant import Interpolant
@@ -42,6 +43,10 @@ class Sampler(Protocol):
 
     def interpolant(self) -> Interpolant:
         """The interpolant of all samples so far."""
+        ...
+
+    def perturbed(self, momentum: float) -> Perturbed:
+        """The same with errors like those that it probably has for momenta up to this magnitude."""
         ...
 
 
@@ -108,6 +113,10 @@ class LoopSampler:
         """As `Sampler.interpolant`."""
         return self._sampler.interpolant()
 
+    def perturbed(self, momentum: float) -> Perturbed:
+        """As `Sampler.perturbed`."""
+        return self._sampler.perturbed(momentum)
+
 
 class FinishedSampler:
     """A finished interpolant in the place of a sampler: nothing is evaluated again."""
@@ -125,3 +134,7 @@ class FinishedSampler:
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
         return self._interpolant
+
+    def perturbed(self, momentum: float) -> Perturbed:  # noqa: ARG002
+        """The same: its errors count elsewhere."""
+        return Perturbed(self._interpolant.coefficients, 0.0)

@@ -32,7 +32,6 @@ _STEPS = (
     "sampling_error",
     "stepping_error",
     "amplification",
-    "propagator",
 )
 _SAMPLES = ("edges", "coefficients")
 _CENTRE_DEGREE = 24

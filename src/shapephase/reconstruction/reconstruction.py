@@ -190,11 +190,6 @@ class Motion:
         """The largest growth of a small error of the attitude from one time to a later one: batch."""
         return self._stepped.amplification.reshape(self.batch)[()]
 
-    @property
-    def propagator(self) -> Array:
-        """`sensitivity.by_attitude` to a few thousandths, at no cost: batch + (3, 3)."""
-        return self._stepped.propagator.reshape(*self.batch, 3, 3)
-
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""

@@ -1,0 +1,374 @@
+"""The attitude equation stepped on an interpolant three times, so that the differences tell the errors.
+
+All steps; half as many; half as many on series with errors like those they probably have. For a few momenta each march
+is one CasADi call after another, for many the steps are taken on whole arrays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, Integers
+from ..chebyshev import chebyshev
+from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
+from .casadi_calls import call_casadi
+from .compilation import compiled_or_interpreted
+from .interpolant import Interpolant
+
+# Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
+BLOCK = 256
+# Momenta: up to so many, one after another in CasADi is faster than all at once on NumPy's arrays.
+FEW = 24
+# Times between which the growth of errors is compared: 28 pairs.
+CHECKPOINTS = 8
+# Momenta on arrays at once, so that the arrays of one step stay in the processor's cache.
+_ROWS_AT_ONCE = 2048
+# The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
+_INNER_STAGES = (5, 8)
+
+
+@dataclass(frozen=True, eq=False)
+class Marches:
+    """K steps for each momentum of a batch of B, and how far coarser marches come out from them.
+
+    Attributes
+    ----------
+    quaternions : (B, K + 1, 4) S at the step ends, xyzw
+    directions : (B, K + 1, 3) Pi/|Pi| at the step ends; without momentum (B, 0, 3)
+    turns : (B, K) of each step about its starting direction, the shortest rotation between its ends taken off [rad]
+    dynamics : (B, K) dynamic phase of each step [rad]
+    propagators : (B, CHECKPOINTS, 3, 3) error propagators, the state transition matrices that carry a small turn of the
+        start to even parts of the steps; (B, 0, 3, 3) without momentum or where they were not asked for
+    stepping : (B,) the largest angle between the steps and half as many, at the ends of the latter [rad]
+    truncation : (B,) the largest angle between half as many steps on the series and on the perturbed ones; zero without
+        these [rad]
+    """
+
+    quaternions: Array
+    directions: Array
+    turns: Array
+    dynamics: Array
+    propagators: Array
+    stepping: Array
+    truncation: Array
+
+
+def march(
+    interpolant: Interpolant,
+    perturbed: Array | None,
+    steps: Integers,
+    directions: Array,
+    magnitudes: Array,
+    *,
+    with_propagators: bool = True,
+) -> Marches:
+    """All steps of all loops, starting at the identity.
+
+    Parameters
+    ----------
+    perturbed : (P, n, 9) the interpolant's coefficients with errors like those they probably have; None: not marched on
+    steps : (P,) even, on each panel of one loop
+    directions : (B, 3) Pi/|Pi| at the start
+    magnitudes : (B,) of the momentum [kg m^2/s]
+    with_propagators : whether to integrate the error propagators too
+    """
+    total = interpolant.loops * int(steps.sum())
+    batch = len(magnitudes)
+    whole = Marches(
+        quaternions=np.empty((batch, total + 1, 4)),
+        directions=np.empty((batch, total + 1, 3)),
+        turns=np.empty((batch, total)),
+        dynamics=np.empty((batch, total)),
+        propagators=np.empty((batch, CHECKPOINTS if with_propagators else 0, 3, 3)),
+        stepping=np.empty(batch),
+        truncation=np.zeros(batch),
+    )
+    channels = _channels_at_stages(interpolant, interpolant.coefficients, steps)
+    coarse = _channels_at_stages(interpolant, interpolant.coefficients, steps // 2)
+    cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps // 2)
+    record, attitudes = (_record_one, _attitudes_of_one) if batch <= FEW else (_record_many, _attitudes_of_many)
+    at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
+    for first in range(0, batch, at_once):
+        rows = slice(first, first + at_once)
+        starts = directions[rows], magnitudes[rows]
+        record(whole, rows, channels, interpolant.loops, *starts)
+        half = attitudes(coarse, interpolant.loops, *starts)
+        whole.stepping[rows] = _largest_angle(whole.quaternions[rows, ::2], half)
+        if cut is not None:
+            whole.truncation[rows] = _largest_angle(half, attitudes(cut, interpolant.loops, *starts))
+    return whole
+
+
+def march_at_rest(interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> Marches:
+    """As `march` without momentum: a batch of one.
+
+    The equation is linear, so steps do not depend on each other, and a further loop repeats the rotation of the first:
+    it costs no steps.
+    """
+    loops, coefficients = interpolant.loops, interpolant.coefficients
+    whole = _quaternions_at_rest(_channels_at_stages(interpolant, coefficients, steps), loops)
+    half = _quaternions_at_rest(_channels_at_stages(interpolant, coefficients, steps // 2), loops)
+    truncation = 0.0
+    if perturbed is not None:
+        cut = _quaternions_at_rest(_channels_at_stages(interpolant, perturbed, steps // 2), loops)
+        truncation = _largest_angle(half, cut)
+    nothing = np.zeros((1, len(whole) - 1))
+    return Marches(
+        quaternions=whole[None],
+        directions=np.empty((1, 0, 3)),
+        turns=nothing,
+        dynamics=nothing,
+        propagators=np.empty((1, 0, 3, 3)),
+        stepping=np.array([_largest_angle(whole[::2], half)]),
+        truncation=np.array([truncation]),
+    )
+
+
+def checkpoint_steps(count: int) -> Integers:
+    """After how many of so many steps the propagators are kept: (CHECKPOINTS,), the first none, the last all."""
+    return np.arange(CHECKPOINTS) * count // (CHECKPOINTS - 1)
+
+
+def stage_channels(interpolant: Interpolant, steps: Integers) -> Array:
+    """Channels at the 12 stages of each step of the first loop, times the step's length: (K, 108)."""
+    return _channels_at_stages(interpolant, interpolant.coefficients, steps)
+
+
+def _channels_at_stages(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:
+    widths = np.diff(interpolant.edges[: len(steps) + 1])
+    scaled = coefficients * widths[:, None, None]
+    degrees = scaled.shape[1]
+    channels = np.empty((int(steps.sum()) * STAGES, 9))
+    panel = row = 0
+    for count, run in groupby(steps.tolist()):
+        panels = len(list(run))
+        stop = row + panels * count * STAGES
+        out = channels[row:stop].reshape(panels, count * STAGES, 9)
+        np.matmul(_stage_matrix(degrees, count), scaled[panel : panel + panels], out=out)
+        panel, row = panel + panels, stop
+    return channels.reshape(-1, 9 * STAGES)
+
+
+@lru_cache(maxsize=512)
+def _stage_matrix(degree_count: int, count: int) -> Array:
+    """Chebyshev coefficients of a panel -> values at all stages of its steps, times the step's share of it.
+
+    (12 count, degrees)
+    """
+    _, _, c = tableau()
+    x = 2.0 * (np.arange(count)[:, None] + c) / count - 1.0
+    return chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(STAGES * count, degree_count) / count
+
+
+def _largest_angle(a: Array, b: Array) -> Any:
+    """The largest angle between attitudes that are near each other: (..., K, 4) quaternions -> (...) [rad]."""
+    apart, opposite = a - b, a + b
+    # A quaternion and its negative are one attitude.
+    squares = np.minimum(np.einsum("...i,...i", apart, apart), np.einsum("...i,...i", opposite, opposite))
+    return 2.0 * np.sqrt(squares.max(axis=-1))
+
+
+def _record_one(
+    record: Marches, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
+) -> None:
+    """All steps of one momentum into its row."""
+    with_propagators = bool(record.propagators.shape[1])
+    row, done, total = rows.start, 0, loops * len(channels)
+    marks = checkpoint_steps(total)
+    state = _first_state(directions[0], magnitudes[0], with_propagators)
+    record.directions[row, 0], record.quaternions[row, 0] = state[:3], state[3:7]
+    record.propagators[row] = np.eye(3)
+    for states, sides in _blocks(channels, loops, state):
+        after = slice(done + 1, done + len(states) + 1)
+        record.directions[row, after], record.quaternions[row, after] = states[:, :3], states[:, 3:7]
+        record.turns[row, done : after.stop - 1], record.dynamics[row, done : after.stop - 1] = sides.T
+        if with_propagators:
+            reached = np.flatnonzero((marks > done) & (marks < after.stop))
+            record.propagators[row, reached] = states[marks[reached] - done - 1, 8:].reshape(-1, 3, 3)
+        done = after.stop - 1
+
+
+def _attitudes_of_one(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
+    """The quaternions alone at the ends of all steps: (1, K + 1, 4)."""
+    state = _first_state(directions[0], magnitudes[0], with_propagators=False)
+    parts = [states[:, 3:7] for states, _ in _blocks(channels, loops, state)]
+    return np.concatenate([state[None, 3:7], *parts])[None]
+
+
+def _first_state(direction: Array, magnitude: float, with_propagators: bool) -> Array:
+    """Direction, quaternion, magnitude and propagator at the start: (8,) or (17,)."""
+    state = np.zeros(17 if with_propagators else 8)
+    state[:3], state[6], state[7] = direction, 1.0, magnitude
+    state[8::4] = 1.0
+    return state
+
+
+def _blocks(channels: Array, loops: int, state: Array) -> Iterator[tuple[Array, Array]]:
+    """The states after the steps of each block (n, 8 or 17), and their turns and dynamic phases (n, 2)."""
+    for _ in range(loops):
+        for first in range(0, len(channels), BLOCK):
+            block = channels[first : first + BLOCK]
+            states, sides = call_casadi(_momentum_function(len(block), len(state) > 8), len(block), state, block)
+            yield states, sides
+            state = states[-1]
+
+
+def _record_many(
+    record: Marches, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
+) -> None:
+    """All steps of many momenta into their rows."""
+    with_propagators = bool(record.propagators.shape[1])
+    marks = checkpoint_steps(loops * len(channels)).tolist()
+    record.directions[rows, 0], record.quaternions[rows, 0] = directions, [0.0, 0.0, 0.0, 1.0]
+    record.propagators[rows] = np.eye(3)
+    propagator: Any = np.eye(3).tolist()
+    start = list(directions.T)
+    steps = _steps_of_many(channels, loops, directions, magnitudes)
+    for number, (step, end, quaternion, turn, dynamic) in enumerate(steps, 1):
+        record.turns[rows, number - 1], record.dynamics[rows, number - 1] = turn, dynamic
+        for column, part in enumerate(end):
+            record.directions[rows, number, column] = part
+        for column, part in enumerate(quaternion):
+            record.quaternions[rows, number, column] = part
+        if with_propagators:
+            propagator = _next_propagator(propagator, start, end, magnitudes, step)
+            for mark in (place for place, reached in enumerate(marks) if reached == number):
+                for i, line in enumerate(propagator):
+                    for j, part in enumerate(line):
+                        record.propagators[rows, mark, i, j] = part
+        start = end
+
+
+def _attitudes_of_many(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
+    """The quaternions alone at the ends of all steps: (B, K + 1, 4)."""
+    quaternions = np.empty((len(magnitudes), loops * len(channels) + 1, 4))
+    quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0]
+    for number, (_, _, quaternion, _, _) in enumerate(_steps_of_many(channels, loops, directions, magnitudes), 1):
+        for column, part in enumerate(quaternion):
+            quaternions[:, number, column] = part
+    return quaternions
+
+
+def _steps_of_many(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Iterator[tuple[Any, ...]]:
+    """After each step its channels, directions, quaternions, turns and dynamic phases, the components apart."""
+    direction, quaternion = list(directions.T), [0.0, 0.0, 0.0, 1.0]
+    steps = channels.reshape(-1, STAGES, 9).tolist()
+    for _ in range(loops):
+        for step in steps:
+            end, turn, dynamic = momentum_step(direction, magnitudes, step)
+            half = 0.5 * turn
+            quaternion = turned(quaternion, direction, end, (np.sin(half), np.cos(half)))
+            yield step, end, quaternion, turn, dynamic
+            direction = end
+
+
+def _quaternions_at_rest(channels: Array, loops: int) -> Array:
+    """At the ends of all steps without momentum: (loops K + 1, 4)."""
+    count = len(channels)
+    quaternions = np.empty((count + 1, 4))
+    quaternions[0] = [0.0, 0.0, 0.0, 1.0]
+    drifts = np.ascontiguousarray(channels.reshape(count, STAGES, 9)[:, :, 6:]).reshape(count, -1)
+    for first in range(0, count, BLOCK):
+        block = drifts[first : first + BLOCK]
+        (states,) = call_casadi(_rest_function(len(block)), len(block), quaternions[first], block)
+        quaternions[first + 1 : first + BLOCK + 1] = states
+    return _repeated(quaternions, loops) if loops > 1 else quaternions
+
+
+def _repeated(quaternions: Array, loops: int) -> Array:
+    """The first loop's quaternions after 0, 1, 2 ... loops, the last of each being the first of the next."""
+    x, y, z, w = quaternions[-1]
+    sine = np.sqrt(x * x + y * y + z * z)
+    half = np.arctan2(sine, w) * np.arange(loops)
+    axis = quaternions[-1, :3] / sine if sine > 0.0 else np.zeros(3)
+    powers = np.concatenate([np.sin(half)[:, None] * axis, np.cos(half)[:, None]], axis=1)
+    further = np.stack(product(list(powers.T[:, :, None]), list(quaternions[1:].T)), axis=-1).reshape(-1, 4)
+    return np.concatenate([quaternions[:1], further])
+
+
+def adjugate_of(matrix: Any) -> list[list[Any]]:
+    """Of a 3 x 3 matrix of numbers, arrays or symbols."""
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    return [
+        [e * i - f * h, c * h - b * i, b * f - c * e],
+        [f * g - d * i, a * i - c * g, c * d - a * f],
+        [d * h - e * g, b * g - a * h, a * e - b * d],
+    ]
+
+
+def _next_propagator(propagator: Any, start: Any, end: Any, magnitude: Any, channels: Any) -> list[list[Any]]:
+    """The error propagator after a step, by the Cayley transform of the variation at its middle, for each half of it.
+
+    That is a rotation where the variation is one, however long the step.
+    """
+    middle = [0.25 * magnitude * part for part in unit([a + b for a, b in zip(start, end, strict=True)])]
+    first, second = (channels[stage] for stage in _INNER_STAGES)
+    inner = [0.5 * (a + b) for a, b in zip(first[:6], second[:6], strict=True)]
+    quarter = variation(middle, [*inner, *(0.125 * (a + b) for a, b in zip(first[6:], second[6:], strict=True))])
+    onward, back = (
+        [[float(i == j) + sign * quarter[i][j] for j in range(3)] for i in range(3)] for sign in (1.0, -1.0)
+    )
+    adjugate = adjugate_of(back)
+    scale = 1.0 / (back[0][0] * adjugate[0][0] + back[0][1] * adjugate[1][0] + back[0][2] * adjugate[2][0])
+    half = matrix_product([[scale * entry for entry in row] for row in adjugate], onward)
+    return matrix_product(half, matrix_product(half, propagator))
+
+
+def matrix_product(a: Any, b: Any) -> list[list[Any]]:
+    """Of two 3 x 3 matrices of numbers, arrays or symbols."""
+    return [[row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j] for j in range(3)] for row in a]
+
+
+@lru_cache(maxsize=1024)
+def _momentum_function(length: int, with_propagators: bool) -> Any:
+    """`length` steps as one CasADi function of the state (direction, quaternion, magnitude, propagator)."""
+    return compiled_or_interpreted(momentum_step_function(with_propagators)).mapaccum("steps", length)
+
+
+@lru_cache(maxsize=512)
+def _rest_function(length: int) -> Any:
+    """`length` steps without momentum as one CasADi function of the quaternion and the drifts."""
+    return compiled_or_interpreted(rest_step_function()).mapaccum("steps", length)
+
+
+@lru_cache(maxsize=2)
+def momentum_step_function(with_propagators: bool) -> Any:
+    """One step as a CasADi function: state and channels -> the next state; turn and dynamic phase."""
+    import casadi
+
+    state, data = casadi.SX.sym("state", 17 if with_propagators else 8), casadi.SX.sym("channels", 9 * STAGES)
+    parts, components = casadi.vertsplit(state), casadi.vertsplit(data)
+    channels = [components[9 * s : 9 * s + 9] for s in range(STAGES)]
+    direction, quaternion, magnitude = parts[:3], parts[3:7], parts[7]
+    end, turn, dynamic = momentum_step(direction, magnitude, channels)
+    attitude = turned(quaternion, direction, end, (casadi.sin(0.5 * turn), casadi.cos(0.5 * turn)))
+    following = [*end, *attitude, magnitude]
+    if with_propagators:
+        propagator = [parts[8 + 3 * i : 11 + 3 * i] for i in range(3)]
+        following += [part for row in _next_propagator(propagator, direction, end, magnitude, channels) for part in row]
+    name = "momentum_step_with_propagator" if with_propagators else "momentum_step"
+    return casadi.Function(name, [state, data], [casadi.vertcat(*following), casadi.vertcat(turn, dynamic)])
+
+
+@lru_cache(maxsize=1)
+def rest_step_function() -> Any:
+    """One step without momentum as a CasADi function: quaternion and drifts -> the next one."""
+    import casadi
+
+    state, data = casadi.SX.sym("state", 4), casadi.SX.sym("drifts", 3 * STAGES)
+    components = casadi.vertsplit(data)
+    turn = rest_step([components[3 * s : 3 * s + 3] for s in range(STAGES)])
+    following = casadi.vertcat(*unit(product(casadi.vertsplit(state), turn)))
+    return casadi.Function("rest_step", [state, data], [following])
+
+
+def forget_functions() -> None:
+    """Build the functions anew when next needed."""
+    for kept in (_momentum_function, _rest_function):
+        kept.cache_clear()
