@@ -12,7 +12,6 @@ from ..arrays import Array
 from ._march import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
 from ._rotation_step import STAGES, attitude_step
 from .casadi_calls import call_casadi, map_rows
-from .compilation import compiled_or_interpreted
 
 
 def amplification(propagators: Array) -> Array:
@@ -108,7 +107,7 @@ def _derivatives(channels: Array, direction: Array, magnitude: float, loops: int
 @lru_cache(maxsize=512)
 def _slope_function(length: int) -> Any:
     """`length` steps as one CasADi function of quaternion, Pi at the start and the quaternion's derivatives by it."""
-    return compiled_or_interpreted(slope_step_function()).mapaccum("steps", length)
+    return slope_step_function().mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1)
@@ -130,7 +129,7 @@ def slope_step_function() -> Any:
 @lru_cache(maxsize=512)
 def _derivative_function(length: int, columns: int) -> Any:
     """`length` steps as one CasADi function of the state with its derivatives, and the channels."""
-    return compiled_or_interpreted(derivative_step_function(columns)).mapaccum("steps", length)
+    return derivative_step_function(columns).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1)
@@ -144,9 +143,3 @@ def derivative_step_function(columns: int) -> Any:
     further = casadi.reshape(casadi.jtimes(following, state, slopes), 8 * columns, 1)
     whole = casadi.vertcat(state, casadi.reshape(slopes, 8 * columns, 1))
     return casadi.Function(f"derivative_step_{columns}", [whole, data], [casadi.vertcat(following, further)])
-
-
-def forget_functions() -> None:
-    """Build the functions anew when next needed."""
-    _slope_function.cache_clear()
-    _derivative_function.cache_clear()

@@ -18,7 +18,6 @@ from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
 from .casadi_calls import call_casadi
-from .compilation import compiled_or_interpreted
 from .interpolant import Interpolant
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
@@ -328,13 +327,13 @@ def matrix_product(a: Any, b: Any) -> list[list[Any]]:
 @lru_cache(maxsize=1024)
 def _momentum_function(length: int, with_propagators: bool) -> Any:
     """`length` steps as one CasADi function of the state (direction, quaternion, magnitude, propagator)."""
-    return compiled_or_interpreted(momentum_step_function(with_propagators)).mapaccum("steps", length)
+    return momentum_step_function(with_propagators).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=512)
 def _rest_function(length: int) -> Any:
     """`length` steps without momentum as one CasADi function of the quaternion and the drifts."""
-    return compiled_or_interpreted(rest_step_function()).mapaccum("steps", length)
+    return rest_step_function().mapaccum("steps", length)
 
 
 @lru_cache(maxsize=2)
@@ -366,9 +365,3 @@ def rest_step_function() -> Any:
     turn = rest_step([components[3 * s : 3 * s + 3] for s in range(STAGES)])
     following = casadi.vertcat(*unit(product(casadi.vertsplit(state), turn)))
     return casadi.Function("rest_step", [state, data], [following])
-
-
-def forget_functions() -> None:
-    """Build the functions anew when next needed."""
-    for kept in (_momentum_function, _rest_function):
-        kept.cache_clear()
