@@ -9,8 +9,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._march import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
 from ._rotation_step import STAGES, attitude_step
+from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
 from .casadi_calls import call_casadi, map_rows
 
 

@@ -93,10 +93,10 @@ class StepRequirements(NamedTuple):
         # As many on each panel as make the sum of all the least.
         each = self.swing ** (1.0 / (_ORDER + 1.0))
         common = self.loops * _DISTANCE * float(np.sqrt((each * each).sum())) / (_AIM * tolerance)
-        wanted = 2.0 * common ** (1.0 / _ORDER) * each
+        planned = 2.0 * common ** (1.0 / _ORDER) * each
         turn = _SHORT_TURN_A_STEP if short else _TURN_A_STEP
         least = np.maximum(self.degree / _DEGREES_A_STEP, self.turn / turn)
-        return np.maximum(np.maximum(wanted, least), 1.0)
+        return np.maximum(np.maximum(planned, least), 1.0)
 
     def part_of_coarser(self, steps: Integers) -> float:
         """Bound of the error of so many steps (P,), relative to their distance from half as many."""

@@ -20,8 +20,8 @@ from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._dense_output import DenseOutput
 from ._error_propagator import amplification, exact_propagators, momentum_slope
-from ._march import FEW, Marches, march, march_at_rest, stage_channels
 from ._step_control import StepRequirements, even_steps
+from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest, stage_channels
 from .interpolant import Interpolant
 from .sampling import Sampler
 
@@ -282,23 +282,23 @@ class _Integration:
         if expected * growth > _NEGLIGIBLE * self._tolerance:
             perturbed = self._sampler.perturbed(self._largest)
         steps = self._plan(interpolant, requirements)
-        marches = self._march(interpolant, None if perturbed is None else perturbed.coefficients, steps)
-        stepping = np.where(np.isfinite(marches.stepping), marches.stepping, np.pi)
+        record = self._take_steps(interpolant, None if perturbed is None else perturbed.coefficients, steps)
+        stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
         amplifications = self._amplifications
         if amplifications is None:
-            amplifications = amplification(marches.propagators)
+            amplifications = amplification(record.propagators)
         sampling = amplifications * expected
         if perturbed is not None:
-            measured = marches.truncation + amplifications * perturbed.hidden
+            measured = record.truncation + amplifications * perturbed.hidden
             sampling = np.fmin(sampling, measured)
         rotation = SteppedRotation(
             interpolant=interpolant,
             momentum=self._momentum,
             steps=steps,
-            quaternions=marches.quaternions,
-            directions=marches.directions,
-            turns=marches.turns,
-            dynamics=marches.dynamics,
+            quaternions=record.quaternions,
+            directions=record.directions,
+            turns=record.turns,
+            dynamics=record.dynamics,
             sampling_error=sampling,
             stepping_error=requirements.part_of_coarser(steps) * stepping,
             amplification=amplifications,
@@ -324,14 +324,16 @@ class _Integration:
             planned = self._finer * requirements.plan(goal / worst, short=short)
         return even_steps(planned, self._subdivide)
 
-    def _march(self, interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> Marches:
+    def _take_steps(self, interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> StepRecord:
         """All steps of all loops and momenta."""
         if not self._magnitudes.any():
-            return march_at_rest(interpolant, perturbed, steps)
+            return integrate_steps_at_rest(interpolant, perturbed, steps)
         directions = _directions(self._momentum, self._magnitudes)
         with_propagators = self._amplifications is None
         with np.errstate(over="ignore", invalid="ignore"):
-            return march(interpolant, perturbed, steps, directions, self._magnitudes, with_propagators=with_propagators)
+            return integrate_steps(
+                interpolant, perturbed, steps, directions, self._magnitudes, with_propagators=with_propagators
+            )
 
     def _refine(self, attempt: _Attempt) -> None:
         """Finer steps and samples for the next round."""

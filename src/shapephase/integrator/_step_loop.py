@@ -33,7 +33,7 @@ _INNER_STAGES = (5, 8)
 
 
 @dataclass(frozen=True, eq=False)
-class Marches:
+class StepRecord:
     """K steps for each momentum of a batch of B, and how far coarser marches come out from them.
 
     Attributes
@@ -58,7 +58,7 @@ class Marches:
     truncation: Array
 
 
-def march(
+def integrate_steps(
     interpolant: Interpolant,
     perturbed: Array | None,
     steps: Integers,
@@ -66,7 +66,7 @@ def march(
     magnitudes: Array,
     *,
     with_propagators: bool = True,
-) -> Marches:
+) -> StepRecord:
     """All steps of all loops, starting at the identity.
 
     Parameters
@@ -79,7 +79,7 @@ def march(
     """
     total = interpolant.loops * int(steps.sum())
     batch = len(magnitudes)
-    whole = Marches(
+    whole = StepRecord(
         quaternions=np.empty((batch, total + 1, 4)),
         directions=np.empty((batch, total + 1, 3)),
         turns=np.empty((batch, total)),
@@ -104,8 +104,8 @@ def march(
     return whole
 
 
-def march_at_rest(interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> Marches:
-    """As `march` without momentum: a batch of one.
+def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> StepRecord:
+    """As `integrate_steps` without momentum: a batch of one.
 
     The equation is linear, so steps do not depend on each other, and a further loop repeats the rotation of the first:
     it costs no steps.
@@ -118,7 +118,7 @@ def march_at_rest(interpolant: Interpolant, perturbed: Array | None, steps: Inte
         cut = _quaternions_at_rest(_channels_at_stages(interpolant, perturbed, steps // 2), loops)
         truncation = _largest_angle(half, cut)
     nothing = np.zeros((1, len(whole) - 1))
-    return Marches(
+    return StepRecord(
         quaternions=whole[None],
         directions=np.empty((1, 0, 3)),
         turns=nothing,
@@ -174,7 +174,7 @@ def _largest_angle(a: Array, b: Array) -> Any:
 
 
 def _record_one(
-    record: Marches, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
+    record: StepRecord, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
 ) -> None:
     """All steps of one momentum into its row."""
     with_propagators = bool(record.propagators.shape[1])
@@ -219,7 +219,7 @@ def _blocks(channels: Array, loops: int, state: Array) -> Iterator[tuple[Array, 
 
 
 def _record_many(
-    record: Marches, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
+    record: StepRecord, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
 ) -> None:
     """All steps of many momenta into their rows."""
     with_propagators = bool(record.propagators.shape[1])
