@@ -248,10 +248,14 @@ def print_table(title: str, contestants: list[Contestant], workload: str, *argum
             faults.append(str(failed))
     print(title if any(columns) else f"{title}: not there", flush=True)
     for name in dict.fromkeys(name for column in columns for name in column):
-        cells = (f"{column[name]:18.4g}" if name in column else f"{'':18}" for column in columns)
+        cells = (_cell(column[name]) if name in column else f"{'':18}" for column in columns)
         print(f"  {name:42}" + "".join(cells))
     for fault in faults:
         print(f"  {fault}")
+
+
+def _cell(value: float) -> str:
+    return f"{value:18,.0f}" if abs(value) >= 1000.0 else f"{value:18.3g}"
 
 
 if __name__ == "__main__":
