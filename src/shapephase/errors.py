@@ -82,7 +82,7 @@ class OpenPathError(TrajectoryError):
 
 
 class NoisyPathError(TrajectoryError):
-    """A path's function whose values scatter however near its times are: it has no rate.
+    """A function of time whose values scatter however near its times are: it has no rate.
 
     Remedy: smooth the data, with `read_shape_path(..., smooth=)` or a spline through fewer samples. A function that is
     merely rough is an `AccuracyNotReached`.
@@ -179,7 +179,7 @@ class TrajectoryWarning(UserWarning):
 
 
 class UndeclaredBreakWarning(TrajectoryWarning):
-    """A path's function has kinks that were not declared as breaks; they were located, and are named."""
+    """A function of time has kinks that were not declared as breaks; they were located, and are named."""
 
 
 def unknown_name(

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,163 +15,28 @@ from ..arguments import on_unphysical_argument, positive_argument, vector_argume
 from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from ..inertia_tensor import second_moment
+from ..shape_space.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
+from ..shape_space.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
+from ._scanned_functions import least_moment
+from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of
 
-
-@dataclass(frozen=True, eq=False)
-class Moments:
-    """What a part adds to the sums over all mass, about the frame's origin, at times (N,).
-
-    Attributes
-    ----------
-    first, momentum : (N, 3) integrals of r dm [kg m] and of its rate v dm [kg m/s]
-    second, flow : (N, 3, 3) integrals of r r^T dm [kg m^2] and of r v^T dm [kg m^2/s]
-    vis_viva : (N,) integral of v.v dm, twice the energy in this frame [J]
-    """
-
-    first: Array
-    momentum: Array
-    second: Array
-    flow: Array
-    vis_viva: Array
-
-    def __add__(self, other: Moments) -> Moments:
-        """The moments of both."""
-        return Moments(*(getattr(self, name) + getattr(other, name) for name in vars(self)))
-
-
-class Part(Protocol):
-    """A part of an assembly, its motion known in the frame of the whole."""
-
-    @property
-    def mass(self) -> float:
-        """All its mass, which stays [kg]."""
-        ...
-
-    @property
-    def path(self) -> ShapePath | None:
-        """What drives it; None: it is fixed in the frame."""
-        ...
-
-    def moments(self, times: Array, origin: Array, /) -> Moments:
-        """Its moments about a point (3,) that is fixed in the frame."""
-        ...
-
-    def correlation(self, times: Array, reference: float, origin: Array, /) -> tuple[Array, Array]:
-        """Integral of r(t) r(reference)^T dm (N, 3, 3) and its rate, about `origin`."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class RigidPart:
-    """A rigid part that is fixed in the frame; made by `rigid_part`.
-
-    Attributes
-    ----------
-    mass : [kg]
-    centre : (3,) its centre of mass in the frame [m]
-    moment : (3, 3) integral of r r^T dm about its centre, tr(I)/2 - I [kg m^2]
-    """
-
-    mass: float
-    centre: Array
-    moment: Array
-    path: ShapePath | None = None
-
-    def moments(self, times: Array, origin: Array) -> Moments:
-        """As `Part`."""
-        arm = self.centre - origin
-        still = np.zeros((len(times), 3))
-        second = self.moment + self.mass * np.outer(arm, arm)
-        matrix = np.zeros((len(times), 3, 3))
-        return Moments(still + self.mass * arm, still, matrix + second, matrix, np.zeros(len(times)))
-
-    def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """As `Part`."""
-        of_all = self.moments(times, origin)
-        return of_all.second, of_all.flow
-
-
-@dataclass(frozen=True, eq=False)
-class MovingMass:
-    """A point mass that moves in the frame; made by `moving_mass`.
-
-    Attributes
-    ----------
-    mass : [kg]
-    path : x, y, z in the frame [m]
-    """
-
-    mass: float
-    path: ShapePath
-
-    def moments(self, times: Array, origin: Array) -> Moments:
-        """As `Part`."""
-        at, speed = self.path.curve(times)
-        arm = at - origin
-        second, flow = (self.mass * arm[:, :, None] * other[:, None] for other in (arm, speed))
-        return Moments(self.mass * arm, self.mass * speed, second, flow, self.mass * np.sum(speed**2, axis=-1))
-
-    def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:
-        """As `Part`."""
-        at, speed = self.path.curve(times)
-        there = self.mass * (self.path.curve(np.array([reference]))[0][0] - origin)
-        return (at - origin)[:, :, None] * there, speed[:, :, None] * there
-
-
-@dataclass(frozen=True, eq=False)
-class Boom:
-    """A uniform straight boom that comes out of a point of the body; made by `boom`.
-
-    Of its `mass` the share length/full_length is out, a rod that moves along itself; the rest is stowed at the root as
-    a point mass at rest. So the boom's mass stays, and what is out is missing at the root.
-
-    Attributes
-    ----------
-    mass : of the whole boom [kg]
-    full_length : of the whole boom [m]
-    root, direction : (3,) where it comes out [m], and the unit vector of where to, in the frame
-    path : the length that is out, one column [m]
-    """
-
-    mass: float
-    full_length: float
-    root: Array
-    direction: Array
-    path: ShapePath
-
-    def moments(self, times: Array, origin: Array) -> Moments:
-        """As `Part`."""
-        out, speed = (column[:, 0] for column in self.path.curve(times))
-        density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
-        half, third = 0.5 * density * out**2, density * out**3 / 3.0
-        first = self.mass * arm + half[:, None] * axis
-        momentum = (density * out * speed)[:, None] * axis
-        mixed = np.outer(arm, axis)
-        second = self.mass * np.outer(arm, arm) + half[:, None, None] * (mixed + mixed.T)
-        second = second + third[:, None, None] * np.outer(axis, axis)
-        of_rod = (density * out)[:, None] * arm + half[:, None] * axis
-        flow = (speed[:, None] * of_rod)[:, :, None] * axis
-        return Moments(first, momentum, second, flow, density * out * speed**2)
-
-    def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:
-        """As `Part`: a bit of boom that ends s behind the tip is max(length - s, 0) along the axis from the root."""
-        out, speed = (column[:, 0] for column in self.path.curve(times))
-        then = self.path.curve(np.array([reference]))[0][0, 0]
-        density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
-        both = np.minimum(out, then)
-        along = out * then * both - 0.5 * (out + then) * both**2 + both**3 / 3.0
-        along_rate = (then * both - 0.5 * both**2) * speed
-        still = self.mass * np.outer(arm, arm) + 0.5 * density * then**2 * np.outer(arm, axis)
-        here = 0.5 * density * out**2
-        square, mixed = np.outer(axis, axis), np.outer(axis, arm)
-        value = still + here[:, None, None] * mixed + density * along[:, None, None] * square
-        rate = (density * out * speed)[:, None, None] * mixed + density * along_rate[:, None, None] * square
-        return value, rate
+_SUBJECT = "what moves the parts of the assembly"
+_PART_WORDS = Words(
+    units=("m", "m/s"),
+    continuous="parts move continuously",
+    rate="velocity",
+    values="places",
+    returned="(places, velocities)",
+)
+# Times at which the whole is looked at to know its size.
+_SIZE_SAMPLES = 64
+# Of the part at the distance at which it alone would be the body's inertia: a lever is no shorter.
+_LEAST_ARM = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +47,13 @@ class AssemblyDescription(UngaugedDescription):
     ----------
     parts : each with its moments
     origin : (3,) a point near the common centre of mass; sums are taken about it, which saves digits
+    breaks : (M,) that were declared [s]
+    oscillations, loops, smooth_loop, sparse : as `Smoothness` has them
     """
 
     parts: tuple[Part, ...]
     origin: Array
+    breaks: Array
     oscillations: float | None
     loops: int
     smooth_loop: bool
@@ -239,14 +106,49 @@ class AssemblyDescription(UngaugedDescription):
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
+    @property
+    def scan(self) -> FunctionScan | None:
+        """As `Description`."""
+        return self._scan
+
+    @cached_property
+    def _scan(self) -> FunctionScan | None:
+        if self.oscillations is not None:
+            return None
+        period = self.breaks[-1] / self.loops
+        return scanned(self.depends_on(), self.breaks[self.breaks <= period * (1.0 + 1e-12)])
+
+    def depends_on(self) -> ScannedFunction:
+        """As `Description`: the paths of all parts, judged by the angular momentum that their rates are worth."""
+        return side_by_side([self._moved(k) for k, part in enumerate(self.parts) if part.path is not None], _SUBJECT)
+
+    def _moved(self, number: int) -> ScannedFunction:
+        part, path = self.parts[number], self.parts[number].path
+        assert path is not None
+
+        def judge(times: Array, columns: Array) -> tuple[Array, Array]:
+            least = least_moment(self.sample(times[:: max(1, len(times) // _SIZE_SAMPLES)])[0])
+            n = columns.shape[1] // 2
+            arm = max(part.lever(columns[:, :n], self.origin), _LEAST_ARM * np.sqrt(least * part.mass))
+            return np.full(2 * n, arm / least), np.zeros(2 * n)
+
+        along = ("along x", "along y", "along z") if path.n_shape == 3 else ("along itself",)
+        moved = path_function(path.curve, path.n_shape, [f"{number} {axis}" for axis in along])
+        columns = tuple(f"part {number} {axis}" for axis in along)
+        quantities = tuple(f"{kind} of {name}" for kind in ("position", "velocity") for name in columns)
+        angles = np.zeros(path.n_shape, dtype=bool)
+        return replace(moved, judge=judge, angles=angles, columns=columns, quantities=quantities, words=_PART_WORDS)
+
     def smoothness(self, breaks: Array) -> Smoothness:
         """As `Description`."""
+        scan = self.scan
         return Smoothness(
             breaks=breaks,
             oscillations=self.oscillations,
             loops=self.loops,
             smooth_loop=self.smooth_loop,
             sparse=self.sparse,
+            resolved=scan.resolved if scan is not None else None,
         )
 
 
@@ -380,6 +282,7 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     about_zero = AssemblyDescription(
         parts=everything,
         origin=np.zeros(3),
+        breaks=breaks,
         oscillations=known,
         loops=count,
         smooth_loop=all(path.smooth_loop for path in paths),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,7 @@ from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import Sampler, sampler
 from ..shape_space.body_path import path_gap
+from ..shape_space.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from .descriptions import (
@@ -39,7 +41,7 @@ class Deformation:
     ----------
     description : the functions themselves
     duration : [s]
-    breaks : (M,) times between which all is smooth, first 0, last `duration` [s]
+    declared_breaks : (M,) times between which all is said to be smooth, first 0, last `duration` [s]
     closure : (3, 3) where the shape at the end is the one at the start turned by it (the identity for a closed
         joint path seen from the base), else None
     shape_gap : how far the end shape is from the start shape [largest joint difference, or relative change]
@@ -50,12 +52,48 @@ class Deformation:
 
     description: Description
     duration: float
-    breaks: Array
+    declared_breaks: Array
     closure: Array | None
     shape_gap: float
     label: str
     loops: int = 1
     inputs: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def breaks(self) -> Array:
+        """Times between which all is smooth, those that the scan found among them: (M,), first 0, last `duration` [s].
+
+        Raises and warns as `scan`.
+        """
+        scan = self.scan
+        if scan is None or not len(scan.found_breaks):
+            return self.declared_breaks
+        starts = self.duration / self.loops * np.arange(self.loops)
+        return np.union1d(self.declared_breaks, (starts[:, None] + scan.found_breaks).ravel())
+
+    @property
+    def scan(self) -> FunctionScan | None:
+        """What one look at the user's functions of time found, and what it cost; None where no such function is.
+
+        Functions are looked at before they are integrated: a path of joints known only as a function, inertia and
+        internal momentum, positions of particles, what drives the parts of an assembly, the frame of a gauge. Whatever
+        is wider than 1/2,000 of the duration is found (of a path in loops, of a loop); what is narrower has to be
+        declared as a break. Done when first needed, at some 5,500 times, and kept. In rad: columns are judged by how
+        far they turn the body.
+
+        Raises
+        ------
+        TrajectoryError
+            If what must be continuous jumps, or rates are not derivatives; the message has the time.
+        NoisyPathError, AccuracyNotReached
+            If values carry noise, or are too rough for thousands of panels.
+
+        Warns
+        -----
+        UndeclaredBreakWarning
+            Of kinks that were not declared; they are among the `breaks` from then on.
+        """
+        return self.description.scan
 
     def inertia(self, t: ArrayLike) -> Array:
         """Locked inertia: times (...) -> (..., 3, 3), base axes, about the centre of mass [kg m^2]."""
@@ -168,12 +206,13 @@ def prescribed(
     inertia : times (N,) -> (N, 3, 3) [kg m^2], symmetric positive definite
     internal_momentum : times (N,) -> (N, 3) [kg m^2/s]; None: zero
     duration : [s]
-    breaks : interior times where a derivative jumps [s]
+    breaks : interior times where a derivative jumps, or the inertia itself [s]
     on_unphysical : what to do with tensors that break the triangle inequality, as no distribution of mass does:
         "allow" them, "warn" or "error". The last two search all times when the deformation is made, and "error" checks
         whatever is evaluated later, too. The equations of motion need only positive definite tensors
 
-    The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9.
+    The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9. Before they are
+    integrated the functions are looked at once (`Deformation.scan`, which has its own errors and warnings).
 
     Raises
     ------
@@ -216,7 +255,8 @@ def particles(
     breaks : interior times where a derivative jumps [s]
 
     The shape is a loop when the particles at the end are those at the start turned by some rotation, which
-    is then the closure.
+    is then the closure. A function is looked at once before it is integrated (`Deformation.scan`, which has its own
+    errors and warnings): velocities that are not those of the positions are refused.
 
     Raises
     ------
@@ -236,14 +276,14 @@ def particles(
             raise ShapeError("positions given by a function need a duration [s]")
         length = positive_argument(duration)
         edges = breaks_argument(breaks, length)
-        description = ParticleDescription(weights, positions)
+        description = ParticleDescription(weights, positions, edges)
     else:
         path = _sampled_positions(positions, weights)
         length = path.duration
         if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
             raise ShapeError(f"duration: the samples last {length:.9g} s, got {duration!r}; leave it out")
         edges = np.union1d(path.breaks, breaks_argument(breaks, length))
-        description = ParticleDescription(weights, ParticlePath(path), path.oscillations)
+        description = ParticleDescription(weights, ParticlePath(path), edges, path.oscillations)
     ends, _ = description.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
     radius = float(np.max(np.linalg.norm(ends[0], axis=-1)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -18,9 +19,12 @@ from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
 from ..shape_space.body_path import channels_along
+from ..shape_space.function_scan import FunctionScan, ScannedFunction, path_function
+from ..shape_space.scanning import scanned
 from ..shape_space.shape_path import ShapePath
 from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
+from ._scanned_functions import inertia_and_momentum, positions_and_velocities
 
 
 class Description(Protocol):
@@ -58,6 +62,18 @@ class Description(Protocol):
         """Orientation (N, 3, 3) and angular velocity (N, 3) of a link in this frame; GaugeError without links."""
         ...
 
+    @property
+    def scan(self) -> FunctionScan | None:
+        """What one look at the user's functions found, found when first needed; None where all is known.
+
+        Of a motion in loops, that of the first. Raises and warns as `ShapePath.scan`.
+        """
+        ...
+
+    def depends_on(self) -> ScannedFunction:
+        """The functions of time of which all else is a smooth function, for a look at them."""
+        ...
+
     def smoothness(self, breaks: Array, /) -> Smoothness:
         """By which the integrator chooses how to sample it, given the deformation's breaks [s].
 
@@ -74,6 +90,16 @@ class UngaugedDescription:
 
     def channels(self, times: Array) -> Array | None:  # noqa: ARG002
         return None
+
+    @property
+    def scan(self) -> FunctionScan | None:
+        return None
+
+    def depends_on(self) -> ScannedFunction:
+        return inertia_and_momentum(self.sample, "the deformation")
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        raise NotImplementedError
 
     def frame(self, times: Array) -> Array:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)).copy()
@@ -123,6 +149,13 @@ class ArticulatedDescription(UngaugedDescription):
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
         return self.body.kinetic_energy(*self.path.curve(times), turning)
 
+    @property
+    def scan(self) -> FunctionScan | None:
+        return self.path.scan
+
+    def depends_on(self) -> ScannedFunction:
+        return path_function(self.path.curve, self.path.n_shape, self.path.joint_names)
+
     def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
         shapes, rates = self.path.curve(times)
         return self.body.link_pose(shapes, link)[:, :3, :3], self.body.link_angular_velocity(shapes, rates, link)
@@ -156,7 +189,10 @@ class RigidDescription(UngaugedDescription):
 
 @dataclass(frozen=True, eq=False)
 class PrescribedDescription(UngaugedDescription):
-    """Functions of time for the inertia and the internal momentum; `on_unphysical` "error" checks every tensor."""
+    """Functions of time for the inertia and the internal momentum, smooth between declared breaks.
+
+    `on_unphysical` "error" checks every tensor.
+    """
 
     inertia: Callable[[Array], ArrayLike]
     momentum: Callable[[Array], ArrayLike] | None
@@ -172,27 +208,41 @@ class PrescribedDescription(UngaugedDescription):
         return tensors, _returned(self.momentum(times), "internal momentum", (len(times), 3))
 
     def inertia_rate(self, times: Array) -> Array:
-        return rate_of(lambda t: self.sample(t)[0], times, self.breaks)
+        return rate_of(lambda t: self.sample(t)[0], times, np.union1d(self.breaks, self._scan.found_breaks))
+
+    @property
+    def scan(self) -> FunctionScan | None:
+        return self._scan
+
+    @cached_property
+    def _scan(self) -> FunctionScan:
+        return scanned(self.depends_on(), self.breaks)
+
+    def depends_on(self) -> ScannedFunction:
+        return inertia_and_momentum(self.sample, "the prescribed deformation")
 
     def smoothness(self, breaks: Array) -> Smoothness:
-        return Smoothness(breaks)
+        return Smoothness(breaks, resolved=self._scan.resolved)
 
 
 @dataclass(frozen=True, eq=False)
 class ParticleDescription(UngaugedDescription):
-    """Point masses that move as seen from a frame; `oscillations` as `Smoothness` has it."""
+    """Point masses that move as seen from a frame, smoothly between declared breaks; `oscillations` as `Smoothness`."""
 
     masses: Array
     positions: Callable[[Array], tuple[ArrayLike, ArrayLike]]
+    breaks: Array
     oscillations: float | None = None
+
+    def as_given(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities (N, m, 3) as the function gives them."""
+        expected_shape = (len(times), len(self.masses), 3)
+        points, speeds = self.positions(times)
+        return _returned(points, "positions", expected_shape), _returned(speeds, "velocities", expected_shape)
 
     def centred(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities (N, m, 3) from the centre of mass."""
-        expected_shape = (len(times), len(self.masses), 3)
-        both = self.positions(times)
-        points, speeds = (
-            _returned(part, name, expected_shape) for name, part in zip(("positions", "velocities"), both, strict=True)
-        )
+        points, speeds = self.as_given(times)
         fraction = self.masses / self.masses.sum()
         return points - (fraction @ points)[:, None], speeds - (fraction @ speeds)[:, None]
 
@@ -223,9 +273,21 @@ class ParticleDescription(UngaugedDescription):
         total = np.cross(turning[:, :, None], points) + speeds
         return 0.5 * np.einsum("m,bnmi,bnmi->bn", self.masses, total, total)
 
+    @property
+    def scan(self) -> FunctionScan | None:
+        return self._scan
+
+    @cached_property
+    def _scan(self) -> FunctionScan | None:
+        return scanned(self.depends_on(), self.breaks) if self.oscillations is None else None
+
+    def depends_on(self) -> ScannedFunction:
+        return positions_and_velocities(self.masses, self.centred, lambda t: float(np.abs(self.as_given(t)[0]).max()))
+
     def smoothness(self, breaks: Array) -> Smoothness:
         check_never_on_a_line(self.moment, breaks)
-        return Smoothness(breaks, oscillations=self.oscillations)
+        scan = self.scan
+        return Smoothness(breaks, oscillations=self.oscillations, resolved=scan.resolved if scan else None)
 
 
 @dataclass(frozen=True, eq=False)

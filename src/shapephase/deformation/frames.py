@@ -6,6 +6,7 @@ The frames of the horizontal gauge are those of the lift; the principal ones are
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -15,26 +16,50 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import times_argument
 from ..arrays import Array, finite_array
-from ..chebyshev import PiecewiseChebyshev, inside, nodes_on, values_to_coefficients
+from ..chebyshev import PiecewiseChebyshev
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import stepped_rotation
+from ..integrator.resolved import DEGREE
 from ..integrator.sampling import sampler
+from ..shape_space.function_scan import ScannedFunction
+from ..shape_space.scanning import scanned
 from ._principal_frame import Frames, principal_frames
+from ._scanned_functions import rates_alone, turns_alone, turns_and_rates
 from .deformation import Deformation
 
 # A gauge that is named so is the frame of a link: "link:torso".
 _LINK = "link:"
 _LIFT_TOLERANCE = 1e-12
 """[rad]; tighter than any motion that is seen from these frames."""
-_PIECES = 4
-"""Panels between two breaks, to begin with: each is halved until the series on it converge."""
-_DEGREE = 16
-"""Of the Chebyshev series of U on a panel: of a smooth U it leaves rounding on a few panels."""
-_SHORTEST = 1e-4
-"""The shortest panel, relative to the time between two breaks: below it differences lose too many digits."""
+# Of a coefficient of U.
+_ROUNDING = 8.0 * float(np.finfo(float).eps)
+# Of the fastest turn: rates that are less certain, found by differentiating U, are refused.
+_RATE_DOUBT = 1e-9
 
 
-def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> Frames:
+@dataclass(frozen=True, eq=False)
+class GivenFrames:
+    """Frames that a user gives as functions of time.
+
+    Attributes
+    ----------
+    frames : U(t) and its body rates
+    function : what the user gave, for a look at it
+    breaks : (M,) times between which they are smooth, as far as is known [s]
+    """
+
+    frames: Frames
+    function: ScannedFunction
+    breaks: Array
+
+    @property
+    def panel_ends(self) -> Array:
+        """Times between which U is a short series, found by a look at it: (P + 1,) [s]. Raises and warns as it."""
+        resolved = scanned(self.function, self.breaks).resolved
+        return np.append(resolved.left[resolved.leaves], self.breaks[-1])
+
+
+def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> GivenFrames:
     """A user's U(t) with its rates, differentiated where it comes without. Raises as `in_gauge`."""
     if not callable(u):
         raise ShapeError(f"a gauge u is a function of times, got {u!r}")
@@ -61,52 +86,42 @@ def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]
         return turned, rate
 
     _check_rates(frames, breaks)
-    return frames
+    return GivenFrames(frames, turns_and_rates(frames), breaks)
 
 
-def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> Frames:
-    """Rotations with their rates: the slopes of Chebyshev series on panels so short that the series have an end."""
-    firsts, lasts = inside(breaks[:-1], breaks[1:])
-    ends = np.linspace(firsts, lasts, _PIECES + 1, axis=-1)
-    left, right = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-    shortest = np.repeat(_SHORTEST * np.diff(breaks), _PIECES)
-    fastest = 1.0 / breaks[-1]
-    done: list[tuple[Array, Array, Array]] = []
-    while len(left):
-        middle, half = 0.5 * (left + right), 0.5 * (right - left)
-        times = np.clip(nodes_on(left, right, _DEGREE), left[:, None], right[:, None])
-        series = values_to_coefficients(_DEGREE) @ turns(times.ravel()).reshape(len(left), _DEGREE + 1, 9)
-        norms = np.linalg.norm(series, axis=-1)
-        fastest = max(fastest, float(np.max(norms[:, 1] / half)))
-        doubt = _DEGREE**2 * norms[:, -3:].max(axis=1) / half
-        rough = doubt > 1e-9 * fastest
-        if np.any(rough & (half < shortest)):
-            row = int(np.argmax(np.where(rough & (half < shortest), doubt, 0.0)))
-            raise GaugeError(
-                f"U(t) is too rough near t = {middle[row]:.9g} s to be differentiated (its rate is uncertain by "
-                f"{doubt[row]:.3g} rad/s): return its body rates too, or let the deformation have a break there"
-            )
-        done.append((left[~rough], right[~rough], series[~rough]))
-        shortest = np.repeat(shortest[rough], 2)
-        left, right = (
-            np.stack([left[rough], middle[rough]], axis=-1).ravel(),
-            np.stack([middle[rough], right[rough]], axis=-1).ravel(),
+def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> GivenFrames:
+    """Rotations with their rates: the slopes of the series that a look at them finds."""
+    function = turns_alone(turns)
+    scan = scanned(function, breaks)
+    resolved, rows = scan.resolved, scan.resolved.leaves
+    series = resolved.coefficients[rows, :, :9] / function.judge(breaks, np.zeros((1, 18)))[0][0]
+    half = 0.5 * (resolved.right - resolved.left)[rows]
+    norms = np.linalg.norm(series, axis=-1)
+    fastest = max(1.0 / breaks[-1], float(np.max(norms[:, 1] / half)))
+    # Coefficients that are rounding would only be magnified: a slope at the end of a series is the sum of its
+    # coefficients, each times the square of its degree.
+    beyond = np.maximum.accumulate(norms[:, ::-1], axis=1)[:, ::-1]
+    degree = np.minimum(np.sum(beyond > _ROUNDING, axis=1), DEGREE)
+    series[np.arange(DEGREE + 1) > degree[:, None]] = 0.0
+    last = np.take_along_axis(beyond, np.minimum(degree, DEGREE - 2)[:, None], axis=1)[:, 0]
+    doubt = degree**2 * last / half
+    worst = int(np.argmax(doubt))
+    if doubt[worst] > _RATE_DOUBT * fastest:
+        where = resolved.left[rows][worst] + half[worst]
+        raise GaugeError(
+            f"U(t) is too rough near t = {where:.9g} s to be differentiated (its rate is "
+            f"uncertain by {doubt[worst]:.3g} rad/s): return its body rates too"
         )
-    left, right, series = (np.concatenate(parts) for parts in zip(*done))
-    order = np.argsort(left)
-    edges = np.append(left[order], breaks[-1])
-    # Samples were taken just inside the breaks, closer to them than matters: panels reach up to the breaks themselves.
-    edges[np.searchsorted(left[order], breaks[:-1])] = breaks[:-1]
-    slopes = PiecewiseChebyshev(edges, series[order]).derivative()
+    slopes = PiecewiseChebyshev(np.append(resolved.left[rows], breaks[-1]), series).derivative()
 
     def frames(times: Array) -> tuple[Array, Array]:
         turned = turns(times)
         return turned, so3.vee(so3.transpose(turned) @ slopes(times).reshape(-1, 3, 3))
 
-    return frames
+    return GivenFrames(frames, function, np.union1d(breaks, scan.found_breaks))
 
 
-def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> Frames:
+def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> GivenFrames:
     """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises as `in_gauge`."""
 
     if not callable(rates):
@@ -124,8 +139,11 @@ def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start:
     first = np.eye(3) if start is None else so3.rotation_argument(start, "start")
     if first.shape != (3, 3):
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
-    turned = stepped_rotation(sampler(unit_body, breaks), np.zeros((1, 3)), _LIFT_TOLERANCE)
-    return lambda times: (first @ turned.rotation(times)[0], spins(times))
+    function = rates_alone(spins)
+    scan = scanned(function, breaks)
+    edges = np.union1d(breaks, scan.found_breaks)
+    turned = stepped_rotation(sampler(unit_body, edges, resolved=scan.resolved), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    return GivenFrames(lambda times: (first @ turned.rotation(times)[0], spins(times)), function, edges)
 
 
 def _check_rates(frames: Frames, breaks: Array) -> None:

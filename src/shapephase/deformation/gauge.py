@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,11 +19,15 @@ from ..arrays import Array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
-from ..shape_space.shape_path import Smoothness
+from ..integrator.resolved import joined
+from ..shape_space.function_scan import FunctionScan, ScannedFunction, side_by_side
+from ..shape_space.scanning import scanned
+from ..shape_space.smoothness import Smoothness
 from .deformation import Deformation
 from .descriptions import Description
 from .frames import (
     Frames,
+    GivenFrames,
     frames_argument,
     integrated_frames,
     link_frames,
@@ -31,6 +36,10 @@ from .frames import (
     principal_frames,
 )
 
+# In messages: everything that a gauge of a user and what is seen from it depend on.
+_SUBJECT = "the deformation seen from the gauge"
+# Of a path in more loops the scan of the first is not copied: the gauge is then checked between its nodes only.
+_MOST_LOOPS = 100
 _LIFT_TOLERANCE = 1e-12
 """[rad]; tighter than any motion that is seen from this frame."""
 
@@ -47,7 +56,7 @@ def in_gauge(
     Parameters
     ----------
     u : times (N,) -> U (N, 3, 3), body rates of U (N, 3) [rad/s], hat(rate) = U^T U'; or U alone, which is then
-        differentiated (to about 1e-11 of its swings); smooth between breaks
+        differentiated (to about 1e-11 of its swings)
     rates : in the place of u: times (N,) -> body rates of U (N, 3) [rad/s]; U is integrated to 1e-12 rad
     start : (3, 3) U(0) for `rates`; None: the identity
 
@@ -62,16 +71,22 @@ def in_gauge(
         rotations, or rates that are not those of U.
     GaugeError
         If U alone is given and is too rough to be differentiated.
-    AccuracyNotReached
-        If the rates are too rough to be integrated.
+    TrajectoryError, NoisyPathError, AccuracyNotReached
+        If the functions jump, carry noise or are too rough: found by a look at them, at once where U or its rates are
+        given alone, else when the deformation is first integrated (`Deformation.scan`).
+
+    Warns
+    -----
+    UndeclaredBreakWarning
+        Of kinks that are no breaks of the deformation; they are taken as breaks.
 
     Source: theory.md B4.
     """
     if (u is None) == (rates is None) or (u is not None and start is not None):
         raise ShapeError("a gauge is given either by u, or by its body rates and a start")
-    if rates is not None:
-        return _seen_from(deformation, integrated_frames(deformation.breaks, rates, start), "turned")
-    return _seen_from(deformation, frames_argument(u, deformation.breaks), "turned")
+    breaks = deformation.breaks
+    turning = integrated_frames(breaks, rates, start) if rates is not None else frames_argument(u, breaks)
+    return _seen_from(deformation, turning.frames, "turned", turning)
 
 
 def link_gauge(deformation: Deformation, link: str) -> Deformation:
@@ -149,22 +164,32 @@ def principal_gauge(deformation: Deformation) -> Deformation:
     return _seen_from(deformation, principal_frames(deformation), "principal")
 
 
-def _seen_from(deformation: Deformation, frames: Frames, name: str) -> Deformation:
+def _seen_from(deformation: Deformation, frames: Frames, name: str, turning: GivenFrames | None = None) -> Deformation:
     closure = deformation.closure
     if closure is not None:
         ends, _ = frames(np.array([0.0, deformation.duration]))
         closure = ends[1] @ closure @ ends[0].T
-    description = _Gauged(deformation.description, frames)
+    breaks = deformation.breaks if turning is None else turning.breaks
+    description = _Gauged(deformation.description, frames, turning, breaks)
     # U(t) need not come back with the loops.
     return replace(
-        deformation, description=description, closure=closure, loops=1, label=f"{deformation.label}, {name} gauge"
+        deformation,
+        description=description,
+        declared_breaks=breaks,
+        closure=closure,
+        loops=1,
+        label=f"{deformation.label}, {name} gauge",
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Gauged:
+    """A description seen from frames, those of a user (`turning`) or such as follow from it; smooth between breaks."""
+
     original: Description
     frames: Frames
+    turning: GivenFrames | None
+    breaks: Array
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         inertia, momentum = self.original.sample(times)
@@ -201,5 +226,31 @@ class _Gauged:
         turn, rate = self.frames(times)
         return turn @ turned, so3.apply(turn, turning + rate)
 
+    @property
+    def scan(self) -> FunctionScan | None:
+        """Of the frame and of what is seen from it at once, where the frame is a user's."""
+        return self._scan
+
+    @cached_property
+    def _scan(self) -> FunctionScan | None:
+        if self.turning is None:
+            return self.original.scan
+        edges = self.original.smoothness(self.breaks).breaks
+        return scanned(self.depends_on(), np.union1d(edges, self.breaks))
+
+    def depends_on(self) -> ScannedFunction:
+        if self.turning is None:
+            return self.original.depends_on()
+        return side_by_side([self.original.depends_on(), self.turning.function], _SUBJECT)
+
     def smoothness(self, breaks: Array) -> Smoothness:
-        return Smoothness(breaks)
+        known = self.original.smoothness(breaks)
+        edges = np.union1d(breaks, known.breaks)
+        if self.turning is not None:
+            scan = self.scan
+            return Smoothness(edges, resolved=scan.resolved if scan else None)
+        # A frame that follows from the inertia can turn faster than the shape: what is hidden in it is not resolved.
+        resolved = known.resolved
+        if resolved is not None and known.loops > 1:
+            resolved = joined([resolved] * known.loops) if known.loops <= _MOST_LOOPS else None
+        return Smoothness(edges, resolved=resolved, checked=True)

@@ -117,9 +117,11 @@ class PanelSampler:
         oscillations: float | None,
         probe: Callable[[Array], Array] | None,
         resolved: ResolvedPath | None = None,
+        *,
+        checked: bool = False,
     ) -> None:
         self._channels, self._probe, self._loops, self._resolved = channels, probe, loops, resolved
-        self._is_bandlimited = oscillations is not None or resolved is not None
+        self._is_bandlimited = oscillations is not None or (resolved is not None and not checked)
         self._span = float(breaks[-1] - breaks[0])
         self._most_panels = _MOST_PANELS + 40 * len(breaks)
         pieces = 4 if oscillations is None else max(1, int(np.ceil(oscillations / 2.0)))

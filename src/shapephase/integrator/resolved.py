@@ -18,6 +18,8 @@ from ..chebyshev import chebyshev, local_coordinate, unit_nodes, values_to_coeff
 DEGREE = 32
 # Of the series of a sampler's panel, from which its hidden part is read: above the degree of most panels.
 _TEST_DEGREE = 48
+# [rad] What series at rest are off by rounding.
+_RESTING = 1e-14
 # Degrees that panels are sampled at first; all of them can be doubled and trebled.
 _FIRST_DEGREES = (5, 7, 10, 12, 15, 18, 21, 24, 27, 30)
 # Stands for the degree of a panel that must be halved.
@@ -71,6 +73,8 @@ class ResolvedPath:
         fits[:, -1] |= self.children < 0
         degree = np.where(fits.any(axis=1), least[np.argmax(fits, axis=1)], _IMPOSSIBLE)
         moving = self.coefficients[:, :, self._n_shape :].any(axis=(1, 2)) | (self.misfit > 0.0).any(axis=1)
+        # Values without rates, as of an inertia that is given, move nevertheless.
+        moving |= tails[:, 0] > _RESTING
         degree[~moving] = 0
         cost, splits = degree + 1, np.zeros(len(degree), dtype=bool)
         # Halves stand behind what they are halves of.

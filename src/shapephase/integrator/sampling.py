@@ -61,6 +61,7 @@ def sampler(
     probe: Callable[[Array], Array] | None = None,
     resolved: ResolvedPath | None = None,
     directly: Directly | None = None,
+    checked: bool = False,
 ) -> Sampler:
     """The sampler that suits a deformation.
 
@@ -78,6 +79,7 @@ def sampler(
     resolved : all of what the deformation depends on in the first loop, as series: nothing is checked between nodes
     directly : times (N,) -> I^-1 and I^-1 L_o (N, 9) as channels, sooner than by `evaluate`; None, or None as its
         result: `evaluate` is asked
+    checked : it depends on more, and is checked between nodes nevertheless
     """
     channels = Channels(evaluate, directly)
     period = float(breaks[-1]) / loops
@@ -87,7 +89,7 @@ def sampler(
             return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe)
         return LoopSampler(channels, period, loops, oscillations)
     ends = breaks[breaks <= period * (1.0 + 1e-12)] if loops > 1 else breaks
-    return PanelSampler(channels, ends, loops, oscillations, probe, resolved)
+    return PanelSampler(channels, ends, loops, oscillations, probe, resolved, checked=checked)
 
 
 class LoopSampler:

@@ -117,8 +117,7 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     lift = motion.horizontal_lift if gauge == "horizontal" else None
     # The integrator's steps are short enough for the base's frame and for the lift, which is stepped alike.
     follows = lift is not None or gauge == "base"
-    frames = None if follows else _frames(motion, gauge)
-    edges = solution.times
+    frames, edges = (None, solution.times) if follows else _frames(motion, gauge)
     spatial = motion.momentum.reshape(-1, 3)
     magnitude = np.linalg.norm(spatial, axis=-1)
     without = magnitude == 0.0
@@ -169,10 +168,12 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     )
 
 
-def _frames(motion: Motion, gauge: Gauge) -> Frames:
+def _frames(motion: Motion, gauge: Gauge) -> tuple[Frames, Array]:
+    """The gauge's frames, and the ends of steps that are short enough to see all of what a user's gauge does."""
     if isinstance(gauge, str):
-        return named_frames(motion.deformation, gauge)
-    return frames_argument(gauge, motion.deformation.breaks)
+        return named_frames(motion.deformation, gauge), motion.solution.times
+    given = frames_argument(gauge, motion.deformation.breaks)
+    return given.frames, np.union1d(motion.solution.times, given.panel_ends)
 
 
 def _from_steps(solution: SteppedRotation, lift: SteppedRotation | None) -> tuple[Array, Array, Array] | None:

@@ -14,7 +14,6 @@ from ..arguments import breaks_argument, check_time_steps, positive_argument, ti
 from ..arrays import Array, check_reach, finite_array
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from ..integrator.resolved import joined
-from ._path_scan import PathScan, scanned_path
 from ._rate_check import check_rates
 from .curves import (
     CLOSED,
@@ -29,6 +28,8 @@ from .curves import (
     Stretched,
     returned_pair,
 )
+from .function_scan import FunctionScan, path_function
+from .scanning import scanned
 from .smoothness import Smoothness
 
 _WHOLE_TURN = 2.0 * np.pi
@@ -66,7 +67,7 @@ class ShapePath:
     smooth_loop: bool = False
     sparse: bool = False
     sha256: str | None = None
-    scanner: Callable[[], PathScan] | None = None
+    scanner: Callable[[], FunctionScan] | None = None
 
     @staticmethod
     def fourier(
@@ -218,7 +219,7 @@ class ShapePath:
         )
 
     @property
-    def scan(self) -> PathScan | None:
+    def scan(self) -> FunctionScan | None:
         """What one look at a path known only as a function found, and what it cost; None for the known kinds.
 
         Of a path repeated, that of its first loop. Found once, when it is first needed, and kept: paths made of this
@@ -239,12 +240,12 @@ class ShapePath:
         return self._scan if self.oscillations is None else None
 
     @cached_property
-    def _scan(self) -> PathScan:
+    def _scan(self) -> FunctionScan:
         if self.scanner is not None:
             return self.scanner()
         period = self.duration / self.loops
         edges = self.breaks[self.breaks <= period * (1.0 + 1e-12)]
-        return scanned_path(self.curve, edges, self.joint_names)
+        return scanned(path_function(self.curve, self.n_shape, self.joint_names), edges)
 
     @property
     def gap(self) -> Array:
@@ -434,7 +435,7 @@ def _larger(a: float | None, b: float | None) -> float | None:
     return None if a is None or b is None else max(a, b)
 
 
-def _joined_scans(paths: Sequence[ShapePath]) -> PathScan:
+def _joined_scans(paths: Sequence[ShapePath]) -> FunctionScan:
     """Of paths one after another, each with all its loops."""
     scans = [path._scan for path in paths]
     whole = [joined([scan.resolved] * path.loops) for scan, path in zip(scans, paths, strict=True)]
@@ -443,4 +444,4 @@ def _joined_scans(paths: Sequence[ShapePath]) -> PathScan:
     for scan, path in zip(scans, paths, strict=True):
         found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
         start += path.duration
-    return PathScan.of_several(scans, joined(whole), np.concatenate(found))
+    return FunctionScan.of_several(scans, joined(whole), np.concatenate(found))

@@ -23,6 +23,7 @@ class Smoothness:
     probe : a cheap stand-in whose swings are those of the function, times (N,) -> (N, 2 n), shapes and then their
         rates; None: there is none
     resolved : the first loop of what it depends on as series, where that is all there is to know; None: unknown
+    checked : whether there is more to know, so that it is compared with its samples between the nodes all the same
     """
 
     breaks: Array
@@ -32,3 +33,4 @@ class Smoothness:
     sparse: bool = False
     probe: Callable[[Array], Array] | None = None
     resolved: ResolvedPath | None = None
+    checked: bool = False

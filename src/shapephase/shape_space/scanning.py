@@ -1,23 +1,21 @@
-"""A path known only as a function of time, looked at once: resolved to its rounding before any body is evaluated.
+"""What is known only as a function of time, looked at once: resolved to its rounding before it is integrated.
 
 The function is first sampled at some 5,200 unevenly spaced times with no gap above 1/4,000 of the duration. Chebyshev
-series on panels, halved where they disagree with these samples or with their own neighbours, then resolve shapes and
-rates. A panel that is halved without end holds a kink: it is located to rounding, by the series on its two sides.
+series on panels, halved where they disagree with these samples or with their own neighbours, then resolve its columns.
+A panel that is halved without end holds a kink: it is located to rounding, by the series on its two sides.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Mask
 from ..chebyshev import derivative_matrix, nodes_on, unit_nodes
 from ..errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
-from ..integrator.resolved import DEGREE, ResolvedPath
+from ..integrator.resolved import DEGREE
 from ._kink_location import located_kink
 from ._scan_panels import (
     CHECKS,
@@ -32,7 +30,8 @@ from ._scan_panels import (
     sample_times,
     transform,
 )
-from .curves import CLOSED, Curve
+from .curves import CLOSED
+from .function_scan import FunctionScan, ScannedFunction
 
 _EPS = float(np.finfo(float).eps)
 # Panels of the only piece, of each of a few (up to four), and of each of many.
@@ -41,7 +40,7 @@ _FIRST_PANELS = (4, 2, 1)
 _ROUNDING = 32.0 * _EPS
 # Of the largest shape or rate of the path: a function that subtracts numbers as large as these is off by so much.
 _INNER_ROUNDING = 64.0 * _EPS
-# [rad or m], also of rates times half the width of a panel: steps within the function may be as high, by rounding as
+# [rad], also of rates times half the width of a panel: steps within the function may be as high, by rounding as
 # of 1,000 + r - 1,000, or from piece to piece of what an integrator gave.
 _INNER_STEPS = 1e-12
 # Of what was left before a panel was halved: series gain digits by it, rounding stays.
@@ -54,7 +53,7 @@ _LEAST_WIDTH = 1e-13
 _KINK_WIDTH = 2.0**-12
 # Panels before halving ends, besides 40 for every break: a path that needs more is rough, not merely long.
 _MOST_PANELS = 4000
-# [rad or m], of rates times half the width of a panel: noise up to this is left to the tolerance; more is refused.
+# [rad], of rates times half the width of a panel: noise up to this is left to the tolerance; more is refused.
 _MOST_NOISE = 1e-9
 # Of the scatter between neighbouring times: a series through values that scatter is off by so much.
 _NOISE_MARGIN = 16.0
@@ -64,75 +63,22 @@ _NOISE_PLACE = 0.4142
 _NOISE_TIMES = 10
 # In units of the rounding of times: so near to each other no function changes.
 _NOISE_STEP = 64.0
-# [rad or m]: an integral of the rates that differs by more from the shapes on a panel is an error of the rates.
+# [rad]: an integral of the rates that differs by more from the shapes on a panel is an error of the rates.
 _RATE_DEFECT = 1e-9
+# Of a Chebyshev polynomial at the end of its panel, times half its width.
+_END_SLOPES = np.arange(DEGREE + 1.0) ** 2
+# Of the largest value, in every coefficient of a series.
+_SLOPE_ROUNDING = 4.0 * _EPS
+# Of the last coefficients: what series of so many terms leave out of a slope.
+_SLOPE_MARGIN = 8.0
+# Of the largest slope: two panels that differ by less at their common end are one smooth function.
+_LEAST_CORNER = 1e-8
 # Times named in a warning.
 _NAMED_TIMES = 8
 
 
-@dataclass(frozen=True, eq=False)
-class PathScan:
-    """What one look at a path found.
-
-    Attributes
-    ----------
-    resolved : shapes and rates as series
-    found_breaks : (K,) times of kinks that were not declared [s]
-    evaluations : times at which the path's function was evaluated
-    calls : of the path's function
-    noise : of the shapes, and of the rates times half the width of a panel, as far as series meet it [rad or m]
-    rate_defect : largest difference between the integral of the rates and the shapes on a panel [rad or m]
-    """
-
-    resolved: ResolvedPath
-    found_breaks: Array
-    evaluations: int
-    calls: int
-    noise: float
-    rate_defect: float
-
-    @property
-    def panels(self) -> int:
-        """How many panels resolve the path to rounding."""
-        return len(self.resolved.leaves)
-
-    @property
-    def duration(self) -> float:
-        """[s]."""
-        return self.resolved.duration
-
-    def __str__(self) -> str:
-        found = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
-        return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{found}"
-
-    def reversed(self) -> PathScan:
-        """Of the path in the opposite order of time."""
-        found = (self.duration - self.found_breaks)[::-1]
-        return replace(self, resolved=self.resolved.reversed(), found_breaks=found)
-
-    def stretched(self, factor: float) -> PathScan:
-        """Of the path `factor` times as slowly."""
-        return replace(self, resolved=self.resolved.stretched(factor), found_breaks=factor * self.found_breaks)
-
-    def reordered(self, order: Integers) -> PathScan:
-        """Of the path with its joints in another order."""
-        return replace(self, resolved=self.resolved.reordered(order))
-
-    @staticmethod
-    def of_several(scans: Sequence[PathScan], resolved: ResolvedPath, found_breaks: Array) -> PathScan:
-        """Of paths one after another."""
-        return PathScan(
-            resolved=resolved,
-            found_breaks=found_breaks,
-            evaluations=sum(scan.evaluations for scan in scans),
-            calls=sum(scan.calls for scan in scans),
-            noise=max(scan.noise for scan in scans),
-            rate_defect=max(scan.rate_defect for scan in scans),
-        )
-
-
-def scanned_path(curve: Curve, breaks: Array, joint_names: tuple[str, ...] | None) -> PathScan:
-    """Look at a path of which only its values are known.
+def scanned(function: ScannedFunction, breaks: Array) -> FunctionScan:
+    """Look at a function of which only its values are known.
 
     Parameters
     ----------
@@ -141,26 +87,26 @@ def scanned_path(curve: Curve, breaks: Array, joint_names: tuple[str, ...] | Non
     Raises
     ------
     TrajectoryError
-        If the shape jumps, or the rate is not its derivative.
+        If what must be continuous jumps, or a rate is not the derivative of its value.
     NoisyPathError
         If the values carry noise.
     AccuracyNotReached
-        If the path is too rough for some thousands of panels.
+        If it is too rough for some thousands of panels.
 
     Warns
     -----
     UndeclaredBreakWarning
         Of kinks that are not among the breaks.
     """
-    scan = _Scan(curve, breaks, joint_names)
-    return scan.result()
+    return _Scan(function, breaks).result()
 
 
 class _Scan:
-    """One look at a path."""
+    """One look at a function; all columns are weighted as soon as their weights are known."""
 
-    def __init__(self, curve: Curve, breaks: Array, joint_names: tuple[str, ...] | None) -> None:
-        self._curve, self._breaks, self._names = curve, breaks, joint_names
+    def __init__(self, function: ScannedFunction, breaks: Array) -> None:
+        self._function, self._breaks = function, breaks
+        self._weights = np.ones(2 * function.n_values)
         self._duration = float(breaks[-1])
         self._tick = float(np.spacing(self._duration))
         self._evaluations = self._calls = 0
@@ -169,7 +115,7 @@ class _Scan:
         # Breaks at which an angle only goes on at another turn.
         self._turned: set[float] = set()
 
-    def result(self) -> PathScan:
+    def result(self) -> FunctionScan:
         """Resolve all pieces, and those again that hold kinks."""
         pieces = [Piece(a, b) for a, b in pairwise(self._breaks)]
         few = _FIRST_PANELS[0] if len(pieces) == 1 else _FIRST_PANELS[1] if len(pieces) <= 4 else _FIRST_PANELS[2]
@@ -178,10 +124,15 @@ class _Scan:
         first = self._first_panels(pieces, few)
         nodes = nodes_on(first.left, first.right, DEGREE)
         both = self._at(np.concatenate([self._times, nodes.ravel()]))
+        self._n = n = self._function.n_values
+        self._weights, sizes = self._function.judge(self._times, both[: len(self._times)])
+        both *= self._weights
         self._samples, values = both[: len(self._times)], both[len(self._times) :].reshape(*nodes.shape, -1)
-        self._n_shape = self._samples.shape[1] // 2
-        self._largest = np.abs(self._samples).max(axis=0, initial=0.0)
-        self._reach = np.abs(self._samples[:, : self._n_shape]).max(axis=0, initial=0.0)
+        self._largest = np.maximum(np.abs(self._samples).max(axis=0, initial=0.0), sizes * self._weights)
+        self._reach = np.abs(self._samples[:, :n]).max(axis=0, initial=0.0)
+        # Of a rate that is a derivative, the largest value in the whole time; any other has its own.
+        of_rates = np.where(self._function.paired, self._largest[:n] / self._duration, self._largest[n:])
+        self._inner_sizes = np.concatenate([self._largest[:n], of_rates])
         done: list[Piece] = []
         while pieces:
             self._resolve(pieces, first, values)
@@ -191,6 +142,7 @@ class _Scan:
                 first = self._first_panels(pieces, _FIRST_PANELS[1])
                 values = None
         done.sort(key=lambda piece: piece.left)
+        self._find_corners(done)
         self._check_jumps(done)
         defect = self._check_rates(done)
         resolved = resolved_path(done, self._duration)
@@ -198,7 +150,7 @@ class _Scan:
         kinks = np.array([time for time in found if time not in self._turned])
         if len(kinks):
             self._warn(kinks)
-        return PathScan(
+        return FunctionScan(
             resolved=resolved,
             found_breaks=found,
             evaluations=self._evaluations,
@@ -208,10 +160,10 @@ class _Scan:
         )
 
     def _at(self, times: Array) -> Array:
-        """Shapes and rates side by side: (N,) -> (N, 2 n)."""
+        """Values and rates side by side: (N,) -> (N, 2 n)."""
         self._evaluations += len(times)
         self._calls += 1
-        return np.concatenate(self._curve(times), axis=1)
+        return np.concatenate(self._function.curve(times), axis=1) * self._weights
 
     def _first_panels(self, pieces: list[Piece], count: int) -> Panels:
         rows: list[tuple[float, float, int, int]] = []
@@ -246,7 +198,7 @@ class _Scan:
 
     def _note(self, pieces: list[Piece], panels: Panels, looked: Looked, good: Mask) -> None:
         """Enter what was found of panels in the trees of their pieces."""
-        n, half = self._n_shape, 0.5 * (panels.right - panels.left)
+        n, half = self._n, 0.5 * (panels.right - panels.left)
         shapes = looked.misfit[:, :n].max(axis=1, initial=0.0)
         rates = half * looked.misfit[:, n:].max(axis=1, initial=0.0)
         for row, (number, node) in enumerate(zip(panels.piece, panels.node, strict=True)):
@@ -294,20 +246,18 @@ class _Scan:
         # Where halving does not help, and no more is left than rounding within the function's own sums, this is it.
         np.maximum(self._largest, np.abs(values).max(axis=(0, 1), initial=0.0), out=self._largest)
         inner = _INNER_ROUNDING * self._largest
-        widths = np.where(np.arange(len(inner)) < self._n_shape, 1.0, 0.5 * (right - left)[:, None])
+        widths = np.where(np.arange(len(inner)) < self._n, 1.0, 0.5 * (right - left)[:, None])
         inner = inner + _INNER_STEPS / widths
         inner = np.where(misfit > _STUBBORN * panels.before, inner, 0.0)
         return Looked(coefficients, misfit, np.maximum(np.maximum(floor, inner), _NOISE_MARGIN * scatter), noise)
 
     def _floor(self, values: Array, width: Array) -> Array:
-        """What rounding of values and of times leaves of shapes and rates on panels: (P, k, 2 n) -> (P, 2 n)."""
-        n = self._n_shape
+        """What rounding of numbers and of times leaves of the columns on panels: (P, k, 2 n) -> (P, 2 n)."""
+        n = self._n
         largest = np.abs(values).max(axis=1, initial=0.0)
-        spread = np.ptp(values[:, :, n:], axis=1)
-        floor = _ROUNDING * largest
-        floor[:, :n] += _TIME_ROUNDING * (self._tick * largest[:, n:] + _EPS * self._reach)
-        floor[:, n:] += _TIME_ROUNDING * (self._tick * spread / width[:, None] + _EPS * self._reach / self._duration)
-        return floor
+        slopes = np.ptp(values, axis=1) / width[:, None]
+        slopes[:, :n] = np.where(self._function.paired, largest[:, n:], slopes[:, :n])
+        return _ROUNDING * largest + _TIME_ROUNDING * (self._tick * slopes + _EPS * self._inner_sizes)
 
     @staticmethod
     def _halves(pieces: list[Piece], panels: Panels, misfit: Array) -> Panels:
@@ -341,25 +291,48 @@ class _Scan:
         self._found += piece.kinks
         return [Piece(a, b) for a, b in pairwise([piece.left, *sorted(piece.kinks), piece.right])]
 
+    def _find_corners(self, pieces: list[Piece]) -> None:
+        """Note kinks of values without rates that are at an end of a panel by chance: the slopes there tell."""
+        alone = ~self._function.paired
+        if not alone.any():
+            return
+        for piece in pieces:
+            rows = sorted((piece.ends[k], k) for k, first in enumerate(piece.children) if first < 0)
+            half = 0.5 * np.array([end[1] - end[0] for end, _ in rows])[:, None]
+            series = np.stack([piece.coefficients[k] for _, k in rows])[:, :, : self._n][:, :, alone]
+            at_end = np.einsum("k,pkn->pn", _END_SLOPES, series) / half
+            signs = np.where(np.arange(DEGREE + 1) % 2, 1.0, -1.0)
+            at_start = np.einsum("k,pkn->pn", signs * _END_SLOPES, series) / half
+            last = np.abs(series[:, -3:]).max(axis=1)
+            rounding = _SLOPE_ROUNDING * self._largest[: self._n][alone]
+            uncertain = _END_SLOPES[-1] * (_SLOPE_MARGIN * last + rounding) / half
+            bends = np.abs(at_start[1:] - at_end[:-1])
+            sizes = np.abs(at_end).max(axis=0, initial=0.0)
+            corner = bends > uncertain[1:] + uncertain[:-1] + _LEAST_CORNER * sizes
+            self._found += [rows[k + 1][0][0] for k in np.flatnonzero(corner.any(axis=1))]
+
     def _check_jumps(self, pieces: list[Piece]) -> None:
-        """Raise TrajectoryError where the shape jumps at a break; an angle that goes on at another turn does not."""
+        """Raise TrajectoryError where a value jumps at a break; an angle that goes on at another turn does not."""
         if len(pieces) < 2:
             return
-        n = self._n_shape
+        n, function = self._n, self._function
         before = np.array([piece.last for piece in pieces[:-1]])
         after = np.array([piece.first for piece in pieces[1:]])
         both = self._at(np.concatenate([before, after]))
         first, second = both[: len(before)], both[len(before) :]
         gap = second[:, :n] - first[:, :n]
-        turns = np.round(gap / (2.0 * np.pi))
+        turns = np.where(function.angles, np.round(gap / (2.0 * np.pi)), 0.0)
         gap -= 2.0 * np.pi * turns
-        moved = 2.0 * (after - before)[:, None] * np.maximum(np.abs(first), np.abs(second))[:, n:]
-        jumps = np.abs(gap) > CLOSED * np.maximum(1.0, self._reach) + moved
+        speeds = np.maximum(np.abs(first), np.abs(second))[:, n:] * function.paired
+        jumps = np.abs(gap) > CLOSED * np.maximum(1.0, self._reach) + 2.0 * (after - before)[:, None] * speeds
+        found = np.isin([piece.right for piece in pieces[:-1]], self._found)
+        jumps &= found[:, None] | ~function.may_jump
         if jumps.any():
-            row, joint = (int(i) for i in np.argwhere(jumps)[0])
+            row, column = (int(i) for i in np.argwhere(jumps)[0])
+            weight = self._weights[column]
             raise TrajectoryError(
-                f"the path's function jumps: joint {self._joint(joint)} goes from {first[row, joint]:.9g} to "
-                f"{second[row, joint]:.9g} at {pieces[row].right:.12g} s; a shape must be continuous"
+                f"{function.subject} jumps: {function.columns[column]} goes from {first[row, column] / weight:.9g} to "
+                f"{second[row, column] / weight:.9g} at {pieces[row].right:.12g} s; {function.words.continuous}"
             )
         rate_jumps = np.abs(second - first)[:, n:] > CLOSED * np.maximum(1.0, self._largest[n:])
         self._turned = {
@@ -377,50 +350,55 @@ class _Scan:
 
     def _allowed_noise(self, panels: Panels, noisy: Mask, scatter: Array) -> Array:
         """Of panels whose series follow noise, where it can be left to a tolerance: (P,) [rad]; else NoisyPathError."""
-        n = self._n_shape
+        n = self._n
         half = 0.5 * (panels.right - panels.left)
         weights = np.where(np.arange(2 * n) < n, 1.0, half[:, None])
         sizes = np.where(noisy, scatter * weights, 0.0)
         self._noise = max(self._noise, float(sizes.max(initial=0.0)))
         loud = sizes > _MOST_NOISE * np.maximum(1.0, np.tile(self._reach, 2))
         if loud.any():
-            row, worst = (int(i) for i in np.argwhere(loud)[0])
-            kind, unit = ("shape", "rad or m") if worst < n else ("rate", "rad/s or m/s")
+            row, worst = (int(i) for i in np.unravel_index(np.argmax(np.where(loud, sizes, 0.0)), sizes.shape))
+            where = panels.left[row] + _NOISE_PLACE * 2.0 * half[row]
             raise NoisyPathError(
-                f"the path's function is noisy: the {kind} of joint {self._joint(worst % n)} scatters by "
-                f"{scatter[row, worst]:.2g} {unit} near t = {panels.left[row] + _NOISE_PLACE * 2.0 * half[row]:.9g} s, "
-                "however near the times; smooth the data first"
+                f"{self._function.subject} is noisy: the {self._function.quantities[worst]} scatters by "
+                f"{scatter[row, worst] / self._weights[worst]:.2g} {self._function.words.units[worst >= n]} near "
+                f"t = {where:.9g} s, however near the times; smooth the data first"
             )
         return sizes.max(axis=1, initial=0.0)
 
     def _too_rough(self, where: float) -> AccuracyNotReached:
         return AccuracyNotReached(
-            f"the path's function is rough near t = {where:.12g} s: {self._evaluations} evaluations do not resolve it; "
-            "declare the times of its jumps as breaks, or smooth the data"
+            f"{self._function.subject} is rough near t = {where:.12g} s: {self._evaluations} evaluations do not "
+            "resolve it; declare the times of its jumps as breaks, or smooth the data"
         )
 
     def _check_rates(self, pieces: list[Piece]) -> float:
-        """Compare the integral of the rates on each panel with its shapes: the largest difference."""
+        """Compare the integral of each rate on each panel with its value: the largest difference."""
+        if not self._function.paired.any():
+            return 0.0
         rows = [(piece, node) for piece in pieces for node, first in enumerate(piece.children) if first < 0]
         series = np.stack([piece.coefficients[node] for piece, node in rows])
         left, right = np.array([piece.ends[node] for piece, node in rows]).T
-        n, half = self._n_shape, 0.5 * (right - left)
+        n, half = self._n, 0.5 * (right - left)
         integrals = half[:, None, None] * (integral_matrix() @ series[:, :, n:])
         apart = np.abs(integrals[:, 1:-1] - series[:, 1:, :n]).max(axis=1, initial=0.0)
+        apart *= self._function.paired
         fastest = np.abs(series[:, :, n:]).sum(axis=1)
         allowed = _RATE_DEFECT * np.maximum(1.0, self._reach) + 2.0 * _TIME_ROUNDING * self._tick * fastest
         wrong = apart > allowed + _NOISE_MARGIN * self._noise
         if wrong.any():
-            panel, joint = (int(i) for i in np.unravel_index(np.argmax(np.where(wrong, apart, 0.0)), wrong.shape))
+            panel, column = (int(i) for i in np.unravel_index(np.argmax(np.where(wrong, apart, 0.0)), wrong.shape))
             basis = polynomials(unit_nodes(DEGREE))
-            slopes = basis @ (derivative_matrix(DEGREE + 1) @ series[panel, :, joint]) / half[panel]
-            rates = basis @ series[panel, :, n + joint]
+            slopes = basis @ (derivative_matrix(DEGREE + 1) @ series[panel, :, column]) / half[panel]
+            rates = basis @ series[panel, :, n + column]
             # The ends of a differentiated series are its least certain part.
             place = 3 + int(np.argmax(np.abs(slopes - rates)[3:-3]))
             where = nodes_on(left[panel : panel + 1], right[panel : panel + 1], DEGREE)[0, place]
+            weight, words = self._weights[column], self._function.words
             raise TrajectoryError(
-                f"the path's function gives the rate {rates[place]:.9g} of joint {self._joint(joint)} at "
-                f"{where:.9g} s, but its shapes change at {slopes[place]:.9g}; return (shapes, rates)"
+                f"{self._function.subject} gives the {words.rate} {rates[place] / weight:.9g} of "
+                f"{self._function.columns[column]} at {where:.9g} s, but its {words.values} change at "
+                f"{slopes[place] / weight:.9g}; return {words.returned}"
             )
         return float(apart.max(initial=0.0))
 
@@ -428,11 +406,8 @@ class _Scan:
         named = ", ".join(f"{time:.15g}" for time in found[:_NAMED_TIMES])
         more = f" and at {len(found) - _NAMED_TIMES} more times" if len(found) > _NAMED_TIMES else ""
         warnings.warn(
-            f"the path's function has kinks that were not declared, at t = {named} s{more}; they are taken as breaks. "
-            "Declare them with breaks= to be certain",
+            f"{self._function.subject} has kinks that were not declared, at t = {named} s{more}; they are taken as "
+            "breaks. Declare them with breaks= to be certain",
             UndeclaredBreakWarning,
             stacklevel=2,
         )
-
-    def _joint(self, column: int) -> str:
-        return self._names[column] if self._names else f"number {column}"
