@@ -431,6 +431,22 @@ def test_found_kinks_of_a_path_are_breaks_of_its_deformations_and_gauges():
     assert np.abs(apart).max() < one.error_estimate + two.error_estimate + 1e-11
 
 
+def test_a_frame_over_a_long_recording_is_sampled_densely_enough_without_a_look():
+    body = sp.load_body("cat_two_halves")
+    times = np.linspace(0.0, T, 2401)
+    path = sp.ShapePath.spline(times, np.sin(2.0 * times)[:, None] * np.linspace(0.5, 0.8, body.n_shape))
+    plain = sp.articulated(body, path)
+    value, slope = bump(1.7, T / 1500.0, 0.3)
+    seen = gauged(plain, "both", value, slope)
+    assert seen.scan is None
+    momentum, at = np.array([0.02, 0.01, 0.03]), np.array([1.0, 1.7, 2.5, T])
+    start = frame(value, slope)(np.zeros(1))[0][0]
+    one = sp.reconstruct(plain, momentum, tolerance=1e-7)
+    two = sp.reconstruct(seen, momentum, start.T, tolerance=1e-7)
+    apart = two.attitude(at) @ frame(value, slope)(at)[0] - one.attitude(at)
+    assert np.abs(apart).max() < one.error_estimate + two.error_estimate + 1e-11
+
+
 def test_a_split_in_a_frame_with_a_burst_is_that_of_the_frame_without():
     """A frame that ends as it began closes the motion as the base does: the same phase."""
     body = sp.load_body("cat_two_halves")

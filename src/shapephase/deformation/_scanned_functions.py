@@ -23,8 +23,9 @@ from ..shape_space.function_scan import Judge, ScannedFunction, Words
 
 Pair = Callable[[Array], tuple[Array, Array]]
 
-# Rows and columns of the six entries of a symmetric tensor.
-_ROWS, _COLUMNS = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
+# Of the six entries of a symmetric tensor.
+_ROWS = np.array([0, 1, 2, 1, 0, 0])
+_COLUMNS = np.array([0, 1, 2, 2, 2, 1])
 _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
 _AXES = ("x", "y", "z")
 # Of the largest moment: a body thinner than this cannot be integrated, and is refused there.

@@ -40,6 +40,9 @@ from .frames import (
 _SUBJECT = "the deformation seen from the gauge"
 # Of a path in more loops the scan of the first is not copied: the gauge is then checked between its nodes only.
 _MOST_LOOPS = 100
+# Breaks of a recorded motion from which on a look at what is between them would take longer than all else: there the
+# sampler begins with panels of at most so many parts of the duration, on which it sees as much as the look does.
+_MOST_BREAKS = 2001
 _LIFT_TOLERANCE = 1e-12
 """[rad]; tighter than any motion that is seen from this frame."""
 
@@ -235,8 +238,8 @@ class _Gauged:
     def _scan(self) -> FunctionScan | None:
         if self.turning is None:
             return self.original.scan
-        edges = self.original.smoothness(self.breaks).breaks
-        return scanned(self.depends_on(), np.union1d(edges, self.breaks))
+        edges = np.union1d(self.original.smoothness(self.breaks).breaks, self.breaks)
+        return scanned(self.depends_on(), edges) if len(edges) <= _MOST_BREAKS else None
 
     def depends_on(self) -> ScannedFunction:
         if self.turning is None:
@@ -248,7 +251,9 @@ class _Gauged:
         edges = np.union1d(breaks, known.breaks)
         if self.turning is not None:
             scan = self.scan
-            return Smoothness(edges, resolved=scan.resolved if scan else None)
+            if scan is None:
+                return Smoothness(np.union1d(edges, np.linspace(0.0, breaks[-1], _MOST_BREAKS)))
+            return Smoothness(edges, resolved=scan.resolved)
         # A frame that follows from the inertia can turn faster than the shape: what is hidden in it is not resolved.
         resolved = known.resolved
         if resolved is not None and known.loops > 1:
