@@ -84,9 +84,9 @@ def attitudes(tensors, momenta, momentum: Array, edges: Sequence[float], times: 
 
 
 def assert_right(motion: sp.Motion, truth: Array, times: Array) -> None:
-    """Within the estimate, but for what DOP853 itself is off by."""
+    """Within the tolerance, and one and a half estimates, which are measured; but for what DOP853 itself is off by."""
     error = np.linalg.norm(motion.attitude(times) - truth, axis=(1, 2)).max() / np.sqrt(2.0)
-    assert error < motion.error_estimate + 2e-12
+    assert error < min(1.5 * motion.error_estimate, motion.tolerance) + 2e-12
 
 
 def solved(deformation: sp.Deformation, tolerance: float = TOLERANCE, momentum: Array = MOMENTUM) -> sp.Motion:
@@ -258,8 +258,7 @@ def test_particles_with_a_bump(count: int, share: float):
     masses, motion, tensors, momenta = cloud(count, bump(1.234, width, 0.3))
     deformation = sp.particles(masses, motion, T)
     edges, times = [0.0, 1.234 - 0.5 * width, 1.234, 1.234 + 0.5 * width, T], np.array([1.0, 1.234, 2.0, T])
-    truth = attitudes(tensors, momenta, MOMENTUM, edges, times)
-    assert np.abs(solved(deformation).attitude(times) - truth).max() < TOLERANCE
+    assert_right(solved(deformation), attitudes(tensors, momenta, MOMENTUM, edges, times), times)
     assert deformation.scan is not None
     assert deformation.scan.rate_defect < 1e-9
 
