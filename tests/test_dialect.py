@@ -36,7 +36,7 @@ GIVEN_UP = {
     "tale": "message",
     "called": "call_casadi",
     "for_rows": "map_rows",
-    "in_machine_code": "compiled_or_interpreted",
+    "in_machine_code": "engine.is_ready",
     "Judgement": "SpectralEstimate",
     "judged": "estimate_spectrum",
     "Tail": "estimate_tail",

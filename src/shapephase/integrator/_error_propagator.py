@@ -12,6 +12,8 @@ from ..arrays import Array
 from ._rotation_step import STAGES, attitude_step
 from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
 from .casadi_calls import call_casadi, map_rows
+from .fast import engine
+from .fast.marches import amplifications
 
 
 def amplification(propagators: Array) -> Array:
@@ -22,6 +24,8 @@ def amplification(propagators: Array) -> Array:
     """
     if propagators.shape[1] == 0:
         return np.ones(1)
+    if engine.is_ready():
+        return amplifications(propagators)
     chosen = propagators.reshape(len(propagators), -1)
     largest = map_rows(largest_amplification, 9 * CHECKPOINTS, chosen)[:, 0]
     # Where steps were so long that they overflowed, the growth is unknown.

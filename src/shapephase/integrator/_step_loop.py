@@ -1,7 +1,8 @@
 """The attitude equation stepped on an interpolant three times, so that the differences tell the errors.
 
-All steps; half as many; half as many on series with errors like those they probably have. For a few momenta each march
-is one CasADi call after another, for many the steps are taken on whole arrays.
+All steps; half as many; half as many on series with errors like those they probably have. Machine code
+takes them where there is some (`fast.marches`). Without it each march of a few momenta is one CasADi call after
+another, and the steps of many are taken on whole arrays.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
 from .casadi_calls import call_casadi
+from .fast import engine
+from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
@@ -77,6 +80,8 @@ def integrate_steps(
     magnitudes : (B,) of the momentum [kg m^2/s]
     with_propagators : whether to integrate the error propagators too
     """
+    if engine.is_ready():
+        return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators)
     total = interpolant.loops * int(steps.sum())
     batch = len(magnitudes)
     whole = StepRecord(
@@ -110,12 +115,12 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
     The equation is linear, so steps do not depend on each other, and a further loop repeats the rotation of the first:
     it costs no steps.
     """
-    loops, coefficients = interpolant.loops, interpolant.coefficients
-    whole = _quaternions_at_rest(_channels_at_stages(interpolant, coefficients, steps), loops)
-    half = _quaternions_at_rest(_channels_at_stages(interpolant, coefficients, steps // 2), loops)
+    coefficients = interpolant.coefficients
+    whole = _quaternions_at_rest(interpolant, coefficients, steps)
+    half = _quaternions_at_rest(interpolant, coefficients, steps // 2)
     truncation = 0.0
     if perturbed is not None:
-        cut = _quaternions_at_rest(_channels_at_stages(interpolant, perturbed, steps // 2), loops)
+        cut = _quaternions_at_rest(interpolant, perturbed, steps // 2)
         truncation = _largest_angle(half, cut)
     nothing = np.zeros((1, len(whole) - 1))
     return StepRecord(
@@ -267,8 +272,32 @@ def _steps_of_many(channels: Array, loops: int, directions: Array, magnitudes: A
             direction = end
 
 
-def _quaternions_at_rest(channels: Array, loops: int) -> Array:
+def _by_kernel(
+    interpolant: Interpolant,
+    perturbed: Array | None,
+    steps: Integers,
+    directions: Array,
+    magnitudes: Array,
+    with_propagators: bool,
+) -> StepRecord:
+    widths, loops = np.diff(interpolant.edges[: len(steps) + 1]), interpolant.loops
+    marks = checkpoint_steps(loops * int(steps.sum())) if with_propagators else np.zeros(0, dtype=int)
+    arrays = march_in_threads(
+        widths, interpolant.coefficients, perturbed, steps, loops, directions, magnitudes, marks=marks
+    )
+    return StepRecord(**vars(arrays))
+
+
+def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:
     """At the ends of all steps without momentum: (loops K + 1, 4)."""
+    if engine.is_ready():
+        quaternions = quaternions_at_rest(np.diff(interpolant.edges[: len(steps) + 1]), coefficients, steps)
+    else:
+        quaternions = _quaternions_of_one_loop(_channels_at_stages(interpolant, coefficients, steps))
+    return _repeated(quaternions, interpolant.loops) if interpolant.loops > 1 else quaternions
+
+
+def _quaternions_of_one_loop(channels: Array) -> Array:
     count = len(channels)
     quaternions = np.empty((count + 1, 4))
     quaternions[0] = [0.0, 0.0, 0.0, 1.0]
@@ -277,7 +306,7 @@ def _quaternions_at_rest(channels: Array, loops: int) -> Array:
         block = drifts[first : first + BLOCK]
         (states,) = call_casadi(_rest_function(len(block)), len(block), quaternions[first], block)
         quaternions[first + 1 : first + BLOCK + 1] = states
-    return _repeated(quaternions, loops) if loops > 1 else quaternions
+    return quaternions
 
 
 def _repeated(quaternions: Array, loops: int) -> Array:

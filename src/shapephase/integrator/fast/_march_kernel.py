@@ -76,10 +76,10 @@ def _turn(s, lanes):
 @inline
 def _grow(c, b, s, lanes):
     for i in range(lanes):
-        half = 0.5 * s[_MAGNITUDE + i]
-        x = half * (s[_START + i] + s[_END + i])
-        y = half * (s[_START + LANES + i] + s[_END + LANES + i])
-        z = half * (s[_START + 2 * LANES + i] + s[_END + 2 * LANES + i])
+        x, y = s[_START + i] + s[_END + i], s[_START + LANES + i] + s[_END + LANES + i]
+        z = s[_START + 2 * LANES + i] + s[_END + 2 * LANES + i]
+        scale = s[_MAGNITUDE + i] / math.sqrt(x * x + y * y + z * z)
+        x, y, z = scale * x, scale * y, scale * z
         g = _PROPAGATOR + i
         g0, g1, g2, g3, g4, g5, g6, g7, g8 = grown(
             c, b, x, y, z, s[g], s[g + LANES], s[g + 2 * LANES], s[g + 3 * LANES], s[g + 4 * LANES],

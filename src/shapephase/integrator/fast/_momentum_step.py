@@ -92,10 +92,20 @@ def product(a0, a1, a2, a3, b0, b1, b2, b3):
 
 
 @inline
-def grown(c, b, x, y, z, g0, g1, g2, g3, g4, g5, g6, g7, g8):
-    """An error propagator after a step, by the Cayley transform of the variation at its middle.
+def _times(a0, a1, a2, a3, a4, a5, a6, a7, a8, b0, b1, b2, b3, b4, b5, b6, b7, b8):
+    """Of 3 x 3 matrices."""
+    return (
+        a0 * b0 + a1 * b3 + a2 * b6, a0 * b1 + a1 * b4 + a2 * b7, a0 * b2 + a1 * b5 + a2 * b8,
+        a3 * b0 + a4 * b3 + a5 * b6, a3 * b1 + a4 * b4 + a5 * b7, a3 * b2 + a4 * b5 + a5 * b8,
+        a6 * b0 + a7 * b3 + a8 * b6, a6 * b1 + a7 * b4 + a8 * b7, a6 * b2 + a7 * b5 + a8 * b8,
+    )  # fmt: skip
 
-    (x, y, z): the momentum seen from the body, the mean of the step's ends
+
+@inline
+def grown(c, b, x, y, z, g0, g1, g2, g3, g4, g5, g6, g7, g8):
+    """An error propagator after a step, by the Cayley transform of the variation at its middle, once for each half.
+
+    (x, y, z): the momentum in the middle, seen from the body
     """
     i, j = b + _INNER_STAGES[0], b + _INNER_STAGES[1]
     xx, yy = 0.5 * (c[i] + c[j]), 0.5 * (c[STRIDE + i] + c[STRIDE + j])
@@ -104,23 +114,18 @@ def grown(c, b, x, y, z, g0, g1, g2, g3, g4, g5, g6, g7, g8):
     w0 = xx * x + xy * y + xz * z - 0.5 * (c[6 * STRIDE + i] + c[6 * STRIDE + j])
     w1 = xy * x + yy * y + yz * z - 0.5 * (c[7 * STRIDE + i] + c[7 * STRIDE + j])
     w2 = xz * x + yz * y + zz * z - 0.5 * (c[8 * STRIDE + i] + c[8 * STRIDE + j])
-    m0, m1, m2 = 0.5 * (xy * z - xz * y), 0.5 * (xz * x - xx * z + w2), 0.5 * (xx * y - xy * x - w1)
-    m3, m4, m5 = 0.5 * (yy * z - yz * y - w2), 0.5 * (yz * x - xy * z), 0.5 * (xy * y - yy * x + w0)
-    m6, m7, m8 = 0.5 * (yz * z - zz * y + w1), 0.5 * (zz * x - xz * z - w0), 0.5 * (xz * y - yz * x)
+    m0, m1, m2 = 0.25 * (xy * z - xz * y), 0.25 * (xz * x - xx * z + w2), 0.25 * (xx * y - xy * x - w1)
+    m3, m4, m5 = 0.25 * (yy * z - yz * y - w2), 0.25 * (yz * x - xy * z), 0.25 * (xy * y - yy * x + w0)
+    m6, m7, m8 = 0.25 * (yz * z - zz * y + w1), 0.25 * (zz * x - xz * z - w0), 0.25 * (xz * y - yz * x)
     a0, a4, a8 = 1.0 - m0, 1.0 - m4, 1.0 - m8
-    # The adjugate of one minus half the variation.
+    # The adjugate of one minus a quarter of the variation.
     f0, f1, f2 = a4 * a8 - m5 * m7, m2 * m7 + m1 * a8, m1 * m5 + m2 * a4
     f3, f4, f5 = m5 * m6 + m3 * a8, a0 * a8 - m2 * m6, m2 * m3 + a0 * m5
     f6, f7, f8 = m3 * m7 + a4 * m6, m1 * m6 + a0 * m7, a0 * a4 - m1 * m3
     scale = 1.0 / (a0 * f0 - m1 * f3 - m2 * f6)
-    m0, m4, m8 = 1.0 + m0, 1.0 + m4, 1.0 + m8
-    t0, t1, t2 = m0 * g0 + m1 * g3 + m2 * g6, m0 * g1 + m1 * g4 + m2 * g7, m0 * g2 + m1 * g5 + m2 * g8
-    t3, t4, t5 = m3 * g0 + m4 * g3 + m5 * g6, m3 * g1 + m4 * g4 + m5 * g7, m3 * g2 + m4 * g5 + m5 * g8
-    t6, t7, t8 = m6 * g0 + m7 * g3 + m8 * g6, m6 * g1 + m7 * g4 + m8 * g7, m6 * g2 + m7 * g5 + m8 * g8
-    return (
-        scale * (f0 * t0 + f1 * t3 + f2 * t6), scale * (f0 * t1 + f1 * t4 + f2 * t7),
-        scale * (f0 * t2 + f1 * t5 + f2 * t8), scale * (f3 * t0 + f4 * t3 + f5 * t6),
-        scale * (f3 * t1 + f4 * t4 + f5 * t7), scale * (f3 * t2 + f4 * t5 + f5 * t8),
-        scale * (f6 * t0 + f7 * t3 + f8 * t6), scale * (f6 * t1 + f7 * t4 + f8 * t7),
-        scale * (f6 * t2 + f7 * t5 + f8 * t8),
+    h0, h1, h2, h3, h4, h5, h6, h7, h8 = _times(
+        scale * f0, scale * f1, scale * f2, scale * f3, scale * f4, scale * f5, scale * f6, scale * f7, scale * f8,
+        1.0 + m0, m1, m2, m3, 1.0 + m4, m5, m6, m7, 1.0 + m8,
     )  # fmt: skip
+    g0, g1, g2, g3, g4, g5, g6, g7, g8 = _times(h0, h1, h2, h3, h4, h5, h6, h7, h8, g0, g1, g2, g3, g4, g5, g6, g7, g8)
+    return _times(h0, h1, h2, h3, h4, h5, h6, h7, h8, g0, g1, g2, g3, g4, g5, g6, g7, g8)
