@@ -24,9 +24,12 @@ SPLIT = ["split", "cat", "cat_righting", "--json"]
 def home(tmp_path, monkeypatch):
     """A folder for caches that nothing has used yet."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    cache_folder.kernel_folder.cache_clear()
+    kept = cache_folder.kernel_folder, engine._are_kept
+    for answer in kept:
+        answer.cache_clear()
     yield tmp_path
-    cache_folder.kernel_folder.cache_clear()
+    for answer in kept:
+        answer.cache_clear()
 
 
 def kernel_folder():

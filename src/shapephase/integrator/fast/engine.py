@@ -9,6 +9,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
@@ -89,8 +90,9 @@ def _import_kernels() -> None:
         import_module(module, __package__)
 
 
+@lru_cache(maxsize=1)
 def _are_kept() -> bool:
-    """Whether every kernel has been compiled before, as far as the names of files tell."""
+    """Whether every kernel was compiled before this process first asked, as far as the names of files tell."""
     folder = kernel_folder()
     return folder is not None and all(any(folder.rglob(f"*{name}-*.nbi")) for name in _KERNELS)
 
