@@ -25,6 +25,12 @@ def test_without_numba_all_is_as_before(monkeypatch):
 
 
 @pytest.mark.usefixtures("fast")
+def test_a_numba_that_interprets_is_not_used(monkeypatch):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert not switch.is_on()
+
+
+@pytest.mark.usefixtures("fast")
 @pytest.mark.parametrize(("momenta", "samples", "enough"), [(1, 4000, False), (1000, 4000, True), (1, 400_000, True)])
 def test_the_command_line_waits_for_large_work(monkeypatch, momenta, samples, enough):
     monkeypatch.delenv("SHAPEPHASE_FAST")

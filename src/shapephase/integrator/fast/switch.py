@@ -30,7 +30,9 @@ def is_installed() -> bool:
 
 def is_allowed() -> bool:
     """Whether machine code may be used in this process."""
-    return _setting() != "0" and is_installed()
+    # A Numba that is told to interpret would take the loops one operation after another.
+    interpreting = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
+    return _setting() != "0" and not interpreting and is_installed()
 
 
 def is_on() -> bool:
