@@ -15,8 +15,8 @@ _LAST = 2
 _LEAST_DEGREE = 4
 # The slowest decay from one degree to the next that is believed.
 _SLOWEST = 0.99
-# Of a series' first term: smaller ones are rounding, and what is beyond them is so too.
-_ROUNDING = 1e-14
+# Of the largest term of a series: what is smaller may be rounding, which does not fall any more.
+_ROUNDING = 3e-14
 # Of what is missing by the decay of the terms: they may fall more slowly beyond, and what aliases adds to it.
 _SAFETY_FACTOR = 3.0
 # Keeps quotients of coefficients defined where these are zero.
@@ -48,9 +48,11 @@ def perturbed(coefficients: Array, degrees: Integers, widths: Array, momentum: f
         late, start = x[:, degree - 1 :].max(axis=1), max(1, min(3 * int(degree) // 5, int(degree) - _LEAST_DEGREE))
         middle = np.maximum(x[:, start : degree - 1].max(axis=1), late)
         decay = (np.maximum(late, _TINY) / np.maximum(middle, _TINY)) ** (1.0 / (degree - 1 - start))
-        decay = np.where(late <= _ROUNDING * x[:, 0], 0.0, np.minimum(decay, _SLOWEST))
+        decay = np.minimum(decay, _SLOWEST)
         # Where the body turns as fast as the series swings, what aliases to lower degrees weighs more.
         fast = 2.0 * x.sum(axis=1) / degree
         missing = _SAFETY_FACTOR * decay / (1.0 - decay) * (1.0 + fast * fast)
+        # Rounding is as large in the terms that are missing as in the last ones, and no larger.
+        missing = np.where(late <= _ROUNDING * x.max(axis=1), 1.0, np.minimum(missing, _SAFETY_FACTOR * degree))
         changed[rows, degree + 1 - _LAST : degree + 1] *= (1.0 - missing)[:, None, None]
     return Perturbed(changed, hidden)

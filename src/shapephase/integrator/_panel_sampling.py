@@ -12,9 +12,9 @@ from ..arrays import Array, Integers, Mask
 from ..chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import AccuracyNotReached
 from ._last_terms import Perturbed, perturbed
-from ._spectral_error import Channels, SpectralEstimate, estimate_spectrum, spectral_norms
+from ._spectral_error import Channels, SpectralEstimate, averaged_share, estimate_spectrum, spectral_norms
 from .interpolant import Interpolant
-from .resolved import ResolvedPath
+from .resolved import Hidden, ResolvedPath
 
 # Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
 _FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
@@ -26,6 +26,8 @@ _HIGHEST_DEGREE = 80
 _MOST_PANELS = 4000
 # Of the tolerance: what the first panels may leave hidden of a path that is resolved.
 _HIDDEN_SHARE = 0.1
+# Of the root of the sum of squared noises: their sum is hardly ever larger.
+_NOISE_FACTOR = 4.0
 # Of a panel, relative to the interval: narrower ones would consist of rounding.
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
@@ -129,7 +131,7 @@ class PanelSampler:
         self._left, self._right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
         self._at_rest = oscillations == 0.0
         self._groups: dict[int, _Group] = {}
-        self._known_hidden: dict[int, tuple[_Group, Array, Array, Array]] = {}
+        self._known_hidden: dict[int, tuple[_Group, Hidden]] = {}
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
@@ -145,29 +147,32 @@ class PanelSampler:
                 [_PanelsToSample(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()]
             )
         while True:
-            errors = {d: g.estimate.error(momentum, g.width, 2.0 * d) for d, g in self._groups.items()}
+            hidden = {d: self._hidden(d, momentum)[0] for d in self._groups}
+            errors = {
+                d: np.maximum(g.estimate.error(momentum, g.width, 2.0 * d), hidden[d]) for d, g in self._groups.items()
+            }
             total = self._loops * sum(float(e.sum()) for e in errors.values())
-            hiding = {d: self._hidden(d, momentum)[0] > tolerance for d in self._groups}
-            if any(rows.any() for rows in hiding.values()):
-                self._refine_panels(hiding, errors, tolerance, total)
-                continue
             if total <= tolerance:
                 if self._is_bandlimited or not self._check_between_nodes():
                     return
                 continue
             share = tolerance / (self._span * self._loops)
-            rough = {d: (errors[d] > share * g.width) & ~g.estimate.at_rounding for d, g in self._groups.items()}
+            rough = {
+                d: (errors[d] > share * g.width) & (~g.estimate.at_rounding | (hidden[d] > share * g.width))
+                for d, g in self._groups.items()
+            }
             if not any(rows.any() for rows in rough.values()):
                 return
             self._refine_panels(rough, errors, tolerance, total)
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
-        total = 0.0
+        total, noises = 0.0, []
         for degree, g in self._groups.items():
             hidden, noise = self._hidden(degree, momentum)
-            total += float(np.maximum(g.estimate.error(momentum, g.width, 2.0 * degree), hidden).sum() + noise.sum())
-        return self._loops * total
+            total += float(np.maximum(g.estimate.error(momentum, g.width, 2.0 * degree), hidden).sum())
+            noises.append(noise)
+        return self._loops * (total + _sum_of_noise(np.concatenate(noises)))
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
@@ -190,11 +195,13 @@ class PanelSampler:
         """As `Sampler.perturbed`."""
         degrees = np.concatenate([np.full(len(g.left), d) for d, g in self._groups.items()])
         left = np.concatenate([g.left for g in self._groups.values()])
-        hidden = 0.0
+        hidden, noises = 0.0, []
         for degree, g in self._groups.items():
             between, noise = self._hidden(degree, momentum)
             seen = 0.5 * g.width * (np.nan_to_num(g.gaps) @ np.array([momentum, 1.0]))
-            hidden += float((between + noise + seen).sum())
+            hidden += float((between + seen).sum())
+            noises.append(noise)
+        hidden += _sum_of_noise(np.concatenate(noises))
         interpolant, order = self.interpolant(), np.argsort(left)
         widths = np.diff(interpolant.edges[: len(left) + 1])
         return perturbed(interpolant.coefficients, degrees[order], widths, momentum, self._loops * hidden)
@@ -240,11 +247,13 @@ class PanelSampler:
         if self._resolved is None or not degree:
             return np.zeros(len(g.left)), np.zeros(len(g.left))
         if self._known_hidden.get(degree, (None,))[0] is not g:
-            self._known_hidden[degree] = g, *self._resolved.hidden(g.left, g.right, degree)
-        _, shapes, rates, noise = self._known_hidden[degree]
+            self._known_hidden[degree] = g, self._resolved.hidden(g.left, g.right, degree)
+        hidden = self._known_hidden[degree][1]
         # A shape that is off turns the body by the inertia, for as long as the panel lasts.
         turn = momentum * g.estimate.inverse_norm * g.width
-        return shapes * turn + rates, noise * (1.0 + turn)
+        share = averaged_share(2.0 * degree, turn + g.width * g.estimate.drift_norm)
+        shapes, rates = (share[:, None] * hidden.beyond + hidden.misfit).T
+        return shapes * turn + rates, hidden.noise * (1.0 + turn)
 
     def _panels_at_rest(self) -> Mask:
         """Panels on which nothing moves: one sample each is enough."""
@@ -310,3 +319,8 @@ class PanelSampler:
         half = gap.shape[-1] // 2
         worst = [np.argmax(part.max(axis=-1), axis=1) for part in (gap[..., :half], gap[..., half:])]
         return _TEST_FRACTIONS[np.stack(worst, axis=-1)]
+
+
+def _sum_of_noise(noise: Array) -> float:
+    """Of panels whose noise is independent of one another: (P,)."""
+    return min(float(noise.sum()), _NOISE_FACTOR * float(np.sqrt((noise * noise).sum())))

@@ -131,6 +131,11 @@ def unaveraged_share(converging: bool, phase: float, turn: float) -> float:
     return min(1.0, _UNAVERAGED_PHASE / max(phase - turn, _UNAVERAGED_PHASE)) if converging else 1.0
 
 
+def averaged_share(phase: float, turn: Array) -> Array:
+    """The same for many panels that converge: (G,) -> (G,)."""
+    return np.minimum(1.0, _UNAVERAGED_PHASE / np.maximum(phase - turn, _UNAVERAGED_PHASE))
+
+
 @dataclass(frozen=True, eq=False)
 class SpectralEstimate:
     """Error estimates from the spectra of some panels: (G,) each."""
@@ -148,8 +153,7 @@ class SpectralEstimate:
         """Attitude error caused by the interpolation error: (G,) [rad]; it averages out as in `unaveraged_share`."""
         rate = momentum * self.inverse + self.drift
         turn = width * (momentum * self.inverse_norm + self.drift_norm)
-        share = np.minimum(1.0, _UNAVERAGED_PHASE / np.maximum(phase - turn, _UNAVERAGED_PHASE))
-        return 0.5 * width * rate * np.where(self.converging, share, 1.0)
+        return 0.5 * width * rate * np.where(self.converging, averaged_share(phase, turn), 1.0)
 
     def raised_to(self, gaps: Array, seen: Mask) -> SpectralEstimate:
         """The same with errors at least as large as gaps that were seen (G, 2), which do not average out."""

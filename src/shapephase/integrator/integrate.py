@@ -19,13 +19,12 @@ from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._dense_output import DenseOutput
-from ._error_propagator import amplification, exact_propagators, momentum_slope
+from ._error_propagator import amplification, exact_propagators, momentum_slope, rounding_error
 from ._step_control import StepRequirements, even_steps
 from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest, stage_channels
 from .interpolant import Interpolant
 from .sampling import Sampler
 
-_EPS = np.finfo(float).eps
 # Steps of one motion: some ten seconds, and a gigabyte of results.
 _MOST_STEPS = 4_000_000
 # Rounds of refinement; most motions need one.
@@ -50,12 +49,15 @@ _ORDER = 8.0
 _MARGIN_OF_MANY = 0.1
 # [rad] distance of coarser steps up to which the propagators of the steps are trusted.
 _INFORMATIVE_ERROR = 0.1
+# Of the tolerance: rounding below is not looked at closely.
+_LITTLE_ROUNDING = 0.01
 # Of the tolerance: with more rounding than this no refinement reaches it.
 _MOST_ROUNDING = 0.9
 # Of the error at the ends of the steps: what the polynomials between them may add.
 _DENSE_SHARE = 5e-3
 _BATCHED_FIELDS = (
-    "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error", "amplification",
+    "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
+    "rounding_error", "amplification",
 )  # fmt: skip
 
 
@@ -73,6 +75,7 @@ class SteppedRotation:
     turns : (B, K) of each step about its starting direction, the shortest rotation between its ends taken off [rad]
     dynamics : (B, K) dynamic phase of each step [rad]
     sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
+    rounding_error : (B,) error due to rounding alone [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
     """
 
@@ -85,6 +88,7 @@ class SteppedRotation:
     dynamics: Array
     sampling_error: Array
     stepping_error: Array
+    rounding_error: Array
     amplification: Array
 
     @cached_property
@@ -114,15 +118,6 @@ class SteppedRotation:
     def _error_at_ends(self) -> Array:
         """The same at the ends of the steps: (B,) [rad]."""
         return self.sampling_error + self.stepping_error + self.rounding_error
-
-    @cached_property
-    def rounding_error(self) -> Array:
-        """Error due to rounding alone: (B,) [rad]."""
-        chords = self.quaternions[:, 1:] - self.quaternions[:, :-1]
-        turned_by = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords)).sum(axis=1)
-        # The rate of turning itself is known only to a few units of rounding; the error grows as the body turns on.
-        committed = 8.0 + 2.0 * np.sqrt(self.quaternions.shape[1]) + turned_by
-        return _EPS * (self.amplification * committed + 4.0 * turned_by)
 
     def rotation(self, t: Array) -> Array:
         """S(t): (N,) -> (B, N, 3, 3)."""
@@ -250,8 +245,8 @@ class _Integration:
         self._sampling_target = _SAMPLING_SHARE * tolerance
         self._finer = 1.0
         self._amplification: float | None = None
-        # The same for every momentum, where only the derivative of the steps shows it.
-        self._amplifications: Array | None = None
+        # How they do, where only the derivative of the steps shows it: (B, CHECKPOINTS, 3, 3).
+        self._propagators: Array | None = None
 
     def solution(self) -> SteppedRotation:
         """The first attempt whose error estimate is within the tolerance for every momentum."""
@@ -284,9 +279,8 @@ class _Integration:
         steps = self._plan(interpolant, requirements)
         record = self._take_steps(interpolant, None if perturbed is None else perturbed.coefficients, steps)
         stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
-        amplifications = self._amplifications
-        if amplifications is None:
-            amplifications = amplification(record.propagators)
+        propagators = record.propagators if self._propagators is None else self._propagators
+        amplifications = amplification(propagators)
         sampling = amplifications * expected
         if perturbed is not None:
             measured = record.truncation + amplifications * perturbed.hidden
@@ -301,6 +295,9 @@ class _Integration:
             dynamics=record.dynamics,
             sampling_error=sampling,
             stepping_error=requirements.part_of_coarser(steps) * stepping,
+            rounding_error=rounding_error(
+                propagators, record.quaternions, amplifications, _LITTLE_ROUNDING * self._tolerance
+            ),
             amplification=amplifications,
         )
         return _Attempt(rotation, stepping)
@@ -317,10 +314,11 @@ class _Integration:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         many = count > _MANY_STEPS
         if self._largest > 0.0 and (many or (requirements.far and not short)):
-            if self._amplifications is None:
-                self._amplifications = _amplification_by_derivative(interpolant, self._momentum, self._magnitudes)
+            if self._propagators is None:
+                self._propagators = _propagators_by_derivative(interpolant, self._momentum, self._magnitudes)
             # Errors will be amplified: each must be that much smaller.
-            worst = max(1.0, float(np.nan_to_num(self._amplifications).max()))
+            growth = amplification(self._propagators)
+            worst = max(1.0, float(growth.max(where=np.isfinite(growth), initial=1.0)))
             planned = self._finer * requirements.plan(goal / worst, short=short)
         return even_steps(planned, self._subdivide)
 
@@ -329,7 +327,7 @@ class _Integration:
         if not self._magnitudes.any():
             return integrate_steps_at_rest(interpolant, perturbed, steps)
         directions = _directions(self._momentum, self._magnitudes)
-        with_propagators = self._amplifications is None
+        with_propagators = self._propagators is None
         with np.errstate(over="ignore", invalid="ignore"):
             return integrate_steps(
                 interpolant, perturbed, steps, directions, self._magnitudes, with_propagators=with_propagators
@@ -373,8 +371,8 @@ def _not_reached(tolerance: float, last: SteppedRotation) -> AccuracyNotReached:
     )
 
 
-def _amplification_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> Array:
-    """The largest growth of errors along long motions, by the derivative of coarse steps: (B,).
+def _propagators_by_derivative(interpolant: Interpolant, momentum: Array, magnitudes: Array) -> Array:
+    """How errors grow along long motions, by the derivative of coarse steps: (B, CHECKPOINTS, 3, 3).
 
     Propagators that are only nearly right would drift off over many turns; the steps' own derivative does not.
     """
@@ -382,14 +380,8 @@ def _amplification_by_derivative(interpolant: Interpolant, momentum: Array, magn
     requirements = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE)
     steps = even_steps(requirements.plan(LOOSEST_TOLERANCE), 1)
     channels, directions = stage_channels(interpolant, steps), _directions(momentum, magnitudes)
-    found = np.empty(len(magnitudes))
     with np.errstate(all="ignore"):
-        for row in range(len(magnitudes)):
-            part = slice(row, row + 1)
-            found[part] = amplification(
-                exact_propagators(channels, directions[part], magnitudes[part], interpolant.loops)
-            )
-    return found
+        return exact_propagators(channels, directions, magnitudes, interpolant.loops)
 
 
 def _directions(momentum: Array, magnitudes: Array) -> Array:

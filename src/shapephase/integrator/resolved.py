@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,14 @@ class FirstPanels:
     degree: Integers
     left: Array
     right: Array
+
+
+class Hidden(NamedTuple):
+    """What the nodes of panels do not show of a path: (P, 2) of the shapes and of their rates times half the width."""
+
+    beyond: Array  # terms of higher degrees, which swing and mostly average out
+    misfit: Array  # what series on these panels cannot follow
+    noise: Array  # (P,) the larger of both
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +101,8 @@ class ResolvedPath:
         chosen = np.concatenate(kept)
         return FirstPanels(degree[chosen], self.left[chosen], self.right[chosen])
 
-    def hidden(self, left: Array, right: Array, degree: int) -> tuple[Array, Array, Array]:
-        """What of the path lies beyond a degree on panels: shapes, rates times half the width, noise (P,) [rad]."""
+    def hidden(self, left: Array, right: Array, degree: int) -> Hidden:
+        """What of the path lies beyond a degree on panels (P,) [rad]."""
         rows = self._smallest_around(left, right)
         nodes = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(_TEST_DEGREE)
         local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])
@@ -101,11 +110,8 @@ class ResolvedPath:
         series = np.abs(values_to_coefficients(_TEST_DEGREE) @ values)
         beyond = series[:, degree + 1 :].sum(axis=1) if degree < _TEST_DEGREE else 0.0 * series[:, 0]
         shapes, rates = beyond[:, : self._n_shape], beyond[:, self._n_shape :]
-        return (
-            shapes.max(axis=1, initial=0.0) + self.misfit[rows, 0],
-            0.5 * (right - left) * rates.max(axis=1, initial=0.0) + self.misfit[rows, 1],
-            self.noise[rows],
-        )
+        largest = [shapes.max(axis=1, initial=0.0), 0.5 * (right - left) * rates.max(axis=1, initial=0.0)]
+        return Hidden(np.stack(largest, axis=1), self.misfit[rows], self.noise[rows])
 
     def reversed(self) -> ResolvedPath:
         """Of the path in the opposite order of time."""

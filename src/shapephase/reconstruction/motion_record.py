@@ -31,6 +31,7 @@ _STEPS = (
     "dynamics",
     "sampling_error",
     "stepping_error",
+    "rounding_error",
     "amplification",
 )
 _SAMPLES = ("edges", "coefficients")
