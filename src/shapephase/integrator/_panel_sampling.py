@@ -42,6 +42,7 @@ class _Group:
     left: Array
     right: Array
     values: Array  # (G, degree + 1, 9) at the ascending Chebyshev points
+    coefficients: Array  # (G, degree + 1, 9) of the Chebyshev series through them
     gaps: Array  # (G, 2) errors seen between the nodes; NaN: not checked
     estimate: SpectralEstimate
 
@@ -55,13 +56,16 @@ class _Group:
 
 def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
     rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
-    estimate = estimate_spectrum(spectral_norms(values_to_coefficients(degree) @ values), rounding)
+    coefficients = values_to_coefficients(degree) @ values
+    estimate = estimate_spectrum(spectral_norms(coefficients), rounding)
     if gaps is None:
         gaps = np.full((len(left), 2), np.nan)
     seen = ~np.isnan(gaps[:, 0])
     if seen.any():
         estimate = estimate.raised_to(2.0 * np.nan_to_num(gaps), seen)
-    return _Group(degree=degree, left=left, right=right, values=values, gaps=gaps, estimate=estimate)
+    return _Group(
+        degree=degree, left=left, right=right, values=values, coefficients=coefficients, gaps=gaps, estimate=estimate
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +136,7 @@ class PanelSampler:
         self._at_rest = oscillations == 0.0
         self._groups: dict[int, _Group] = {}
         self._known_hidden: dict[int, tuple[_Group, Hidden]] = {}
+        self._interpolant: Interpolant | None = None
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
@@ -176,20 +181,21 @@ class PanelSampler:
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
-        groups = list(self._groups.values())
-        left = np.concatenate([g.left for g in groups])
-        order = np.argsort(left)
-        coefficients = np.zeros((len(left), max(self._groups) + 1, 9))
-        start = 0
-        for g in groups:
-            rows = slice(start, start + len(g.left))
-            coefficients[rows, : g.degree + 1] = values_to_coefficients(g.degree) @ g.values
-            start = rows.stop
-        edges = np.append(left[order], max(float(g.right.max()) for g in groups))
-        if self._loops > 1:
-            starts = edges[-1] * np.arange(self._loops)
-            edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
-        return Interpolant(edges, coefficients[order], self._loops, self._channels.count)
+        if self._interpolant is None:
+            groups = list(self._groups.values())
+            left = np.concatenate([g.left for g in groups])
+            coefficients = np.zeros((len(left), max(self._groups) + 1, 9))
+            start = 0
+            for g in groups:
+                coefficients[start : start + len(g.left), : g.degree + 1] = g.coefficients
+                start += len(g.left)
+            order = np.argsort(left)
+            edges = np.append(left[order], max(float(g.right.max()) for g in groups))
+            if self._loops > 1:
+                starts = edges[-1] * np.arange(self._loops)
+                edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
+            self._interpolant = Interpolant(edges, coefficients[order], self._loops, self._channels.count)
+        return self._interpolant
 
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`."""
@@ -275,6 +281,7 @@ class PanelSampler:
 
     def _add(self, to_sample: list[_PanelsToSample]) -> None:
         """Sample new panels, and those whose degree is raised; one call for all points."""
+        self._interpolant = None
         times = [panels.new_points() for panels in to_sample]
         values = self._channels(np.concatenate([t.ravel() for t in times]))
         start = 0
@@ -292,6 +299,7 @@ class PanelSampler:
 
     def _check_between_nodes(self) -> bool:
         """Compare new panels of a black box with samples between their nodes. False: no panel was new."""
+        self._interpolant = None
         found = False
         for degree, g in list(self._groups.items()):
             rows = np.flatnonzero(np.isnan(g.gaps[:, 0]))

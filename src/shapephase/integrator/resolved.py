@@ -7,8 +7,8 @@ it must be sampled so that nothing of the path lies hidden between the nodes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,12 @@ DEGREE = 32
 _TEST_DEGREE = 48
 # [rad] What series at rest are off by rounding.
 _RESTING = 1e-14
-# Degrees that panels are sampled at first; all of them can be doubled and trebled.
-_FIRST_DEGREES = (5, 7, 10, 12, 15, 18, 21, 24, 27, 30)
+# Degrees that a path is looked at, and those that a panel is then sampled at first: a body's inertia swings faster than
+# its shape. All of the latter can be doubled and trebled.
+_DEGREES_OF_PATH = np.array([5, 10, 20, 30])
+_FIRST_DEGREES = np.array([10, 15, 30, 40])
+# Choices of panels, and what they hide, that are kept with a path.
+_MOST_REMEMBERED = 64
 # Stands for the degree of a panel that must be halved.
 _IMPOSSIBLE = 1_000_000_000
 
@@ -67,6 +71,8 @@ class ResolvedPath:
     children: Integers
     roots: Integers
     duration: float
+    _first: dict[float, FirstPanels] = field(default_factory=dict, init=False, repr=False)
+    _hidden: dict[tuple[int, bytes, bytes], Hidden] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def leaves(self) -> Integers:
@@ -76,11 +82,15 @@ class ResolvedPath:
 
     def first_panels(self, tolerance: float) -> FirstPanels:
         """The panels and degrees with the fewest samples that leave less than `tolerance` [rad] of the path hidden."""
+        if tolerance not in self._first:
+            _remember(self._first, tolerance, self._chosen(tolerance))
+        return self._first[tolerance]
+
+    def _chosen(self, tolerance: float) -> FirstPanels:
         tails = self._tails(self.coefficients) + self.misfit.max(axis=1)[:, None]
-        least = np.array(_FIRST_DEGREES)
-        fits = tails[:, least] <= tolerance
+        fits = tails[:, _DEGREES_OF_PATH] <= tolerance
         fits[:, -1] |= self.children < 0
-        degree = np.where(fits.any(axis=1), least[np.argmax(fits, axis=1)], _IMPOSSIBLE)
+        degree = np.where(fits.any(axis=1), _FIRST_DEGREES[np.argmax(fits, axis=1)], _IMPOSSIBLE)
         moving = self.coefficients[:, :, self._n_shape :].any(axis=(1, 2)) | (self.misfit > 0.0).any(axis=1)
         # Values without rates, as of an inertia that is given, move nevertheless.
         moving |= tails[:, 0] > _RESTING
@@ -103,6 +113,12 @@ class ResolvedPath:
 
     def hidden(self, left: Array, right: Array, degree: int) -> Hidden:
         """What of the path lies beyond a degree on panels (P,) [rad]."""
+        key = degree, left.tobytes(), right.tobytes()
+        if key not in self._hidden:
+            _remember(self._hidden, key, self._beyond(left, right, degree))
+        return self._hidden[key]
+
+    def _beyond(self, left: Array, right: Array, degree: int) -> Hidden:
         rows = self._smallest_around(left, right)
         nodes = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(_TEST_DEGREE)
         local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])
@@ -177,6 +193,13 @@ class ResolvedPath:
             if not holds.any():
                 return rows
             rows = np.where(holds, half, rows)
+
+
+def _remember(known: dict[Any, Any], key: Any, value: Any) -> None:
+    """Keep a result for the next motion along the same path."""
+    if len(known) >= _MOST_REMEMBERED:
+        known.clear()
+    known[key] = value
 
 
 def joined(paths: Sequence[ResolvedPath]) -> ResolvedPath:
