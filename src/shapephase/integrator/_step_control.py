@@ -23,10 +23,10 @@ _GROWTH_WITH_DEGREES = 1.5
 # [rad] bound of the turn in one step; it is up to twice the turn itself.
 _TURN_A_STEP = 2.0
 # [rad] the same where the propagator of a step must be right over a long motion without the steps' derivative.
-_SHORT_TURN_A_STEP = 0.3
-# [rad] bound of the whole turn (some thirty radians indeed) from which errors of the propagators have added up to more
+_SHORT_TURN_A_STEP = 0.6
+# [rad] bound of the whole turn (some fifteen radians indeed) from which errors of the propagators have added up to more
 # than an estimate can bear.
-_FAR = 40.0
+_FAR = 25.0
 # A term of the rate of turning, times the panel's width, is significant above this part of the tolerance.
 _SIGNIFICANT = 0.003
 # The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
