@@ -12,7 +12,13 @@ from scipy.integrate import DOP853, solve_ivp
 import shapephase as sp
 from shapephase import so3
 from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
-from shapephase.integrator.fast.marches import MarchArrays, amplifications, march_in_threads, quaternions_at_rest
+from shapephase.integrator.fast.marches import (
+    MarchArrays,
+    amplifications,
+    derivatives,
+    march_in_threads,
+    quaternions_at_rest,
+)
 
 pytestmark = pytest.mark.usefixtures("fast")
 NONE = np.zeros(0, dtype=int)
@@ -169,6 +175,25 @@ def test_the_largest_growth_is_about_the_largest_singular_value(path, rng):
     propagators[3, 2, 1, 1] = np.nan
     propagators[4] *= 1e200
     assert np.array_equal(np.flatnonzero(np.isinf(amplifications(propagators))), [3, 4])
+
+
+@pytest.mark.parametrize("loops", [1, 2])
+def test_derivatives_are_those_of_the_steps(path, rng, loops):
+    """Central differences of marches from directions a little apart; the error is that of their third derivative."""
+    (direction,), (magnitude,) = momenta(rng, 1)
+    seeds = np.cross(direction, np.eye(3)[:2])
+    channels = np.array(list(path.stages(path.steps))).reshape(-1, 108)
+    total = loops * len(channels)
+    marks = np.array([0, 0, 3, total // 2, total - 1, total])
+    quaternions, slopes = derivatives(channels, loops, direction, seeds, magnitude, marks)
+    start = np.array([magnitude])
+    whole = path.march(direction[None], start, loops=loops)
+    assert np.abs(quaternions - whole.quaternions[0, marks]).max() < 2000.0 * EPS
+    for seed, slope in zip(seeds, np.swapaxes(slopes, 0, 1), strict=True):
+        change = 1e-5 * seed
+        apart = [path.march((direction + sign * change)[None], start, loops=loops) for sign in (1.0, -1.0)]
+        expected = (apart[0].quaternions[0, marks] - apart[1].quaternions[0, marks]) / 2e-5
+        assert np.abs(slope - expected).max() < 1e-7 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("loops", [1, 3])

@@ -13,7 +13,7 @@ from ._rotation_step import STAGES, attitude_step
 from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
 from .casadi_calls import call_casadi, map_rows
 from .fast import engine
-from .fast.marches import amplifications
+from .fast.marches import amplifications, derivatives
 
 _EPS = float(np.finfo(float).eps)
 # Units of rounding: of the first attitude, of a step (at random), and of each radian turned; of 250 motions with errors
@@ -108,6 +108,11 @@ def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loo
         basis = np.stack([first, np.cross(direction, first)])
         seeds = np.zeros((2, 8))
         seeds[:, :3] = np.cross(direction, basis)
+        if engine.is_ready():
+            ends, changes = derivatives(channels, loops, direction, seeds[:, :3], float(magnitude), marks)
+            turns = so3.turn_of(ends[:, None], changes)
+            propagators[row] = so3.transpose(so3.matrix_from_quat(ends)) + so3.transpose(turns) @ basis
+            continue
         for done, quaternions, slopes in _derivatives(channels, direction, float(magnitude), loops, seeds):
             reached = np.flatnonzero((marks > done) & (marks <= done + len(quaternions)))
             if len(reached):

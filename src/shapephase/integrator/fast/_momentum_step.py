@@ -41,8 +41,11 @@ def _rate(c, i, magnitude, p0, p1, p2, d0, d1, d2):
 
 
 @inline
-def momentum_step(c, b, magnitude, u, v, w):
-    """The direction (u, v, w) after a step whose channels begin at c[b], its turn and its dynamic phase."""
+def unscaled_step(c, b, magnitude, u, v, w):
+    """The direction (u, v, w) after a step whose channels begin at c[b], its turn and its dynamic phase.
+
+    The direction's length is one but for the error of the step. Numbers may be complex.
+    """
     x0, y0, z0, g0, t0 = _rate(c, b, magnitude, u, v, w, u, v, w)
     p, q, r = u + sum_1(x0), v + sum_1(y0), w + sum_1(z0)
     x1, y1, z1, _, _ = _rate(c, b + 1, magnitude, p, q, r, u, v, w)
@@ -75,8 +78,15 @@ def momentum_step(c, b, magnitude, u, v, w):
     p = u + sum_b(x0, x5, x6, x7, x8, x9, x10, x11)
     q = v + sum_b(y0, y5, y6, y7, y8, y9, y10, y11)
     r = w + sum_b(z0, z5, z6, z7, z8, z9, z10, z11)
-    scale = 1.0 / math.sqrt(p * p + q * q + r * r)
     turn, dynamic = sum_b(t0, t5, t6, t7, t8, t9, t10, t11), sum_b(g0, g5, g6, g7, g8, g9, g10, g11)
+    return p, q, r, turn, dynamic
+
+
+@inline
+def momentum_step(c, b, magnitude, u, v, w):
+    """The same with a direction of length one."""
+    p, q, r, turn, dynamic = unscaled_step(c, b, magnitude, u, v, w)
+    scale = 1.0 / math.sqrt(p * p + q * q + r * r)
     return p * scale, q * scale, r * scale, turn, dynamic
 
 

@@ -23,6 +23,7 @@ _KERNELS = {
     "march_momenta": "._march_kernel",
     "march_at_rest": "._march_kernel",
     "largest_growths": "._growth_kernel",
+    "step_derivatives": "._derivative_kernel",
 }
 """And the modules that they are in."""
 # A version of Numba that does not go with this NumPy or this Python says so in many ways.

@@ -123,6 +123,32 @@ def amplifications(propagators: Array) -> Array:
     return growths
 
 
+def derivatives(
+    channels: Array, loops: int, direction: Array, seeds: Array, magnitude: float, marks: Integers
+) -> tuple[Array, Array]:
+    """Quaternions after some steps and their derivatives by the momentum's direction at the start: (M, 4), (M, S, 4).
+
+    Parameters
+    ----------
+    channels : (K, 108) of one loop, at the stages one after another, times the step's length
+    direction : (3,) of the momentum at the start
+    seeds : (S, 3) its changes
+    magnitude : of the momentum [kg m^2/s]
+    marks : (M,) after how many steps, ascending
+    """
+    quaternions, slopes = np.empty((len(marks), 4)), np.empty((len(marks), len(seeds), 4))
+    places = np.array(marks, dtype=np.int64)
+    _derivative_kernel().step_derivatives(
+        plain(channels), loops, plain(direction), plain(seeds), float(magnitude), places, quaternions, slopes
+    )
+    return quaternions, slopes
+
+
+@lru_cache(maxsize=1)
+def _derivative_kernel() -> Any:
+    return import_module("._derivative_kernel", __package__)
+
+
 @lru_cache(maxsize=1)
 def _kernels() -> Any:
     return import_module("._march_kernel", __package__)
@@ -140,6 +166,7 @@ def warm() -> None:
     march_in_threads(width, series, None, steps, 1, direction, np.ones(1), marks=none)
     quaternions_at_rest(width, series, steps)
     amplifications(np.zeros((1, 1, 3, 3)))
+    derivatives(np.zeros((1, 108)), 1, direction[0], direction, 1.0, steps)
 
 
 def _parts(batch: int, lanes: int, threads: int | None) -> list[slice]:
