@@ -23,7 +23,7 @@ from shapephase.shape_space.curves import PiecewisePolynomial
 
 _TERM = 7
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0], dtype=np.longdouble)
-CONSTANT, HARMONIC, GAUSSIAN, RAMP, BURST, BUMP = map(float, range(6))
+CONSTANT, HARMONIC, GAUSSIAN, RAMP, BURST, BUMP, _FOURIER = map(float, range(7))
 
 
 @dataclass(frozen=True)
@@ -261,9 +261,9 @@ def _parts(path: sp.ShapePath | Terms, n_shape: int) -> tuple[np.ndarray, np.nda
         raise TypeError(f"no extended precision for a path made of {type(curve).__name__}")
     rows = [(CONSTANT, i, mean, 0.0, 0.0, 0.0, 0.0) for i, mean in enumerate(curve.mean)]
     for k in range(curve.cosines.shape[1]):
-        frequency = 2.0 * np.pi / curve.period * (k + 1)
-        rows += [(HARMONIC, i, a, 0.0, 0.0, frequency, 0.5 * np.pi) for i, a in enumerate(curve.cosines[:, k])]
-        rows += [(HARMONIC, i, b, 0.0, 0.0, frequency, 0.0) for i, b in enumerate(curve.sines[:, k])]
+        # Frequency and phase in whole turns, so that none of them is rounded.
+        rows += [(_FOURIER, i, a, 0.0, curve.period, k + 1.0, 0.25) for i, a in enumerate(curve.cosines[:, k])]
+        rows += [(_FOURIER, i, b, 0.0, curve.period, k + 1.0, 0.0) for i, b in enumerate(curve.sines[:, k])]
     kept = np.array(rows)
     return np.ascontiguousarray(kept[kept[:, 2] != 0.0]), *none
 

@@ -9,7 +9,8 @@
 
 typedef long double real;
 enum { MOST_JOINTS = 256, COLUMNS = 8, TERM = 7 };
-enum { CONSTANT, HARMONIC, GAUSSIAN, RAMP, BURST, BUMP };
+enum { CONSTANT, HARMONIC, GAUSSIAN, RAMP, BURST, BUMP, FOURIER };
+#define TURN 6.283185307179586476925286766559005768L
 
 typedef struct {
     int joints, shapes;
@@ -53,6 +54,9 @@ static void follow(const Path *path, int shapes, int piece, real time, real *q, 
         switch ((int)e[0]) {
         case CONSTANT: q[i] += a; break;
         case HARMONIC: q[i] += a*sinl(w*s + phase); v[i] += a*w*cosl(w*s + phase); break;
+        /* Of `frequency` periods of the length `width`: no multiple of 2 pi is rounded to a double. */
+        case FOURIER: w = w*TURN/width;
+                      q[i] += a*sinl(w*s + phase*TURN); v[i] += a*w*cosl(w*s + phase*TURN); break;
         case GAUSSIAN: x = s/width; g = a*expl(-x*x); q[i] += g; v[i] -= 2*x/width*g; break;
         case RAMP: x = tanhl(s/width); q[i] += a*x; v[i] += a*(1 - x*x)/width; break;
         case BURST: x = s/width; g = a*expl(-x*x); q[i] += g*sinl(w*s + phase);
