@@ -27,6 +27,8 @@ _SHORT_TURN_A_STEP = 0.6
 # [rad] bound of the whole turn (some fifteen radians indeed) from which errors of the propagators have added up to more
 # than an estimate can bear.
 _FAR = 25.0
+# [rad] on a panel, that a plan of steps is made for.
+_MOST_TURN = 1e9
 # A term of the rate of turning, times the panel's width, is significant above this part of the tolerance.
 _SIGNIFICANT = 0.003
 # The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
@@ -71,7 +73,8 @@ class StepRequirements(NamedTuple):
             # Without momentum a steady turn is exact.
             swinging = rates.copy()
             swinging[:, 0] = 0.0
-        seen = degree + (_DEGREES_A_RADIAN * turn)[:, None] if magnitude else degree
+        # More turns than can be stepped are refused, and their powers would overflow.
+        seen = degree + (_DEGREES_A_RADIAN * np.minimum(turn, _MOST_TURN))[:, None] if magnitude else degree
         return cls(
             turn=turn,
             swing=(swinging * seen**_ORDER).sum(axis=1),

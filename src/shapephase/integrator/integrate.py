@@ -304,7 +304,7 @@ class _Integration:
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> Integers:
         """Steps on each panel: (P,). Finds the growth of errors first where the steps themselves will not show it."""
-        few = len(self._momentum) <= FEW
+        few = len(self._momentum) <= FEW or self._largest == 0.0
         # The derivative for each of many momenta would take too long; with short steps it is not needed.
         short = requirements.far and not few
         goal = self._tolerance * (1.0 if few else _MARGIN_OF_MANY)
