@@ -130,6 +130,13 @@ class MissingExtraError(ShapePhaseError, ImportError):
     """An optional dependency is not installed. Remedy: the message names the extra to install."""
 
 
+class RunStopped(ShapePhaseError):
+    """A run was stopped by the `progress` callback that watched it, as it asked; nothing is left of it.
+
+    A look at a path that was complete is kept.
+    """
+
+
 class ResultFileError(ShapePhaseError, ValueError):
     """A result file that this version cannot read: another format, or damaged. Remedy: compute it anew."""
 

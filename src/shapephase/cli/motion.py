@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .. import so3
 from ..body.body import Body
@@ -14,6 +16,7 @@ from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.fast.switch import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..run_progress import RunProgress
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
 from .options import AS_RECORDED, FlightOptions, RecordingOptions
@@ -43,13 +46,14 @@ def flight(
     options: FlightOptions,
     recording: RecordingOptions,
     tolerance: float = DEFAULT_TOLERANCE,
+    progress: Callable[[RunProgress], Any] | None = None,
 ) -> Flight:
     """The motion that the arguments and options of a command describe."""
     loaded = load_body(body, isolate=True)
     path, recorded = joint_motion(motion, loaded, recording)
     start = so3.quat_argument(options.attitude, "attitude")
     expect_work(samples=_SAMPLES_A_BREAK * len(path.breaks))
-    moved = reconstruct(articulated(loaded, path), options.momentum, start, tolerance=tolerance)
+    moved = reconstruct(articulated(loaded, path), options.momentum, start, tolerance=tolerance, progress=progress)
     return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
 
 

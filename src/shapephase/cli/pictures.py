@@ -53,7 +53,7 @@ def view_command(
     aside = check_writable(html, "--html", ".html")
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording)
+        flown = motions.flight(body, motion, flight, recording, progress=work.watch)
         if html is not None:
             work.begin("recording the animation")
             motion_page(flown.motion, html, trail=trail, speed=speed)
@@ -94,7 +94,7 @@ def plot_command(
     check_writable(out, "--out", ".svg", ".pdf", ".png")
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording)
+        flown = motions.flight(body, motion, flight, recording, progress=work.watch)
         work.begin(f"drawing {kind.replace('_', ' ')}")
         write_figure(kind, flown.motion, out, flown.path, gauge)
         say_written(out)

@@ -1,4 +1,4 @@
-"""A progress bar for what takes more than a second, on a terminal only."""
+"""A progress bar for what takes more than two seconds, on a terminal only."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ..run_progress import RunProgress
 from .terminal import Verbosity, say, verbosity
 
 # [s] Work that takes longer shows a progress bar; what is done sooner leaves the terminal alone.
-_PATIENCE = 1.0
+_PATIENCE = 2.0
 
 
 class Steps:
@@ -25,6 +26,7 @@ class Steps:
 
     def __init__(self, total: int, display: Any = None) -> None:
         self._display = display
+        self._begun = 0
         self._task = None if display is None else display.add_task("", total=total)
 
     def begin(self, what: str) -> None:
@@ -32,9 +34,14 @@ class Steps:
         say(f"shapephase: {what}", Verbosity.VERBOSE)
         if self._display is None:
             return
-        task = self._display.tasks[0]
-        done = task.completed + (1 if task.description else 0)
-        self._display.update(self._task, description=what, completed=done)
+        self._begun += 1
+        self._display.update(self._task, description=what, completed=self._begun - 1)
+
+    def watch(self, now: RunProgress) -> None:
+        """The callback of a run that is the step under way: the bar moves within the step, with the run's own words."""
+        if self._display is not None:
+            done = self._begun - 1 + now.share
+            self._display.update(self._task, description=now.phase or None, completed=done)
 
     def say(self, what: str) -> None:
         """Other words for the step under way."""
@@ -44,7 +51,7 @@ class Steps:
 
 @contextmanager
 def steps(total: int) -> Iterator[Steps]:
-    """Show `total` steps on standard error once a second has passed; in a pipe or a file nothing is written."""
+    """Show `total` steps on standard error once two seconds have passed; in a pipe or a file nothing is written."""
     if sys.stderr is None or not sys.stderr.isatty() or verbosity() is not Verbosity.NORMAL:
         yield Steps(total)
         return

@@ -48,10 +48,11 @@ def split_command(
 
     aside = check_writable(out, "--out", ".npz")
     aside = check_writable(html, "--html", ".html") or aside
-    with steps(12 if html else 2) as work:
+    with steps(13 if html else 2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance)
-        result = split(flown.motion, gauge)
+        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch)
+        work.begin("splitting")
+        result = split(flown.motion, gauge, progress=work.watch)
         if out is not None:
             flown.motion.save(out)
             say_written(out)

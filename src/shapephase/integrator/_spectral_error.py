@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import run_progress
 from ..arrays import Array, Mask
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
@@ -30,6 +31,8 @@ _CONVERGED_TAIL = 1e-2
 _LEAST_OF_FLOOR = 0.02
 # [rad] phase of the missing terms, beyond the body's turn, over which they do not average out.
 _UNAVERAGED_PHASE = 8.0
+# Times in one call of the body: some seconds of work at most, and its arrays stay within some hundred MB.
+_AT_ONCE = 16_384
 _VOIGT = np.array([0, 4, 8, 5, 2, 1])
 # Off-diagonal channels stand for two entries of I^-1.
 _SQUARES = np.array([[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T
@@ -46,6 +49,19 @@ class Channels:
     def __call__(self, times: Array) -> Array:
         """I^-1 (xx yy zz yz xz xy) and I^-1 L_o: (N,) -> (N, 9)."""
         self.count += len(times)
+        run_progress.begin(run_progress.SAMPLING, len(times))
+        if len(times) <= _AT_ONCE:
+            channels = self._at(times)
+            run_progress.advance(len(times))
+            return channels
+        channels = np.empty((len(times), 9))
+        for first in range(0, len(times), _AT_ONCE):
+            part = times[first : first + _AT_ONCE]
+            channels[first : first + _AT_ONCE] = self._at(part)
+            run_progress.advance(len(part))
+        return channels
+
+    def _at(self, times: Array) -> Array:
         channels = None if self._directly is None else self._directly(times)
         return self._inverted(times) if channels is None else channels
 

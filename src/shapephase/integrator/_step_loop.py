@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import run_progress
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
@@ -98,6 +99,8 @@ def integrate_steps(
     cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps // 2)
     record, attitudes = (_record_one, _attitudes_of_one) if batch <= FEW else (_record_many, _attitudes_of_many)
     at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
+    # All steps, half as many, and these again where series are perturbed.
+    run_progress.begin(run_progress.STEPPING, -(-batch // at_once) * total * (3 if perturbed is None else 4) // 2)
     for first in range(0, batch, at_once):
         rows = slice(first, first + at_once)
         starts = directions[rows], magnitudes[rows]
@@ -115,6 +118,7 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
     The equation is linear, so steps do not depend on each other, and a further loop repeats the rotation of the first:
     it costs no steps.
     """
+    run_progress.begin(run_progress.STEPPING, int(steps.sum()) * (3 if perturbed is None else 4) // 2)
     coefficients = interpolant.coefficients
     whole = _quaternions_at_rest(interpolant, coefficients, steps)
     half = _quaternions_at_rest(interpolant, coefficients, steps // 2)
@@ -219,6 +223,7 @@ def _blocks(channels: Array, loops: int, state: Array) -> Iterator[tuple[Array, 
         for first in range(0, len(channels), BLOCK):
             block = channels[first : first + BLOCK]
             states, sides = call_casadi(_momentum_function(len(block), len(state) > 8), len(block), state, block)
+            run_progress.advance(len(block))
             yield states, sides
             state = states[-1]
 
@@ -268,6 +273,7 @@ def _steps_of_many(channels: Array, loops: int, directions: Array, magnitudes: A
             end, turn, dynamic = momentum_step(direction, magnitudes, step)
             half = 0.5 * turn
             quaternion = turned(quaternion, direction, end, (np.sin(half), np.cos(half)))
+            run_progress.advance(1)
             yield step, end, quaternion, turn, dynamic
             direction = end
 
@@ -306,6 +312,7 @@ def _quaternions_of_one_loop(channels: Array) -> Array:
         block = drifts[first : first + BLOCK]
         (states,) = call_casadi(_rest_function(len(block)), len(block), quaternions[first], block)
         quaternions[first + 1 : first + BLOCK + 1] = states
+    run_progress.begin(run_progress.STEPPING, int(steps.sum()) * (3 if perturbed is None else 4) // 2)
     return quaternions
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +15,7 @@ from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
+from ..run_progress import RunProgress, watched
 from ._momentum_curve import Gauge, momentum_curve
 
 
@@ -64,7 +67,9 @@ class PhaseSplit:
     has_phase: Array
 
 
-def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
+def split(
+    motion: Motion, gauge: Gauge = "horizontal", *, progress: Callable[[RunProgress], Any] | None = None
+) -> PhaseSplit:
     """Split the rotation of a motion into shape holonomy and Montgomery phase.
 
     Parameters
@@ -73,6 +78,7 @@ def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
         "base", the deformation's own frame, whose phase already holds the shape's part; "principal", the
         principal axes of inertia; "mean_body", the frame nearest to the start shape; "link:NAME", a link of an
         articulated body; or U(t) itself, a function as for `in_gauge`
+    progress : as for `reconstruct`
 
     Raises
     ------
@@ -80,11 +86,15 @@ def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
         For another gauge.
     GaugeError
         If the gauge's frame does not exist, or is not continuous.
+    RunStopped
+        If `progress` stopped it.
 
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
     """
     deformation, batch = motion.deformation, motion.batch
-    curve = momentum_curve(motion, gauge)
+    with watched(progress):
+        curve = momentum_curve(motion, gauge)
+        lift = motion.horizontal_lift
     has_phase = curve.has_phase
     moving = has_phase[:, None, None]
     own, seen = curve.end_attitudes
@@ -93,7 +103,7 @@ def split(motion: Motion, gauge: Gauge = "horizontal") -> PhaseSplit:
     departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     total = end @ closure @ so3.transpose(start)
-    holonomy = start @ motion.horizontal_lift.end[0] @ closure @ so3.transpose(start)
+    holonomy = start @ lift.end[0] @ closure @ so3.transpose(start)
     dynamical = np.where(moving, total @ so3.transpose(holonomy), np.eye(3))
     tilt = np.where(moving, first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)

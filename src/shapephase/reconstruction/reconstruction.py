@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +20,7 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import FinishedSampler
+from ..run_progress import RunProgress, watched
 from ._solvers import METHODS, SOLVERS, Solution
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
 
@@ -284,6 +287,7 @@ def reconstruct(
     *,
     tolerance: float = 1e-9,
     method: str = "auto",
+    progress: Callable[[RunProgress], Any] | None = None,
 ) -> Motion:
     """The motion of a free body with a known change of shape and a given angular momentum.
 
@@ -298,6 +302,8 @@ def reconstruct(
     method : "auto" or "collocation" (the deformation sampled at Chebyshev points, the attitude stepped on the
         interpolant), "closed_form" (of a rigid body, by elliptic functions: `rigid_body.EulerTop`), or "dop853"
         (SciPy's integrator on the deformation itself, an independent check)
+    progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
+        falls, and what is being done; if it returns something true, the run stops
 
     Raises
     ------
@@ -307,6 +313,8 @@ def reconstruct(
         If the locked inertia is not positive definite somewhere.
     AccuracyNotReached
         If the tolerance cannot be met.
+    RunStopped
+        If `progress` stopped the run.
 
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
     """
@@ -315,7 +323,8 @@ def reconstruct(
     goal = tolerance_argument(tolerance)
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
-    solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal)
+    with watched(progress):
+        solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal)
     return Motion(
         deformation=deformation,
         momentum=spatial,

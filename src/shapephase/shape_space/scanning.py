@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from .. import run_progress
 from ..arrays import Array, Mask
 from ..chebyshev import derivative_matrix, nodes_on, unit_nodes
 from ..errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
@@ -163,7 +164,10 @@ class _Scan:
         """Values and rates side by side: (N,) -> (N, 2 n)."""
         self._evaluations += len(times)
         self._calls += 1
-        return np.concatenate(self._function.curve(times), axis=1) * self._weights
+        run_progress.begin(run_progress.LOOKING, 1)
+        both = np.concatenate(self._function.curve(times), axis=1) * self._weights
+        run_progress.advance(1)
+        return both
 
     def _first_panels(self, pieces: list[Piece], count: int) -> Panels:
         rows: list[tuple[float, float, int, int]] = []

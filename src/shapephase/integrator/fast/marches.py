@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import run_progress
 from ...arrays import Array, Integers
 from ._plain import plain
 
@@ -19,6 +20,8 @@ _SEGMENTS_OF_MANY = 8
 _SEGMENTS_OF_LOOPS = 64
 # Momenta for a thread of its own: some milliseconds of work.
 _LEAST_FOR_A_THREAD = 128
+# Momenta in one call: some tenths of a second, after which a run that is watched says so.
+_MOST_AT_ONCE = 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +102,16 @@ def march_in_threads(
             propagators[rows], whole.stepping[rows], whole.truncation[rows],
         )  # fmt: skip
 
-    parts = _parts(batch, module.LANES, threads)
+    workers = _workers(batch, threads)
+    parts = _parts(batch, module.LANES, workers)
+    run_progress.begin(run_progress.STEPPING, max(batch, 1))
     if len(parts) == 1:
         run(parts[0])
+        run_progress.advance(batch)
     else:
-        with ThreadPoolExecutor(len(parts)) as pool:
-            list(pool.map(run, parts))
+        with ThreadPoolExecutor(workers) as pool:
+            for rows, _ in zip(parts, pool.map(run, parts), strict=True):
+                run_progress.advance(rows.stop - rows.start)
     return whole
 
 
@@ -169,10 +176,13 @@ def warm() -> None:
     derivatives(np.zeros((1, 108)), 1, direction[0], direction, 1.0, steps)
 
 
-def _parts(batch: int, lanes: int, threads: int | None) -> list[slice]:
-    """The rows for each thread, whole groups of lanes."""
-    count = max(1, min(_processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
-    each = -(-batch // (count * lanes)) * lanes
+def _workers(batch: int, threads: int | None) -> int:
+    return max(1, min(_processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
+
+
+def _parts(batch: int, lanes: int, workers: int) -> list[slice]:
+    """The rows for each call, whole groups of lanes: one call for each thread, or as many as show progress."""
+    each = min(-(-batch // (workers * lanes)) * lanes, -(-_MOST_AT_ONCE // lanes) * lanes)
     return [slice(first, min(first + each, batch)) for first in range(0, max(batch, 1), each or 1)]
 
 
