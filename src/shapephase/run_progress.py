@@ -48,7 +48,7 @@ class _Watcher:
         self._phase, self._phase_end = "", 0.0
         self._share = self._start = self._end = 0.0
         self._total = self._done = 0
-        self._told = -1.0
+        self._last_share = -1.0
 
     def begin(self, phase: str, total: int) -> None:
         """A stretch of work begins."""
@@ -58,22 +58,22 @@ class _Watcher:
             self._phase, self._phase_end = phase, self._share + _PHASES[phase] * (1.0 - self._share)
         self._start, self._end = self._share, self._share + _STRETCH * (self._phase_end - self._share)
         self._total, self._done = total, 0
-        if is_new or self._share >= self._told + _NOTICEABLE:
-            self._tell(self._share)
+        if is_new or self._share >= self._last_share + _NOTICEABLE:
+            self._report(self._share)
 
     def advance(self, count: int) -> None:
         """So much more of it is done."""
         self._done += count
         self._share = self._start + min(1.0, self._done / self._total) * (self._end - self._start)
-        if self._share >= self._told + _NOTICEABLE:
-            self._tell(self._share)
+        if self._share >= self._last_share + _NOTICEABLE:
+            self._report(self._share)
 
     def finish(self) -> None:
         """The run is done: too late to stop it."""
         self._callback(RunProgress(1.0, self._phase))
 
-    def _tell(self, share: float) -> None:
-        self._told = share
+    def _report(self, share: float) -> None:
+        self._last_share = share
         if self._callback(RunProgress(share, self._phase)):
             raise RunStopped(f"stopped on request while {self._phase}, with {100.0 * share:.0f} % done")
 

@@ -298,6 +298,7 @@ def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: I
     """At the ends of all steps without momentum: (loops K + 1, 4)."""
     if engine.is_ready():
         quaternions = quaternions_at_rest(np.diff(interpolant.edges[: len(steps) + 1]), coefficients, steps)
+        run_progress.advance(int(steps.sum()))
     else:
         quaternions = _quaternions_of_one_loop(_channels_at_stages(interpolant, coefficients, steps))
     return _repeated(quaternions, interpolant.loops) if interpolant.loops > 1 else quaternions
@@ -312,7 +313,7 @@ def _quaternions_of_one_loop(channels: Array) -> Array:
         block = drifts[first : first + BLOCK]
         (states,) = call_casadi(_rest_function(len(block)), len(block), quaternions[first], block)
         quaternions[first + 1 : first + BLOCK + 1] = states
-    run_progress.begin(run_progress.STEPPING, int(steps.sum()) * (3 if perturbed is None else 4) // 2)
+        run_progress.advance(len(block))
     return quaternions
 
 
