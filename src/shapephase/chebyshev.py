@@ -104,7 +104,10 @@ def values_to_coefficients(degree: int) -> Array:
     matrix = chebyshev(unit_nodes(degree), degree + 1).T * (2.0 / degree)
     matrix[:, [0, -1]] *= 0.5
     matrix[[0, -1], :] *= 0.5
-    return matrix
+    # Values that are all alike have one coefficient: their rounding would else fill all others.
+    share = matrix.sum(axis=1) / (degree + 1)
+    share[0] -= 1.0 / (degree + 1)
+    return matrix - share[:, None]
 
 
 @lru_cache(maxsize=16)

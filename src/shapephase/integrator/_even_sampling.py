@@ -176,4 +176,9 @@ def _even_to_panel(count: int, panels: int, degree: int, highest: int) -> Array:
         return np.ones((1, 1))
     phase = (2.0 * np.pi / panels) * (0.5 + 0.5 * unit_nodes(degree))
     angle = phase[:, None] - 2.0 * np.pi / count * np.arange(count)
-    return values_to_coefficients(degree) @ _periodic_sinc(angle, count, highest)
+    matrix = values_to_coefficients(degree) @ _periodic_sinc(angle, count, highest)
+    # What does not swing is far larger than what does, and loops repeat its rounding: samples that are all alike make a
+    # series of one term.
+    share = matrix.sum(axis=1) / count
+    share[0] -= 1.0 / count
+    return matrix - share[:, None]
