@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import so3
 from .arrays import Array, common_batch, finite_array
-from .errors import ShapeError, TrajectoryError, UnphysicalInertiaError, unknown_name
+from .errors import (
+    LocalFunctionError,
+    ShapeError,
+    TrajectoryError,
+    UnphysicalInertiaError,
+    WrongObjectError,
+    unknown_name,
+)
 from .inertia_tensor import inverse_inertia
 
 TIGHTEST_TOLERANCE = 1e-13
@@ -18,6 +27,8 @@ LEAST_SIZE = 1e-60
 """Of times [s], masses [kg] and the like: fifth powers of smaller ones vanish."""
 LARGEST_SIZE = 1e60
 """Of times [s], masses [kg] and the like: fifth powers of larger ones overflow."""
+_BY_VALUE = frozenset({"cloudpickle", "dill"})
+"""Packages that pickle a function with its code, not by its name."""
 ON_UNPHYSICAL = ("allow", "warn", "error")
 
 # How far outside [0, T] a time may lie, relative to T: rounding of a user's own arithmetic.
@@ -29,8 +40,49 @@ _LEAST_MOMENT_RATIO = 1e-12
 
 _LARGEST_MOMENTUM = 1e100
 """[kg m^2/s]; squares of larger ones overflow."""
+# How an object that a function needs is made of another that came, or of anything else.
+_WAYS = {
+    "Body": {
+        "": "make it with load_body(file or name)",
+        "Deformation": "of one made by articulated, it is deformation.description.body",
+        "Motion": "of one made by articulated, it is motion.deformation.description.body",
+    },
+    "ShapePath": {
+        "": "make it with read_shape_path(file, body), or ShapePath.fourier, spline, waypoints or function",
+        "RecordedMotion": "it is recorded.path",
+        "Deformation": "of one made by articulated, it is deformation.description.path",
+        "Motion": "of one made by articulated, it is motion.deformation.description.path",
+    },
+    "Deformation": {
+        "": "make it with articulated(body, path), particles, prescribed or rigid",
+        "RecordedMotion": "make it with articulated(body, recorded.path)",
+        "Motion": "it is motion.deformation",
+    },
+    "Motion": {
+        "": "make it with reconstruct(deformation, momentum)",
+        "ShapePath": "make it with reconstruct(articulated(body, path), momentum)",
+        "Body": "make it with reconstruct(articulated(body, path), momentum)",
+        "str": "read it with load_motion(file)",
+        "PosixPath": "read it with load_motion(file)",
+    },
+    "PhaseSplit": {"": "make it with split(motion)", "Motion": "make it with split(motion)"},
+}
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
+
+
+def check_object(value: object, kind: str, name: str) -> None:
+    """Raise WrongObjectError where an argument is none of our class `kind`; the message says how to make one."""
+    if any(parent.__name__ == kind for parent in type(value).__mro__):
+        return
+    came = type(value).__name__
+    given = f"the class {value.__name__} itself" if isinstance(value, type) else f"{_article(came)} {came}"
+    ways = _WAYS[kind]
+    raise WrongObjectError(f"{name}: {_article(kind)} {kind} is needed, got {given}; {ways.get(came, ways[''])}")
+
+
+def _article(name: str) -> str:
+    return "an" if name[:1].lower() in "aeiou" else "a"
 
 
 def times_argument(t: ArrayLike, duration: float) -> Array:
@@ -83,6 +135,24 @@ def tolerance_argument(tolerance: float) -> float:
             f"tolerance: a number from {TIGHTEST_TOLERANCE:g} to {LOOSEST_TOLERANCE:g} rad is needed, got {tolerance!r}"
         )
     return float(goal)
+
+
+def check_picklable(function: object, what: str) -> None:
+    """Raise LocalFunctionError for a function that pickle cannot find by its name; `what` is made of it.
+
+    Picklers that take functions by value (cloudpickle, which joblib uses, and dill) may have it.
+    """
+    name = getattr(function, "__qualname__", "")
+    if "<" not in name:
+        return
+    frame = sys._getframe()
+    while (frame := frame.f_back) is not None:
+        if not _BY_VALUE.isdisjoint(frame.f_globals.get("__name__", "").split(".")):
+            return
+    raise LocalFunctionError(
+        f"{what} made of {name!r} cannot be pickled: another process would not find that function; define it at the "
+        "top of a module, or save the motion"
+    )
 
 
 def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
@@ -166,8 +236,8 @@ def direction_argument(value: ArrayLike, name: str) -> Array:
 
 
 def vector_argument(value: ArrayLike, name: str, length: int = 3, unit: str = "") -> Array:
-    """One vector of this length. Raises ShapeError."""
-    vector = finite_array(value, name, (length,), unit=unit)
+    """One vector of this length, a copy. Raises ShapeError."""
+    vector = finite_array(value, name, (length,), unit=unit).copy()
     if vector.ndim != 1:
         raise ShapeError(f"{name}: one vector ({length},) is needed, got {vector.shape}")
     return vector

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +13,8 @@ from .errors import ShapeError
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+AnyArray = TypeVar("AnyArray", Array, Integers, Mask)
 
 FARTHEST = 1e6
 
@@ -86,3 +89,18 @@ def _shape_text(trailing: tuple[int | None, ...]) -> str:
 
 def _in(unit: str) -> str:
     return f" [{unit}]" if unit else ""
+
+
+def read_only(array: AnyArray) -> AnyArray:
+    """A view of an array that cannot be written to; the array itself stays as it is."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def lock_arrays(result: Any) -> None:
+    """Show the arrays among the fields of a frozen dataclass as read-only views: what they mean would change else."""
+    for field in dataclasses.fields(result):
+        value = getattr(result, field.name)
+        if isinstance(value, np.ndarray) and value.flags.writeable:
+            object.__setattr__(result, field.name, read_only(value))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pickle import PicklingError
 
 
 class ShapePhaseError(Exception):
@@ -19,6 +20,13 @@ class ShapeError(ShapePhaseError, ValueError):
 
     Remedy: the message names the argument, what came and what was expected; arrays of text, objects, complex numbers
     or with masked entries are refused, never converted.
+    """
+
+
+class WrongObjectError(ShapeError, TypeError):
+    """A function got another kind of object than it needs.
+
+    Remedy: the message says what is needed, what came, and how the one is made of the other.
     """
 
 
@@ -146,6 +154,13 @@ class CompilerError(ShapePhaseError, RuntimeError):
 
     Causes: a Numba that does not go with this NumPy, no folder that only this user may write to. Remedy: another
     version of Numba, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps.
+    """
+
+
+class LocalFunctionError(ShapePhaseError, PicklingError):
+    """A path, deformation or gauge made of a lambda, or of a function inside another, cannot be pickled.
+
+    Remedy: define the function at the top of a module, where another process finds it by its name; or save the motion.
     """
 
 

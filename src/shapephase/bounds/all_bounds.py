@@ -12,7 +12,7 @@ from typing import SupportsFloat
 import numpy as np
 
 from .. import so3, sphere
-from ..arguments import interval_argument
+from ..arguments import check_object, interval_argument
 from ..arrays import Array
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
@@ -78,6 +78,7 @@ def bounds(
 
     Source: theory.md E3, E6 to E14.
     """
+    check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"bounds are of one motion, this is a batch of {motion.batch}; reconstruct one of them")
     start, end = interval_argument(interval, motion.duration)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import times_argument
+from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError
@@ -76,6 +76,7 @@ def momentum_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 def energy_along(motion: Motion, t: ArrayLike) -> Array:
     """E_t of a motion: times (...) -> batch + (...) [J]. Source: theory.md E1."""
+    check_object(motion, "Motion", "motion")
     times, inverse, _, pi = _along(motion, t)
     energy = 0.5 * np.sum(pi * so3.apply(inverse, pi), axis=-1)
     return energy.reshape((*motion.batch, *times.shape))[()]
@@ -86,6 +87,7 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
 
     Source: Cabrera 2006, section 4.1, with L_o where L(d_0) is printed (theory.md C-E9); E3.
     """
+    check_object(motion, "Motion", "motion")
     times, inverse, drift, pi = _along(motion, t)
     inverse_rate = -inverse @ motion.deformation.description.inertia_rate(times.ravel()) @ inverse
     shape = (*motion.batch, *times.shape)
@@ -103,6 +105,7 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
     Raises GaugeError if the deformation is known by its inertia only.
     Source: Cabrera 2006, equation (4), with the missing half (theory.md C-E1); A6.
     """
+    check_object(motion, "Motion", "motion")
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     inertia, internal = motion.deformation.description.sample(flat)
@@ -121,6 +124,7 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
 
     Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
     """
+    check_object(deformation, "Deformation", "deformation")
     norm = float(finite_array(magnitude, "magnitude"))
     times = times_argument(t, deformation.duration)
     middle = np.linalg.eigvalsh(deformation.inertia(times))[..., 1]
@@ -137,6 +141,7 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
 
     Source: Cabrera 2006, section 4.1; theory.md E4.
     """
+    check_object(deformation, "Deformation", "deformation")
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:
         raise ShapeError(f"count: a whole number of 2 or more is needed, got {count!r}")
     inertia = deformation.inertia(float(finite_array(t, "t", unit="s")))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import positive_argument, vector_argument
+from ..arguments import check_object, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
@@ -322,6 +322,7 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
 
     Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
     """
+    check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"one motion is needed, this is a batch of {motion.batch}; reconstruct one of them")
     allowed = motion.tolerance if tolerance is None else positive_argument(tolerance, "tolerance", "an angle in rad")

@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import body_momentum_argument
+from ..arguments import body_momentum_argument, check_object
 from ..arrays import Array, Mask, finite_array
 from ..deformation.deformation import Deformation
 from ._enclosure import Enclosure
@@ -158,6 +158,7 @@ def regime_certificate(
 
     Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
     """
+    check_object(deformation, "Deformation", "deformation")
     body = body_momentum_argument(momentum, attitude)
     bounds = energy_bounds(deformation, momentum, attitude, interval, resolution=resolution)
     known = bounds.enclosure
@@ -193,6 +194,7 @@ def crown_region(
 
     Source: Cabrera 2006, section 4.1.1; theory.md E8.
     """
+    check_object(deformation, "Deformation", "deformation")
     return CrownRegion(regime_certificate(deformation, momentum, attitude, interval))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import on_unphysical_argument, positive_argument, vector_argument
+from ..arguments import check_object, on_unphysical_argument, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
 from ..inertia_tensor import second_moment
@@ -204,6 +204,7 @@ def moving_mass(mass: float, path: ShapePath) -> MovingMass:
 
     Source: Cabrera 2006, example 2.2.
     """
+    check_object(path, "ShapePath", "path")
     return MovingMass(positive_argument(mass, "mass", "a mass in kg"), _columns(path, 3, "a moving mass"))
 
 
@@ -225,6 +226,7 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
     ShapeError, TrajectoryError
         If an argument has the wrong shape or sign, or the length leaves its range; the message names the time.
     """
+    check_object(path, "ShapePath", "path")
     weight = positive_argument(mass, "mass", "a mass in kg")
     whole = positive_argument(full_length, "full_length", "a length in m")
     axis = vector_argument(direction, "direction")

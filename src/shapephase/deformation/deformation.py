@@ -9,8 +9,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import breaks_argument, inertia_argument, on_unphysical_argument, positive_argument, times_argument
-from ..arrays import Array, finite_array
+from ..arguments import (
+    breaks_argument,
+    check_object,
+    inertia_argument,
+    on_unphysical_argument,
+    positive_argument,
+    times_argument,
+)
+from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
@@ -58,6 +65,8 @@ class Deformation:
     label: str
     loops: int = 1
     inputs: Mapping[str, str] = field(default_factory=dict)
+
+    __post_init__ = lock_arrays
 
     @cached_property
     def breaks(self) -> Array:
@@ -171,6 +180,8 @@ def articulated(body: Body, path: ShapePath) -> Deformation:
     UnknownNameError, TrajectoryError
         If the path has other joints than the body.
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
@@ -268,7 +279,7 @@ def particles(
 
     Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
     """
-    weights = finite_array(masses, "masses", (None,), unit="kg")
+    weights = finite_array(masses, "masses", (None,), unit="kg").copy()
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
         raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {weights}")
     if callable(positions):

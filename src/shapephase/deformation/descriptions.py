@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import inertia_argument
-from ..arrays import Array, finite_array
+from ..arguments import check_picklable, inertia_argument
+from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coefficients
 from ..errors import GaugeError, ShapeError
@@ -170,6 +170,8 @@ class RigidDescription(UngaugedDescription):
 
     tensor: Array
 
+    __post_init__ = lock_arrays
+
     def sample(self, times: Array) -> tuple[Array, Array]:
         return np.broadcast_to(self.tensor, (len(times), 3, 3)).copy(), np.zeros((len(times), 3))
 
@@ -198,6 +200,16 @@ class PrescribedDescription(UngaugedDescription):
     momentum: Callable[[Array], ArrayLike] | None
     breaks: Array
     on_unphysical: str = "allow"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for a lambda."""
+        for function in (self.inertia, self.momentum):
+            check_picklable(function, "a deformation")
+        return self.__dict__
+
+    def __deepcopy__(self, _: dict[int, Any]) -> PrescribedDescription:
+        """The description itself: nothing of it changes."""
+        return self
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         tensors = inertia_argument(_returned(self.inertia(times), "inertia", (len(times), 3, 3)), times)
@@ -233,6 +245,17 @@ class ParticleDescription(UngaugedDescription):
     positions: Callable[[Array], tuple[ArrayLike, ArrayLike]]
     breaks: Array
     oscillations: float | None = None
+
+    __post_init__ = lock_arrays
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for a lambda."""
+        check_picklable(self.positions, "a deformation")
+        return self.__dict__
+
+    def __deepcopy__(self, _: dict[int, Any]) -> ParticleDescription:
+        """The description itself: nothing of it changes."""
+        return self
 
     def as_given(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities (N, m, 3) as the function gives them."""

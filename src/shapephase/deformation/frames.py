@@ -26,6 +26,7 @@ from ..shape_space.scanning import scanned
 from ._principal_frame import Frames, principal_frames
 from ._scanned_functions import rates_alone, turns_alone, turns_and_rates
 from .deformation import Deformation
+from .descriptions import Description
 
 # A gauge that is named so is the frame of a link: "link:torso".
 _LINK = "link:"
@@ -136,7 +137,7 @@ def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start:
     def unit_body(times: Array) -> tuple[Array, Array]:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -spins(times)
 
-    first = np.eye(3) if start is None else so3.rotation_argument(start, "start")
+    first = np.eye(3) if start is None else so3.rotation_argument(start, "start").copy()
     if first.shape != (3, 3):
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
     function = rates_alone(spins)
@@ -167,13 +168,22 @@ def _check_rates(frames: Frames, breaks: Array) -> None:
 
 def link_frames(deformation: Deformation, link: str) -> Frames:
     """U(t) and its body rates of the frame of a link. Raises as `link_gauge`."""
-
-    def frames(times: Array) -> tuple[Array, Array]:
-        turned, turning = deformation.description.link_frames(times, link)
-        return so3.transpose(turned), -turning
-
+    frames = _LinkFrames(deformation.description, link)
     frames(deformation.breaks[:1])
     return frames
+
+
+@dataclass(frozen=True, eq=False)
+class _LinkFrames:
+    """The frame of a link."""
+
+    description: Description
+    link: str
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """U and its rates."""
+        turned, turning = self.description.link_frames(times, self.link)
+        return so3.transpose(turned), -turning
 
 
 def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames:
@@ -185,10 +195,21 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
     time = times_argument(reference, deformation.duration)
     if time.ndim:
         raise ShapeError(f"reference: one time is needed, got an array of shape {time.shape}")
-    time = float(time)
+    frames = _MeanBodyFrames(deformation.description, float(time))
+    _check_unbroken(frames, deformation, float(time))
+    return frames
 
-    def frames(times: Array) -> tuple[Array, Array]:
-        correlation, slope = deformation.description.correlation(times, time)
+
+@dataclass(frozen=True, eq=False)
+class _MeanBodyFrames:
+    """The frame of the mean body."""
+
+    description: Description
+    reference: float
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """U and its rates."""
+        correlation, slope = self.description.correlation(times, self.reference)
         left, singular, right = np.linalg.svd(correlation)
         sign = np.sign(np.linalg.det(left @ right))
         singular[:, 2] *= sign
@@ -196,7 +217,7 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
         if not unique.all():
             raise GaugeError(
                 f"at t = {times[np.argmin(unique)]:.9g} s no orientation of the body is nearest to that at "
-                f"{time:.9g} s; choose another reference time"
+                f"{self.reference:.9g} s; choose another reference time"
             )
         left[:, :, 2] *= sign[:, None]
         turned = so3.transpose(left @ right)
@@ -205,9 +226,6 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
         twisted = so3.apply(right, 2.0 * so3.vee(turned @ slope))
         spin = -so3.apply(so3.transpose(right), inverse * twisted)
         return turned, so3.apply(so3.transpose(turned), spin)
-
-    _check_unbroken(frames, deformation, time)
-    return frames
 
 
 def _check_unbroken(frames: Frames, deformation: Deformation, reference: float) -> None:

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import stepped_rotation
+from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.resolved import joined
 from ..shape_space.function_scan import FunctionScan, ScannedFunction, side_by_side
 from ..shape_space.scanning import scanned
@@ -85,6 +86,7 @@ def in_gauge(
 
     Source: theory.md B4.
     """
+    check_object(deformation, "Deformation", "deformation")
     if (u is None) == (rates is None) or (u is not None and start is not None):
         raise ShapeError("a gauge is given either by u, or by its body rates and a start")
     breaks = deformation.breaks
@@ -104,6 +106,7 @@ def link_gauge(deformation: Deformation, link: str) -> Deformation:
 
     Source: theory.md B4 with U = R_base_link^T.
     """
+    check_object(deformation, "Deformation", "deformation")
     return _seen_from(deformation, link_frames(deformation, link), f"link {link}")
 
 
@@ -122,11 +125,13 @@ def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deforma
 
     Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
     """
+    check_object(deformation, "Deformation", "deformation")
     return _seen_from(deformation, mean_body_frames(deformation, reference), "mean body")
 
 
 def named_gauge(deformation: Deformation, name: str) -> Deformation:
     """The deformation in one of `GAUGES` or "link:NAME". Raises UnknownNameError, and as the gauge itself."""
+    check_object(deformation, "Deformation", "deformation")
     if name == "base":
         return deformation
     if name == "horizontal":
@@ -140,13 +145,19 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
     U(0) is the identity and U' = -U hat(I^-1 L_o). For a loop the closure is the holonomy (base axes at t = 0).
     Source: Cabrera 2006, section 2.3.1 (a); theory.md B2.
     """
+    check_object(deformation, "Deformation", "deformation")
     lift = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    return _seen_from(deformation, _HorizontalFrames(deformation.description, lift), "horizontal")
 
-    def frames(times: Array) -> tuple[Array, Array]:
-        inertia, momentum = deformation.description.sample(times)
-        return lift.rotation(times)[0], -so3.apply(inverse_inertia(inertia, times), momentum)
 
-    return _seen_from(deformation, frames, "horizontal")
+@dataclass(frozen=True, eq=False)
+class _HorizontalFrames:
+    description: Description
+    lift: SteppedRotation
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        inertia, momentum = self.description.sample(times)
+        return self.lift.rotation(times)[0], -so3.apply(inverse_inertia(inertia, times), momentum)
 
 
 def principal_gauge(deformation: Deformation) -> Deformation:
@@ -164,6 +175,7 @@ def principal_gauge(deformation: Deformation) -> Deformation:
 
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
+    check_object(deformation, "Deformation", "deformation")
     return _seen_from(deformation, principal_frames(deformation), "principal")
 
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root_scalar
 
 from .. import so3
-from ..arguments import moments_argument
+from ..arguments import check_object, moments_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
@@ -188,6 +188,7 @@ def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: f
 
     Source: Hannay 1985; derived here, theory.md F5.
     """
+    check_object(deformation, "Deformation", "deformation")
     end = positive(until, "until", "s")
     top = orbit_about_third(_ascending(deformation, np.zeros(1))[0], momentum)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -53,12 +54,27 @@ def dop853_rotation(
         evaluations += run.nfev
         quaternion = so3.normalised(run.y[:, -1])
 
-    def dense(t: Array) -> Array:
-        piece = np.clip(np.searchsorted(breaks, t, side="right") - 1, 0, len(pieces) - 1)
+    return Dop853Output(breaks, tuple(pieces)), evaluations
+
+
+@dataclass(frozen=True, eq=False)
+class Dop853Output:
+    """Quaternions at every time, piece by piece.
+
+    Attributes
+    ----------
+    breaks : (M,) between which SciPy's own dense outputs hold [s]
+    pieces : one dense output between two breaks each
+    """
+
+    breaks: Array
+    pieces: tuple[Callable[[Array], Array], ...]
+
+    def __call__(self, t: Array) -> Array:
+        """Times (N,) -> unit quaternions (N, 4)."""
+        piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.pieces) - 1)
         values = np.empty((len(t), 4))
         for number in np.unique(piece):
             rows = piece == number
-            values[rows] = pieces[number](t[rows]).T
+            values[rows] = self.pieces[number](t[rows]).T
         return so3.normalised(values)
-
-    return dense, evaluations

@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import so3, sphere
 from ..arguments import LOOSEST_TOLERANCE
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, lock_arrays, read_only
 from ..errors import AccuracyNotReached
 from ._dense_output import DenseOutput
 from ._error_propagator import amplification, exact_propagators, momentum_slope, rounding_error
@@ -91,16 +91,18 @@ class SteppedRotation:
     rounding_error: Array
     amplification: Array
 
+    __post_init__ = lock_arrays
+
     @cached_property
     def panel(self) -> Integers:
         """The interpolant's panel of each step: (K,)."""
         each = np.tile(self.steps, self.interpolant.loops)
-        return np.repeat(np.arange(len(each)), each)
+        return read_only(np.repeat(np.arange(len(each)), each))
 
     @property
     def times(self) -> Array:
         """The ends of the steps: (K + 1,) [s]."""
-        return self._times
+        return read_only(self._times)
 
     @cached_property
     def _times(self) -> Array:

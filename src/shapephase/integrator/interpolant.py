@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
 
 _MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
@@ -30,6 +30,8 @@ class Interpolant:
     coefficients: Array
     loops: int
     evaluations: int
+
+    __post_init__ = lock_arrays
 
     @cached_property
     def series(self) -> PiecewiseChebyshev:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Integers, Mask, lock_arrays
 from ..chebyshev import chebyshev, local_coordinate, unit_nodes, values_to_coefficients
 
 # Of the series of a panel: about what a sampler at 1e-9 rad asks for.
@@ -73,6 +73,8 @@ class ResolvedPath:
     duration: float
     _first: dict[float, FirstPanels] = field(default_factory=dict, init=False, repr=False)
     _hidden: dict[tuple[int, bytes, bytes], Hidden] = field(default_factory=dict, init=False, repr=False)
+
+    __post_init__ = lock_arrays
 
     @property
     def leaves(self) -> Integers:

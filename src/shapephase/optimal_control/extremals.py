@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import positive_argument, times_argument, tolerance_argument, vector_argument
+from ..arguments import check_object, positive_argument, times_argument, tolerance_argument, vector_argument
 from ..arrays import Array, check_reach
 from ..body.body import Body
 from ..integrator.casadi_calls import call_casadi
@@ -125,6 +125,7 @@ def extremal(
     Source: Montgomery, Isoholonomic problems and some applications, Comm. Math. Phys. 128 (1990) 565-592, theorem 1 and
     its Hamiltonian form; signs as in theory.md section 1.
     """
+    check_object(body, "Body", "body")
     start, speed = (vector_argument(value, name, body.n_shape) for value, name in ((shape, "shape"), (rate, "rate")))
     check_reach(start, "shape")
     check_reach(speed, "rate")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import PlanNotFound, ShapePhaseError
@@ -99,6 +100,7 @@ def plan_reorientation(
 
     Source: Montgomery 1990, Isoholonomic problems and some applications.
     """
+    check_object(body, "Body", "body")
     chosen = Search() if search is None else search
     task = reorientation(
         body,

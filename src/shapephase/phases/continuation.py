@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import direction_argument, magnitudes_argument
+from ..arguments import check_object, direction_argument, magnitudes_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, TrajectoryError
@@ -76,6 +76,7 @@ def continued_orbits(
 
     Source: theory.md section 2.
     """
+    check_object(deformation, "Deformation", "deformation")
     magnitudes = magnitudes_argument(magnitudes)
     loop = MomentumLoop.of(deformation, tolerance)
     first = 0.0 if start is None else float(magnitudes[0])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3, sphere
-from ..arguments import times_argument
+from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
@@ -91,6 +91,7 @@ def split(
 
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
     """
+    check_object(motion, "Motion", "motion")
     deformation, batch = motion.deformation, motion.batch
     with watched(progress):
         curve = momentum_curve(motion, gauge)
@@ -174,6 +175,7 @@ def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") ->
 
     Raises as `split`. Source: Cabrera 2006, equation (12); theory.md D5, D9; numerics.md section 3 (branch).
     """
+    check_object(motion, "Motion", "motion")
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     curve = momentum_curve(motion, gauge, times=flat)
@@ -253,6 +255,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
 
     Raises also as `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
     """
+    check_object(motion, "Motion", "motion")
     cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
     if cuts.ndim != 1 or len(cuts) < 2 or np.any(np.diff(cuts) <= 0.0):
         raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {cuts}")
@@ -310,6 +313,7 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
 
     Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
     """
+    check_object(motion, "Motion", "motion")
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     curve = momentum_curve(motion, gauge, times=flat)
@@ -331,6 +335,7 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
 
     Source: Cabrera 2006, remark 3.7; theory.md D11.
     """
+    check_object(motion, "Motion", "motion")
     edges = motion.solution.times
     nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
     times = nodes.ravel()

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array, Integers, Mask, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
@@ -96,6 +97,7 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
 
     Source: theory.md section 6 and D12.
     """
+    check_object(motion, "Motion", "motion")
     largest = finite_array(gap, "gap", unit="rad")
     if largest.ndim or not 0.0 < largest <= np.pi:
         raise ShapeError(f"gap: an angle above 0, up to pi [rad] is needed, got {gap!r}")
@@ -145,6 +147,7 @@ def momentum_crossings(motion: Motion) -> Crossings:
 
     Source: theory.md D8.
     """
+    check_object(motion, "Motion", "motion")
     curve = _Curve.of(motion)
     pieces = _Pieces.of(curve, _resolved(curve, motion))
     near = max(_SAME_CURVE, 30.0 * float(motion.error_estimate))

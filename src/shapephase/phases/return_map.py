@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import direction_argument, magnitude_argument
+from ..arguments import check_object, direction_argument, magnitude_argument
 from ..arrays import Array, Integers
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError
@@ -127,6 +127,7 @@ def stroboscopic_map(
 
     Source: theory.md section 2.
     """
+    check_object(deformation, "Deformation", "deformation")
     magnitude = magnitude_argument(magnitude, allow_zero=True)
     start = direction_argument(directions, "directions")
     flat = start.reshape(-1, 3)
@@ -167,6 +168,7 @@ def fixed_points(
 
     Source: theory.md section 2, B9, D16.
     """
+    check_object(deformation, "Deformation", "deformation")
     magnitude = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
         raise ShapeError(f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {most_directions!r}")
@@ -210,6 +212,7 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     OpenPathError
         If the shape does not close.
     """
+    check_object(deformation, "Deformation", "deformation")
     found = fixed_points(deformation, magnitude, tolerance=tolerance)
     momentum, attitudes = found.magnitude * _UP, _attitude_of(found.directions)
     return [reconstruct(deformation, momentum, attitude, tolerance=found.tolerance) for attitude in attitudes]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import so3, sphere
-from ..arguments import times_argument
+from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..phases._momentum_curve import Gauge, MomentumCurve, momentum_curve
@@ -85,6 +85,7 @@ def plot_momentum_curve(
 
     Source: Cabrera 2006, equation (12) and section 4.1; Marsden and Ratiu, figure 15.3.1.
     """
+    check_object(motion, "Motion", "motion")
     check_axes(ax)
     one_motion(motion)
     if not np.any(motion.momentum):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
@@ -61,6 +62,7 @@ def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times:
 
     Raises MissingExtraError, ShapeError, and as `running_phases`. Source: Cabrera 2006, equation (12).
     """
+    check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     one_motion(motion)
     t = motion_times(motion, times)
@@ -92,6 +94,7 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
 
     Raises MissingExtraError, ShapeError, UnknownNameError.
     """
+    check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     one_motion(motion)
     if kind not in ATTITUDES:
@@ -126,6 +129,7 @@ def plot_inertia(
 
     Raises MissingExtraError, ShapeError, UnknownNameError.
     """
+    check_object(deformation, "Deformation", "deformation")
     check_flat_axes(ax)
     if kind not in INERTIAS:
         raise unknown_name("kind of inertia", kind, INERTIAS)
@@ -154,6 +158,7 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
 
     Raises MissingExtraError, ShapeError.
     """
+    check_object(deformation, "Deformation", "deformation")
     check_flat_axes(ax)
     t = even_times(deformation, times)
     internal = deformation.internal_momentum(t)
@@ -192,6 +197,7 @@ def plot_energy(
 
     Source: Cabrera 2006, section 4.1.1; theory.md E1, E5.
     """
+    check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     one_motion(motion)
     magnitude = float(np.linalg.norm(motion.momentum))

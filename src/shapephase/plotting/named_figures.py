@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..arguments import check_object
 from ..errors import ShapeError, unknown_name
 from ..files import write_whole
 from ..phases._momentum_curve import Gauge
@@ -116,6 +117,7 @@ def figure_image(
     MissingExtraError
         Without Matplotlib.
     """
+    check_object(motion, "Motion", "motion")
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     if ending not in ("svg", "pdf", "png"):
@@ -136,5 +138,6 @@ def write_figure(
     gauge: Gauge = "horizontal",
 ) -> None:
     """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all. Raises as `figure_image`."""
+    check_object(motion, "Motion", "motion")
     image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
     write_whole(out, lambda stream: stream.write(image))

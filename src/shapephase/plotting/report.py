@@ -11,6 +11,7 @@ from importlib.metadata import version
 import numpy as np
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array
 from ..files import write_whole
 from ..phases.phases import PhaseSplit
@@ -71,6 +72,8 @@ def write_report(
     ShapeError
         If the motion is a batch.
     """
+    check_object(motion, "Motion", "motion")
+    check_object(result, "PhaseSplit", "result")
     begin("recording the animation")
     animation = motion_html(motion, trail=trail)
     figures = []

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, unknown_name
@@ -53,6 +54,7 @@ def plot_shape_path(
 
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
     """
+    check_object(path, "ShapePath", "path")
     check_flat_axes(ax)
     t = even_times(path, times)
     route, names, units = _named(path, body)
@@ -97,6 +99,7 @@ def plot_shape_plane(
 
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
     """
+    check_object(path, "ShapePath", "path")
     check_flat_axes(ax)
     t = even_times(path, times)
     route, names, units = _named(path, body)
@@ -136,6 +139,7 @@ def plot_curvature(
 
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError. Source: theory.md B6.
     """
+    check_object(body, "Body", "body")
     check_flat_axes(ax)
     names, units = body.joint_names, body.joint_units
     i, j = _pair(joints, names)

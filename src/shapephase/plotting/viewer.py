@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object
 from ..errors import MissingExtraError, ShapeError, VisualWarning
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
@@ -76,6 +77,7 @@ def motion_page(
         As `visuals`; and, where `frames` is None, if something turns by more than a quarter turn from one frame to the
         next, so that it may seem to turn the other way.
     """
+    check_object(motion, "Motion", "motion")
     page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, **fall)
     write_whole(path, lambda stream: stream.write(page.encode()))
 
@@ -90,6 +92,7 @@ def motion_html(
     **fall: ArrayLike,
 ) -> str:
     """The page that `motion_page` writes, as text: arguments, errors and warnings as there."""
+    check_object(motion, "Motion", "motion")
     viser_module()
     playing_speed = _playing_speed(motion, speed)
     scene = _scene(motion, playing_speed, frames, trail, fall)
@@ -127,6 +130,7 @@ def view(
 
     Raises and warns as `motion_page`.
     """
+    check_object(motion, "Motion", "motion")
     viser_module()
     playing_speed = _playing_speed(motion, speed)
     scene = _scene(motion, playing_speed, frames, trail, fall)

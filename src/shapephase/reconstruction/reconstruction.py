@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import initial_state_arguments, times_argument, tolerance_argument
-from ..arrays import Array, finite_array
+from ..arguments import check_object, initial_state_arguments, times_argument, tolerance_argument
+from ..arrays import Array, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
@@ -50,6 +50,8 @@ class Sensitivity:
     by_momentum: Array
     by_attitude: Array
 
+    __post_init__ = lock_arrays
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -75,6 +77,11 @@ class Motion:
     method: str
     evaluations: int
     solution: Solution
+
+    def __post_init__(self) -> None:
+        """Nothing that is shown of a motion can be written to."""
+        lock_arrays(self)
+        lock_arrays(self.solution)
 
     @property
     def duration(self) -> float:
@@ -318,6 +325,7 @@ def reconstruct(
 
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
     """
+    check_object(deformation, "Deformation", "deformation")
     if method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     goal = tolerance_argument(tolerance)
@@ -365,6 +373,7 @@ def momentum_from_rate(
 
     Source: Cabrera 2006, equation (7).
     """
+    check_object(deformation, "Deformation", "deformation")
     omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
     inertia, internal = deformation.inertia(0.0), deformation.internal_momentum(0.0)
     body = so3.apply(inertia, omega) + internal

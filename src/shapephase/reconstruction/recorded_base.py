@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import times_argument
+from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from .reconstruction import Motion
@@ -46,6 +46,7 @@ def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> B
     ShapeError
         If the shapes disagree, or the motion is a batch.
     """
+    check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"one motion can be compared with a record, this is a batch of {motion.batch}")
     at = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)

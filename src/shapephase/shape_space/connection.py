@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import times_argument, tolerance_argument
+from ..arguments import check_object, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
@@ -46,6 +46,7 @@ def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
 
     Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
     """
+    check_object(body, "Body", "body")
     return inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
 
 
@@ -64,6 +65,7 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
 
     Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
     """
+    check_object(body, "Body", "body")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
     return slopes - np.swapaxes(slopes, -2, -3) - bracket
@@ -99,6 +101,8 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
 
     Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
     return _lift_of_loop(body, route, goal).end[0]
@@ -163,6 +167,8 @@ def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Hor
 
     Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
     return HorizontalLift(body, route, _lift(body, route, goal))
@@ -209,6 +215,8 @@ def holonomy_derivative(
 
     Source: theory.md B6; numerics.md section 4 (curvature of the connection).
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
     lift = _lift_of_loop(body, route, goal)

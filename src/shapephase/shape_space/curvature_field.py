@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import tolerance_argument
+from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
@@ -57,6 +57,7 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
 
     Source: theory.md B6.
     """
+    check_object(body, "Body", "body")
     goal = finite_array(tolerance, "tolerance")
     if goal.ndim or goal <= 0.0:
         raise ShapeError(f"tolerance: a number above 0 is needed, got {tolerance!r}")
@@ -100,6 +101,7 @@ def curvature_on_plane(
 
     Source: theory.md B6; numerics.md section 4.
     """
+    check_object(body, "Body", "body")
     i, j = _two_joints(body, joints)
     across, along = (_row(values, name) for values, name in ((first, "first"), (second, "second")))
     shapes = np.empty((len(across), len(along), body.n_shape))
@@ -148,6 +150,8 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
 
     Source: theory.md B6, B7.
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = path.matched(body.joint_names, body.name)
     check_closed(body, route)

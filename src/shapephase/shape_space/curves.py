@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, Integers, check_reach, real_array
+from ..arguments import check_picklable
+from ..arrays import Array, Integers, check_reach, lock_arrays, real_array
 from ..errors import ShapeError, TrajectoryError
 
 CLOSED = 1e-9
@@ -35,6 +36,8 @@ class Fourier:
     sines: Array
     period: float
 
+    __post_init__ = lock_arrays
+
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
         harmonics, weights = self._weights
@@ -58,6 +61,8 @@ class PiecewisePolynomial:
 
     knots: Array
     coefficients: Array
+
+    __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
@@ -91,6 +96,15 @@ class Function:
 
     f: Callable[[Array], tuple[ArrayLike, ArrayLike]]
     n_shape: int
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for a lambda."""
+        check_picklable(self.f, "a path")
+        return self.__dict__
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Function:
+        """The curve itself: nothing of it changes."""
+        return self
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
@@ -142,6 +156,8 @@ class Reordered:
     curve: Curve
     order: Integers
 
+    __post_init__ = lock_arrays
+
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
         shapes, rates = self.curve(times)
@@ -157,6 +173,8 @@ class Joined:
     second: Curve
     second_duration: float
     offset: Array
+
+    __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
@@ -177,6 +195,8 @@ class Repeated:
     period: float
     count: int
     turns: Array
+
+    __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import tolerance_argument
+from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, ShapePhaseError
@@ -61,6 +61,7 @@ def final_attitudes(
     ShapePhaseError
         What `reconstruct` raises, with the number of the path in front.
     """
+    check_object(body, "Body", "body")
     goal = tolerance_argument(tolerance)
     spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")

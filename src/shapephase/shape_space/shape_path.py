@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import breaks_argument, check_time_steps, positive_argument, times_argument
-from ..arrays import Array, check_reach, finite_array
+from ..arrays import Array, check_reach, finite_array, lock_arrays
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
-from ..integrator.resolved import joined
+from ._derived_scan import DerivedScan, JoinedScan
 from ._rate_check import check_rates
 from .curves import (
     CLOSED,
@@ -69,6 +69,8 @@ class ShapePath:
     sha256: str | None = None
     scanner: Callable[[], FunctionScan] | None = None
 
+    __post_init__ = lock_arrays
+
     @staticmethod
     def fourier(
         mean: ArrayLike,
@@ -101,7 +103,7 @@ class ShapePath:
         loops = int(np.gcd.reduce(occupied)) if len(occupied) else 1
         highest = int(occupied[-1]) // loops if len(occupied) else 0
         return ShapePath(
-            Fourier(middle, a, b, period),
+            Fourier(middle.copy(), a.copy(), b.copy(), period),
             period,
             breaks=np.array([0.0, period]),
             n_shape=len(middle),
@@ -258,7 +260,7 @@ class ShapePath:
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
         curve = Reversed(self.curve, self.duration)
-        return replace(self, curve=curve, breaks=breaks, scanner=lambda: self._scan.reversed())
+        return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"))
 
     def stretched(self, factor: float) -> ShapePath:
         """The same shapes, `factor` times as slowly."""
@@ -267,7 +269,7 @@ class ShapePath:
         breaks = self.breaks * scale
         breaks[-1] = duration
         curve = Stretched(self.curve, scale, self.duration)
-        scanner = lambda: self._scan.stretched(scale)  # noqa: E731
+        scanner = DerivedScan(self, "stretched", (scale,))
         return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner)
 
     def then(self, other: ShapePath) -> ShapePath:
@@ -301,7 +303,7 @@ class ShapePath:
             self.n_shape,
             names,
             _larger(self.oscillations, other.oscillations),
-            scanner=lambda: _joined_scans([self, other]),
+            scanner=JoinedScan([self, other]),
         )
 
     def repeated(self, count: int) -> ShapePath:
@@ -326,7 +328,7 @@ class ShapePath:
         curve = Repeated(self.curve, self.duration, int(count), turns)
         loops = self.loops * int(count)
         return replace(
-            self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops, scanner=lambda: self._scan
+            self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops, scanner=DerivedScan(self)
         )
 
     @property
@@ -365,7 +367,7 @@ class ShapePath:
             return self
         order = np.array([self.joint_names.index(name) for name in expected])
         curve = Reordered(self.curve, order)
-        return replace(self, curve=curve, joint_names=expected, scanner=lambda: self._scan.reordered(order))
+        return replace(self, curve=curve, joint_names=expected, scanner=DerivedScan(self, "reordered", (order,)))
 
     def _joint(self, column: int) -> str:
         return self.joint_names[column] if self.joint_names else f"number {column}"
@@ -433,15 +435,3 @@ def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None
 
 def _larger(a: float | None, b: float | None) -> float | None:
     return None if a is None or b is None else max(a, b)
-
-
-def _joined_scans(paths: Sequence[ShapePath]) -> FunctionScan:
-    """Of paths one after another, each with all its loops."""
-    scans = [path._scan for path in paths]
-    whole = [joined([scan.resolved] * path.loops) for scan, path in zip(scans, paths, strict=True)]
-    found: list[Array] = []
-    start = 0.0
-    for scan, path in zip(scans, paths, strict=True):
-        found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
-        start += path.duration
-    return FunctionScan.of_several(scans, joined(whole), np.concatenate(found))

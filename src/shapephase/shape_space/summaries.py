@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..inertia_tensor import principal_axes, triangle_defect
@@ -83,6 +84,7 @@ class PathSummary:
 
 def body_summary(body: Body) -> BodySummary:
     """What there is to know of a body at its neutral shape."""
+    check_object(body, "Body", "body")
     neutral = body.shape()
     inertia = body.locked_inertia(neutral)
     moments, axes = principal_axes(inertia)
@@ -109,6 +111,8 @@ def body_summary(body: Body) -> BodySummary:
 
 def path_summary(body: Body, path: ShapePath) -> PathSummary:
     """What there is to know of a joint motion for a body. Raises TrajectoryError, UnknownNameError for other joints."""
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)
     times = np.union1d(np.linspace(0.0, route.duration, _SAMPLES), route.breaks)
     shapes, rates = route.curve(times)

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
@@ -108,6 +109,7 @@ def read_recorded_motion(
     TrajectoryWarning
         For what can be read and is probably not meant: limits left, gaps, jumps of a whole turn.
     """
+    check_object(body, "Body", "body")
     where = Path(file)
     recording = _read(where, body, topic, timestep)
     motion = matched(recording, body, names, degrees)
@@ -137,6 +139,7 @@ def read_shape_path(
 
     Kinds of file, parameters and errors as there.
     """
+    check_object(body, "Body", "body")
     motion = read_recorded_motion(
         file, body, names=names, smooth=smooth, periodic=periodic, degrees=degrees, topic=topic, timestep=timestep
     )
@@ -157,6 +160,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     UnknownNameError
         For an unknown ending of the file.
     """
+    check_object(path, "ShapePath", "path")
     where = Path(file)
     suffix = where.suffix.lower()
     if suffix not in _WRITTEN:
