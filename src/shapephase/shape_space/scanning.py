@@ -56,6 +56,8 @@ _KINK_WIDTH = 2.0**-12
 _MOST_PANELS = 4000
 # [rad], of rates times half the width of a panel: noise up to this is left to the tolerance; more is refused.
 _MOST_NOISE = 1e-9
+# In units of the rounding of times: how well kinks are located.
+_KINK_TICKS = 2.0
 # Of the scatter between neighbouring times: a series through values that scatter is off by so much.
 _NOISE_MARGIN = 16.0
 # Of a panel: where noise is looked for, which is no node and no half of anything.
@@ -338,10 +340,18 @@ class _Scan:
                 f"{function.subject} jumps: {function.columns[column]} goes from {first[row, column] / weight:.9g} to "
                 f"{second[row, column] / weight:.9g} at {pieces[row].right:.12g} s; {function.words.continuous}"
             )
+        self._note_uncertain_times(pieces, np.abs(second - first)[:, n:].max(axis=1, initial=0.0) * found)
         rate_jumps = np.abs(second - first)[:, n:] > CLOSED * np.maximum(1.0, self._largest[n:])
         self._turned = {
             piece.right for row, piece in enumerate(pieces[:-1]) if turns[row].any() and not rate_jumps[row].any()
         }
+
+    def _note_uncertain_times(self, pieces: list[Piece], rate_jumps: Array) -> None:
+        """A kink is known to a rounding or two of the times: what a value may be off by there counts as noise."""
+        for piece, jump in zip(pieces, rate_jumps, strict=False):
+            for node, (_, right) in enumerate(piece.ends):
+                if right == piece.last:
+                    piece.noise[node] += _KINK_TICKS * self._tick * float(jump)
 
     def _scatter(self, values: Array) -> Array:
         """How far values scatter over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
