@@ -258,7 +258,7 @@ class PanelSampler:
         # A shape that is off turns the body by the inertia, for as long as the panel lasts.
         turn = momentum * g.estimate.inverse_norm * g.width
         share = averaged_share(2.0 * degree, turn + g.width * g.estimate.drift_norm)
-        shapes, rates = (share[:, None] * hidden.beyond + hidden.misfit).T
+        shapes, rates = (share[:, None] * hidden.higher + hidden.misfit).T
         return shapes * turn + rates, hidden.noise * (1.0 + turn)
 
     def _panels_at_rest(self) -> Mask:

@@ -43,7 +43,7 @@ class FirstPanels:
 class Hidden(NamedTuple):
     """What the nodes of panels do not show of a path: (P, 2) of the shapes and of their rates times half the width."""
 
-    beyond: Array  # terms of higher degrees, which swing and mostly average out
+    higher: Array  # terms of higher degrees, which swing and mostly average out
     misfit: Array  # what series on these panels cannot follow
     noise: Array  # (P,) the larger of both
 
@@ -117,10 +117,10 @@ class ResolvedPath:
         """What of the path lies beyond a degree on panels (P,) [rad]."""
         key = degree, left.tobytes(), right.tobytes()
         if key not in self._hidden:
-            _remember(self._hidden, key, self._beyond(left, right, degree))
+            _remember(self._hidden, key, self._found_hidden(left, right, degree))
         return self._hidden[key]
 
-    def _beyond(self, left: Array, right: Array, degree: int) -> Hidden:
+    def _found_hidden(self, left: Array, right: Array, degree: int) -> Hidden:
         rows = self._smallest_around(left, right)
         nodes = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(_TEST_DEGREE)
         local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])

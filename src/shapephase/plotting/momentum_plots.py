@@ -154,7 +154,7 @@ def plot_fixed_points(
 
 def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
     """The curve, cut so finely that its chords stay within a line's width of it."""
-    curve = momentum_curve(motion, gauge, times=subdivided(motion.solution.times, 4))
+    curve = momentum_curve(motion, gauge, times=subdivided(motion.solution.times, 8))
     bend = so3.angle_between(curve.corners[0, :-1], curve.corners[0, 1:])
     parts = np.clip(np.ceil(bend / _MAX_ANGLE), 1, _MAX_PARTS).astype(int)
     step = np.repeat(np.arange(len(parts)), parts)
