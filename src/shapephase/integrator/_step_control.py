@@ -13,13 +13,15 @@ from .interpolant import Interpolant
 # Of the formula.
 _ORDER = 8.0
 # Significant Chebyshev degrees of a panel that one step may span, so that half as many steps still see all of them.
-_DEGREES_A_STEP = 3.5
-# The error of the steps is at most this part of their distance from half as many: an eighth-order formula would allow
-# 1/255, and in 600 random motions the part was 1/270 in the median and 1/60 at worst, as long as a step spans few
-# degrees. Of more it grew to 1/16 at four.
-_OF_COARSER_STEPS = 1.0 / 26.0
-_FEW_DEGREES_A_STEP = 3.0
-_GROWTH_WITH_DEGREES = 1.5
+_DEGREES_A_STEP = 2.6
+# The error of the steps, as a part of their distance from half as many. An eighth-order formula would allow 1/255; that
+# is the median of 600 random motions, half of them with bumps and ramps that hide. It grows with the degrees
+# that a step spans of terms that are not small against the distance.
+_NOT_SMALL = 0.1
+_DEGREES = np.array([1.6, 2.2, 3.0, 5.0])
+_PARTS = np.array([1.0 / 30.0, 1.0 / 12.0, 1.0 / 8.0, 1.0])
+# Numbers compared at once.
+_MOST_COMPARED = 4_000_000
 # [rad] bound of the turn in one step; it is up to twice the turn itself.
 _TURN_A_STEP = 2.0
 # [rad] the same where the propagator of a step must be right over a long motion without the steps' derivative.
@@ -30,7 +32,7 @@ _FAR = 25.0
 # [rad] on a panel, that a plan of steps is made for.
 _MOST_TURN = 1e9
 # A term of the rate of turning, times the panel's width, is significant above this part of the tolerance.
-_SIGNIFICANT = 0.003
+_SIGNIFICANT = 0.001
 # The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
 # each the sum of its terms times the eighth power of their degree over half the steps. Three of four random motions
 # need no more.
@@ -38,7 +40,7 @@ _DISTANCE = 10.0**-8.1
 # What a radian turned on a panel adds to the degrees of its series: they swing as seen from space.
 _DEGREES_A_RADIAN = 0.6
 # Of the tolerance: the distance that is planned for; its part that counts is far smaller, and so is the usual one.
-_AIM = 60.0
+_AIM = 40.0
 
 
 class StepRequirements(NamedTuple):
@@ -49,6 +51,7 @@ class StepRequirements(NamedTuple):
     turn : (P,) a bound of how far the body turns on a panel [rad]
     swing : (P,) the error of a single step of each panel, but for a factor common to all [rad]
     degree : (P,) the last significant degree there
+    rates : (P, n) the size of each term of the rate of turning, times the panel's width [rad]
     whole_turn : the bound for all panels and loops [rad]
     loops : how often the panels are repeated
     """
@@ -56,6 +59,7 @@ class StepRequirements(NamedTuple):
     turn: Array
     swing: Array
     degree: Array
+    rates: Array
     whole_turn: float
     loops: int
 
@@ -79,6 +83,7 @@ class StepRequirements(NamedTuple):
             turn=turn,
             swing=(swinging * seen**_ORDER).sum(axis=1),
             degree=last,
+            rates=rates,
             whole_turn=interpolant.loops * float(turn.sum()),
             loops=interpolant.loops,
         )
@@ -101,10 +106,16 @@ class StepRequirements(NamedTuple):
         least = np.maximum(self.degree / _DEGREES_A_STEP, self.turn / turn)
         return np.maximum(np.maximum(planned, least), 1.0)
 
-    def part_of_coarser(self, steps: Integers) -> float:
-        """Bound of the error of so many steps (P,), relative to their distance from half as many."""
-        spanned = float((self.degree / steps).max(initial=0.0))
-        return _OF_COARSER_STEPS * max(1.0, spanned / _FEW_DEGREES_A_STEP) ** _GROWTH_WITH_DEGREES
+    def stepping_error(self, steps: Integers, distance: Array) -> Array:
+        """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad]."""
+        spanned = np.arange(self.rates.shape[1]) / steps[:, None]
+        most = np.empty(len(distance))
+        at_once = max(1, _MOST_COMPARED // spanned.size)
+        for first in range(0, len(distance), at_once):
+            part = slice(first, first + at_once)
+            counts = self.rates > _NOT_SMALL * distance[part, None, None]
+            most[part] = (counts * spanned).max(axis=(1, 2), initial=0.0)
+        return distance * np.exp(np.interp(most, _DEGREES, np.log(_PARTS)))
 
 
 def even_steps(planned: Array, subdivide: Integers | int) -> Integers:

@@ -44,6 +44,8 @@ _MOST_SAMPLING = 0.4
 _AIM = 0.2
 # The order of the steps.
 _ORDER = 8.0
+# Amplification that the first plan allows for; what grows more is seen when it is there.
+_MOST_FORESEEN = 1e4
 # Of the tolerance, for the plan of many momenta at once: some need more steps than most, and a second round would
 # repeat them all.
 _MARGIN_OF_MANY = 0.1
@@ -296,7 +298,7 @@ class _Integration:
             turns=record.turns,
             dynamics=record.dynamics,
             sampling_error=sampling,
-            stepping_error=requirements.part_of_coarser(steps) * stepping,
+            stepping_error=requirements.stepping_error(steps, stepping),
             rounding_error=rounding_error(
                 propagators, record.quaternions, amplifications, _LITTLE_ROUNDING * self._tolerance
             ),
@@ -320,9 +322,12 @@ class _Integration:
                 self._propagators = _propagators_by_derivative(interpolant, self._momentum, self._magnitudes)
             # Errors will be amplified: each must be that much smaller.
             growth = amplification(self._propagators)
-            worst = max(1.0, float(growth.max(where=np.isfinite(growth), initial=1.0)))
-            planned = self._finer * requirements.plan(goal / worst, short=short)
-        return even_steps(planned, self._subdivide)
+            worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
+            planned = self._finer * requirements.plan(goal / min(worst, _MOST_FORESEEN), short=short)
+        steps = even_steps(planned, self._subdivide)
+        if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
+            raise _too_many_steps(count, requirements.whole_turn, interpolant)
+        return steps
 
     def _take_steps(self, interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> StepRecord:
         """All steps of all loops and momenta."""
