@@ -155,6 +155,15 @@ def check_picklable(function: object, what: str) -> None:
     )
 
 
+def threads_argument(threads: int | None) -> int | None:
+    """A number of threads, at least one; None: as many as there are processors. Raises ShapeError."""
+    if threads is None:
+        return None
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
+        raise ShapeError(f"threads: a whole number above 0 or None is needed, got {threads!r}")
+    return int(threads)
+
+
 def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
     """A user's tensors (N, 3, 3), made exactly symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
     skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)

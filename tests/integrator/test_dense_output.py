@@ -12,8 +12,9 @@ from shapephase import so3, sphere
 from shapephase.integrator import _dense_output
 from shapephase.integrator._dense_output import TERMS, hermite_matrix
 from shapephase.integrator.curve_integrals import curve_integrals
-from shapephase.integrator.integrate import SteppedRotation, stepped_rotation
+from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.sampling import FinishedSampler
+from shapephase.integrator.stepped import SteppedRotation
 from support.independent import BODIES, body_of, random_loop, random_vector
 
 NAMES = ("cat", "astronaut", "example:human")

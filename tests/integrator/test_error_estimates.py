@@ -7,7 +7,8 @@ import pytest
 
 import shapephase as sp
 from shapephase.integrator._spectral_error import estimate_spectrum, estimate_tail
-from shapephase.integrator.integrate import SteppedRotation, stepped_rotation
+from shapephase.integrator.integrate import stepped_rotation
+from shapephase.integrator.stepped import SteppedRotation
 from support.independent import apart
 
 EPS = np.finfo(float).eps

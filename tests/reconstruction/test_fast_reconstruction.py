@@ -25,6 +25,13 @@ def both(monkeypatch, compute):
 def same(with_it, without, *, rounding):
     """Samples, steps, attitudes, phases and estimates of two motions."""
     assert with_it.evaluations == without.evaluations
+    for (rows, part), (others, other) in zip(with_it.parts, without.parts, strict=True):
+        assert np.array_equal(rows, others)
+        same_part(part, other, rounding=rounding)
+
+
+def same_part(with_it, without, *, rounding):
+    """Of motions that share samples and steps."""
     times = np.linspace(0.0, without.duration, 9)
     growth = rounding * EPS * float(np.max(without.amplification)) * (1.0 + without.solution.quaternions.shape[1])
     assert np.array_equal(with_it.solution.steps, without.solution.steps)

@@ -12,8 +12,9 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, TrajectoryError, UnknownNameError
-from shapephase.integrator.integrate import SteppedRotation, stepped_rotation
+from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.sampling import Sampler
+from shapephase.integrator.stepped import SteppedRotation
 from support.independent import (
     BODIES,
     apart,

@@ -22,7 +22,7 @@ from ..body.body import Body
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
-from ..integrator.sampling import Sampler, sampler
+from ..integrator.sampling import Sampler, Samplers
 from ..shape_space.body_path import path_gap
 from ..shape_space.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
@@ -166,8 +166,12 @@ class Deformation:
 
         Raises SingularInertiaError for particles that are on one line at some time.
         """
+        return self.samplers().fresh()
+
+    def samplers(self) -> Samplers:
+        """Fresh samplers that share what they find out, for many motions of this deformation. Raises as `sampler`."""
         known = self.description
-        return sampler(known.sample, **vars(known.smoothness(self.breaks)), directly=known.channels)
+        return Samplers(known.sample, **vars(known.smoothness(self.breaks)), directly=known.channels)
 
 
 def articulated(body: Body, path: ShapePath) -> Deformation:

@@ -1,9 +1,10 @@
 from .compiled_steps import compile_steps
 from .dop853 import dop853_rotation
 from .fast.cache_folder import code_folder
-from .integrate import SteppedRotation, stepped_rotation
+from .integrate import stepped_rotation
 from .interpolant import Interpolant
 from .sampling import Sampler, sampler
+from .stepped import SteppedRotation
 
 __all__ = [
     "Interpolant",

@@ -49,15 +49,24 @@ def rounding_error(propagators: Array, quaternions: Array, amplifications: Array
     propagators : (B, CHECKPOINTS, 3, 3), or (B, 0, 3, 3) without momentum
     quaternions : (B, K + 1, 4) at the step ends
     amplifications : (B,) the largest growth of all
-    least : [rad]; where all errors are below by the largest growth alone, that is enough
+    least : [rad]; where an error is below by the largest growth alone, that is enough
     """
     chords = quaternions[:, 1:] - quaternions[:, :-1]
     turned = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords))
     count = turned.shape[1]
     committed = _BY_STARTING + _BY_A_STEP * np.sqrt(count) + _BY_A_RADIAN * turned.sum(axis=1)
     bound = _EPS * amplifications * committed
-    if propagators.shape[1] == 0 or bound.max(initial=0.0) <= least or not np.isfinite(bound).all():
+    if propagators.shape[1] == 0:
         return bound
+    large = (bound > least) & np.isfinite(bound)
+    if large.any():
+        bound[large] = _rounding_at_worst(propagators[large], turned[large])
+    return bound
+
+
+def _rounding_at_worst(propagators: Array, turned: Array) -> Array:
+    """The same, time by time, from how far each step turns (B, K) [rad]."""
+    count = turned.shape[1]
     marks = checkpoint_steps(count)
     turned = np.add.reduceat(turned, np.minimum(marks[:-1], count - 1), axis=1)
     adjugates = np.moveaxis(np.array(adjugate_of(np.moveaxis(propagators, (2, 3), (0, 1)))), (0, 1), (2, 3))

@@ -29,6 +29,8 @@ _SHORT_TURN_A_STEP = 0.6
 # [rad] bound of the whole turn (some fifteen radians indeed) from which errors of the propagators have added up to more
 # than an estimate can bear.
 _FAR = 25.0
+# [rad] the same of short steps; they were right to 3 % in turns of half as much, and to 30 % in the double.
+_VERY_FAR = 100.0
 # [rad] on a panel, that a plan of steps is made for.
 _MOST_TURN = 1e9
 # A term of the rate of turning, times the panel's width, is significant above this part of the tolerance.
@@ -92,6 +94,11 @@ class StepRequirements(NamedTuple):
     def far(self) -> bool:
         """Whether the body may turn so far that the error propagators must be exact."""
         return self.whole_turn > _FAR
+
+    @property
+    def very_far(self) -> bool:
+        """Whether it may turn so far that no propagators but exact ones will do."""
+        return self.whole_turn > _VERY_FAR
 
     def plan(self, tolerance: float, *, short: bool = False) -> Array:
         """Steps per panel, not yet whole, that will probably suffice: (P,).

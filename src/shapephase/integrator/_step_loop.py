@@ -70,6 +70,7 @@ def integrate_steps(
     magnitudes: Array,
     *,
     with_propagators: bool = True,
+    threads: int | None = None,
 ) -> StepRecord:
     """All steps of all loops, starting at the identity.
 
@@ -80,9 +81,10 @@ def integrate_steps(
     directions : (B, 3) Pi/|Pi| at the start
     magnitudes : (B,) of the momentum [kg m^2/s]
     with_propagators : whether to integrate the error propagators too
+    threads : at most, in machine code; None: one for each processor
     """
     if engine.is_ready():
-        return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators)
+        return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators, threads)
     total = interpolant.loops * int(steps.sum())
     batch = len(magnitudes)
     whole = StepRecord(
@@ -285,11 +287,12 @@ def _by_kernel(
     directions: Array,
     magnitudes: Array,
     with_propagators: bool,
+    threads: int | None,
 ) -> StepRecord:
     widths, loops = np.diff(interpolant.edges[: len(steps) + 1]), interpolant.loops
     marks = checkpoint_steps(loops * int(steps.sum())) if with_propagators else np.zeros(0, dtype=int)
     arrays = march_in_threads(
-        widths, interpolant.coefficients, perturbed, steps, loops, directions, magnitudes, marks=marks
+        widths, interpolant.coefficients, perturbed, steps, loops, directions, magnitudes, marks=marks, threads=threads
     )
     return StepRecord(**vars(arrays))
 

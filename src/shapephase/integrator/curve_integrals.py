@@ -15,7 +15,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._dense_output import TERMS, convolved, direction_terms, end_channels, hermite_matrix, transported
-from .integrate import SteppedRotation
+from .stepped import SteppedRotation
 
 # Of the error that is estimated by the decay of three rules.
 _SAFETY_FACTOR = 2.0

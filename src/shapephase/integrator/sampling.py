@@ -8,7 +8,7 @@ of the spectrum is small enough.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -90,6 +90,36 @@ def sampler(
         return LoopSampler(channels, period, loops, oscillations)
     ends = breaks[breaks <= period * (1.0 + 1e-12)] if loops > 1 else breaks
     return PanelSampler(channels, ends, loops, oscillations, probe, resolved, checked=checked)
+
+
+class Samplers:
+    """Samplers of one deformation that share what they find out about it; arguments as of `sampler`.
+
+    What is remembered are whole calls: one with other times is made as it would be alone, to the last bit.
+    """
+
+    def __init__(
+        self, evaluate: Evaluate, breaks: Array, *, directly: Directly | None = None, **smoothness: Any
+    ) -> None:
+        self._evaluate, self._breaks, self._smoothness = evaluate, breaks, smoothness
+        self._channels = Channels(evaluate, directly)
+        self._known: dict[bytes, Array] = {}
+
+    @property
+    def evaluations(self) -> int:
+        """How many times the deformation was evaluated so far."""
+        return self._channels.count
+
+    def fresh(self) -> Sampler:
+        """A sampler that knows nothing yet."""
+        return sampler(self._evaluate, self._breaks, directly=self._remembered, **self._smoothness)
+
+    def _remembered(self, times: Array) -> Array:
+        key = times.tobytes()
+        if key not in self._known:
+            # A copy: what is computed in work arrays is overwritten by the next call.
+            self._known[key] = self._channels(times).copy()
+        return self._known[key]
 
 
 class LoopSampler:

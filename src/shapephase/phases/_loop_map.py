@@ -11,8 +11,9 @@ from ..arguments import tolerance_argument
 from ..arrays import Array, Integers, Mask
 from ..deformation.deformation import Deformation
 from ..errors import OpenPathError
-from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import Sampler
+from ..integrator.stepped import SteppedRotation
 
 # Memory: directions that are run through the loop together.
 _ROWS_AT_ONCE = 2048

@@ -13,7 +13,7 @@ from ..arrays import Array
 from ..deformation.frames import Frames, frames_argument, named_frames
 from ..errors import GaugeError
 from ..integrator.curve_integrals import curve_integrals
-from ..integrator.integrate import SteppedRotation
+from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 
 # Memory and time: a frame that needs more steps along the motion is refused.

@@ -17,6 +17,7 @@ from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
 from ._momentum_curve import Gauge, momentum_curve
+from ._motion_parts import array_by_parts, by_parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,9 @@ def split(
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
     """
     check_object(motion, "Motion", "motion")
+    if len(motion.parts) > 1:
+        with watched(progress):
+            return by_parts(motion, lambda part: split(part, gauge))
     deformation, batch = motion.deformation, motion.batch
     with watched(progress):
         curve = momentum_curve(motion, gauge)
@@ -176,6 +180,8 @@ def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") ->
     Raises as `split`. Source: Cabrera 2006, equation (12); theory.md D5, D9; numerics.md section 3 (branch).
     """
     check_object(motion, "Motion", "motion")
+    if len(motion.parts) > 1:
+        return by_parts(motion, lambda part: running_phases(part, t, gauge), shared=("times",))
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     curve = momentum_curve(motion, gauge, times=flat)
@@ -259,6 +265,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
     if cuts.ndim != 1 or len(cuts) < 2 or np.any(np.diff(cuts) <= 0.0):
         raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {cuts}")
+    if len(motion.parts) > 1:
+        return by_parts(motion, lambda part: arc_phases(part, times, gauge), shared=("times",))
     curve = momentum_curve(motion, gauge, times=cuts)
     references = curve.references
     swept_phase, swept_area = curve.swept(cuts)
@@ -314,6 +322,8 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
     Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
     """
     check_object(motion, "Motion", "motion")
+    if len(motion.parts) > 1:
+        return array_by_parts(motion, lambda part: parallel_transport(part, t, gauge))
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     curve = momentum_curve(motion, gauge, times=flat)

@@ -19,7 +19,7 @@ from ..arguments import check_object, direction_argument, magnitude_argument
 from ..arrays import Array, Integers
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError
-from ..integrator.integrate import SteppedRotation
+from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
 from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis

@@ -15,7 +15,7 @@ from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, unknown_name
 from ..integrator.dop853 import dop853_rotation
-from ..integrator.integrate import stepped_rotation
+from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
@@ -143,12 +143,20 @@ def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float)
     return Dop853Rotation(tuple(dense), times, np.array(estimates), evaluations)
 
 
-def _by_collocation(deformation: Deformation, at_start: Array, tolerance: float) -> tuple[Solution, int]:
-    solution = stepped_rotation(deformation.sampler(), at_start, tolerance)
-    return solution, solution.interpolant.evaluations
+def _by_collocation(
+    deformation: Deformation, at_start: Array, tolerance: float, threads: int | None
+) -> tuple[Solution, int]:
+    samplers = deformation.samplers()
+    solution = rotations_of_each(samplers, at_start, tolerance, threads=threads)
+    return solution, samplers.evaluations
 
 
-def _by_closed_form(deformation: Deformation, at_start: Array, tolerance: float) -> tuple[Solution, int]:
+def _by_closed_form(
+    deformation: Deformation,
+    at_start: Array,
+    tolerance: float,
+    threads: int | None,  # noqa: ARG001
+) -> tuple[Solution, int]:
     description = deformation.description
     if not isinstance(description, RigidDescription):
         others = [name for name in METHODS if name != "closed_form"]
@@ -156,13 +164,19 @@ def _by_closed_form(deformation: Deformation, at_start: Array, tolerance: float)
     return rigid_rotation(description.tensor, at_start, deformation.duration, tolerance), 1
 
 
-def _by_dop853(deformation: Deformation, at_start: Array, tolerance: float) -> tuple[Solution, int]:
+def _by_dop853(
+    deformation: Deformation,
+    at_start: Array,
+    tolerance: float,
+    threads: int | None,  # noqa: ARG001
+) -> tuple[Solution, int]:
     solution = dop853_solution(deformation, at_start, tolerance)
     return solution, solution.evaluations
 
 
-# Deformation, body momenta at the start (B, 3) and tolerance [rad] to the solution and its number of evaluations.
-Solver = Callable[[Deformation, Array, float], tuple[Solution, int]]
+# Deformation, body momenta at the start (B, 3), tolerance [rad] and number of threads to the solution and its number of
+# evaluations.
+Solver = Callable[[Deformation, Array, float, int | None], tuple[Solution, int]]
 SOLVERS: dict[str, Solver] = {
     "auto": _by_collocation,
     "collocation": _by_collocation,

@@ -18,8 +18,9 @@ from ..chebyshev import nodes_on, values_to_coefficients
 from ..deformation.deformation import Deformation, sampled_deformation
 from ..errors import InputFileNotFoundError, ResultFileError
 from ..files import npz_arrays, write_whole
-from ..integrator.integrate import SteppedRotation
 from ..integrator.interpolant import Interpolant
+from ..integrator.many_rotations import GroupedRotations, RotationPart
+from ..integrator.stepped import SteppedRotation
 
 _FORMAT = "shapephase motion 3"
 _STEPS = (
@@ -53,7 +54,7 @@ class MotionRecord:
     tolerance: float
     method: str
     evaluations: int
-    solution: SteppedRotation
+    solution: SteppedRotation | GroupedRotations
 
 
 def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> None:
@@ -79,9 +80,16 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "initial_attitude": record.initial_attitude,
         "breaks": deformation.breaks,
         "centre": _centre_coefficients(deformation, interpolant),
-        **{name: getattr(interpolant, name) for name in _SAMPLES},
-        **{f"step_{name}": getattr(record.solution, name) for name in _STEPS},
+        **_samples(interpolant),
     }
+    if isinstance(record.solution, GroupedRotations):
+        header["parts"] = [part.rotation.interpolant.evaluations for part in record.solution.parts]
+        arrays["header"] = np.array(json.dumps(header))
+        for number, (rows, rotation) in enumerate(record.solution.parts):
+            of_part = {"rows": rows, **_samples(rotation.interpolant), **_steps(rotation)}
+            arrays.update({_of_part(number, name): value for name, value in of_part.items()})
+    else:
+        arrays.update(_steps(record.solution))
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure
     write_whole(path, lambda stream: np.savez(stream, **arrays))
@@ -127,12 +135,22 @@ def write_table(path: str | os.PathLike[str], columns: Mapping[str, Array]) -> N
     write_whole(path, lambda stream: stream.write(text.encode()))
 
 
+def _samples(interpolant: Interpolant) -> dict[str, Array]:
+    return {name: getattr(interpolant, name) for name in _SAMPLES}
+
+
+def _steps(rotation: SteppedRotation) -> dict[str, Array]:
+    return {f"step_{name}": getattr(rotation, name) for name in _STEPS}
+
+
+def _of_part(number: int, name: str) -> str:
+    """The name of an array of one part of a batch whose samples differ."""
+    return f"part_{number}_{name}"
+
+
 def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecord:
-    interpolant = Interpolant(
-        **{name: arrays[name] for name in _SAMPLES},
-        loops=int(header["loops"]),
-        evaluations=int(header["interpolant_evaluations"]),
-    )
+    loops = int(header["loops"])
+    interpolant = _interpolant(arrays, loops, int(header["interpolant_evaluations"]))
     deformation = sampled_deformation(
         interpolant,
         arrays["centre"],
@@ -149,8 +167,30 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         float(header["tolerance"]),
         str(header["method"]),
         int(header["evaluations"]),
-        SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS}),
+        _solution(header, arrays, interpolant),
     )
+
+
+def _solution(
+    header: Mapping[str, Any], arrays: Mapping[str, Any], interpolant: Interpolant
+) -> SteppedRotation | GroupedRotations:
+    if "parts" not in header:
+        return _rotation(arrays, interpolant)
+    parts = []
+    for number, evaluations in enumerate(header["parts"]):
+        start = _of_part(number, "")
+        own = {name.removeprefix(start): value for name, value in arrays.items() if name.startswith(start)}
+        samples = _interpolant(own, interpolant.loops, int(evaluations))
+        parts.append(RotationPart(own["rows"], _rotation(own, samples)))
+    return GroupedRotations(tuple(parts), int(header["evaluations"]))
+
+
+def _interpolant(arrays: Mapping[str, Any], loops: int, evaluations: int) -> Interpolant:
+    return Interpolant(**{name: arrays[name] for name in _SAMPLES}, loops=loops, evaluations=evaluations)
+
+
+def _rotation(arrays: Mapping[str, Any], interpolant: Interpolant) -> SteppedRotation:
+    return SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS})
 
 
 def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> Array:

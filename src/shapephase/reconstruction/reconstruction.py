@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,14 +12,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, initial_state_arguments, times_argument, tolerance_argument
-from ..arrays import Array, finite_array, lock_arrays
+from ..arguments import (
+    check_object,
+    initial_state_arguments,
+    threads_argument,
+    times_argument,
+    tolerance_argument,
+)
+from ..arrays import Array, Integers, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
+from ..integrator.many_rotations import GroupedRotations, assembled
 from ..integrator.sampling import FinishedSampler
+from ..integrator.stepped import SteppedRotation
 from ..run_progress import RunProgress, watched
 from ._solvers import METHODS, SOLVERS, Solution
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
@@ -158,6 +166,9 @@ class Motion:
 
         At 20 times; the deformation is evaluated anew, so a fault of sampling or stepping shows here.
         """
+        if len(self.parts) > 1:
+            each = [(rows, np.atleast_1d(part.equation_residual)) for rows, part in self.parts]
+            return assembled(each).reshape(self.batch)
         inner = np.repeat(self.solution.times[:-1], 2) + np.repeat(np.diff(self.solution.times), 2) * np.tile(
             [0.3, 0.7], len(self.solution.times) - 1
         )
@@ -170,9 +181,20 @@ class Motion:
         return (np.linalg.norm(defect, axis=-1).max(axis=-1) / scale).reshape(self.batch)[()]
 
     @cached_property
-    def _stepped(self) -> SteppedRotation:
-        """The motion on an interpolant; for another method that interpolant's steps hold the method's rotations."""
-        if isinstance(self.solution, SteppedRotation):
+    def parts(self) -> tuple[tuple[Integers, Motion], ...]:
+        """Rows of the flattened batch that share samples and steps, and the motions of each; of one motion itself."""
+        if not isinstance(self.solution, GroupedRotations):
+            return ((np.arange(len(self._flat_attitude)), self),)
+        momentum = self.momentum.reshape(-1, 3)
+        return tuple(
+            (rows, replace(self, momentum=momentum[rows], initial_attitude=self._flat_attitude[rows], solution=one))
+            for rows, one in self.solution.parts
+        )
+
+    @cached_property
+    def _stepped(self) -> SteppedRotation | GroupedRotations:
+        """The motion on interpolants; for another method an interpolant's steps hold the method's rotations."""
+        if isinstance(self.solution, SteppedRotation | GroupedRotations):
             return self.solution
         start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
         stepped = stepped_rotation(self.deformation.sampler(), start, self.tolerance)
@@ -185,14 +207,13 @@ class Motion:
         Its steps end where those of the motion do. Integrated once, when it is first needed; every split and every
         gauge shares it.
         """
-        tolerance = min(self.tolerance, _LIFT_TOLERANCE)
-        return stepped_rotation(
-            FinishedSampler(self.interpolant), np.zeros((1, 3)), tolerance, subdivide=self._stepped.steps
-        )
+        tolerance, stepped = min(self.tolerance, _LIFT_TOLERANCE), self._stepped
+        steps = stepped.finest.steps if isinstance(stepped, GroupedRotations) else stepped.steps
+        return stepped_rotation(FinishedSampler(self.interpolant), np.zeros((1, 3)), tolerance, subdivide=steps)
 
     @property
     def interpolant(self) -> Interpolant:
-        """I^-1 and I^-1 L_o as the integrator saw them."""
+        """I^-1 and I^-1 L_o as the integrator saw them; in a batch as for the largest momentum."""
         return self._stepped.interpolant
 
     @property
@@ -294,6 +315,7 @@ def reconstruct(
     *,
     tolerance: float = 1e-9,
     method: str = "auto",
+    threads: int | None = None,
     progress: Callable[[RunProgress], Any] | None = None,
 ) -> Motion:
     """The motion of a free body with a known change of shape and a given angular momentum.
@@ -304,7 +326,7 @@ def reconstruct(
     ----------
     momentum : (..., 3) about the centre of mass, inertial axes [kg m^2/s]; zero is allowed
     attitude : (..., 3, 3) of the deformation's frame at t = 0, to inertial axes; None: the identity. Leading
-        axes of both broadcast; the deformation is sampled once for all of them.
+        axes of both broadcast.
     tolerance : of the attitude, over the whole interval, between 1e-13 and 1e-4 [rad]
     method : "auto" or "collocation" (the deformation sampled at Chebyshev points, the attitude stepped on the
         interpolant), "closed_form" (of a rigid body, by elliptic functions: `rigid_body.EulerTop`), or "dop853"
@@ -332,7 +354,7 @@ def reconstruct(
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     with watched(progress):
-        solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal)
+        solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal, threads_argument(threads))
     return Motion(
         deformation=deformation,
         momentum=spatial,

@@ -10,7 +10,7 @@ from ..body.body import Body
 from ..errors import OpenPathError
 from ..integrator.fast import engine
 from ..integrator.fast.tree import tree_channels
-from ..integrator.sampling import Sampler, sampler
+from ..integrator.sampling import Sampler, Samplers
 from .shape_path import CLOSED, ShapePath
 
 
@@ -33,6 +33,11 @@ def check_closed(body: Body, path: ShapePath) -> None:
 
 def path_sampler(body: Body, path: ShapePath) -> Sampler:
     """A sampler of the body along a path whose columns are in the body's order."""
+    return path_samplers(body, path).fresh()
+
+
+def path_samplers(body: Body, path: ShapePath) -> Samplers:
+    """The same, as many as are needed."""
 
     def evaluate(times: Array) -> tuple[Array, Array]:
         return body.sample(*path.curve(times))
@@ -40,7 +45,7 @@ def path_sampler(body: Body, path: ShapePath) -> Sampler:
     def directly(times: Array) -> Array | None:
         return channels_along(body, path, times)
 
-    return sampler(evaluate, **vars(path.smoothness), directly=directly)
+    return Samplers(evaluate, **vars(path.smoothness), directly=directly)
 
 
 def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:

@@ -15,7 +15,8 @@ from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
-from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.integrate import stepped_rotation
+from ..integrator.stepped import SteppedRotation
 from .body_path import check_closed, path_sampler
 from .shape_path import CLOSED, ShapePath
 

@@ -13,8 +13,8 @@ from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, ShapePhaseError
-from ..integrator.integrate import stepped_rotation
-from .body_path import path_sampler
+from ..integrator.many_rotations import rotations_of_each
+from .body_path import path_samplers
 from .shape_path import ShapePath
 
 
@@ -74,8 +74,8 @@ def final_attitudes(
     for number, path in enumerate(paths):
         mu, first = _of_path(spatial, 1, number), _of_path(start, 2, number)
         try:
-            sampler = path_sampler(body, path.matched(body.joint_names, body.name))
-            solution = stepped_rotation(sampler, (first.T @ mu)[None], goal)
+            samplers = path_samplers(body, path.matched(body.joint_names, body.name))
+            solution = rotations_of_each(samplers, (first.T @ mu)[None], goal)
         except ShapePhaseError as error:
             raise type(error)(f"path {number}: {error}") from error
         ends.append(first @ solution.end[0])

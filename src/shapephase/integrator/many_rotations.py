@@ -1,0 +1,243 @@
+"""Many momenta on one deformation, each with the samples and steps that it would have alone.
+
+Momenta are put into classes by their magnitude, and what a class needs is planned for its ceiling, also for one
+momentum alone. Those of a class share samples and steps as long as they need the same. Where the estimate of some is
+above the tolerance, they go on with refinements of their own, which are rounded up so that many share them again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Array, Integers
+from ..errors import AccuracyNotReached
+from .integrate import Attempt, Integration, Refinement, norms
+from .interpolant import Interpolant
+from .sampling import Sampler, Samplers
+from .stepped import SteppedRotation, for_whole_batch, of_rows
+
+# Classes of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed.
+_CLASSES = 4
+# Refinements in each factor of two: of the steps, and of what samples must reach and errors grow by.
+_STEPS_OF_FINER = 8
+_STEPS_OF_OTHERS = 2
+# From here on a growth of errors is not told from any larger one.
+_MOST_GROWTH = 1e30
+
+
+class RotationPart(NamedTuple):
+    """Some rows of a batch that share samples and steps."""
+
+    rows: Integers
+    rotation: SteppedRotation
+
+
+@dataclass(frozen=True, eq=False)
+class GroupedRotations:
+    """S(t) for a batch of momenta whose samples and steps differ; in the parts every row is once.
+
+    Attributes
+    ----------
+    parts : ordered by the largest momentum, which comes last
+    evaluations : how many times the deformation was evaluated
+    """
+
+    parts: tuple[RotationPart, ...]
+    evaluations: int
+
+    @property
+    def count(self) -> int:
+        """B, the number of rows."""
+        return sum(len(part.rows) for part in self.parts)
+
+    @property
+    def finest(self) -> SteppedRotation:
+        """The part of the largest momentum."""
+        return self.parts[-1].rotation
+
+    @property
+    def interpolant(self) -> Interpolant:
+        """The deformation as it was sampled for the largest momentum."""
+        return self.finest.interpolant
+
+    @property
+    def times(self) -> Array:
+        """The ends of all steps: (K + 1,) [s]."""
+        return np.unique(np.concatenate([part.rotation.times for part in self.parts]))
+
+    @property
+    def error_estimate(self) -> Array:
+        """As of `SteppedRotation`: (B,) [rad]."""
+        return self._assembled(lambda rotation: rotation.error_estimate)
+
+    @property
+    def amplification(self) -> Array:
+        """As of `SteppedRotation`: (B,)."""
+        return self._assembled(lambda rotation: rotation.amplification)
+
+    @property
+    def end(self) -> Array:
+        """S at the end of the interval: (B, 3, 3)."""
+        return self._assembled(lambda rotation: rotation.end)
+
+    @property
+    def momentum_slope(self) -> Array:
+        """As of `SteppedRotation`: (B, 3, 3)."""
+        return self._assembled(lambda rotation: rotation.momentum_slope)
+
+    def rotation(self, t: Array) -> Array:
+        """S(t): (N,) -> (B, N, 3, 3)."""
+        return self._assembled(lambda rotation: rotation.rotation(t))
+
+    def dynamic_phase(self, t: Array) -> Array:
+        """As of `SteppedRotation`: (N,) -> (B, N) [rad]."""
+        return self._assembled(lambda rotation: rotation.dynamic_phase(t))
+
+    def solid_angle(self, t: Array) -> Array:
+        """As of `SteppedRotation`: (N,) -> (B, N) [sr]."""
+        return self._assembled(lambda rotation: rotation.solid_angle(t))
+
+    def _assembled(self, of_part: Callable[[SteppedRotation], Array]) -> Array:
+        return assembled([(part.rows, of_part(part.rotation)) for part in self.parts])
+
+
+def assembled(parts: list[tuple[Integers, Array]]) -> Array:
+    """The rows of parts in one array: (n, ...) each -> (B, ...)."""
+    first = parts[0][1]
+    whole = np.empty((sum(len(rows) for rows, _ in parts), *first.shape[1:]), dtype=first.dtype)
+    for rows, values in parts:
+        whole[rows] = values
+    return whole
+
+
+class _Group(NamedTuple):
+    """Momenta that have come to the same refinements."""
+
+    rows: Integers
+    best: Array  # (n,) the lowest estimate so far [rad]
+    ceiling: float  # of their magnitudes [kg m^2/s]
+    history: tuple[Refinement, ...]  # of all rounds, the one to come included
+    sampler: Sampler | None  # after the rounds before; None: they have to be gone through again
+
+
+def rotations_of_each(
+    samplers: Samplers, momentum: Array, tolerance: float, *, threads: int | None = None
+) -> SteppedRotation | GroupedRotations:
+    """Integrate the attitude equation for each momentum as if it were alone.
+
+    Parameters
+    ----------
+    momentum : (B, 3) body angular momentum at the start [kg m^2/s]
+    tolerance : of every attitude over the whole interval [rad]
+    threads : at most, in machine code; None: one for each processor. Results do not depend on it
+
+    Raises
+    ------
+    AccuracyNotReached
+        If an estimate stays above the tolerance; in a batch the message has its row.
+    """
+    ceilings = _rounded_up(norms(momentum), _CLASSES)
+    parts: list[RotationPart] = []
+    for ceiling in np.unique(ceilings) if len(ceilings) else (0.0,):
+        rows = np.flatnonzero(ceilings == ceiling)
+        first = Refinement.at_first(tolerance)
+        waiting = [_Group(rows, np.full(len(rows), np.inf), float(ceiling), (first,), None)]
+        while waiting:
+            found, further = _integrated(samplers, waiting.pop(), momentum, tolerance, threads)
+            parts += found
+            waiting += further
+    if len(parts) == 1:
+        return parts[0].rotation
+    return GroupedRotations(tuple(parts), samplers.evaluations)
+
+
+def _integrated(
+    samplers: Samplers, group: _Group, momentum: Array, tolerance: float, threads: int | None
+) -> tuple[list[RotationPart], list[_Group]]:
+    """One round for a group: the rows that are within the tolerance now, and those that have to go on."""
+    rows, starts = group.rows, momentum[group.rows]
+    sampler = group.sampler or _after(samplers, group)
+    integration = Integration(
+        sampler,
+        starts if group.ceiling else starts[:1],
+        tolerance,
+        ceiling=group.ceiling,
+        short_when_far=True,
+        threads=threads,
+        refinement=group.history[-1],
+    )
+    try:
+        if len(rows) > 1 and integration.is_long:
+            # Each by the growth of its own errors.
+            return [], [group._replace(rows=rows[k : k + 1], best=group.best[k : k + 1]) for k in range(len(rows))]
+        attempt = integration.attempt()
+    except AccuracyNotReached as error:
+        raise _of_row(error, int(rows[0]), len(momentum)) from error
+    estimates = attempt.rotation.error_estimate
+    failed = np.flatnonzero(~(estimates <= tolerance))
+    if not len(failed):
+        return [RotationPart(rows, for_whole_batch(attempt.rotation, starts))], []
+    found = []
+    if len(failed) < len(estimates):
+        passed = np.flatnonzero(estimates <= tolerance)
+        found.append(RotationPart(rows[passed], of_rows(attempt.rotation, passed)))
+    return found, list(_further(group, integration, sampler, attempt, failed, len(momentum)))
+
+
+def _further(
+    group: _Group, integration: Integration, sampler: Sampler, attempt: Attempt, failed: Integers, count: int
+) -> Iterator[_Group]:
+    """Rows that failed, by the refinements that they need."""
+    at_rest = not group.ceiling
+    together: dict[Refinement, list[tuple[int, float]]] = {}
+    for row, errors in zip(failed.tolist(), attempt.errors(failed), strict=True):
+        best = float(group.best[row])
+        try:
+            integration.check_progress(errors, len(group.history), best)
+        except AccuracyNotReached as error:
+            raise _of_row(error, int(group.rows[row]), count) from None
+        refinement = _rounded(integration.refined(errors))
+        together.setdefault(refinement, []).append((row, min(best, errors.estimate)))
+    for refinement, members in together.items():
+        rows = group.rows if at_rest else group.rows[[row for row, _ in members]]
+        best = np.full(len(rows), members[0][1]) if at_rest else np.array([best for _, best in members])
+        history = (*group.history, refinement)
+        # Where all go on together the sampler goes with them.
+        yield _Group(rows, best, group.ceiling, history, sampler if len(together) == 1 else None)
+
+
+def _after(samplers: Samplers, group: _Group) -> Sampler:
+    """A sampler after the rounds of a group but the one to come."""
+    sampler = samplers.fresh()
+    for refinement in group.history[:-1]:
+        sampler.refine(group.ceiling, refinement.sampling_target)
+    return sampler
+
+
+def _rounded(refinement: Refinement) -> Refinement:
+    """Made stricter by little, so that many are the same."""
+    target, finer, amplified = refinement
+    return Refinement(
+        sampling_target=1.0 / _up(1.0 / target, _STEPS_OF_OTHERS),
+        finer=_up(finer, _STEPS_OF_FINER),
+        amplified=None if amplified is None else _up(min(amplified, _MOST_GROWTH), _STEPS_OF_OTHERS),
+    )
+
+
+def _up(number: float, steps: int) -> float:
+    return float(_rounded_up(np.array([number]), steps)[0])
+
+
+def _rounded_up(numbers: Array, steps: int) -> Array:
+    """To the next of `steps` geometric steps in each factor of two, exactly alike for equal numbers; zero is zero."""
+    mantissa, exponent = np.frexp(numbers)
+    marks = 0.5 * 2.0 ** (np.arange(steps + 1) / steps)
+    return np.where(numbers == 0.0, 0.0, np.ldexp(marks[np.searchsorted(marks, mantissa) % len(marks)], exponent))
+
+
+def _of_row(error: AccuracyNotReached, row: int, count: int) -> AccuracyNotReached:
+    return error if count == 1 else AccuracyNotReached(f"momentum {row} of {count}: {error}")

@@ -1,0 +1,181 @@
+"""S(t) as it was stepped: the attitudes at the ends of steps, and all that is made of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .. import so3, sphere
+from ..arrays import Array, Integers, lock_arrays, read_only
+from ._dense_output import DenseOutput
+from ._error_propagator import momentum_slope
+from ._step_loop import stage_channels
+from .interpolant import Interpolant
+
+# Of the error at the ends of the steps: what the polynomials between them may add.
+_DENSE_SHARE = 5e-3
+_BATCHED_FIELDS = (
+    "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
+    "rounding_error", "amplification",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class SteppedRotation:
+    """S(t), the attitude relative to the start, at every time, for a batch of momenta.
+
+    Attributes
+    ----------
+    interpolant : the sampled deformation
+    momentum : (B, 3) body angular momentum at the start [kg m^2/s]
+    steps : (P,) steps on each of the interpolant's panels, the same in every loop
+    quaternions : (B, K + 1, 4) xyzw at the step ends
+    directions : (B, K + 1, 3) Pi/|Pi| at the step ends; (B, 0, 3) where no momentum of the batch differs from zero
+    turns : (B, K) of each step about its starting direction, the shortest rotation between its ends taken off [rad]
+    dynamics : (B, K) dynamic phase of each step [rad]
+    sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
+    rounding_error : (B,) error due to rounding alone [rad]
+    amplification : (B,) largest growth of an attitude error from one time to a later one
+    """
+
+    interpolant: Interpolant
+    momentum: Array
+    steps: Integers
+    quaternions: Array
+    directions: Array
+    turns: Array
+    dynamics: Array
+    sampling_error: Array
+    stepping_error: Array
+    rounding_error: Array
+    amplification: Array
+
+    __post_init__ = lock_arrays
+
+    @cached_property
+    def panel(self) -> Integers:
+        """The interpolant's panel of each step: (K,)."""
+        each = np.tile(self.steps, self.interpolant.loops)
+        return read_only(np.repeat(np.arange(len(each)), each))
+
+    @property
+    def times(self) -> Array:
+        """The ends of the steps: (K + 1,) [s]."""
+        return read_only(self._times)
+
+    @cached_property
+    def _times(self) -> Array:
+        edges, panel = self.interpolant.edges, self.panel
+        each = np.tile(self.steps, self.interpolant.loops)
+        within = np.arange(len(panel)) - np.repeat(np.cumsum(each) - each, each)
+        return np.append(edges[panel] + (edges[panel + 1] - edges[panel]) * (within / each[panel]), edges[-1])
+
+    @property
+    def error_estimate(self) -> Array:
+        """Estimate of the largest attitude error over the interval, rounding included: (B,) [rad]."""
+        return (1.0 + _DENSE_SHARE) * self._error_at_ends
+
+    @property
+    def _error_at_ends(self) -> Array:
+        """The same at the ends of the steps: (B,) [rad]."""
+        return self.sampling_error + self.stepping_error + self.rounding_error
+
+    def rotation(self, t: Array) -> Array:
+        """S(t): (N,) -> (B, N, 3, 3)."""
+        found, count = so3.matrix_from_quat(np.moveaxis(self._dense.quaternion(t), 0, -1)), len(self.momentum)
+        return found if len(found) == count else np.repeat(found, count, axis=0)
+
+    @property
+    def end(self) -> Array:
+        """S at the end of the interval: (B, 3, 3)."""
+        return so3.matrix_from_quat(self.quaternions[:, -1])
+
+    def dynamic_phase(self, t: Array) -> Array:
+        """The integral of omega . Pi/|Pi| from 0 to t: (N,) -> (B, N) [rad]; zero without momentum."""
+        before = np.cumsum(self.dynamics, axis=1) - self.dynamics
+        return (before[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)) * self._moving
+
+    def solid_angle(self, t: Array) -> Array:
+        """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
+
+        Seen from this description's frame, positive where the curve goes counter-clockwise seen from outside. It
+        grows continuously from zero as long as the curve keeps away from the point opposite its start, at which
+        it jumps by 4 pi.
+        """
+        if not self.directions.shape[1]:
+            return np.zeros((len(self.momentum), len(t)))
+        start, corners, index = self.directions[:, :1], self.directions, self._dense.step_of(t)
+        fans = sphere.triangle_area(start, corners[:, :-1], corners[:, 1:]) + self.dynamics - self.turns
+        before = np.cumsum(fans, axis=1) - fans
+        attitude, near = self.rotation(t), corners[:, index]
+        there = so3.apply(so3.transpose(attitude), start)
+        # The turn about the direction at the step's start, the shortest rotation taken off.
+        steps = so3.transpose(so3.matrix_from_quat(self.quaternions[:, index])) @ attitude
+        turn = np.where(t == self.times[index], 0.0, so3.angle_about(steps @ so3.between(near, there), near))
+        part = sphere.triangle_area(start, near, there) + self._dense.dynamic_phase(t) - turn
+        return (before[:, index] + part) * self._moving
+
+    @property
+    def _moving(self) -> Array:
+        """One where there is momentum, else zero: (B, 1)."""
+        return np.any(self.momentum != 0.0, axis=1, keepdims=True).astype(np.float64)
+
+    @cached_property
+    def momentum_slope(self) -> Array:
+        """How the end turns, S exp(hat(slope dPi)), by a change dPi of the body momentum at the start: (B, 3, 3).
+
+        The derivative of steps half as long as those that were taken.
+        """
+        # The error of a derivative is larger than that of the steps: twice as many make it smaller.
+        channels = stage_channels(self.interpolant, 2 * self.steps)
+        return momentum_slope(channels, self.momentum, self.interpolant.loops)
+
+    @cached_property
+    def _dense(self) -> DenseOutput:
+        """The same rotation between the ends of the steps; without momentum it is one for the whole batch."""
+        rows = slice(None) if self.directions.shape[1] else slice(1)
+        return DenseOutput(
+            interpolant=self.interpolant,
+            steps=self.steps,
+            times=self.times,
+            quaternions=self.quaternions[rows],
+            directions=self.directions[rows],
+            dynamics=self.dynamics[rows],
+            magnitude=np.linalg.norm(self.momentum[rows], axis=-1),
+            goal=_DENSE_SHARE * float(self._error_at_ends.min(initial=np.inf)),
+        )
+
+    def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:
+        """The same steps with the rotations at their ends (B, K + 1, 3, 3) found by another method."""
+        directions = self.directions
+        if directions.shape[1]:
+            directions = so3.apply(so3.transpose(rotations), directions[:, :1])
+        return replace(
+            self,
+            quaternions=so3.quat_from_matrix(rotations),
+            directions=directions,
+            stepping_error=error,
+            sampling_error=0.0 * error,
+        )
+
+    def inverse_and_drift(self, t: Array) -> tuple[Array, Array]:
+        """I^-1 and I^-1 L_o at times: (N,) -> (N, 3, 3), (N, 3)."""
+        return self.interpolant.inverse_and_drift(t)
+
+
+def for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotation:
+    """The solution with one row for each momentum; without momentum all share the only one."""
+    count = len(momentum)
+    if len(solution.quaternions) == count:
+        return solution
+    shared = {name: getattr(solution, name) for name in _BATCHED_FIELDS}
+    broadcast = {name: np.broadcast_to(v, (count, *v.shape[1:])) for name, v in shared.items()}
+    return replace(solution, momentum=momentum, **broadcast)
+
+
+def of_rows(solution: SteppedRotation, rows: Integers) -> SteppedRotation:
+    """The solution for some of its momenta."""
+    chosen = {name: getattr(solution, name)[rows] for name in ("momentum", *_BATCHED_FIELDS)}
+    return replace(solution, **chosen)
