@@ -144,7 +144,7 @@ def on_a_terminal(source):
     return told.decode()
 
 
-def test_progress_is_shown_after_a_second_on_a_terminal_only():
+def test_progress_is_shown_after_two_seconds_on_a_terminal_only():
     source = """
 import time
 from shapephase.cli import progress
@@ -155,7 +155,7 @@ with progress.steps(2) as work:
     work.begin("second things")
     time.sleep({0})
 """
-    assert progress._PATIENCE == 1.0
+    assert progress._PATIENCE == 2.0
     assert "things" not in on_a_terminal(source.format(0.05, 600.0))
     shown = on_a_terminal(source.format(0.9, 0.3))
     assert "first things" in shown or "second things" in shown

@@ -337,12 +337,14 @@ def test_phases_in_time_end_in_those_of_the_split(motions, name):
     dynamic, geometric, total = (by_label(ax, label) for label in ("dynamic", "geometric", "total"))
     assert dynamic + geometric == pytest.approx(total, abs=1e-12)
     assert [dynamic[0], geometric[0], total[0]] == [0.0, 0.0, 0.0]
-    assert dynamic[-1] == pytest.approx(float(found.dynamic_phase), rel=1e-12)
+    # Two ways of integrating along one motion, each far nearer to it than the motion is to the truth.
+    near = 0.1 * float(motion.error_estimate) + 1e-12
+    assert dynamic[-1] == pytest.approx(float(found.dynamic_phase), rel=1e-12, abs=near)
     times = np.asarray(next(line for line in ax.lines if line.get_label() == "total").get_xdata())
     assert (times[0], times[-1]) == (0.0, motion.duration) == ax.get_xlim()
     assert np.abs(np.diff(total)).max() < 0.5
     # Independently: the dynamic phase from the integrator.
-    assert sp.running_phases(motion, times).dynamic_phase == pytest.approx(dynamic, abs=1e-12)
+    assert sp.running_phases(motion, times).dynamic_phase == pytest.approx(dynamic, abs=near)
     wrapped = np.concatenate(drawn(ax, WRAPPED))
     assert wrapped[:, 0] == pytest.approx(times, abs=0.0)
     assert np.abs(so3.wrap(wrapped[:, 1] - total)).max() < 1e-12

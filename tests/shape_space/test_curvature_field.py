@@ -202,7 +202,9 @@ def test_squares_from_a_corner_turn_the_body_by_the_curvature(name, pairs, rng):
         assert slope > 2.97, (body.joint_names[i], body.joint_names[j], slope)
         # The next power of the side tilts the slope between two sides in proportion to them; in the limit it is three.
         steps = np.log2(np.array(left[:-1]) / left[1:])
-        assert abs(2.0 * steps[-1] - steps[-2] - 3.0) < 1e-4, (body.joint_names[i], body.joint_names[j], steps)
+        # What is left after the last side is known to the tolerance of its holonomy.
+        unsure = 3.0 * 1e-13 / (np.log(2.0) * left[-1])
+        assert abs(2.0 * steps[-1] - steps[-2] - 3.0) < 1e-4 + unsure, (body.joint_names[i], body.joint_names[j], steps)
         assert left[-1] < 0.05 * sides[-1] ** 2 * np.linalg.norm(field)
 
 
