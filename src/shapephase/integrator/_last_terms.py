@@ -19,6 +19,8 @@ _SLOWEST = 0.99
 _ROUNDING = 3e-14
 # Of what is missing by the decay of the terms: they may fall more slowly beyond, and what aliases adds to it.
 _SAFETY_FACTOR = 3.0
+# Of few terms the decay is less sure: the factor is twice as large at this degree.
+_FEW_TERMS = 10.0
 # Keeps quotients of coefficients defined where these are zero.
 _TINY = 1e-300
 
@@ -51,7 +53,7 @@ def perturbed(coefficients: Array, degrees: Integers, widths: Array, momentum: f
         decay = np.minimum(decay, _SLOWEST)
         # Where the body turns as fast as the series swings, what aliases to lower degrees weighs more.
         fast = 2.0 * x.sum(axis=1) / degree
-        missing = _SAFETY_FACTOR * decay / (1.0 - decay) * (1.0 + fast * fast)
+        missing = _SAFETY_FACTOR * (1.0 + _FEW_TERMS / degree) * decay / (1.0 - decay) * (1.0 + fast * fast)
         # Rounding is as large in the terms that are missing as in the last ones, and no larger.
         missing = np.where(late <= _ROUNDING * x.max(axis=1), 1.0, np.minimum(missing, _SAFETY_FACTOR * degree))
         changed[rows, degree + 1 - _LAST : degree + 1] *= (1.0 - missing)[:, None, None]
