@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import os
-import pty
 import re
 import signal
 import stat
@@ -22,6 +21,7 @@ from shapephase.cli.exit_codes import MEANINGS, ExitCode
 from shapephase.cli.main import main
 from shapephase.cli.terminal import printable
 from support.places import ROOT
+from support.terminals import on_a_terminal
 
 CAT = ("split", "cat", "cat_righting")
 MOVING = ("--momentum", "0", "0", "0.02")
@@ -199,14 +199,13 @@ def test_ctrl_c_at_any_time_is_one_line_and_130(seed, tmp_path):
     """From the first imports to the last figure of the report; no half file, whenever it comes."""
     out = tmp_path / "report.html"
     arguments = [*CAT, *MOVING, "--html", str(out)]
-    begin = "print('go', flush=True)\nfrom shapephase.cli.start import run; run()"
+    begin = "from shapephase.cli.start import run\nprint('go', flush=True)\nrun()"
     source = f"import sys; sys.argv[1:] = {arguments!r}; {begin}"
     process = subprocess.Popen(
         [sys.executable, "-c", source], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, process_group=0
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "go\n"
-    # The signal handler stands some milliseconds later.
     time.sleep(0.15 + 0.25 * seed + np.random.default_rng(seed).uniform(0.0, 0.2))
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=300)
@@ -224,6 +223,28 @@ def test_ctrl_c_within_a_command(capfd, monkeypatch):
 
     monkeypatch.setattr("shapephase.cli.motion.flight", pressed)
     assert ended(capfd, *CAT) == (ExitCode.STOPPED, "", "shapephase: stopped\n")
+
+
+@pytest.mark.parametrize("error", [ImportError("numpy._core failed to import"), SystemError("error return")])
+def test_ctrl_c_that_a_compiled_module_turned_into_its_own_error(error):
+    """As while a command imports what it needs: the exception that comes out is not KeyboardInterrupt any more."""
+    source = f"""
+import signal, sys
+import shapephase.cli.motion as motion
+from shapephase.cli.start import run
+
+def importing(*_, **__):
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise {error!r} from None
+
+motion.flight = importing
+sys.argv[1:] = {list(CAT)!r}
+run()
+"""
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (ExitCode.STOPPED, "", "shapephase: stopped\n")
 
 
 # ---- Exit codes -----------------------------------------------------------------------------------------------------
@@ -402,34 +423,18 @@ def test_every_option_has_a_sentence_and_an_example(name):
             assert re.search(r"\bin (rad|s|kg|degrees|sqrt)|[Tt]urns|without unit|Seconds|sqrt\(kg\)", words), words
 
 
-def on_a_terminal(*arguments, **environment):
-    """What a command writes to a terminal."""
-    reader, writer = pty.openpty()
-    command = [sys.executable, "-m", "shapephase", *arguments]
+def coloured(*arguments, **environment):
+    """What a command writes to a terminal that has colours."""
     plain = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
-    process = subprocess.Popen(
-        command, stdout=writer, stderr=writer, env={**plain, "TERM": "xterm-256color", **environment}, close_fds=True
-    )
-    os.close(writer)
-    received = b""
-    while True:
-        try:
-            part = os.read(reader, 65536)
-        except OSError:
-            break
-        if not part:
-            break
-        received += part
-    os.close(reader)
-    process.wait(timeout=300)
-    return received.decode()
+    command = [sys.executable, "-m", "shapephase", *arguments]
+    return on_a_terminal(command, {**plain, "TERM": "xterm-256color", **environment})
 
 
 def test_colours_are_for_terminals_that_want_them():
     colour = re.compile(r"\x1b\[[0-9;]*(3[0-9]|9[0-7]|4[0-9])[0-9;]*m")
     assert "\x1b" not in ran("--help").stdout
-    assert not colour.search(on_a_terminal("--help", NO_COLOR="1"))
-    assert "\x1b" not in on_a_terminal("robots")
+    assert not colour.search(coloured("--help", NO_COLOR="1"))
+    assert "\x1b" not in coloured("robots")
 
 
 def test_completion_is_offered_for_every_shell(tmp_path):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import html
-import os
-import pty
 import re
 import signal
 import subprocess
@@ -22,6 +20,7 @@ from shapephase.examples.scenarios import cat_righting, satellite_sweep
 from shapephase.plotting.named_figures import FIGURES, figure_image, write_figure
 from shapephase.plotting.report import write_report
 from support.browser import furred, seen, stopped
+from support.terminals import on_a_terminal
 
 MAGIC = {"svg": b"<?xml", "pdf": b"%PDF-", "png": b"\x89PNG"}
 
@@ -125,25 +124,6 @@ def test_the_report_command_writes_nothing_in_a_pipe_but_what_it_says(tmp_path):
     assert "satellite along satellite_sweep" in text_of(out.read_text(encoding="utf-8"))
 
 
-def on_a_terminal(source):
-    """What a program writes to a terminal."""
-    reader, writer = pty.openpty()
-    process = subprocess.Popen([sys.executable, "-c", source], stdout=writer, stderr=writer, close_fds=True)
-    os.close(writer)
-    told = b""
-    while True:
-        try:
-            part = os.read(reader, 65536)
-        except OSError:
-            break
-        if not part:
-            break
-        told += part
-    os.close(reader)
-    process.wait(timeout=300)
-    return told.decode()
-
-
 def test_progress_is_shown_after_two_seconds_on_a_terminal_only():
     source = """
 import time
@@ -156,8 +136,8 @@ with progress.steps(2) as work:
     time.sleep({0})
 """
     assert progress._PATIENCE == 2.0
-    assert "things" not in on_a_terminal(source.format(0.05, 600.0))
-    shown = on_a_terminal(source.format(0.9, 0.3))
+    assert "things" not in on_a_terminal([sys.executable, "-c", source.format(0.05, 600.0)])
+    shown = on_a_terminal([sys.executable, "-c", source.format(0.9, 0.3)])
     assert "first things" in shown or "second things" in shown
     piped = subprocess.run([sys.executable, "-c", source.format(0.7, 0.1)], capture_output=True, text=True, timeout=300)
     assert piped.stdout == piped.stderr == ""

@@ -20,6 +20,7 @@ from ..errors import OutputFileError, ShapePhaseError
 from ..integrator.fast.switch import begin_command
 from .check import check_command
 from .conjugate import conjugate_command
+from .ctrl_c import was_pressed
 from .doctor import doctor_command
 from .exit_codes import ExitCode, exit_code_list, exit_code_of
 from .library import compile_command, robots_command
@@ -117,12 +118,17 @@ def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
     except CycloptsError as error:
         return _Failure(message=one_line(error), code=ExitCode.USAGE, kind="usage")
     except ShapePhaseError as error:
+        # Such an import may also have become a missing extra.
+        if was_pressed():
+            raise KeyboardInterrupt from error
         return _failure(error)
     except MemoryError:
         return _Failure(message="there is not enough memory for this", code=ExitCode.NUMERICS, kind="MemoryError")
     except BrokenPipeError:
         raise
     except Exception as error:
+        if was_pressed():
+            raise KeyboardInterrupt from error
         if verbosity() is Verbosity.VERBOSE:
             traceback.print_exc()
         place = traceback.extract_tb(error.__traceback__)[-1]

@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from types import FrameType
+
+from . import ctrl_c
 
 _STOPPED = 130
 
 
 def run() -> None:
     """The command line, which Ctrl-C ends with one line and 130, also while it still imports what it needs."""
-    pressed: list[int] = []
-
-    def stop(number: int, _: FrameType | None) -> None:
-        pressed.append(number)
-        raise KeyboardInterrupt
-
-    # Where the shell ignores Ctrl-C, as of commands in the background, it stays ignored.
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, stop)
+    ctrl_c.listen()
     try:
         from .main import main
 
@@ -27,8 +19,7 @@ def run() -> None:
     except KeyboardInterrupt:
         _end()
     except Exception:
-        # Compiled modules turn what interrupts their import into errors of their own.
-        if not pressed:
+        if not ctrl_c.was_pressed():
             raise
         _end()
 

@@ -1,0 +1,29 @@
+"""Whether Ctrl-C was pressed, also where its exception was lost on the way.
+
+Compiled modules that Ctrl-C interrupts while they are imported turn its KeyboardInterrupt into an error of their own.
+"""
+
+from __future__ import annotations
+
+import signal
+from types import FrameType
+
+_PRESSED: list[int] = []
+
+
+def listen() -> None:
+    """Note Ctrl-C from now on, which still raises KeyboardInterrupt."""
+    _PRESSED.clear()
+    # Where the shell ignores Ctrl-C, as of commands in the background, it stays ignored.
+    if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, _stop):
+        signal.signal(signal.SIGINT, _stop)
+
+
+def was_pressed() -> bool:
+    """Whether Ctrl-C was pressed since `listen`: then an error is no more than how it ended what was going on."""
+    return bool(_PRESSED)
+
+
+def _stop(number: int, _: FrameType | None) -> None:
+    _PRESSED.append(number)
+    raise KeyboardInterrupt
