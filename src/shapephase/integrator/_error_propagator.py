@@ -10,8 +10,8 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._rotation_step import STAGES, attitude_step
-from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
-from .casadi_calls import call_casadi, map_rows
+from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, momentum_step_function
+from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.marches import amplifications, derivatives
 
@@ -33,10 +33,18 @@ def amplification(propagators: Array) -> Array:
         return np.ones(1)
     if engine.is_ready():
         return amplifications(propagators)
-    chosen = propagators.reshape(len(propagators), -1)
-    largest = map_rows(largest_amplification, 9 * CHECKPOINTS, chosen)[:, 0]
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = np.tril(_growth_between(propagators)).max(axis=(1, 2))
     # Where steps were so long that they overflowed, the growth is unknown.
-    return np.where(np.isfinite(chosen.sum(axis=1)), largest, np.inf)
+    return np.where(np.isfinite(propagators.sum(axis=(1, 2, 3)) + largest), largest, np.inf)
+
+
+def _growth_between(propagators: Array) -> Array:
+    """The growth of errors from each checkpoint to each: (B, M, 3, 3) -> (B, to, from)."""
+    adjugates = np.moveaxis(np.array(adjugate_of(np.moveaxis(propagators, (2, 3), (0, 1)))), (0, 1), (2, 3))
+    between = propagators[:, :, None] @ adjugates[:, None]
+    half = np.maximum(0.5 * (np.einsum("bjkmn,bjkmn->bjk", between, between) - 1.0), 1.0)
+    return np.asarray(np.sqrt(half + np.sqrt(half * half - 1.0)))
 
 
 def rounding_error(propagators: Array, quaternions: Array, amplifications: Array, least: float) -> Array:
@@ -69,35 +77,13 @@ def _rounding_at_worst(propagators: Array, turned: Array) -> Array:
     count = turned.shape[1]
     marks = checkpoint_steps(count)
     turned = np.add.reduceat(turned, np.minimum(marks[:-1], count - 1), axis=1)
-    adjugates = np.moveaxis(np.array(adjugate_of(np.moveaxis(propagators, (2, 3), (0, 1)))), (0, 1), (2, 3))
-    between = propagators[:, :, None] @ adjugates[:, None]
-    growth = _largest_singular_value(np.einsum("bjkmn,bjkmn->bjk", between, between))
+    growth = _growth_between(propagators)
     # What is committed between two checkpoints grows as from the worse of them.
     growth = np.tril(np.maximum(growth[:, 1:, :-1], growth[:, 1:, 1:]))
     random = np.sqrt(growth * growth @ np.diff(marks).astype(np.float64))
     steady = np.einsum("bjk,bk->bj", growth, turned)
     largest = growth.max(axis=(1, 2), initial=1.0)
     return _EPS * (_BY_STARTING * largest + (_BY_A_STEP * random + _BY_A_RADIAN * steady).max(axis=1))
-
-
-def _largest_singular_value(squares: Array) -> Array:
-    """Of matrices whose singular values are s, 1 and 1/s, from the sums of their squared entries."""
-    half = np.maximum(0.5 * (squares - 1.0), 1.0)
-    return np.asarray(np.sqrt(half + np.sqrt(half * half - 1.0)))
-
-
-def largest_amplification(entries: Any) -> list[Any]:
-    """From the nine entries of the propagator at each checkpoint, row by row."""
-    import casadi
-
-    matrices = [[entries[9 * k + 3 * i : 9 * k + 3 * i + 3] for i in range(3)] for k in range(CHECKPOINTS)]
-    largest: Any = 1.0
-    for later in range(1, CHECKPOINTS):
-        for earlier in range(later):
-            between = matrix_product(matrices[later], adjugate_of(matrices[earlier])) if earlier else matrices[later]
-            squares = sum(entry * entry for row in between for entry in row)
-            largest = casadi.fmax(largest, 0.5 * (squares - 1.0))
-    return [(largest + (largest * largest - 1.0) ** 0.5) ** 0.5]
 
 
 def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loops: int) -> Array:
