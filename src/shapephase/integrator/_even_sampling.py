@@ -83,40 +83,43 @@ class EvenSampler:
         turn = self._period * (momentum * inverse.largest + drift.largest)
         share = unaveraged_share(inverse.converging and drift.converging, pi * len(self._values), turn)
         by_tails = (momentum * inverse.error + drift.error) * share
-        # What the tails cannot explain is no missing oscillation that averages out.
-        seen = momentum * _unexplained(self._gaps[0], inverse) + _unexplained(self._gaps[1], drift)
-        return self._loops * 0.5 * self._period * (by_tails + seen)
+        return self._loops * 0.5 * self._period * by_tails + self._hidden(momentum)
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
-        panels, count = self._panels, len(self._values)
+        panels = self._panels
         edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
         edges[-1] = self._period * self._loops
-        return Interpolant(edges, self._series(count // 2), self._loops, self._channels.count)
+        return Interpolant(edges, self._series(), self._loops, self._channels.count)
 
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`: the harmonics that stand for those that are missing, changed by as much."""
         inverse, drift = self._tails
         missing, last = (momentum * inverse.error + drift.error, momentum * inverse.tail + drift.tail)
-        seen = momentum * _unexplained(self._gaps[0], inverse) + _unexplained(self._gaps[1], drift)
-        highest = len(self._values) // 2
-        whole, without = self._series(highest), self._series(highest - tail_length(highest))
-        share = missing / last if last > 0.0 else 0.0
-        return Perturbed(whole + share * (without - whole), self._loops * 0.5 * self._period * seen)
+        return Perturbed(self._series(missing / last if last > 0.0 else 0.0), self._hidden(momentum))
+
+    def _hidden(self, momentum: float) -> float:
+        """What the tails cannot explain is no missing oscillation that averages out [rad]."""
+        inverse, drift = (_unexplained(gap, tail) for gap, tail in zip(self._gaps, self._tails, strict=True))
+        return self._loops * 0.5 * self._period * (momentum * inverse + drift)
 
     @property
     def _panels(self) -> int:
         return max(1, len(self._values) // _SAMPLES_A_PANEL)
 
-    def _series(self, highest: int) -> Array:
-        """Chebyshev coefficients (P, n, 9) of the Fourier series up to a harmonic."""
+    def _series(self, less: float = 0.0) -> Array:
+        """Chebyshev coefficients (P, n, 9) of the Fourier series, with this share of its last terms taken off."""
         count, panels = len(self._values), self._panels
         degree = _PANEL_DEGREE if count > 1 else 0
+        matrix = _even_to_panel(count, panels, degree, count // 2)
+        if less:
+            without = _even_to_panel(count, panels, degree, count // 2 - tail_length(count // 2))
+            matrix = matrix + less * (without - matrix)
         # Panels differ only in where their samples begin: in two copies of the loop each finds its own contiguous.
         two_loops = np.concatenate([self._values, self._values])
         row, number = two_loops.strides
         from_each = np.ndarray((panels, count, 9), buffer=two_loops, strides=(count // panels * row, row, number))
-        return _even_to_panel(count, panels, degree, highest) @ from_each
+        return matrix @ from_each
 
     def _times(self, index: Integers, count: int) -> Array:
         return (self._period / count) * index.astype(np.float64)
