@@ -11,7 +11,7 @@ from ._spectral_error import spectral_norms
 from .interpolant import Interpolant
 
 # Of the formula.
-_ORDER = 8.0
+ORDER = 8.0
 # Significant Chebyshev degrees of a panel that one step may span, so that half as many steps still see all of them.
 _DEGREES_A_STEP = 2.6
 # The error of the steps, as a part of their distance from half as many. An eighth-order formula would allow 1/255; that
@@ -83,7 +83,7 @@ class StepRequirements(NamedTuple):
         seen = degree + (_DEGREES_A_RADIAN * np.minimum(turn, _MOST_TURN))[:, None] if magnitude else degree
         return cls(
             turn=turn,
-            swing=(swinging * seen**_ORDER).sum(axis=1),
+            swing=(swinging * seen**ORDER).sum(axis=1),
             degree=last,
             rates=rates,
             whole_turn=interpolant.loops * float(turn.sum()),
@@ -92,7 +92,7 @@ class StepRequirements(NamedTuple):
 
     @property
     def far(self) -> bool:
-        """Whether the body may turn so far that the error propagators must be exact."""
+        """Whether the body may turn so far that propagators are right only along short steps."""
         return self.whole_turn > _FAR
 
     @property
@@ -106,9 +106,9 @@ class StepRequirements(NamedTuple):
         `short`: so many that the propagators are known without the steps' derivative however far the body turns.
         """
         # As many on each panel as make the sum of all the least.
-        each = self.swing ** (1.0 / (_ORDER + 1.0))
+        each = self.swing ** (1.0 / (ORDER + 1.0))
         common = self.loops * _DISTANCE * float(np.sqrt((each * each).sum())) / (_AIM * tolerance)
-        planned = 2.0 * common ** (1.0 / _ORDER) * each
+        planned = 2.0 * common ** (1.0 / ORDER) * each
         turn = _SHORT_TURN_A_STEP if short else _TURN_A_STEP
         least = np.maximum(self.degree / _DEGREES_A_STEP, self.turn / turn)
         return np.maximum(np.maximum(planned, least), 1.0)

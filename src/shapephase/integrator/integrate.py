@@ -18,10 +18,11 @@ from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._error_propagator import amplification, exact_propagators, rounding_error
-from ._step_control import StepRequirements, even_steps
-from ._step_loop import FEW, StepRecord, integrate_steps, integrate_steps_at_rest, stage_channels
+from ._step_control import ORDER, StepRequirements, even_steps
+from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .interpolant import Interpolant
 from .sampling import Sampler
+from .step_record import StepRecord
 from .stepped import SteppedRotation, for_whole_batch
 
 # Steps of one motion: some ten seconds, and a gigabyte of results.
@@ -41,13 +42,8 @@ _MOST_EXPECTED_GROWTH = 30.0
 _MOST_STEPPING = 0.5
 _MOST_SAMPLING = 0.4
 _AIM = 0.2
-# The order of the steps.
-_ORDER = 8.0
 # Amplification that the first plan allows for; what grows more is seen when it is there.
 _MOST_FORESEEN = 1e4
-# Of the tolerance, for the plan of many momenta at once: some need more steps than most, and a second round would
-# repeat them all.
-_MARGIN_OF_MANY = 0.1
 # [rad] distance of coarser steps up to which the propagators of the steps are trusted.
 _INFORMATIVE_ERROR = 0.1
 # Of the tolerance: rounding below is not looked at closely.
@@ -72,18 +68,8 @@ def stepped_rotation(
     AccuracyNotReached
         If the estimate stays above the tolerance.
     """
-    few = len(momentum) <= FEW or not momentum.any()
-    integration = Integration(
-        sampler,
-        momentum,
-        tolerance,
-        subdivide=subdivide,
-        ceiling=float(norms(momentum).max(initial=0.0)),
-        # The derivative for each of many momenta would take too long; with short steps it is not needed.
-        short_when_far=not few,
-        margin=1.0 if few else _MARGIN_OF_MANY,
-    )
-    return integration.solution()
+    ceiling = float(norms(momentum).max(initial=0.0))
+    return Integration(sampler, momentum, tolerance, ceiling=ceiling, subdivide=subdivide).solution()
 
 
 def norms(momentum: Array) -> Array:
@@ -150,8 +136,6 @@ class Integration:
     ----------
     subdivide : as in `stepped_rotation`
     ceiling : samples and steps are made for it, and no momentum is larger [kg m^2/s]
-    short_when_far : where bodies turn far, take steps so short that their derivative is not needed
-    margin : of the tolerance, what steps are planned for
     threads : at most, for many momenta; None: one for each processor
     refinement : from earlier rounds
     """
@@ -163,16 +147,14 @@ class Integration:
         tolerance: float,
         *,
         ceiling: float,
-        short_when_far: bool,
         subdivide: Integers | None = None,
-        margin: float = 1.0,
         threads: int | None = None,
         refinement: Refinement | None = None,
     ) -> None:
         self._sampler, self._momentum, self._tolerance = sampler, momentum, tolerance
         self._subdivide = 1 if subdivide is None else subdivide
         self._magnitudes = norms(momentum)
-        self._largest, self._short_when_far, self._margin, self._threads = ceiling, short_when_far, margin, threads
+        self._largest, self._threads = ceiling, threads
         self._refinement = refinement or Refinement.at_first(tolerance)
         # How errors grow, where only the derivative of the steps shows it: (B, CHECKPOINTS, 3, 3).
         self._propagators: Array | None = None
@@ -203,12 +185,11 @@ class Integration:
     def is_long(self) -> bool:
         """Whether it takes exact error propagators, and a plan of steps for each momentum by its own."""
         _, requirements = self._sampled()
-        return self._largest > 0.0 and self._takes_exact_propagators(requirements)
+        return self._is_long(requirements)
 
-    def _takes_exact_propagators(self, requirements: StepRequirements) -> bool:
-        planned = self._planned(requirements, short=requirements.far and self._short_when_far)
-        very_far = requirements.very_far and self._margin == 1.0
-        return very_far or requirements.loops * float(planned.sum()) > _MANY_STEPS
+    def _is_long(self, requirements: StepRequirements) -> bool:
+        count = requirements.loops * float(self._planned(requirements).sum())
+        return self._largest > 0.0 and (requirements.very_far or count > _MANY_STEPS)
 
     def _sampled(self) -> tuple[Interpolant, StepRequirements]:
         """All samples so far, as dense as the refinement asks, and how finely they must be stepped."""
@@ -255,13 +236,11 @@ class Integration:
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> Integers:
         """Steps on each panel: (P,). Finds the growth of errors first where the steps themselves will not show it."""
-        short = requirements.far and self._short_when_far
-        planned = self._planned(requirements, short=short)
+        planned = self._planned(requirements)
         count = interpolant.loops * float(planned.sum())
         if count > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
-        exact = self._takes_exact_propagators(requirements)
-        if self._largest > 0.0 and (exact or (requirements.far and not short)):
+        if self._is_long(requirements):
             if self._propagators is None:
                 self._propagators = _propagators_by_derivative(interpolant, self._momentum, self._largest)
             # Errors will be amplified: each must be that much smaller.
@@ -273,9 +252,10 @@ class Integration:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         return steps
 
-    def _planned(self, requirements: StepRequirements, *, short: bool = False, amplified: float = 1.0) -> Array:
-        goal = self._margin * self._tolerance / amplified
-        return self._refinement.finer * requirements.plan(goal, short=short)
+    def _planned(self, requirements: StepRequirements, *, amplified: float | None = None) -> Array:
+        """Steps per panel, not yet whole, short enough for the growth of errors unless that is known: (P,)."""
+        short = amplified is None and self._largest > 0.0 and requirements.far
+        return self._refinement.finer * requirements.plan(self._tolerance / (amplified or 1.0), short=short)
 
     def _take_steps(self, interpolant: Interpolant, perturbed: Array | None, steps: Integers) -> StepRecord:
         """All steps of all loops and momenta."""
@@ -299,7 +279,7 @@ class Integration:
         target, finer, growth = self._refinement
         room = max(self._tolerance - errors.rounding, 0.1 * self._tolerance)
         if errors.stepping > _MOST_STEPPING * room:
-            finer *= min(max((errors.stepping / (_AIM * room)) ** (1.0 / _ORDER), 1.1), 4.0)
+            finer *= min(max((errors.stepping / (_AIM * room)) ** (1.0 / ORDER), 1.1), 4.0)
         if errors.are_informative:
             growth = errors.amplification
             if errors.sampling > _MOST_SAMPLING * room:

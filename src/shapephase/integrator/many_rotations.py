@@ -166,7 +166,6 @@ def _integrated(
         starts if group.ceiling else starts[:1],
         tolerance,
         ceiling=group.ceiling,
-        short_when_far=True,
         threads=threads,
         refinement=group.history[-1],
     )
