@@ -17,6 +17,7 @@ from ._even_sampling import EvenSampler
 from ._last_terms import Perturbed
 from ._panel_sampling import PanelSampler
 from ._spectral_error import Channels, Directly, Evaluate
+from .fast import engine
 from .interpolant import Interpolant
 from .resolved import ResolvedPath
 
@@ -102,7 +103,7 @@ class Samplers:
         self, evaluate: Evaluate, breaks: Array, *, directly: Directly | None = None, **smoothness: Any
     ) -> None:
         self._evaluate, self._breaks, self._smoothness = evaluate, breaks, smoothness
-        self._channels = Channels(evaluate, directly)
+        self._channels = Channels(evaluate, directly if engine.is_ready() else None)
         self._known: dict[bytes, Array] = {}
 
     @property

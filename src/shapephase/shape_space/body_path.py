@@ -8,7 +8,6 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import OpenPathError
-from ..integrator.fast import engine
 from ..integrator.fast.tree import tree_channels
 from ..integrator.sampling import Sampler, Samplers
 from .shape_path import CLOSED, ShapePath
@@ -51,6 +50,6 @@ def path_samplers(body: Body, path: ShapePath) -> Samplers:
 def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
     """I^-1 (xx yy zz yz xz xy) and I^-1 L_o along a path, in machine code: (N,) -> (N, 9).
 
-    None without it, and where a tensor is nearly singular or a number is not finite.
+    None where a tensor is nearly singular or a number is not finite.
     """
-    return tree_channels(body.chain.rows, *path.curve(times)) if engine.is_ready() else None
+    return tree_channels(body.chain.rows, *path.curve(times))
