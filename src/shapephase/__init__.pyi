@@ -27,7 +27,7 @@ from .errors import (
     TrajectoryWarning,
     UnphysicalInertiaWarning,
 )
-from .integrator.compiled_steps import compile_steps
+from .integrator.fast.engine import compile_steps
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
 from .phases.phases import (

@@ -13,12 +13,12 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
 from shapephase.integrator.fast.marches import (
-    MarchArrays,
     amplifications,
     derivatives,
     march_in_threads,
     quaternions_at_rest,
 )
+from shapephase.integrator.step_record import StepRecord
 
 pytestmark = pytest.mark.usefixtures("fast")
 NONE = np.zeros(0, dtype=int)
@@ -203,11 +203,11 @@ def test_momenta_do_not_see_each_other_nor_threads(path, rng, loops):
     options = {"loops": loops, "marks": np.arange(5) * count // 4, "perturbed": 0.999 * path.series}
     together = path.march(directions, magnitudes, threads=1, **options)
     in_threads = path.march(directions, magnitudes, threads=2, **options)
-    for field in fields(MarchArrays):
+    for field in fields(StepRecord):
         assert np.array_equal(getattr(together, field.name), getattr(in_threads, field.name))
     for row in (0, 7, 8, 131, 299):
         alone = path.march(directions[row : row + 1], magnitudes[row : row + 1], **options)
-        for field in fields(MarchArrays):
+        for field in fields(StepRecord):
             assert np.array_equal(getattr(together, field.name)[row], getattr(alone, field.name)[0])
 
 

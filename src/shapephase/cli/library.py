@@ -35,7 +35,7 @@ def compile_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: AR
     Once is enough for all later sessions: what is compiled is kept in $XDG_CACHE_HOME/shapephase, or
     ~/.cache/shapephase. In Python the first reconstruction does it by itself.
     """
-    from ..integrator.compiled_steps import compile_steps
+    from ..integrator.fast.engine import compile_steps
 
     with steps(1) as work:
         work.begin("compiling")

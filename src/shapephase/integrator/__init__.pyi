@@ -1,6 +1,6 @@
-from .compiled_steps import compile_steps
 from .dop853 import dop853_rotation
 from .fast.cache_folder import code_folder
+from .fast.engine import compile_steps
 from .integrate import stepped_rotation
 from .interpolant import Interpolant
 from .sampling import Sampler, sampler

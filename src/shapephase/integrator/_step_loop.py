@@ -8,7 +8,6 @@ another, and the steps of many are taken on whole arrays.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby
 from typing import Any
@@ -23,6 +22,7 @@ from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
+from .step_record import StepRecord
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
 BLOCK = 256
@@ -34,32 +34,6 @@ CHECKPOINTS = 8
 _ROWS_AT_ONCE = 2048
 # The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
 _INNER_STAGES = (5, 8)
-
-
-@dataclass(frozen=True, eq=False)
-class StepRecord:
-    """K steps for each momentum of a batch of B, and how far coarser marches come out from them.
-
-    Attributes
-    ----------
-    quaternions : (B, K + 1, 4) S at the step ends, xyzw
-    directions : (B, K + 1, 3) Pi/|Pi| at the step ends; without momentum (B, 0, 3)
-    turns : (B, K) of each step about its starting direction, the shortest rotation between its ends taken off [rad]
-    dynamics : (B, K) dynamic phase of each step [rad]
-    propagators : (B, CHECKPOINTS, 3, 3) error propagators, the state transition matrices that carry a small turn of the
-        start to even parts of the steps; (B, 0, 3, 3) without momentum or where they were not asked for
-    stepping : (B,) the largest angle between the steps and half as many, at the ends of the latter [rad]
-    truncation : (B,) the largest angle between half as many steps on the series and on the perturbed ones; zero without
-        these [rad]
-    """
-
-    quaternions: Array
-    directions: Array
-    turns: Array
-    dynamics: Array
-    propagators: Array
-    stepping: Array
-    truncation: Array
 
 
 def integrate_steps(
@@ -87,15 +61,7 @@ def integrate_steps(
         return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators, threads)
     total = interpolant.loops * int(steps.sum())
     batch = len(magnitudes)
-    whole = StepRecord(
-        quaternions=np.empty((batch, total + 1, 4)),
-        directions=np.empty((batch, total + 1, 3)),
-        turns=np.empty((batch, total)),
-        dynamics=np.empty((batch, total)),
-        propagators=np.empty((batch, CHECKPOINTS if with_propagators else 0, 3, 3)),
-        stepping=np.empty(batch),
-        truncation=np.zeros(batch),
-    )
+    whole = StepRecord.empty(batch, total, CHECKPOINTS if with_propagators else 0)
     channels = _channels_at_stages(interpolant, interpolant.coefficients, steps)
     coarse = _channels_at_stages(interpolant, interpolant.coefficients, steps // 2)
     cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps // 2)
@@ -291,10 +257,9 @@ def _by_kernel(
 ) -> StepRecord:
     widths, loops = np.diff(interpolant.edges[: len(steps) + 1]), interpolant.loops
     marks = checkpoint_steps(loops * int(steps.sum())) if with_propagators else np.zeros(0, dtype=int)
-    arrays = march_in_threads(
+    return march_in_threads(
         widths, interpolant.coefficients, perturbed, steps, loops, directions, magnitudes, marks=marks, threads=threads
     )
-    return StepRecord(**vars(arrays))
 
 
 def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:

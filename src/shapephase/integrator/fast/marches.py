@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 
 from ... import run_progress
 from ...arrays import Array, Integers
+from ..step_record import StepRecord
 from ._plain import plain
 
 # Steps of a chunk, whose channels stay in the processor's cache: for many momenta, and where a loop is repeated.
@@ -22,29 +22,6 @@ _SEGMENTS_OF_LOOPS = 64
 _LEAST_FOR_A_THREAD = 128
 # Momenta in one call: some tenths of a second, after which a run that is watched says so.
 _MOST_AT_ONCE = 8192
-
-
-@dataclass(frozen=True, eq=False)
-class MarchArrays:
-    """K steps for each of B momenta, and how far coarser marches come out from them.
-
-    Attributes
-    ----------
-    quaternions : (B, K + 1, 4) at the step ends, xyzw
-    directions : (B, K + 1, 3) of the momentum at the step ends
-    turns, dynamics : (B, K) of each step [rad]
-    propagators : (B, M, 3, 3) after the steps asked for
-    stepping : (B,) the largest angle between the steps and half as many [rad]
-    truncation : (B,) the largest angle between half as many steps on the whole series and on the perturbed ones [rad]
-    """
-
-    quaternions: Array
-    directions: Array
-    turns: Array
-    dynamics: Array
-    propagators: Array
-    stepping: Array
-    truncation: Array
 
 
 def march_in_threads(
@@ -58,7 +35,7 @@ def march_in_threads(
     *,
     marks: Integers,
     threads: int | None = None,
-) -> MarchArrays:
+) -> StepRecord:
     """All steps of all loops, starting at the identity; a momentum's results do not depend on the others.
 
     Parameters
@@ -73,15 +50,7 @@ def march_in_threads(
     threads : how many at most; None: one for each processor
     """
     batch, count = len(magnitudes), loops * int(steps.sum())
-    whole = MarchArrays(
-        quaternions=np.empty((batch, count + 1, 4)),
-        directions=np.empty((batch, count + 1, 3)),
-        turns=np.empty((batch, count)),
-        dynamics=np.empty((batch, count)),
-        propagators=np.empty((batch, len(marks), 3, 3)),
-        stepping=np.empty(batch),
-        truncation=np.empty(batch),
-    )
+    whole = StepRecord.empty(batch, count, len(marks))
     module = _kernels()
     path = (
         plain(widths),

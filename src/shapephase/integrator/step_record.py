@@ -1,0 +1,48 @@
+"""What comes out of the steps, whatever takes them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class StepRecord:
+    """K steps for each momentum of a batch of B, and how far coarser marches come out from them.
+
+    Attributes
+    ----------
+    quaternions : (B, K + 1, 4) S at the step ends, xyzw
+    directions : (B, K + 1, 3) Pi/|Pi| at the step ends; without momentum (B, 0, 3)
+    turns : (B, K) of each step about its starting direction, the shortest rotation between its ends taken off [rad]
+    dynamics : (B, K) dynamic phase of each step [rad]
+    propagators : (B, M, 3, 3) error propagators, the state transition matrices that carry a small turn of the start to
+        even parts of the steps; (B, 0, 3, 3) without momentum or where they were not asked for
+    stepping : (B,) the largest angle between the steps and half as many, at the ends of the latter [rad]
+    truncation : (B,) the largest angle between half as many steps on the series and on the perturbed ones; zero without
+        these [rad]
+    """
+
+    quaternions: Array
+    directions: Array
+    turns: Array
+    dynamics: Array
+    propagators: Array
+    stepping: Array
+    truncation: Array
+
+    @classmethod
+    def empty(cls, batch: int, count: int, marks: int) -> StepRecord:
+        """Room for so many momenta, steps and propagators of each."""
+        return cls(
+            quaternions=np.empty((batch, count + 1, 4)),
+            directions=np.empty((batch, count + 1, 3)),
+            turns=np.empty((batch, count)),
+            dynamics=np.empty((batch, count)),
+            propagators=np.empty((batch, marks, 3, 3)),
+            stepping=np.empty(batch),
+            truncation=np.zeros(batch),
+        )
