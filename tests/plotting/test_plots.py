@@ -19,6 +19,7 @@ from shapephase.errors import GaugeError, MissingExtraError, ShapeError, Unknown
 from shapephase.examples.scenarios import astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
 from shapephase.plotting import plots
 from shapephase.plotting._sphere_area import enclosed_cells
+from shapephase.plotting.plot_style import axes_image
 from shapephase.rigid_body.euler_top import EulerTop
 
 BLACK, BLUE, VERMILION, GREEN, WRAPPED = "#000000", "#0072B2", "#D55E00", "#009E73", "#F3CE86"
@@ -734,3 +735,15 @@ def test_without_matplotlib_the_extra_is_named(motions, monkeypatch):
         plots.plot_momentum_curve(ax, motions["cat"])
     with pytest.raises(MissingExtraError, match=r"shapephase\[plot\]"):
         plots.column_axes()
+
+
+@pytest.mark.parametrize(("points", "kind"), [(2_000, "path"), (200_000, "image")])
+def test_long_curves_are_images_within_the_figure(points, kind):
+    """A recording of ten thousand rows would be megabytes of vectors, and no browser would show them in time."""
+    ax = plots.column_axes()
+    t = np.linspace(0.0, 1.0, points)
+    ax.plot(t, np.sin(1e3 * t**2))
+    ax.fill_between(t, 0.0, np.cos(1e3 * t))
+    picture = axes_image(ax, "svg")
+    assert len(picture) < 4e5
+    assert (b"<image" in picture) == (kind == "image")

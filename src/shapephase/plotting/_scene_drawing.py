@@ -13,6 +13,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers
 from ..body.appearance import Visual
+from ._letters import printable
 from ._moving_scene import MovingNode, MovingScene
 
 # Colours of Okabe and Ito, RGB from 0 to 255: people with any colour vision can tell them apart, also in grey.
@@ -261,5 +262,5 @@ def _wxyz(matrix: Array) -> Array:
 
 
 def _safe(name: str) -> str:
-    """A name without slashes, which would go one level down in the tree of the scene."""
-    return name.replace("/", "_")
+    """A name that can be sent, without slashes, which would go one level down in the tree of the scene."""
+    return printable(name).replace("/", "_")

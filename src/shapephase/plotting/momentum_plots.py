@@ -14,6 +14,7 @@ from ..phases._momentum_curve import Gauge, MomentumCurve, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
+from ._letters import plain_text
 from ._sphere_area import enclosed_cells
 from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided
@@ -93,7 +94,7 @@ def plot_momentum_curve(
     curve = _fine_curve(motion, gauge)
     points = curve.corners[0]
     drawn = SphereAxes(ax, _view_of(points) if view is None else view)
-    title = f"{gauge if isinstance(gauge, str) else 'given'} gauge"
+    title = f"{plain_text(gauge) if isinstance(gauge, str) else 'given'} gauge"
     closing = _great_circle(points[-1], points[0])
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     # Many revolutions need a finer line, or they would run together.

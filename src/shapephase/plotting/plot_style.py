@@ -7,6 +7,7 @@ dashes and points by their markers, so that nothing is lost in black and white. 
 
 from __future__ import annotations
 
+import warnings
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +53,8 @@ _RESOLUTION = 300
 _MIN_POINTS = 800
 # Points of a curve in time for each loop of a repeated path.
 _POINTS_PER_LOOP = 200
+# Points from which on a curve is an image within a figure of vectors: ten in each dot of a column's width.
+_MAX_VECTOR_POINTS = 10_000
 
 
 def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
@@ -78,9 +81,23 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
 def axes_image(ax: Any, ending: str) -> bytes:
     """The figure of some axes as "svg", "pdf" or "png", without a date, so that equal figures give equal files."""
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
+    for artist in ax.figure.findobj(_is_long):
+        artist.set_rasterized(True)
     stream = BytesIO()
-    ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
+    with warnings.catch_warnings():
+        # A letter that the font has not is an empty frame in the figure.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
+        ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
     return stream.getvalue()
+
+
+def _is_long(artist: Any) -> bool:
+    """Whether an artist has more points than a figure of vectors should hold."""
+    if hasattr(artist, "get_xdata"):
+        return len(artist.get_xdata(orig=True)) > _MAX_VECTOR_POINTS
+    if hasattr(artist, "get_offsets") and hasattr(artist, "get_paths"):
+        return sum(len(path.vertices) for path in artist.get_paths()) > _MAX_VECTOR_POINTS
+    return False
 
 
 def check_axes(ax: object) -> None:

@@ -17,6 +17,8 @@ from ..files import write_whole
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
+from ._letters import printable
+from ._page_policy import page_policy, policy_element
 from .named_figures import FIGURES, figure_image
 from .viewer import motion_html
 
@@ -82,11 +84,11 @@ def write_report(
             continue
         begin(f"drawing {kind.replace('_', ' ')}")
         figures.append(_figure(kind, motion, shape_path, result.gauge))
-    heading = html.escape(title or motion.deformation.label)
+    heading = html.escape(printable(title or motion.deformation.label))
     page = "\n".join(
         [
             "<!doctype html>",
-            f'<html lang="en"><head><meta charset="utf-8"><title>{heading}</title>',
+            f'<html lang="en"><head>{policy_element(page_policy(animation))}<title>{heading}</title>',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<style>{_STYLE}</style></head><body>",
             f"<h1>{heading}</h1>",
@@ -164,8 +166,8 @@ def _input_rows(motion: Motion) -> list[tuple[str, str, str]]:
 
 
 def _table(rows: list[tuple[str, str, str]]) -> str:
+    escaped = ([html.escape(printable(cell)) for cell in row] for row in rows)
     lines = "".join(
-        f'<tr><th>{html.escape(name)}</th><td class="number">{html.escape(value)}</td><td>{html.escape(text)}</td></tr>'
-        for name, value, text in rows
+        f'<tr><th>{name}</th><td class="number">{value}</td><td>{text}</td></tr>' for name, value, text in escaped
     )
     return f"<table>{lines}</table>"

@@ -14,6 +14,7 @@ from ..body.body import Body
 from ..errors import ShapeError, unknown_name
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.shape_path import ShapePath
+from ._letters import plain_text
 from .plot_style import BLACK, BLUE, GREEN, GREY, SERIES, SMALL, check_flat_axes, even_times, finish, in_time
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 _AT_REST = 1e-9
 # Joints with a style of their own and a name in the legend; more could not be told apart.
 _MAX_NAMED = 6
+# Letters of the longest name in a legend of two columns; longer ones would reach beyond the figure.
+_MAX_BESIDE = 26
 # Lines of equal curvature, about so many.
 _LEVELS = 8
 # Points of the plane along each joint: smooth under shading, and a second of computation.
@@ -66,18 +69,21 @@ def plot_shape_path(
     chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MAX_NAMED else chosen
     scales = sorted({units[k] for k in chosen}, key=("rad", "m", "rad or m").index)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
-    handles: dict[str, Any] = {}
+    handles: dict[int, Any] = {}
+    texts: dict[int, str] = {}
     for number, k in enumerate(chosen):
         named = number < _MAX_NAMED
         look = SERIES[number] if named else {"color": GREY, "linewidth": 0.6, "zorder": 1.5}
         (line,) = places[units[k]].plot(t, values[:, k], **look)
-        text = names[k] if len(scales) == 1 else f"{names[k]} [{units[k]}]"
-        handles[text if named else f"{len(chosen) - _MAX_NAMED} others"] = line
-    for unit, place in list(places.items())[1:]:
-        place.set_ylabel(f"joints [{unit}]", fontsize=SMALL)
-        place.tick_params(labelsize=SMALL)
-    above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", handles=handles.values(), labels=handles.keys(), **above)
+        text = plain_text(names[k]) if len(scales) == 1 else f"{plain_text(names[k])} [{units[k]}]"
+        place = min(number, _MAX_NAMED)
+        handles[place], texts[place] = line, text if named else f"{len(chosen) - _MAX_NAMED} others"
+    for unit, twin in list(places.items())[1:]:
+        twin.set_ylabel(f"joints [{unit}]", fontsize=SMALL)
+        twin.tick_params(labelsize=SMALL)
+    columns = 1 if max(map(len, texts.values())) > _MAX_BESIDE else 2
+    above = {"ncols": columns, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", handles=handles.values(), labels=texts.values(), **above)
     return ax
 
 
@@ -106,8 +112,8 @@ def plot_shape_plane(
     i, j = _pair(joints, names)
     points = route.shape(t)[:, [i, j]]
     _loop(ax, points)
-    ax.set_xlabel(f"{names[i]} [{units[i]}]", fontsize=SMALL)
-    ax.set_ylabel(f"{names[j]} [{units[j]}]", fontsize=SMALL)
+    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=SMALL)
+    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=SMALL)
     finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return ax
 
@@ -162,8 +168,8 @@ def plot_curvature(
         _loop(ax, points)
         finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set(xlim=(rows[0][0], rows[0][-1]), ylim=(rows[1][0], rows[1][-1]))
-    ax.set_xlabel(f"{names[i]} [{units[i]}]", fontsize=SMALL)
-    ax.set_ylabel(f"{names[j]} [{units[j]}]", fontsize=SMALL)
+    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=SMALL)
+    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=SMALL)
     ax.tick_params(labelsize=SMALL)
     bar = ax.figure.colorbar(mesh, ax=ax)
     per = f"{units[i]}²" if units[i] == units[j] else f"({units[i]} {units[j]})"

@@ -20,7 +20,9 @@ from ..arguments import check_object
 from ..errors import MissingExtraError, ShapeError, VisualWarning
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
+from ._letters import printable
 from ._moving_scene import MovingScene, moving_scene
+from ._page_policy import guarded
 from ._scene_drawing import DrawnScene, set_camera
 from ._silent_server import silence_thread_of, silenced
 
@@ -49,7 +51,7 @@ def motion_page(
     ghost: bool = True,
     **fall: ArrayLike,
 ) -> None:
-    """Write a motion as one HTML page to play, stop and scrub; it needs no network and no server.
+    """Write a motion as one HTML page to play, stop and scrub; it needs no network and no server, and may use none.
 
     The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass, and the
     body at the start as a transparent ghost.
@@ -98,8 +100,8 @@ def motion_html(
     scene = _scene(motion, playing_speed, frames, trail, fall)
     with _server() as server:
         page = _recording(server, scene, playing_speed, ghost).as_html()
-    title = f"<title>{html.escape(scene.title)}</title>"
-    return page.replace("<title>Viser</title>", title, 1)
+    title = f"<title>{html.escape(printable(scene.title))}</title>"
+    return guarded(page.replace("<title>Viser</title>", title, 1))
 
 
 def view(

@@ -1,0 +1,182 @@
+"""Names of links and joints that mean something to a browser or to Matplotlib are drawn and written as they are."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import re
+import warnings
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import shapephase as sp
+from shapephase.plotting import _page_policy, motion_page, plots, write_report
+from shapephase.plotting._letters import plain_text, printable
+from shapephase.plotting.plot_style import axes_image
+from support.hostile_names import HALF_A_PAIR, MARK, OF_FILES, OF_MODELS, star_urdf, swinging
+
+matplotlib = pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(scope="module")
+def star(tmp_path_factory):
+    """A body with all names that a file may have, its swinging and its motion."""
+    file = tmp_path_factory.mktemp("star") / "<b>star & co.urdf"
+    file.write_text(star_urdf(OF_FILES), encoding="utf-8")
+    body = sp.load_body(file)
+    assert {*body.joint_names} == {*OF_FILES}
+    path = swinging(body)
+    return body, path, sp.reconstruct(sp.articulated(body, path), [0.0, 0.3, 1.0])
+
+
+def modelled(names):
+    """A body of a model, whose joints have these names."""
+    model, part = pin.Model(), pin.Inertia(1.0, np.zeros(3), 0.1 * np.eye(3))
+    root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    joints = [model.addJoint(root, pin.JointModelRX(), pin.SE3.Identity(), name) for name in names]
+    for place in (root, *joints):
+        model.appendBodyToJoint(place, part, pin.SE3.Identity())
+    return sp.load_body(model)
+
+
+# ---- Figures --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [*OF_FILES, *OF_MODELS], ids=ascii)
+def test_a_figure_shows_the_letters_of_a_name(name):
+    """As Matplotlib itself takes the text apart, it is no formula, and what is left is the name."""
+    from matplotlib.text import Text
+
+    shown, is_formula = Text()._preprocess_math(plain_text(name))
+    assert is_formula is False
+    assert shown.isprintable() or shown.lstrip("\u200a").isprintable()
+    letters = printable(name)
+    assert shown.lstrip("\u200a") == (letters if len(letters) <= 32 else f"{letters[:16]}…{letters[-16:]}")
+
+
+def test_every_name_has_its_line_in_the_legend():
+    """Also names that begin with an underscore, that are equal when shortened, and that no font has letters for."""
+    names = ("$x_$", "_hidden", "long" * 8 + "a" + "name" * 8, "long" * 8 + "b" + "name" * 8, "\U000f0000", "\u0301")
+    path = sp.ShapePath.fourier(np.zeros(6), np.zeros((6, 1)), np.arange(1.0, 7.0)[:, None], 1.0, joint_names=names)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ax = plots.plot_shape_path(plots.column_axes(), path)
+        image = axes_image(ax, "svg")
+    ET.fromstring(image)
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == [plain_text(name) for name in names]
+
+
+@pytest.mark.parametrize("first", [0, 12, 24])
+def test_planes_and_curvatures_of_joints_with_such_names(star, first):
+    body, path, _ = star
+    for pair in OF_FILES[first : first + 12 : 2], OF_FILES[first + 1 : first + 12 : 2]:
+        ax = plots.plot_shape_plane(plots.column_axes(), path, pair[:2], body)
+        ET.fromstring(axes_image(ax, "svg"))
+
+
+def test_a_gauge_by_such_a_link_is_drawn(star):
+    _, _, motion = star
+    ax = plots.plot_momentum_curve(plots.column_axes(3.8), motion, "link:$\\foo$")
+    assert ax.get_legend().get_title().get_text().startswith(r"link:\$\foo\$ gauge")
+    ET.fromstring(axes_image(ax, "svg"))
+
+
+# ---- Pages ----------------------------------------------------------------------------------------------------------
+
+
+def policy_in(page):
+    """The one policy of a page, which stands before everything that it rules."""
+    (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page)
+    assert page.index("Content-Security-Policy") < 200
+    return {words[0]: words[1:] for words in (part.split() for part in html.unescape(policy).split(";"))}
+
+
+def test_the_policy_knows_the_scripts_by_their_hashes_and_lets_nothing_out(star, tmp_path):
+    _, _, motion = star
+    motion_page(motion, tmp_path / "star.html", frames=2)
+    page = (tmp_path / "star.html").read_text(encoding="utf-8")
+    policy = policy_in(page)
+    assert policy["default-src"] == ["'none'"]
+    scripts = re.findall(r"<script[^>]*>(.*?)</script>", page, re.DOTALL)
+    hashed = [f"'sha256-{base64.b64encode(hashlib.sha256(s.encode()).digest()).decode()}'" for s in scripts]
+    # And the viewer that is unpacked when the page opens.
+    assert policy["script-src"][: len(hashed)] == hashed
+    assert len(policy["script-src"]) == len(hashed) + 2
+    assert policy["script-src"][-1] == "'wasm-unsafe-eval'"
+    for directive, sources in policy.items():
+        outside = [s for s in sources if s not in ("'none'", "data:", "blob:", "'wasm-unsafe-eval'", "'unsafe-inline'")]
+        assert directive == "script-src" or outside == []
+    assert "'unsafe-inline'" not in policy["script-src"]
+
+
+def test_a_viewer_that_is_packed_otherwise_runs_but_asks_for_nothing():
+    for page in (
+        '<head><script data-p="&#9;" data-ss="0" data-cs="1">1</script>',
+        "<head><script data-p='!'>1</script>",
+    ):
+        policy = policy_in(_page_policy.guarded(page))
+        assert policy["script-src"] == ["'unsafe-inline'", "'wasm-unsafe-eval'"]
+        assert policy["default-src"] == ["'none'"]
+
+
+def test_pages_and_reports_of_models_with_unprintable_names(tmp_path):
+    """Python's strings may hold half a surrogate pair, which no file can; Pinocchio's names may not."""
+    body = modelled([name for name in OF_MODELS if name != HALF_A_PAIR])
+    path = swinging(body)
+    motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.3, 1.0])
+    title = f"{HALF_A_PAIR} & \u202e swings"
+    write_report(motion, sp.split(motion), tmp_path / "r.html", shape_path=path, title=title)
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "<title>\\ud800 &amp; \\u202e swings</title>" in page
+    outside = re.sub(r'"[^"]*"', "", page)
+    assert all(letter.isprintable() or letter == "\n" for letter in outside)
+
+
+def report_of(star, folder):
+    body, path, motion = star
+    motion_page(motion, folder / "page.html", frames=3, trail=OF_FILES[0])
+    title = f"{body.name} </h1><script>{MARK}=1</script>"
+    write_report(motion, sp.split(motion), folder / "report.html", shape_path=path, title=title, trail="<!--")
+
+
+def test_in_a_browser_no_name_runs_a_script_or_asks_for_anything_and_nothing_fails(star, tmp_path, chromium):
+    """More than thirty hostile names, as links, joints, title and trail."""
+    report_of(star, tmp_path)
+    for name, frames in (("page.html", 1), ("report.html", 2)):
+        page = chromium.new_page()
+        check_in_browser(page, tmp_path / name, frames)
+        page.close()
+
+
+def check_in_browser(page, file, frames):
+    said, asked = [], []
+    page.on("console", lambda message: said.append((message.type, message.text)))
+    page.on("pageerror", lambda error: said.append(("error", str(error))))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    scene = page.frames[-1]
+    scene.wait_for_selector("canvas", timeout=60_000)
+    scene.locator("input").first.wait_for()
+    page.wait_for_timeout(1500)
+    assert [frame.evaluate(MARK) for frame in page.frames] == [None] * frames
+    assert [text for kind, text in said if kind == "error"] == []
+    assert [url for url in asked if not url.startswith((page.url, "data:", "blob:", "about:"))] == []
+    assert page.evaluate("[...document.images].every(image => image.complete && image.naturalWidth > 0)")
+    # The policy holds: what a name might do is refused by it.
+    tries = {
+        "connect-src": "fetch('http://example.invalid/').catch(() => 0)",
+        "img-src": "new Image().src = 'http://example.invalid/x.png'",
+        "script-src-elem": "document.head.append(Object.assign(document.createElement('script'), {text: 'owned = 1'}))",
+        "script-src-attr": "document.body.insertAdjacentHTML('beforeend', '<b onclick=0>')",
+        "frame-src": "document.body.append(Object.assign(document.createElement('iframe'), {src: 'http://a.invalid'}))",
+    }
+    for frame in page.frames:
+        for directive, deed in tries.items():
+            listening = "document.addEventListener('securitypolicyviolation', e => done(e.effectiveDirective)"
+            refused = frame.evaluate(f"() => new Promise(done => {{ {listening}, {{once: true}}); {deed}; }})")
+            assert refused == directive
+        assert frame.evaluate(MARK) is None
