@@ -18,6 +18,7 @@ from . import (
 )
 from .body.body import Body
 from .body.catalog import load_body, robot_names
+from .body.family import BodyFamily
 from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .errors import (
@@ -67,6 +68,7 @@ __all__ = [
     "ArcPhases",
     "BaseDifference",
     "Body",
+    "BodyFamily",
     "BodySummary",
     "CompiledCodeWarning",
     "Crossings",

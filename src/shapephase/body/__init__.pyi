@@ -1,10 +1,13 @@
 from .appearance import Visual, inertia_box, visuals
-from .body import Body, MovingPart
+from .body import Body
 from .catalog import example_file, example_names, load_body, robot_names, robots_folder
+from .family import BodyFamily
 from .joint_chain import JointChain
+from .moving_parts import MovingPart
 
 __all__ = [
     "Body",
+    "BodyFamily",
     "JointChain",
     "MovingPart",
     "Visual",

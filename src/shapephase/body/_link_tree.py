@@ -23,11 +23,11 @@ LEAST_MASS = 1e-15
 """[kg]; below the rounding of 1 kg, Pinocchio's sums of inertias are wrong without any message."""
 MOST_MASS = 1e30
 """[kg], and [kg m^2] for moments: their squares are still finite numbers."""
-_TRIANGLE = 1e-3
+TRIANGLE = 1e-3
 """Share of the largest moment by which it may exceed the sum of the others: files round their moments."""
-_NEGATIVE = 1e-9
+NEGATIVE = 1e-9
 """Share of the largest moment by which another may be below zero: rounding of a rotated, thin body."""
-_ROUNDING = 1e-12
+ROUNDING = 1e-12
 """Share of the largest moment of the whole body that rounding may leave of a vanishing one."""
 _LEAST_RADIUS = 1e-4
 """Radius of gyration [m]; a smaller one suggests moments in other units than kg m^2."""
@@ -187,8 +187,8 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     masses = np.array([link.mass for link in links])
     moments = np.linalg.eigvalsh(np.array([link.inertia for link in links]).reshape(-1, 3, 3))
     offsets = np.array([link.centre for link in links]).reshape(-1, 3)
-    floor = _ROUNDING * np.max(moments[:, 2] + masses * (offsets**2).sum(axis=-1), initial=0.0)
-    negative = moments[:, 0] < -_NEGATIVE * np.maximum(moments[:, 2], 0.0) - floor
+    floor = ROUNDING * np.max(moments[:, 2] + masses * (offsets**2).sum(axis=-1), initial=0.0)
+    negative = moments[:, 0] < -NEGATIVE * np.maximum(moments[:, 2], 0.0) - floor
     if negative.any() and on_unphysical == "error":
         first = int(np.argmax(negative))
         others = [label.format(links[i].name) for i in np.flatnonzero(negative)[1:]]
@@ -197,7 +197,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
             f"{links[first].where}: {label.format(links[first].name)} has principal moments {moments[first]} "
             f"kg m^2, one of them negative{also}; correct the file, or load it with on_unphysical='warn'"
         )
-    broken = ~negative & (moments[:, 2] - moments[:, 1] - moments[:, 0] > _TRIANGLE * moments[:, 2] + floor)
+    broken = ~negative & (moments[:, 2] - moments[:, 1] - moments[:, 0] > TRIANGLE * moments[:, 2] + floor)
     # A radius from the largest moment: a rod may be as thin as it likes.
     radius = np.sqrt(np.maximum(moments[:, 2], 0.0) / np.where(masses > 0.0, masses, np.inf))
     real = (masses > 0.0) & (moments[:, 2] > floor)

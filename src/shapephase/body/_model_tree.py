@@ -63,6 +63,14 @@ def checked_model(model: pin.Model, where: str, on_unphysical: str) -> tuple[pin
     return model.copy(), doubts
 
 
+def model_with(model: pin.Model, masses: Array, centres: Array, tensors: Array) -> pin.Model:
+    """A copy whose joints, from the free-flyer on, move other inertias, in their axes: (k,), (k, 3), (k, 3, 3)."""
+    changed = model.copy()
+    for place, (mass, centre, tensor) in enumerate(zip(masses.tolist(), centres, tensors, strict=True), start=1):
+        changed.inertias[place] = _inertia(mass, centre, tensor)
+    return changed
+
+
 def moving_joints(model: pin.Model) -> dict[str, int]:
     """Names and numbers of the joints below the free-flyer, in Pinocchio's order."""
     moving = {}
@@ -123,13 +131,14 @@ def _built(tree: LinkTree, root: str) -> pin.Model:
         hangs[joint.child] = number, pose * after
     for name, (number, pose) in hangs.items():
         if name not in tree.frames:
-            model.appendBodyToJoint(number, _inertia(tree.links[name]), pose)
+            link = tree.links[name]
+            model.appendBodyToJoint(number, _inertia(link.mass, link.centre, link.inertia), pose)
             model.addBodyFrame(name, number, pose, 0)
     return model
 
 
-def _inertia(link: Link) -> pin.Inertia:
+def _inertia(mass: float, centre: Array, tensor: Array) -> pin.Inertia:
     # Entry by entry: the constructor refuses what `on_unphysical` may allow.
     inertia = pin.Inertia.Zero()
-    inertia.mass, inertia.lever, inertia.inertia = link.mass, link.centre, link.inertia
+    inertia.mass, inertia.lever, inertia.inertia = mass, centre, tensor
     return inertia

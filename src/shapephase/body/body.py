@@ -7,9 +7,8 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -19,30 +18,19 @@ from .. import so3
 from ..arrays import Array, check_reach, common_batch, finite_array
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
+from ._changed_body import changed_body
+from ._given_inertias import Given, given_inertias
 from ._joint_map import JointMap
+from ._link_motions import link_motions
 from ._link_tree import Mimic
 from .joint_chain import joint_chain
+from .moving_parts import MovingPart, moving_parts
+
+if TYPE_CHECKING:
+    from .family import BodyFamily
 
 # Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
 _BASE = 6
-
-
-@dataclass(frozen=True, eq=False)
-class MovingPart:
-    """Links that are fixed to each other, and their inertia together, in the axes of the first.
-
-    Attributes
-    ----------
-    links : their names
-    mass : [kg]
-    centre : (3,) centre of mass [m]
-    inertia : (3, 3) about the centre of mass [kg m^2]
-    """
-
-    links: tuple[str, ...]
-    mass: float
-    centre: Array
-    inertia: Array
 
 
 class Body:
@@ -90,17 +78,7 @@ class Body:
     @property
     def moving_parts(self) -> tuple[MovingPart, ...]:
         """The base and what each joint moves, in Pinocchio's order; only those that have links."""
-        frames: dict[int, list[Any]] = {}
-        for frame in self._model.frames:
-            if frame.type == pin.FrameType.BODY:
-                frames.setdefault(frame.parentJoint, []).append(frame)
-        parts = []
-        for joint, inertia in enumerate(self._model.inertias.tolist()):
-            if joint in frames:
-                seen = frames[joint][0].placement.actInv(inertia)
-                names = tuple(frame.name for frame in frames[joint])
-                parts.append(MovingPart(names, seen.mass, np.array(seen.lever), np.array(seen.inertia)))
-        return tuple(parts)
+        return moving_parts(self._model)
 
     def __repr__(self) -> str:
         """One line for people."""
@@ -132,6 +110,43 @@ class Body:
                 raise ShapeError(f"joint {name}: one number is needed, got an array of shape {coordinate.shape}")
             shape[self.joint_index(name)] = coordinate
         return shape
+
+    def with_inertias(
+        self, masses: Given = None, centres: Given = None, inertias: Given = None, *, on_unphysical: str = "error"
+    ) -> Body | BodyFamily:
+        """The same joints between links of other mass, centre of mass or rotational inertia: a body, or N of them.
+
+        Each argument is for all moving parts, in the order of `moving_parts`, or for some: a mapping from the first
+        link of a part. What is not given stays as it is. A leading axis N of anything that is given makes a
+        `BodyFamily`, a sequence of N bodies.
+
+        Parameters
+        ----------
+        masses : (k,) or (N, k); of a link one number or (N,) [kg]
+        centres : (k, 3) or (N, k, 3) centres of mass, axes of the part's first link; of a link (3,) or (N, 3) [m]
+        inertias : (k, 3, 3) or (N, k, 3, 3) about the centre of mass, the same axes; of a link (3, 3) or (N, 3, 3)
+            [kg m^2]
+        on_unphysical : what to do with inertias that no distribution of mass has, by a negative principal moment or by
+            the triangle inequality (to 0.1 %): "error", "warn" or "allow"
+
+        Raises
+        ------
+        UnknownNameError, ShapeError
+            For a name that is no link, a link fixed to another, or arrays of the wrong shape.
+        UnphysicalInertiaError
+            For a mass that is not positive, a tensor that is not symmetric or, with "error", as said above.
+
+        Warns
+        -----
+        UnphysicalInertiaWarning
+            With "warn", for inertias that no distribution of mass has.
+        """
+        from .family import BodyFamily
+
+        parts = tuple(part.links for part in self.moving_parts)
+        given = {"masses": masses, "centres": centres, "inertias": inertias}
+        found = given_inertias(self.chain, parts, given, on_unphysical)
+        return changed_body(self, *found) if found.masses.ndim == 1 else BodyFamily(self, *found)
 
     def joint_index(self, name: str) -> int:
         """The place of a joint in the shape vector. Raises UnknownNameError."""
@@ -300,15 +315,12 @@ class Body:
         still = self._checked(reference, "reference")
         if still.ndim != 1:
             raise ShapeError(f"reference: one shape ({self.n_shape},) is needed, got {still.shape}")
-        links = self._model.inertias.tolist()[1:]
-        masses = np.array([link.mass for link in links])
-        moments = second_moment(np.array([link.inertia for link in links]))
-        (turns0,), (centres0,), _, _ = self._links(still[None], np.zeros((1, self.n_shape)))
-        turns, centres, turning, speeds = self._links(self._rows(r), self._rows(v))
-        there = moments @ np.swapaxes(turns0, -1, -2)
-        weighted = masses[:, None] * centres0
-        correlation = np.swapaxes(centres, -1, -2) @ weighted + (turns @ there).sum(axis=1)
-        slope = np.swapaxes(speeds, -1, -2) @ weighted + (so3.hat(turning) @ turns @ there).sum(axis=1)
+        masses, moments = self.chain.masses[:, None], second_moment(self.chain.inertias)
+        then = link_motions(self.chain, still[None], np.zeros((1, self.n_shape)))
+        now = link_motions(self.chain, self._rows(r), self._rows(v))
+        there, weighted = moments @ so3.transpose(then.turns[0]), masses * then.places[0]
+        correlation = so3.transpose(now.places) @ weighted + (now.turns @ there).sum(axis=1)
+        slope = so3.transpose(now.speeds) @ weighted + (so3.hat(now.spins) @ now.turns @ there).sum(axis=1)
         matrix = (*r.shape[:-1], 3, 3)
         return correlation.reshape(matrix), slope.reshape(matrix)
 
@@ -348,32 +360,6 @@ class Body:
         """I, J, dI/dt and dJ/dt along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3, n) and once more. Unchecked."""
         whole, slope = self._angular_map(shape), self._angular_map_rate(shape, rate)
         return whole[:, :, :3], whole[:, :, 3:], slope[:, :, :3], slope[:, :, 3:]
-
-    def _links(self, shapes: Array, rates: Array) -> tuple[Array, Array, Array, Array]:
-        """Of each link that carries mass: orientation (N, k, 3, 3), centre of mass from that of the whole (N, k, 3),
-        angular velocity and speed of that centre (N, k, 3), base axes."""
-        model, data = self._model, self._data()
-        levers = np.array([link.lever for link in model.inertias.tolist()[1:]])
-        masses = np.array([link.mass for link in model.inertias.tolist()[1:]]) / self.mass
-        count = model.njoints - 1
-        turns, places = np.empty((len(shapes), count, 3, 3)), np.empty((len(shapes), count, 3))
-        motions = np.empty((len(shapes), count, 6))
-        states = zip(self._joints.configurations(shapes), self._joints.velocities(rates), strict=True)
-        for row, (q, v) in enumerate(states):
-            pin.forwardKinematics(model, data, q, v)
-            for link in range(count):
-                place = data.oMi[link + 1]
-                turns[row, link], places[row, link] = place.rotation, place.translation
-                motions[row, link] = data.v[link + 1].vector
-        centres = places + so3.apply(turns, levers)
-        turning = so3.apply(turns, motions[..., 3:])
-        speeds = so3.apply(turns, motions[..., :3] + np.cross(motions[..., 3:], levers))
-        return (
-            turns,
-            centres - (masses @ centres)[:, None],
-            turning,
-            speeds - (masses @ speeds)[:, None],
-        )
 
     def _link_frame(self, link: str) -> int:
         if link not in self.link_names:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 NUMBERS = 22
 """In the row of a frame: its turn at rest in the parent's axes (9, row by row), its place there (3) [m]; then of what
 moves with it the mass [kg], the centre of mass (3) [m] and the inertia about that (xx yy zz yz xz xy) [kg m^2]."""
+GEOMETRY = 12
+"""How many of them do not depend on masses; they come first."""
 _PARALLEL = 1e-14
 """Sine of the angle between a screw's axis and its slide: all that rounding leaves."""
 
@@ -31,6 +33,7 @@ class LinkRows:
     rows : (k + 1, NUMBERS)
     mass : of all [kg]
     matrix, offset : as in `JointChain`, or None where all joints are independent
+    bases : (k + 1, 3, 3) the axes of each frame in those that it has in the chain, in more digits
     """
 
     parents: Any
@@ -40,6 +43,7 @@ class LinkRows:
     mass: float
     matrix: Array | None
     offset: Array | None
+    bases: Any
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """Of all joints, followers included: (N, n), (N, n) -> (N, k), (N, k), each in one piece."""
@@ -66,10 +70,8 @@ def link_rows(chain: JointChain) -> LinkRows:
         rows[joint + 1, 9:12] = parent.T @ chain.places[joint]
         bases.append(basis)
     rows[0, [0, 4, 8]] = 1.0
-    for frame, basis in enumerate(bases):
-        rows[frame, 12] = chain.masses[frame]
-        rows[frame, 13:16] = basis.T @ chain.centres[frame]
-        rows[frame, 16:] = (basis.T @ chain.inertias[frame] @ basis).ravel()[[0, 4, 8, 5, 2, 1]]
+    axes = np.array(bases)
+    rows[:, GEOMETRY:] = inertial_numbers(axes, chain.masses, chain.centres, chain.inertias)
     independent = chain.matrix.shape == (count, count) and np.array_equal(chain.matrix, np.eye(count))
     plain = independent and not chain.offset.any()
     return LinkRows(
@@ -80,7 +82,15 @@ def link_rows(chain: JointChain) -> LinkRows:
         mass=float(chain.masses.sum()),
         matrix=None if plain else chain.matrix,
         offset=None if plain else chain.offset,
+        bases=axes,
     )
+
+
+def inertial_numbers(bases: Any, masses: Array, centres: Array, inertias: Array) -> Array:
+    """What the rows say of masses: (..., k + 1), (..., k + 1, 3), (..., k + 1, 3, 3) -> (..., k + 1, 10)."""
+    back = np.swapaxes(bases, -1, -2)
+    turned = (back @ inertias @ bases).reshape(*masses.shape, 9)[..., [0, 4, 8, 5, 2, 1]]
+    return np.concatenate([masses[..., None], (back @ centres[..., None])[..., 0], turned], axis=-1).astype(float)
 
 
 def _with_third_axis(axis: Array) -> Any:

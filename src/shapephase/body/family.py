@@ -1,0 +1,86 @@
+"""Bodies with the same joints and other masses, centres of mass and rotational inertias."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import overload
+
+import numpy as np
+
+from ..arrays import Array, lock_arrays
+from ._changed_body import changed_body
+from .body import Body
+from .inertial_regressor import inertial_regressor
+from .link_rows import GEOMETRY, inertial_numbers
+
+# Numbers of regressors at once: some hundred MB.
+_AT_ONCE = 10_000_000
+_OF_A_LINK = 150
+
+
+@dataclass(frozen=True, eq=False)
+class BodyFamily(Sequence[Body]):
+    """N bodies that differ in their inertias only: a sequence of them, made by `Body.with_inertias`.
+
+    Where the links are and how they move is the same for all, and computed once.
+
+    Attributes
+    ----------
+    body : the one that they were made from
+    masses : (N, k + 1) of what moves with each frame of `body.chain` [kg]
+    centres : (N, k + 1, 3) centres of mass, axes of each frame [m]
+    tensors : (N, k + 1, 3, 3) inertias about them [kg m^2]
+    """
+
+    body: Body
+    masses: Array
+    centres: Array
+    tensors: Array
+
+    __post_init__ = lock_arrays
+
+    def __len__(self) -> int:
+        """N."""
+        return len(self.masses)
+
+    @overload
+    def __getitem__(self, index: int) -> Body: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> BodyFamily: ...
+
+    def __getitem__(self, index: int | slice) -> Body | BodyFamily:
+        """One of the bodies, made when it is asked for, or a family of some of them."""
+        chosen = self.masses[index], self.centres[index], self.tensors[index]
+        return BodyFamily(self.body, *chosen) if isinstance(index, slice) else changed_body(self.body, *chosen)
+
+    def __repr__(self) -> str:
+        """One line for people."""
+        return f"BodyFamily({len(self)} x {self.body!r})"
+
+    @property
+    def mass(self) -> Array:
+        """Of each: (N,) [kg]."""
+        return self.masses.sum(axis=-1)
+
+    def sample(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
+        """I and L_o of all along a trajectory: (S, n), (S, n) -> (N, S, 3, 3), (N, S, 3). Unchecked."""
+        inertia, momentum = np.empty((len(self), len(shapes), 3, 3)), np.empty((len(self), len(shapes), 3))
+        at_once = max(1, _AT_ONCE // (_OF_A_LINK * self.masses.shape[1]))
+        for first in range(0, len(shapes), at_once):
+            part = slice(first, first + at_once)
+            regressor = inertial_regressor(self.body.chain, shapes[part], rates[part])
+            found = regressor.inertia_and_momentum(self.masses, self.centres, self.tensors)
+            inertia[:, part], momentum[:, part] = found
+        return inertia, momentum
+
+    @cached_property
+    def rows(self) -> Array:
+        """The rows of each, as `LinkRows` has those of one body: (N, k + 1, 22), made when first needed."""
+        own = self.body.chain.rows
+        rows = np.empty((len(self), *own.rows.shape))
+        rows[..., :GEOMETRY] = own.rows[:, :GEOMETRY]
+        rows[..., GEOMETRY:] = inertial_numbers(own.bases, self.masses, self.centres, self.tensors)
+        return rows

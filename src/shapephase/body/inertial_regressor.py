@@ -1,0 +1,121 @@
+"""Inertia and internal momentum as functions of the masses, centres and rotational inertias of the links.
+
+Seen from a given point that moves, both are linear in ten numbers for each link; about the centre of mass of all
+there comes a product of two sums that are linear in four of them. What multiplies the numbers depends on shapes and
+rates alone, so that one set of matrices serves all bodies with the same joints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ._link_motions import LinkMotions, link_motions
+from .joint_chain import JointChain
+
+PARAMETERS = 10
+"""Of a link, in its axes and about the centre of mass that it has in the body the matrices were made for: mass [kg],
+first moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
+_OUTPUTS = 15
+"""About the point that is that body's centre of mass: inertia xx yy zz yz xz xy, angular momentum (3), first moment of
+mass (3), its rate (3)."""
+_VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+_MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
+
+
+@dataclass(frozen=True, eq=False)
+class InertialRegressor:
+    """The matrices at N shapes and rates.
+
+    At the body that they were made for, the first moment of mass vanishes: there the first six and the next three rows
+    are the exact derivatives of I and of L_o by the parameters.
+
+    Attributes
+    ----------
+    matrices : (N, 15, 10 links)
+    centres : (links, 3) the centres of mass that parameters are about, axes of each link [m]
+    """
+
+    matrices: Array
+    centres: Array
+
+    def inertia_and_momentum(self, masses: Array, centres: Array, inertias: Array) -> tuple[Array, Array]:
+        """I and L_o of bodies with the same joints, about the centre of mass of each, axes of the base.
+
+        Parameters
+        ----------
+        masses, centres, inertias : (V, links), (V, links, 3), (V, links, 3, 3); the latter about these centres
+
+        Returns
+        -------
+        (V, N, 3, 3) [kg m^2], (V, N, 3) [kg m^2/s]
+        """
+        given = parameters(masses, centres, inertias, self.centres)
+        count = len(self.matrices)
+        sums = (given @ self.matrices.reshape(count * _OUTPUTS, -1).T).reshape(len(masses), count, _OUTPUTS)
+        moment, rate = sums[..., 9:12], sums[..., 12:]
+        whole = masses.sum(axis=-1)[:, None, None]
+        inertia = sums[..., :6][..., _MATRIX].reshape(*sums.shape[:2], 3, 3)
+        return inertia - _of_point(moment) / whole[..., None], sums[..., 6:9] - np.cross(moment, rate) / whole
+
+
+def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> InertialRegressor:
+    """The matrices at shapes and rates of the independent joints, (N, n) each.
+
+    With P, U the place and speed of a link's centre from the centre of mass of all, R, w its orientation and angular
+    velocity, and m, h, J its parameters: I is the sum of m (P.P - P P^T) + 2 P.Rh - P (Rh)^T - Rh P^T + R J R^T, and
+    L_o of m P x U + Rh x U + P x (w x Rh) + R J R^T w.
+
+    Source: theory.md A3, A7.
+    """
+    links = link_motions(chain, shapes, rates)
+    count, frames = links.places.shape[:2]
+    whole = np.zeros((count, frames, _OUTPUTS, PARAMETERS))
+    whole[..., 0] = np.concatenate(_of_masses(links), axis=-1)
+    for axis in range(3):
+        whole[..., 1 + axis] = np.concatenate(_of_first_moments(links, axis), axis=-1)
+    for entry, (i, j) in enumerate(_VOIGT):
+        # A symmetric tensor with a one at (i, j), turned with the link.
+        turned = links.turns[..., :, i, None] * links.turns[..., None, :, j]
+        tensor = turned if i == j else turned + so3.transpose(turned)
+        whole[..., :6, 4 + entry] = _voigt(tensor)
+        whole[..., 6:9, 4 + entry] = so3.apply(tensor, links.spins)
+    matrices = np.swapaxes(whole, 1, 2).reshape(count, _OUTPUTS, frames * PARAMETERS)
+    return InertialRegressor(np.ascontiguousarray(matrices), chain.centres)
+
+
+def parameters(masses: Array, centres: Array, inertias: Array, about: Array) -> Array:
+    """Mass, first moment and inertia about given points: (V, k), (V, k, 3), (V, k, 3, 3), (k, 3) -> (V, 10 k)."""
+    offsets = centres - about
+    whole = np.empty((*masses.shape, PARAMETERS))
+    whole[..., 0] = masses
+    whole[..., 1:4] = masses[..., None] * offsets
+    whole[..., 4:] = _voigt(inertias + masses[..., None, None] * _of_point(offsets))
+    return whole.reshape(len(masses), -1)
+
+
+def _of_masses(links: LinkMotions) -> list[Array]:
+    """What one kilogram at the centre of each link adds: (N, k, ...)."""
+    return [_voigt(_of_point(links.places)), np.cross(links.places, links.speeds), links.places, links.speeds]
+
+
+def _of_first_moments(links: LinkMotions, axis: int) -> list[Array]:
+    """What a first moment of one along an axis of each link adds."""
+    moment = links.turns[..., axis]
+    rate = np.cross(links.spins, moment)
+    product = links.places[..., :, None] * moment[..., None, :]
+    trace = 2.0 * np.trace(product, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
+    momentum = np.cross(moment, links.speeds) + np.cross(links.places, rate)
+    return [_voigt(trace - product - so3.transpose(product)), momentum, moment, rate]
+
+
+def _of_point(place: Array) -> Array:
+    """The inertia of one kilogram: (..., 3) -> (..., 3, 3)."""
+    return (place * place).sum(axis=-1)[..., None, None] * np.eye(3) - place[..., :, None] * place[..., None, :]
+
+
+def _voigt(tensor: Array) -> Array:
+    return np.stack([tensor[..., i, j] for i, j in _VOIGT], axis=-1)
