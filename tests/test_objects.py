@@ -285,6 +285,19 @@ def swing(times):
     return np.sin(times[:, None] + ahead), np.cos(times[:, None] + ahead)
 
 
+def turned(times):
+    return so3.exp(np.outer(np.sin(3.0 * times), [0.1, 0.2, 0.3]))
+
+
+def turning(times):
+    axis = np.array([0.1, 0.2, 0.3])
+    return turned(times), np.outer(3.0 * np.cos(3.0 * times), axis)
+
+
+def spinning(times):
+    return np.stack([np.sin(times), np.cos(times), 0.0 * times], axis=1)
+
+
 def travellers():
     body, path = sp.load_body("cat_two_halves"), kane_scher(0.3, 1.0)
     deformation = sp.articulated(body, path)
@@ -303,6 +316,9 @@ def travellers():
         "mean body": sp.mean_body_gauge(deformation),
         "principal": sp.principal_gauge(deformation),
         "link": sp.link_gauge(deformation, body.link_names[-1]),
+        "turned": sp.in_gauge(deformation, turning),
+        "turned without rates": sp.in_gauge(deformation, turned),
+        "turned by rates": sp.in_gauge(deformation, rates=spinning),
         "particles": sp.particles([1.0, 2.0, 3.0, 4.0], moving_points, 1.0),
         "rigid": sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0),
         "motion": motion,
@@ -345,7 +361,7 @@ def test_it_pickles_and_copies(all_travellers, name):
 
 def test_it_goes_to_a_new_process_and_back(all_travellers):
     # Functions of this file are not found there.
-    here = ("function", "matched", "particles")
+    here = ("function", "matched", "particles", "turned", "turned without rates", "turned by rates")
     things = {name: thing for name, thing in all_travellers.items() if name not in here}
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         for thing, back in zip(things.values(), pool.map(copy.copy, things.values(), timeout=300), strict=True):
@@ -362,6 +378,9 @@ def test_it_goes_to_a_new_process_and_back(all_travellers):
             lambda: sp.prescribed(lambda t: steady(t), None, 1.0),
             "a deformation made of",
         ),
+        (lambda: sp.in_gauge(sp.rigid(np.eye(3), 1.0), lambda t: turning(t)), "a gauge made of"),
+        (lambda: sp.in_gauge(sp.rigid(np.eye(3), 1.0), lambda t: turned(t)), "a gauge made of"),
+        (lambda: sp.in_gauge(sp.rigid(np.eye(3), 1.0), rates=lambda t: spinning(t)), "a gauge made of"),
     ],
 )
 def test_what_is_made_of_a_lambda_says_so_and_is_copied_all_the_same(make, words):

@@ -8,19 +8,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import times_argument
+from ..arguments import check_picklable, times_argument
 from ..arrays import Array, finite_array
 from ..chebyshev import PiecewiseChebyshev
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import stepped_rotation
 from ..integrator.resolved import DEGREE
 from ..integrator.sampling import sampler
+from ..integrator.stepped import SteppedRotation
 from ..shape_space.function_scan import ScannedFunction
 from ..shape_space.scanning import scanned
 from ._principal_frame import Frames, principal_frames
@@ -38,6 +39,18 @@ _ROUNDING = 8.0 * float(np.finfo(float).eps)
 _RATE_DOUBT = 1e-9
 
 
+class _OfUser(Protocol):
+    """A gauge that a user gives as a function of time."""
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """U(t) and its body rates."""
+        ...
+
+    def looked_at(self) -> ScannedFunction:
+        """What the user gave, for a look at it."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class GivenFrames:
     """Frames that a user gives as functions of time.
@@ -45,13 +58,16 @@ class GivenFrames:
     Attributes
     ----------
     frames : U(t) and its body rates
-    function : what the user gave, for a look at it
     breaks : (M,) times between which they are smooth, as far as is known [s]
     """
 
-    frames: Frames
-    function: ScannedFunction
+    frames: _OfUser
     breaks: Array
+
+    @property
+    def function(self) -> ScannedFunction:
+        """What the user gave, for a look at it."""
+        return self.frames.looked_at()
 
     @property
     def panel_ends(self) -> Array:
@@ -64,35 +80,113 @@ def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]
     """A user's U(t) with its rates, differentiated where it comes without. Raises as `in_gauge`."""
     if not callable(u):
         raise ShapeError(f"a gauge u is a function of times, got {u!r}")
+    if _turns_of(u, breaks[:1])[1] is None:
+        return _differentiated(u, breaks)
+    frames = _TurnsWithRates(u)
+    _check_rates(frames, breaks)
+    return GivenFrames(frames, breaks)
 
-    def evaluate(times: Array) -> tuple[Array, Array | None]:
-        answer: Any = u(times)
-        turns, rates = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
-        turned = so3.rotation_argument(turns, "U")
-        rate = None if rates is None else finite_array(rates, "body rates of U", unit="rad/s")
-        if turned.shape != (len(times), 3, 3) or (rate is not None and rate.shape != (len(times), 3)):
-            raise ShapeError(
-                f"u must return U ({len(times)}, 3, 3) and body rates ({len(times)}, 3) for these times, got "
-                f"{turned.shape}" + ("" if rate is None else f" and {rate.shape}")
-            )
-        return turned, rate
 
-    if evaluate(breaks[:1])[1] is None:
-        return _differentiated(lambda times: evaluate(times)[0], breaks)
+def _turns_of(u: Callable[[Array], Any], times: Array) -> tuple[Array, Array | None]:
+    """What a user's function returns: U, and its body rates if it gives them. Raises ShapeError."""
+    answer = u(times)
+    turns, rates = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
+    turned = so3.rotation_argument(turns, "U")
+    rate = None if rates is None else finite_array(rates, "body rates of U", unit="rad/s")
+    if turned.shape != (len(times), 3, 3) or (rate is not None and rate.shape != (len(times), 3)):
+        raise ShapeError(
+            f"u must return U ({len(times)}, 3, 3) and body rates ({len(times)}, 3) for these times, got "
+            f"{turned.shape}" + ("" if rate is None else f" and {rate.shape}")
+        )
+    return turned, rate
 
-    def frames(times: Array) -> tuple[Array, Array]:
-        turned, rate = evaluate(times)
+
+@dataclass(frozen=True, eq=False)
+class _TurnsWithRates:
+    """U and its body rates as a function gives them."""
+
+    u: Callable[[Array], Any]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for a lambda."""
+        return _state(self, self.u)
+
+    def __deepcopy__(self, _: dict[int, Any]) -> _TurnsWithRates:
+        """The frames themselves: nothing of them changes."""
+        return self
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        turned, rate = _turns_of(self.u, times)
         if rate is None:
             raise ShapeError("u returned body rates at the start, and U alone later on")
         return turned, rate
 
-    _check_rates(frames, breaks)
-    return GivenFrames(frames, turns_and_rates(frames), breaks)
+    def looked_at(self) -> ScannedFunction:
+        return turns_and_rates(self)
 
 
-def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> GivenFrames:
+@dataclass(frozen=True, eq=False)
+class _TurnsAlone:
+    """U as a function gives it, with the slopes of a series of it: times (N,) -> (N, 9)."""
+
+    u: Callable[[Array], Any]
+    slopes: PiecewiseChebyshev
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for a lambda."""
+        return _state(self, self.u)
+
+    def __deepcopy__(self, _: dict[int, Any]) -> _TurnsAlone:
+        """The frames themselves: nothing of them changes."""
+        return self
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        turned, _ = _turns_of(self.u, times)
+        return turned, so3.vee(so3.transpose(turned) @ self.slopes(times).reshape(-1, 3, 3))
+
+    def looked_at(self) -> ScannedFunction:
+        return _look_at_turns(self.u)
+
+
+@dataclass(frozen=True, eq=False)
+class _TurnsOfRates:
+    """U from the body rates that a function gives: a start, and how it goes on."""
+
+    rates: Callable[[Array], ArrayLike]
+    start: Array
+    turned: SteppedRotation
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for a lambda."""
+        return _state(self, self.rates)
+
+    def __deepcopy__(self, _: dict[int, Any]) -> _TurnsOfRates:
+        """The frames themselves: nothing of them changes."""
+        return self
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        return self.start @ self.turned.rotation(times)[0], _spins_of(self.rates, times)
+
+    def looked_at(self) -> ScannedFunction:
+        return _look_at_rates(self.rates)
+
+
+def _state(frames: object, function: object) -> dict[str, Any]:
+    check_picklable(function, "a gauge")
+    return frames.__dict__
+
+
+def _look_at_turns(u: Callable[[Array], Any]) -> ScannedFunction:
+    return turns_alone(lambda times: _turns_of(u, times)[0])
+
+
+def _look_at_rates(rates: Callable[[Array], ArrayLike]) -> ScannedFunction:
+    return rates_alone(lambda times: _spins_of(rates, times))
+
+
+def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
     """Rotations with their rates: the slopes of the series that a look at them finds."""
-    function = turns_alone(turns)
+    function = _look_at_turns(u)
     scan = scanned(function, breaks)
     resolved, rows = scan.resolved, scan.resolved.leaves
     series = resolved.coefficients[rows, :, :9] / function.judge(breaks, np.zeros((1, 18)))[0][0]
@@ -114,37 +208,32 @@ def _differentiated(turns: Callable[[Array], Array], breaks: Array) -> GivenFram
             f"uncertain by {doubt[worst]:.3g} rad/s): return its body rates too"
         )
     slopes = PiecewiseChebyshev(np.append(resolved.left[rows], breaks[-1]), series).derivative()
-
-    def frames(times: Array) -> tuple[Array, Array]:
-        turned = turns(times)
-        return turned, so3.vee(so3.transpose(turned) @ slopes(times).reshape(-1, 3, 3))
-
-    return GivenFrames(frames, function, np.union1d(breaks, scan.found_breaks))
+    return GivenFrames(_TurnsAlone(u, slopes), np.union1d(breaks, scan.found_breaks))
 
 
 def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> GivenFrames:
     """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises as `in_gauge`."""
-
     if not callable(rates):
         raise ShapeError(f"the body rates of a gauge are a function of times, got {rates!r}")
 
-    def spins(times: Array) -> Array:
-        spin = finite_array(rates(times), "body rates of U", unit="rad/s")
-        if spin.shape != (len(times), 3):
-            raise ShapeError(f"rates must return ({len(times)}, 3) for these times, got {spin.shape}")
-        return spin
-
     def unit_body(times: Array) -> tuple[Array, Array]:
-        return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -spins(times)
+        return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -_spins_of(rates, times)
 
     first = np.eye(3) if start is None else so3.rotation_argument(start, "start").copy()
     if first.shape != (3, 3):
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
-    function = rates_alone(spins)
-    scan = scanned(function, breaks)
+    scan = scanned(_look_at_rates(rates), breaks)
     edges = np.union1d(breaks, scan.found_breaks)
     turned = stepped_rotation(sampler(unit_body, edges, resolved=scan.resolved), np.zeros((1, 3)), _LIFT_TOLERANCE)
-    return GivenFrames(lambda times: (first @ turned.rotation(times)[0], spins(times)), function, edges)
+    return GivenFrames(_TurnsOfRates(rates, first, turned), edges)
+
+
+def _spins_of(rates: Callable[[Array], ArrayLike], times: Array) -> Array:
+    """Body rates as a user's function gives them. Raises ShapeError."""
+    spin = finite_array(rates(times), "body rates of U", unit="rad/s")
+    if spin.shape != (len(times), 3):
+        raise ShapeError(f"rates must return ({len(times)}, 3) for these times, got {spin.shape}")
+    return spin
 
 
 def _check_rates(frames: Frames, breaks: Array) -> None:
