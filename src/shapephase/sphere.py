@@ -31,7 +31,7 @@ _HALVINGS = 12
 
 def area_rate(reference: Array, direction: Array, direction_rate: Array) -> Array:
     """dA/dt = n.(u x u')/(1 + n.u): (3,), (..., 3), (..., 3) -> (...) [sr/s]."""
-    along = np.sum(np.cross(direction, direction_rate) * reference, axis=-1)
+    along = np.sum(so3.cross(direction, direction_rate) * reference, axis=-1)
     return along / (1.0 + np.sum(reference * direction, axis=-1))
 
 
@@ -41,7 +41,7 @@ def triangle_area(reference: Array, start: Array, end: Array) -> Array:
     The integral of the area form along the great circle from `start` to `end`.
     Source: van Oosterom and Strackee 1983.
     """
-    volume = np.sum(reference * np.cross(start, end), axis=-1)
+    volume = np.sum(reference * so3.cross(start, end), axis=-1)
     denominator = 1.0 + np.sum(start * end + reference * start + reference * end, axis=-1)
     return 2.0 * np.arctan2(volume, denominator)
 
