@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from math import ceil, inf, log, pi
 
 import numpy as np
@@ -87,39 +87,23 @@ class EvenSampler:
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
-        panels = self._panels
+        panels = _panel_count(self._values)
         edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
         edges[-1] = self._period * self._loops
-        return Interpolant(edges, self._series(), self._loops, self._channels.count)
+        return Interpolant(edges, _series(self._values), self._loops, self._channels.count)
 
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`: the harmonics that stand for those that are missing, changed by as much."""
         inverse, drift = self._tails
         missing, last = (momentum * inverse.error + drift.error, momentum * inverse.tail + drift.tail)
-        return Perturbed(self._series(missing / last if last > 0.0 else 0.0), self._hidden(momentum))
+        # A copy: samples in work arrays are overwritten by the next motion.
+        make = partial(_series, self._values.copy(), missing / last if last > 0.0 else 0.0)
+        return Perturbed(make, self._hidden(momentum))
 
     def _hidden(self, momentum: float) -> float:
         """What the tails cannot explain is no missing oscillation that averages out [rad]."""
         inverse, drift = (_unexplained(gap, tail) for gap, tail in zip(self._gaps, self._tails, strict=True))
         return self._loops * 0.5 * self._period * (momentum * inverse + drift)
-
-    @property
-    def _panels(self) -> int:
-        return max(1, len(self._values) // _SAMPLES_A_PANEL)
-
-    def _series(self, less: float = 0.0) -> Array:
-        """Chebyshev coefficients (P, n, 9) of the Fourier series, with this share of its last terms taken off."""
-        count, panels = len(self._values), self._panels
-        degree = _PANEL_DEGREE if count > 1 else 0
-        matrix = _even_to_panel(count, panels, degree, count // 2)
-        if less:
-            without = _even_to_panel(count, panels, degree, count // 2 - tail_length(count // 2))
-            matrix = matrix + less * (without - matrix)
-        # Panels differ only in where their samples begin: in two copies of the loop each finds its own contiguous.
-        two_loops = np.concatenate([self._values, self._values])
-        row, number = two_loops.strides
-        from_each = np.ndarray((panels, count, 9), buffer=two_loops, strides=(count // panels * row, row, number))
-        return matrix @ from_each
 
     def _times(self, index: Integers, count: int) -> Array:
         return (self._period / count) * index.astype(np.float64)
@@ -144,6 +128,25 @@ class EvenSampler:
     def _has_gaps(self) -> bool:
         """Whether the series misses, between the nodes, what its spectrum does not show."""
         return any(_unexplained(gap, tail) for gap, tail in zip(self._gaps, self._tails, strict=True))
+
+
+def _panel_count(values: Array) -> int:
+    return max(1, len(values) // _SAMPLES_A_PANEL)
+
+
+def _series(values: Array, less: float = 0.0) -> Array:
+    """Chebyshev coefficients (P, n, 9) of the Fourier series, with this share of its last terms taken off."""
+    count, panels = len(values), _panel_count(values)
+    degree = _PANEL_DEGREE if count > 1 else 0
+    matrix = _even_to_panel(count, panels, degree, count // 2)
+    if less:
+        without = _even_to_panel(count, panels, degree, count // 2 - tail_length(count // 2))
+        matrix = matrix + less * (without - matrix)
+    # Panels differ only in where their samples begin: in two copies of the loop each finds its own contiguous.
+    two_loops = np.concatenate([values, values])
+    row, number = two_loops.strides
+    from_each = np.ndarray((panels, count, 9), buffer=two_loops, strides=(count // panels * row, row, number))
+    return matrix @ from_each
 
 
 def _unexplained(gap: float, tail: TailEstimate) -> float:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, read_only
 from ._spectral_error import spectral_norms
 
 # Terms of a panel's series that are changed: two, since one may be small by chance, or by the symmetry of a motion.
@@ -25,20 +27,35 @@ _FEW_TERMS = 10.0
 _TINY = 1e-300
 
 
-class Perturbed(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Perturbed:
     """An interpolant's series with errors like those that they probably have.
 
     Attributes
     ----------
-    coefficients : (P, n, 9), the last terms of each series changed by as much as is missing beyond them
+    make : the coefficients, when they are needed
     hidden : attitude error of what they do not show, without amplification [rad]
     """
 
-    coefficients: Array
+    make: Callable[[], Array]
     hidden: float
 
+    @cached_property
+    def coefficients(self) -> Array:
+        """(P, n, 9), the last terms of each series changed by as much as is missing beyond them."""
+        return read_only(self.make())
 
-def perturbed(coefficients: Array, degrees: Integers, widths: Array, momentum: float, hidden: float) -> Perturbed:
+    @classmethod
+    def known(cls, coefficients: Array, hidden: float) -> Perturbed:
+        """With coefficients that are made already."""
+        return cls(partial(np.asarray, coefficients), hidden)
+
+    def changes(self, coefficients: Array) -> bool:
+        """Whether any series is not what it was."""
+        return not np.array_equal(self.coefficients, coefficients)
+
+
+def perturbed_series(coefficients: Array, degrees: Integers, widths: Array, momentum: float) -> Array:
     """Chebyshev series (P, n, 9) of degrees (P,) on panels of widths (P,) [s], for momenta of this magnitude."""
     sizes = (spectral_norms(coefficients) @ np.array([momentum, 1.0])) * widths[:, None]
     changed = coefficients.copy()
@@ -57,4 +74,4 @@ def perturbed(coefficients: Array, degrees: Integers, widths: Array, momentum: f
         # Rounding is as large in the terms that are missing as in the last ones, and no larger.
         missing = np.where(late <= _ROUNDING * x.max(axis=1), 1.0, np.minimum(missing, _SAFETY_FACTOR * degree))
         changed[rows, degree + 1 - _LAST : degree + 1] *= (1.0 - missing)[:, None, None]
-    return Perturbed(changed, hidden)
+    return changed

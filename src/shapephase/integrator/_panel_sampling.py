@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ..arrays import Array, Integers, Mask
 from ..chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
 from ..errors import AccuracyNotReached
-from ._last_terms import Perturbed, perturbed
+from ._last_terms import Perturbed, perturbed_series
 from ._spectral_error import Channels, SpectralEstimate, averaged_share, estimate_spectrum, spectral_norms
 from .interpolant import Interpolant
 from .resolved import Hidden, ResolvedPath
@@ -210,7 +211,8 @@ class PanelSampler:
         hidden += _sum_of_noise(np.concatenate(noises))
         interpolant, order = self.interpolant(), np.argsort(left)
         widths = np.diff(interpolant.edges[: len(left) + 1])
-        return perturbed(interpolant.coefficients, degrees[order], widths, momentum, self._loops * hidden)
+        make = partial(perturbed_series, interpolant.coefficients, degrees[order], widths, momentum)
+        return Perturbed(make, self._loops * hidden)
 
     def _refine_panels(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""

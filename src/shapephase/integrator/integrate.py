@@ -205,16 +205,15 @@ class Integration:
         if growth is None:
             turn = requirements.whole_turn if self._largest else 0.0
             growth = min(1.0 + _EXPECTED_GROWTH * turn, _MOST_EXPECTED_GROWTH)
-        perturbed = None
-        if expected * growth > _NEGLIGIBLE * self._tolerance:
-            perturbed = self._sampler.perturbed(self._largest)
+        perturbed = self._sampler.perturbed(self._largest)
+        counts = expected * growth > _NEGLIGIBLE * self._tolerance
         steps = self._plan(interpolant, requirements)
-        record = self._take_steps(interpolant, None if perturbed is None else perturbed.coefficients, steps)
+        record = self._take_steps(interpolant, perturbed.coefficients if counts else None, steps)
         stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
         propagators = record.propagators if self._propagators is None else self._propagators
         amplifications = amplification(propagators)
         sampling = amplifications * expected
-        if perturbed is not None:
+        if counts:
             measured = record.truncation + amplifications * perturbed.hidden
             sampling = np.fmin(sampling, measured)
         rotation = SteppedRotation(
@@ -231,6 +230,7 @@ class Integration:
                 propagators, record.quaternions, amplifications, _LITTLE_ROUNDING * self._tolerance
             ),
             amplification=amplifications,
+            perturbed=perturbed,
         )
         return Attempt(rotation, stepping)
 

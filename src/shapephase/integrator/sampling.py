@@ -170,4 +170,4 @@ class FinishedSampler:
 
     def perturbed(self, momentum: float) -> Perturbed:  # noqa: ARG002
         """The same: its errors count elsewhere."""
-        return Perturbed(self._interpolant.coefficients, 0.0)
+        return Perturbed.known(self._interpolant.coefficients, 0.0)

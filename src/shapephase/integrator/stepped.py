@@ -11,6 +11,7 @@ from .. import so3, sphere
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ._dense_output import DenseOutput
 from ._error_propagator import momentum_slope
+from ._last_terms import Perturbed
 from ._step_loop import stage_channels
 from .interpolant import Interpolant
 
@@ -38,6 +39,7 @@ class SteppedRotation:
     sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
     rounding_error : (B,) error due to rounding alone [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
+    perturbed : the interpolant's series with errors like those that they probably have
     """
 
     interpolant: Interpolant
@@ -51,6 +53,7 @@ class SteppedRotation:
     stepping_error: Array
     rounding_error: Array
     amplification: Array
+    perturbed: Perturbed
 
     __post_init__ = lock_arrays
 

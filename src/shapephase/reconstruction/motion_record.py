@@ -20,7 +20,7 @@ from ..errors import InputFileNotFoundError, ResultFileError
 from ..files import npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
-from ..integrator.stepped import SteppedRotation
+from ..integrator.stepped import Perturbed, SteppedRotation
 
 _FORMAT = "shapephase motion 3"
 _STEPS = (
@@ -140,7 +140,8 @@ def _samples(interpolant: Interpolant) -> dict[str, Array]:
 
 
 def _steps(rotation: SteppedRotation) -> dict[str, Array]:
-    return {f"step_{name}": getattr(rotation, name) for name in _STEPS}
+    kept = {f"step_{name}": getattr(rotation, name) for name in _STEPS}
+    return kept | {"perturbed": rotation.perturbed.coefficients, "hidden": np.array(rotation.perturbed.hidden)}
 
 
 def _of_part(number: int, name: str) -> str:
@@ -190,7 +191,8 @@ def _interpolant(arrays: Mapping[str, Any], loops: int, evaluations: int) -> Int
 
 
 def _rotation(arrays: Mapping[str, Any], interpolant: Interpolant) -> SteppedRotation:
-    return SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS})
+    perturbed = Perturbed.known(arrays["perturbed"], float(arrays["hidden"]))
+    return SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS}, perturbed=perturbed)
 
 
 def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> Array:

@@ -25,15 +25,13 @@ from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
+from ..integrator.lift import lift_along
 from ..integrator.many_rotations import GroupedRotations, assembled
-from ..integrator.sampling import FinishedSampler
 from ..integrator.stepped import SteppedRotation
 from ..run_progress import RunProgress, watched
 from ._solvers import METHODS, SOLVERS, Solution
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
 
-_LIFT_TOLERANCE = 1e-11
-"""[rad]; the lift is on given samples and costs little, so that its own error never matters."""
 _COLUMNS = (
     "time",
     *("qx", "qy", "qz", "qw"),
@@ -192,7 +190,7 @@ class Motion:
         )
 
     @cached_property
-    def _stepped(self) -> SteppedRotation | GroupedRotations:
+    def stepped(self) -> SteppedRotation | GroupedRotations:
         """The motion on interpolants; for another method an interpolant's steps hold the method's rotations."""
         if isinstance(self.solution, SteppedRotation | GroupedRotations):
             return self.solution
@@ -207,24 +205,22 @@ class Motion:
         Its steps end where those of the motion do. Integrated once, when it is first needed; every split and every
         gauge shares it.
         """
-        tolerance, stepped = min(self.tolerance, _LIFT_TOLERANCE), self._stepped
-        steps = stepped.finest.steps if isinstance(stepped, GroupedRotations) else stepped.steps
-        return stepped_rotation(FinishedSampler(self.interpolant), np.zeros((1, 3)), tolerance, subdivide=steps)
+        return lift_along(self.stepped.finest if isinstance(self.stepped, GroupedRotations) else self.stepped)
 
     @property
     def interpolant(self) -> Interpolant:
         """I^-1 and I^-1 L_o as the integrator saw them; in a batch as for the largest momentum."""
-        return self._stepped.interpolant
+        return self.stepped.interpolant
 
     @property
     def amplification(self) -> Array:
         """The largest growth of a small error of the attitude from one time to a later one: batch."""
-        return self._stepped.amplification.reshape(self.batch)[()]
+        return self.stepped.amplification.reshape(self.batch)[()]
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
         """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""
-        stepped = self._stepped
+        stepped = self.stepped
         slope = stepped.momentum_slope
         start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
         attitude = so3.transpose(stepped.end) + slope @ so3.hat(start)
@@ -240,7 +236,7 @@ class Motion:
         Source: Cabrera 2006, equation (12); theory.md B9.
         """
         times = times_argument(t, self.duration)
-        return self._stepped.dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
+        return self.stepped.dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def solid_angle(self, t: ArrayLike) -> Array:
         """The signed area that Pi has gone round from 0 to t, closed by the great circle, seen from the base frame.
@@ -253,7 +249,7 @@ class Motion:
         Source: theory.md D; numerics.md section 3.
         """
         times = times_argument(t, self.duration)
-        return self._stepped.solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
+        return self.stepped.solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
@@ -264,7 +260,7 @@ class Motion:
             tolerance=self.tolerance,
             method=self.method,
             evaluations=self.evaluations,
-            solution=self._stepped,
+            solution=self.stepped,
         )
         write_motion_record(record, path)
 
