@@ -51,12 +51,17 @@ def npy_header(text, body=b""):
     return b"\x93NUMPY\x01\x00" + len(line).to_bytes(2, "little") + line + body
 
 
-def bomb():
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("time.npy", bytes(2**20))
-        archive.filelist[0].file_size = 2**31
-    return stream.getvalue()
+def bomb(size=2**31):
+    """An archive that says it unpacks to this size."""
+
+    def made():
+        stream = io.BytesIO()
+        with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("time.npy", bytes(2**20))
+            archive.filelist[0].file_size = size
+        return stream.getvalue()
+
+    return lambda file: file.write_bytes(made())
 
 
 def doubled_member():
@@ -131,6 +136,119 @@ def sparse(size):
     return write
 
 
+SHEET = [["time", LEFT, RIGHT], [0.0, 0.1, 0.2], [1.0, 0.3, 0.4], [2.0, 0.5, 0.6]]
+ZEROS = np.zeros(6_000_000)
+
+
+def workbook(*sheets):
+    def write(file):
+        import openpyxl
+
+        book = openpyxl.Workbook()
+        for k, rows in enumerate(sheets):
+            sheet = book.active if k == 0 else book.create_sheet()
+            for row in rows:
+                sheet.append(row)
+        book.save(file)
+
+    return write
+
+
+def far_cell(file):
+    """A sheet whose third row is said to be the millionth, with a cell in the last column there is."""
+    whole = file.with_name("whole.xlsx")
+    workbook(SHEET)(whole)
+    with zipfile.ZipFile(whole) as old, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new:
+        for entry in old.infolist():
+            content = old.read(entry)
+            if entry.filename.endswith("sheet1.xml"):
+                content = content.replace(b'<row r="4"', b'<row r="1048576"').replace(b'r="C4"', b'r="XFD1048576"')
+                rows = b"".join(b'<row r="%d"><c r="XFD%d"><v>1</v></c></row>' % (k, k) for k in range(5, 900))
+                content = content.replace(b'<row r="1048576"', rows + b'<row r="1048576"')
+            new.writestr(entry, content)
+
+
+def parquet(columns):
+    def write(file):
+        import pyarrow
+        import pyarrow.parquet
+
+        pyarrow.parquet.write_table(pyarrow.table(columns), file)
+
+    return write
+
+
+def mat(variables, **options):
+    def write(file):
+        import scipy.io
+
+        scipy.io.savemat(file, variables, **options)
+
+    return write
+
+
+def zeros_of_hdf5(file):
+    import h5py
+
+    with h5py.File(file, "w") as book:
+        book.create_dataset("time", shape=(2**40,), dtype="f8", chunks=(1024,))
+
+
+def outward_links(file):
+    import h5py
+
+    with h5py.File(file, "w") as book:
+        book["time"] = h5py.ExternalLink("/etc/hostname", "/time")
+        book[LEFT] = h5py.SoftLink("/nowhere")
+
+
+def circle(file):
+    import h5py
+
+    with h5py.File(file, "w") as book:
+        book.create_group("a/b")
+        book["a/b/c"] = book["a"]
+
+
+def c3d_header(frames=1, place=2):
+    """The first blocks of a C3D file, its parameters in the block `place`."""
+    header = bytearray(1024)
+    header[0], header[1], header[515] = place, 0x50, 84
+    header[514] = 1
+    for word, value in ((1, 20), (3, 1), (4, frames), (8, 3)):
+        header[2 * word : 2 * word + 2] = value.to_bytes(2, "little")
+    header[12:16] = np.float32(-1.0).tobytes()
+    return bytes(header)
+
+
+def cut_off(ending):
+    """A good file of this kind without its second half."""
+
+    def write(file):
+        whole = file.with_name(f"whole.{ending}")
+        columns = {"time": np.arange(9.0), LEFT: np.full(9, 0.1), RIGHT: np.full(9, 0.2)}
+        if ending == "h5":
+            import h5py
+
+            with h5py.File(whole, "w") as book:
+                for name, values in columns.items():
+                    book[name] = values
+        elif ending == "c3d":
+            import ezc3d
+
+            made = ezc3d.c3d()
+            made["parameters"]["POINT"]["RATE"]["value"] = [60]
+            made["parameters"]["POINT"]["LABELS"]["value"] = ("A",)
+            made["data"]["points"] = np.ones((4, 1, 999))
+            made.write(str(whole))
+        else:
+            {"xlsx": workbook(SHEET), "parquet": parquet(columns), "mat": mat(columns)}[ending](whole)
+        data = whole.read_bytes()
+        file.write_bytes(data[: len(data) // 2])
+
+    return write
+
+
 E, U, N, W = TrajectoryError, UnknownNameError, InputFileNotFoundError, TrajectoryWarning
 C = UnknownColumnError
 TAB = HEADER.replace(",", "\t") + ROWS.replace(",", "\t")
@@ -174,12 +292,24 @@ ODD_FILES = {
     "commas in a .tsv": ("m.tsv", csv_text(), E, ["separated by tabs"]),
     "tabs": ("m.tsv", TAB, None, ()),
     "tabs in a .csv": ("m.csv", TAB, None, ()),
-    "decimal commas": (
+    "decimal commas": ("m.csv", csv_text().replace(",", ";").replace(".", ","), None, ()),
+    "decimal commas and points": (
         "m.csv",
         csv_text().replace(",", ";").replace("0.1", "0,1"),
         E,
-        ["row 2", LEFT, "'0,1'", "write the decimal comma as a point"],
+        ["row 2", RIGHT, "'0.2' has a decimal point", "decimal commas"],
     ),
+    "thousands": ("m.csv", csv_text().replace("0.1", '"1,234"'), E, ["row 2: '1,234' may have a decimal comma"]),
+    "degrees with limits at hand": ("m.csv", csv_text(ROWS + "3,0,6\n"), E, [f"{RIGHT} is at 6 rad", "degrees?"]),
+    "milliseconds": ("m.csv", csv_text("".join(f"{16 * k},0,0\n" for k in range(30))), E, ["are they in ms?"]),
+    "times in two columns": ("m.csv", csv_text("0,0,0,0\n1,1,0,0\n", "time [s],t," + BOTH + "\n"), E, ["both times"]),
+    "a unit of time that is none": (
+        "m.csv",
+        csv_text(header=HEADER.replace("time", "time [m]")),
+        E,
+        ["no unit of time"],
+    ),
+    "nothing but units": ("m.csv", csv_text("s,rad,rad\n"), E, ["two samples or more are needed, got 0"]),
     "too short a row": ("m.csv", csv_text(ROWS + "3,0\n"), E, ["row 5 has 2 entries, the header 3"]),
     "too long a row": ("m.csv", csv_text(ROWS + "3,0,0,0\n"), E, ["row 5 has 4 entries, the header 3"]),
     "empty cell": ("m.csv", csv_text(ROWS + "3,,0\n"), E, ["row 5", LEFT, "fill the gap or drop the row"]),
@@ -237,7 +367,7 @@ ODD_FILES = {
     "nothing but lines": ("m.csv", b"\n" * 2_000_003, E, ["2000003 lines, up to 2000000 are read"]),
     "not there": ("m.csv", nothing, N, ["no such file"]),
     "a pipe": ("m.csv", os.mkfifo, N, ["no regular file"]),
-    "unknown ending": ("m.xlsx", csv_text(), U, [".csv, .npz", ".mcap"]),
+    "unknown ending": ("m.docx", csv_text(), U, [".csv, .npz", ".mcap"]),
     "no ending": ("m", csv_text(), U, [".csv"]),
     "a bare folder": ("m", lambda file: file.mkdir(), E, ["without metadata.yaml"]),
     "OpenSim": ("m.mot", opensim(), None, ()),
@@ -317,7 +447,7 @@ ODD_FILES = {
     "NPZ": ("m.npz", npz_bytes(**GOOD_ARRAYS), None, ()),
     "NPZ, no archive": ("m.npz", b"PK\x03\x04 nothing", E, ["no NPZ file"]),
     "NPZ, cut off": ("m.npz", npz_bytes(**GOOD_ARRAYS)[:-30], E, ["no NPZ file"]),
-    "NPZ, a bomb": ("m.npz", bomb, E, ["1024 MiB when unpacked"]),
+    "NPZ, a bomb": ("m.npz", bomb(), E, ["1024 MiB when unpacked"]),
     "NPZ, an array twice": ("m.npz", doubled_member, E, ["stands twice"]),
     "NPZ of objects": (
         "m.npz",
@@ -381,6 +511,62 @@ ODD_FILES = {
     "NPY, code as header": ("m.npy", npy_header("__import__('os').getcwd()"), E, ["no array that can be read"]),
     "NPY, nested header": ("m.npy", npy_header("(" * 5000), E, ["no array that can be read"]),
     "NPY, empty": ("m.npy", b"", E, ["no array that can be read"]),
+    "markers": ("m.trc", "PathFileType\t4\n", E, [".trc files are not read", "inverse kinematics"]),
+    "a skeleton": ("m.bvh", "HIERARCHY\n", E, [".bvh files are not read", "joint angles"]),
+    "an older workbook": ("m.xls", b"\xd0\xcf\x11\xe0", E, ["save it as .xlsx"]),
+    **{
+        f"{kind}, {how}": (f"m.{ending}", content, E, [name])
+        for kind, ending, name in (
+            ("workbook", "xlsx", "no workbook that can be read"),
+            ("Parquet", "parquet", "no Parquet file that can be read"),
+            ("MATLAB", "mat", "no MATLAB file that can be read"),
+            ("HDF5", "h5", "no HDF5 file that can be read"),
+            ("C3D", "c3d", "file"),
+        )
+        for how, content in (
+            ("empty", b""),
+            ("a text", csv_text()),
+            ("bytes at random", np.random.default_rng(2).bytes(5000)),
+            ("cut off", cut_off(ending)),
+        )
+    },
+    "workbook, a bomb": ("m.xlsx", bomb(2**29), E, ["512 MiB when unpacked, up to 256"]),
+    "workbook, empty": ("m.xlsx", workbook(), E, ["empty; a row `time"]),
+    "workbook, two sheets": ("m.xlsx", workbook(SHEET, SHEET), E, ["several sheets have cells", "topic=", "Sheet1"]),
+    "workbook, a text": ("m.xlsx", workbook([*SHEET, [3, "fell", 0]]), E, ["row 5", LEFT, "'fell' is no finite"]),
+    "workbook, a hole": ("m.xlsx", workbook([*SHEET, [3, None, 0]]), E, ["row 5", LEFT, "fill the gap"]),
+    "workbook, a truth": ("m.xlsx", workbook([*SHEET, [3, True, 0]]), E, ["row 5", LEFT, "'True' is no finite"]),
+    "workbook, a formula": ("m.xlsx", workbook([*SHEET, [3, "=1/0", 0]]), E, ["row 5", LEFT, "fill the gap"]),
+    "workbook, beside its names": ("m.xlsx", workbook([*SHEET, [3, 0, 0, 1]]), E, ["row 5", "column 4, which has no"]),
+    "workbook, a far cell": ("m.xlsx", far_cell, E, ["more than 5000000 cells"]),
+    "workbook, a number as name": ("m.xlsx", workbook([["time", 7, RIGHT], [0, 0, 0]]), E, ["has the name 7"]),
+    "workbook": ("m.xlsx", workbook(SHEET), None, ()),
+    "Parquet, texts": ("m.parquet", parquet({"time": [0.0, 1.0], LEFT: ["a", "b"], RIGHT: [0.0, 0.0]}), E, ["'a' is"]),
+    "Parquet, holes": (
+        "m.parquet",
+        parquet({"time": [0.0, 1.0], LEFT: [0.0, None], RIGHT: [0.0, 0.0]}),
+        E,
+        ["sample 1"],
+    ),
+    "Parquet, lists": ("m.parquet", parquet({"time": [0.0, 1.0], LEFT: [[1.0], []], RIGHT: [0.0, 0.0]}), E, [LEFT]),
+    "Parquet of many zeros": ("m.parquet", parquet({"time": ZEROS, LEFT: ZEROS, RIGHT: ZEROS}), E, ["values, up to"]),
+    "MATLAB, nothing": ("m.mat", mat({}), E, ["no motion", "there is nothing"]),
+    "MATLAB, no times": ("m.mat", mat({LEFT: [0.0, 1.0], RIGHT: [0.0, 1.0]}), E, ["no column `time`", "timestep"]),
+    "MATLAB, several lengths": ("m.mat", mat({"time": [0.0, 1.0], LEFT: [0.0, 1.0, 2.0]}), E, ["different lengths"]),
+    "MATLAB, complex": ("m.mat", mat({"time": [0.0, 1.0], LEFT: [1j, 1.0], RIGHT: [0.0, 1.0]}), E, ["no column for"]),
+    "MATLAB, two structures": ("m.mat", mat({"a": {"t": [0.0, 1.0]}, "b": {"t": [0.0, 1.0]}}), E, ["topic=: a, b"]),
+    "MATLAB, names of others": (
+        "m.mat",
+        mat({"data": np.zeros((3, 2)), "names": np.array(["a", "b", "c"], dtype=object)}),
+        E,
+        ["data has 2 columns, and there are 3 names"],
+    ),
+    "MATLAB of many zeros": ("m.mat", mat({"time": np.zeros(2**24 + 1)}, do_compression=True), E, ["values, up to"]),
+    "HDF5 of many zeros": ("m.h5", zeros_of_hdf5, E, ["more than", "values"]),
+    "HDF5, links that lead out": ("m.h5", outward_links, E, ["no motion", "nothing"]),
+    "HDF5, a circle": ("m.h5", circle, E, ["no motion"]),
+    "C3D, frames that are not there": ("m.c3d", c3d_header(frames=60_000), E, ["promises 60000 frames", "cut off"]),
+    "C3D, parameters beyond the end": ("m.c3d", c3d_header(place=200), E, ["its header is damaged"]),
     "bag, no bag": ("m.bag", b"#ROSBAG V2.0\n" + bytes(50), E, ["no bag that can be read"]),
     "bag, empty": ("m.bag", b"", E, ["no bag that can be read"]),
     "bag, cut off": ("m.bag", cut_bag, E, ["no bag that can be read"]),
@@ -446,7 +632,7 @@ def odd_file(case, folder):
         file.write_text(content, encoding="utf-8", newline="")
     elif isinstance(content, bytes):
         file.write_bytes(content)
-    elif content in (bomb, doubled_member):
+    elif content is doubled_member:
         file.write_bytes(content())
     else:
         content(file)

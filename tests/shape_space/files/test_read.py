@@ -123,7 +123,7 @@ def test_files_that_are_not_there_or_no_motion(tmp_path, diver):
     with pytest.raises(InputFileNotFoundError, match="no such file"):
         sp.read_shape_path(tmp_path / "m.csv", diver)
     with pytest.raises(UnknownNameError, match=r"\.csv, \.npz"):
-        sp.read_shape_path(tmp_path / "m.xlsx", diver)
+        sp.read_shape_path(tmp_path / "m.docx", diver)
     (tmp_path / "m.npz").write_bytes(b"PK nothing")
     with pytest.raises(TrajectoryError, match="no NPZ file"):
         sp.read_shape_path(tmp_path / "m.npz", diver)
@@ -208,7 +208,7 @@ def test_options_that_do_not_fit_the_file_are_refused(tmp_path, diver):
 
 
 def test_a_yaml_file_of_too_many_entries_is_refused(tmp_path, diver, monkeypatch):
-    monkeypatch.setattr("shapephase.shape_space.files._strict_yaml._MOST_ENTRIES", 100)
+    monkeypatch.setattr("shapephase.shape_space.files.formats.strict_yaml._MOST_ENTRIES", 100)
     (tmp_path / "m.yaml").write_text(points(*[("[0, 0]", str(k)) for k in range(20)]))
     with pytest.raises(TrajectoryError, match="more than 100 entries; use NPZ or a bag"):
         read_recorded_motion(tmp_path / "m.yaml", diver)

@@ -1,8 +1,9 @@
-"""Columns of a recording matched to the joints of a body by name, in SI units; what is doubtful is warned of."""
+"""Columns of a recording matched to the joints of a body by name, in SI units; what is doubtful is asked or told."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,157 +12,232 @@ from ... import so3
 from ...arrays import FARTHEST, Array
 from ...body.body import Body
 from ...errors import TrajectoryError, UnknownColumnError, unknown_name
-from ._recording import Recording, warn
+from ._labels import ANGLES, LENGTHS, SI, Label, in_square_brackets, label, quantity
+from ._recording import Recording
+from ._unit_doubts import check_unit, warn_of_values
 
-_DEGREES = "_deg"
-_LONGEST_NAME = 256
+LONGEST_NAME = 256
 """Characters of a column's name, as of a joint's name in a body's file."""
-_MOST_SHOWN = 200
-"""Columns that an error about an unknown one lists."""
 _QUATERNIONS = (("qx", "qy", "qz", "qw"), ("base_qx", "base_qy", "base_qz", "base_qw"))
 _POSITION = ("base_x_m", "base_y_m", "base_z_m")
 # In the tables that `Motion.write_csv` writes; they follow from the rest.
 _FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
 _BASE = {*_QUATERNIONS[0], *_QUATERNIONS[1], *_POSITION, *_FOLLOWING}
+_STILL = 1e-9
+"""Range of a coordinate [rad, m or degrees] below which it was locked."""
+_SAME = 1e-6
+"""Difference of two coordinates, relative to their range: what printed digits leave of one that follows another."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointChoices:
+    """How columns become joints: what a caller has said, checked.
+
+    Attributes
+    ----------
+    names : label -> name of the joint, with a unit if need be; None for a column to be left out
+    degrees : whether turning joints are in degrees; None: as the file says. A sliding joint never is
+    rest : joint -> value [rad or m] or a text with its unit, of joints without a column
+    rest_missing : whether joints without a column rest at zero, or at the limit that is nearest to it
+    ignore_extra : whether columns that are no joints are left out
+    """
+
+    names: Mapping[str, str | None]
+    degrees: bool | None = None
+    rest: Mapping[str, float | str] | None = None
+    rest_missing: bool = False
+    ignore_extra: bool = False
 
 
 class Matched(NamedTuple):
-    """Shapes (N, n) [rad or m] in the body's order; attitude (N, 3, 3) and position (N, 3) [m] of the base or None."""
+    """The motion of a body's joints that a recording holds.
+
+    Attributes
+    ----------
+    shapes : (N, n) [rad or m] in the body's order
+    base_attitude : (N, 3, 3) or None
+    base_position : (N, 3) [m] or None
+    columns : joint -> the label of its column
+    units : joint -> the unit in which its column was read
+    at_rest : joint -> where it rests [rad or m], of joints without a column
+    left_out : label -> why it was left out
+    """
 
     shapes: Array
     base_attitude: Array | None
     base_position: Array | None
+    columns: dict[str, str]
+    units: dict[str, str]
+    at_rest: dict[str, float]
+    left_out: dict[str, str]
 
 
-def matched(recording: Recording, body: Body, names: Mapping[str, str | None] | None, degrees: bool | None) -> Matched:
+def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     """The shapes of a body that a recording holds.
-
-    Parameters
-    ----------
-    names : name in the file -> name of the joint, or None for a column to be left out
-    degrees : whether turning joints are in degrees; None: as the file says. A sliding joint is in metres always, a
-        column `<joint>_deg` in degrees.
 
     Raises
     ------
     UnknownNameError
         If a column is no joint of the body.
     TrajectoryError
-        If a joint is missing or doubled, a value is no possible coordinate, a limited joint turns so far that its
-        angles look like degrees, or a quaternion is not of unit length.
+        If a joint is missing or doubled, a value is no number or no possible coordinate, a quaternion is not of unit
+        length, or the unit of a column can only be guessed.
 
     Warns
     -----
     TrajectoryWarning
         Where a joint leaves its limits, or jumps by about a whole turn from one sample to the next.
     """
-    for name in recording.columns:
-        if len(name) > _LONGEST_NAME:
-            raise TrajectoryError(f"{recording.where}: a column's name has {len(name)} characters: {name[:40]!r}...")
-    for name in names or ():
-        if name not in recording.columns:
-            raise unknown_name(f"column of {recording.where} in names", name, list(recording.columns)[:_MOST_SHOWN])
+    table, where = recording.table, recording.table.where
+    for text in table.columns:
+        if len(text) > LONGEST_NAME:
+            raise TrajectoryError(f"{where}: a column's name has {len(text)} characters: {text[:40]!r}...")
     shapes = np.empty((len(recording.times), body.n_shape))
     found: dict[int, str] = {}
+    units: dict[str, str] = {}
+    known: set[int] = set()
     base: dict[str, Array] = {}
-    for name, values in recording.columns.items():
-        target = names.get(name, name) if names else name
+    left_out: dict[str, str] = {}
+    for text, values in table.columns.items():
+        target = choices.names.get(text, text)
         if target is None:
+            left_out[text] = "as told by names"
             continue
         if target in _BASE and target not in body.joint_names:
+            table.check_column(text)
             base[target] = values
             continue
-        joint, factor = _joint_of(name, target, body, recording, degrees)
+        resolved = _resolved(target, body)
+        if resolved is None:
+            left_out[text] = _why_left_out(text, target, recording, body, choices)
+            continue
+        joint = body.joint_names.index(resolved.name)
+        unit, stated = _unit(text, resolved, joint, body, recording, choices.degrees)
         if joint in found:
-            raise TrajectoryError(
-                f"{recording.where}: columns {found[joint]!r} and {name!r} are the same joint; keep one"
-            )
-        found[joint] = name
-        shapes[:, joint] = factor * values
-    missing = [name for i, name in enumerate(body.joint_names) if i not in found]
-    if missing:
+            raise TrajectoryError(f"{where}: columns {found[joint]!r} and {text!r} are the same joint; keep one")
+        table.check_column(text)
+        found[joint] = text
+        units[body.joint_names[joint]] = unit
+        known |= {joint} if stated else set()
+        shapes[:, joint] = (ANGLES | LENGTHS)[unit] * values
+    at_rest = _rest_of_missing(found, body, where, choices)
+    for name, value in at_rest.items():
+        shapes[:, body.joint_index(name)] = value
+    for joint in range(body.n_shape):
+        _check_reach(shapes[:, joint], joint, body, recording)
+        if joint in found and joint not in known:
+            check_unit(shapes[:, joint], joint, body, recording)
+    for joint in range(body.n_shape):
+        warn_of_values(shapes[:, joint], joint, body, recording)
+    attitude, position = _base(base, recording)
+    columns = {body.joint_names[joint]: text for joint, text in found.items()}
+    return Matched(shapes, attitude, position, columns, units, at_rest, left_out)
+
+
+def _resolved(target: str, body: Body) -> Label | None:
+    """The joint and the unit that a name stands for, or None."""
+    if target in body.joint_names:
+        return Label(target, None)
+    parts = label(target)
+    return parts if parts.name in body.joint_names else None
+
+
+def _why_left_out(text: str, target: str, recording: Recording, body: Body, choices: JointChoices) -> str:
+    """Why a column that is no joint is left out; UnknownColumnError if nobody has said that it may be."""
+    table = recording.table
+    if text not in choices.names:
+        if choices.ignore_extra:
+            return "no joint of the body"
+        if table.format.startswith("OpenSim") and np.isfinite(values := table.columns[text]).all():
+            if np.ptp(values) <= _STILL:
+                return f"locked at {values[0]:.6g}"
+            for other, those in table.columns.items():
+                if other != text and np.ptp(those - values) <= _SAME * np.ptp(values) and other in text:
+                    return f"coupled to {other}"
+    unit = in_square_brackets(target)
+    if unit is not None and target[: target.rindex("[")].strip() in body.joint_names:
+        units = ", ".join([*ANGLES, *LENGTHS])
+        raise TrajectoryError(f"{table.where}: column {text!r}: no unit {unit!r:.40} is known; these are: {units}")
+    kind = f"column in {table.where}; joint of {body.name}"
+    error = unknown_name(kind, target, body.joint_names, UnknownColumnError)
+    if text in choices.names:
+        raise error
+    raise UnknownColumnError(
+        f"{error}. Columns that are no joints are left out with ignore_extra=True (--ignore-extra); "
+        "names={column: joint} (--names COLUMN=JOINT) says which joint one is"
+    )
+
+
+def _unit(
+    text: str, target: Label, joint: int, body: Body, recording: Recording, degrees: bool | None
+) -> tuple[str, bool]:
+    """The unit of a column, and whether the caller or its header has said it."""
+    table, name = recording.table, body.joint_names[joint]
+    turns = body.joint_units[joint] == "rad"
+    # A column keeps its unit when it is given another name.
+    own = table.units.get(text) or (label(text).unit if text not in body.joint_names else None)
+    said = target.unit or own
+    if target.unit and own and target.unit != own:
+        raise TrajectoryError(f"{table.where}: column {text!r} is in {own}, and names says {target.unit}")
+    if said == SI:
+        said = body.joint_units[joint]
+    if said is not None and said not in (ANGLES if turns else LENGTHS):
+        spelled = "degrees" if said == "deg" else said
+        moves = "turns and is in rad or degrees" if turns else "slides and is in metres"
+        raise TrajectoryError(f"{table.where}: column {text!r} is in {spelled}, but joint {name} {moves}")
+    if not turns:
+        return said or "m", said is not None
+    if said is not None and degrees is not None and degrees != (said == "deg"):
+        spelled = "degrees" if said == "deg" else said
         raise TrajectoryError(
-            f"{recording.where}: no column for {', '.join(missing)}; add them (zeros where the joint rests). Joints of "
+            f"{table.where}: column {text!r} is in {spelled} by its name, and degrees={degrees} was given"
+        )
+    if said is not None:
+        return said, True
+    if degrees is not None:
+        return "deg" if degrees else "rad", True
+    if table.degrees is None:
+        raise TrajectoryError(
+            f"{table.where}: the header does not say inDegrees=yes or no; add that, or give degrees=True or False "
+            "(--degrees, --radians)"
+        )
+    return "deg" if table.degrees else "rad", table.degrees
+
+
+def _rest_of_missing(found: Mapping[int, str], body: Body, where: str, choices: JointChoices) -> dict[str, float]:
+    """Joint -> where it rests, of the joints without a column."""
+    at_rest: dict[str, float] = {}
+    for name, value in (choices.rest or {}).items():
+        joint = body.joint_index(name)
+        if joint in found:
+            raise TrajectoryError(f"{where}: rest: joint {name} has a column, {found[joint]!r}; leave one of them out")
+        at_rest[name] = quantity(value, body.joint_units[joint], f"rest of joint {name}")
+    missing = [name for i, name in enumerate(body.joint_names) if i not in found and name not in at_rest]
+    if choices.rest_missing:
+        limits = {name: body.joint_limits[body.joint_index(name)] for name in missing}
+        at_rest |= {name: float(np.clip(0.0, *limits[name])) for name in missing}
+    elif missing:
+        raise TrajectoryError(
+            f"{where}: no column for {', '.join(missing)}; add them (zeros where the joint rests), or say where they "
+            "rest: rest={joint: value} (--rest JOINT=VALUE), or rest_missing=True (--rest-missing) for zero. Joints of "
             f"{body.name}: {', '.join(body.joint_names)}"
         )
-    for joint in range(body.n_shape):
-        _check_joint(shapes[:, joint], joint, body, recording, degrees)
-    attitude, position = _base(base, recording)
-    return Matched(shapes, attitude, position)
+    return {name: at_rest[name] for name in body.joint_names if name in at_rest}
 
 
-def _joint_of(name: str, target: str, body: Body, recording: Recording, degrees: bool | None) -> tuple[int, float]:
-    """The joint of a column and the factor to SI units."""
-    plain = target if target in body.joint_names else target.removesuffix(_DEGREES)
-    if plain not in body.joint_names:
-        raise unknown_name(
-            f"column in {recording.where}; joint of {body.name}", target, body.joint_names, UnknownColumnError
-        )
-    joint = body.joint_names.index(plain)
-    # A column keeps its unit when it is given another name.
-    by_name = plain != target or (name != target and name.endswith(_DEGREES))
-    if body.joint_units[joint] != "rad":
-        if by_name:
-            raise TrajectoryError(
-                f"{recording.where}: column {name!r} is in degrees, but joint {plain} slides and is in metres"
-            )
-        return joint, 1.0
-    if by_name and degrees is False:
-        raise TrajectoryError(
-            f"{recording.where}: column {name!r} is in degrees by its name, and degrees=False was given"
-        )
-    in_degrees = recording.degrees if degrees is None else degrees
-    if in_degrees is None and not by_name:
-        raise TrajectoryError(
-            f"{recording.where}: the header does not say inDegrees=yes or no; add that, or give degrees=True or False"
-        )
-    return joint, np.pi / 180.0 if by_name or in_degrees else 1.0
-
-
-def _check_joint(values: Array, joint: int, body: Body, recording: Recording, degrees: bool | None) -> None:
-    name, unit = body.joint_names[joint], body.joint_units[joint]
-    lower, upper = body.joint_limits[joint]
+def _check_reach(values: Array, joint: int, body: Body, recording: Recording) -> None:
     largest = int(np.argmax(np.abs(values)))
     if abs(values[largest]) > FARTHEST:
+        name, unit = body.joint_names[joint], body.joint_units[joint]
         raise TrajectoryError(
             f"{recording.place(largest)}: joint {name} is at {values[largest]:.6g} {unit}; up to {FARTHEST:g} {unit} "
             "can be represented to full accuracy"
         )
-    beyond = np.maximum(lower - values, values - upper)
-    worst = int(np.argmax(beyond))
-    outside = beyond[worst] > 1e-9 * max(1.0, abs(values[worst]))
-    limited = unit == "rad" and np.isfinite([lower, upper]).all()
-    if outside and limited and degrees is None and abs(values[largest]) > 4.0 * np.pi:
-        raise TrajectoryError(
-            f"{recording.place(largest)}: joint {name} is at {values[largest]:.6g} rad, its limits are {lower:.4g} and "
-            f"{upper:.4g} rad: degrees? Name the column {name}{_DEGREES} or give degrees=True; for radians, give "
-            "degrees=False"
-        )
-    if outside:
-        count = int(np.count_nonzero(beyond > 0.0))
-        warn(
-            f"{recording.place(worst)}: joint {name} is at {values[worst]:.6g} {unit}, outside its limits {lower:.6g} "
-            f"to {upper:.6g} {unit} (in {count} of {len(values)} {recording.row}s); check the file's units and signs"
-        )
-    if body.continuous[joint]:
-        _check_turns(values, name, recording)
-
-
-def _check_turns(values: Array, name: str, recording: Recording) -> None:
-    """Warn where a joint that turns without end jumps by about 2 pi: it is read as written, as a turn."""
-    jumps = np.diff(values)
-    turns = np.flatnonzero((np.abs(jumps) > 1.5 * np.pi) & (np.abs(jumps) < 2.5 * np.pi))
-    if len(turns):
-        i = int(turns[0])
-        warn(
-            f"{recording.place(i + 1)}: joint {name} jumps by {jumps[i]:.6g} rad from {recording.row} "
-            f"{recording.rows[i]} and is taken to make this whole turn; where the angles were wrapped to one turn, "
-            "unwrap them first (numpy.unwrap)"
-        )
 
 
 def _base(columns: dict[str, Array], recording: Recording) -> tuple[Array | None, Array | None]:
-    quaternions, positions = recording.base_quat_xyzw, recording.base_position
+    table = recording.table
+    quaternions, positions = table.base_quat_xyzw, table.base_position
     for group in (*_QUATERNIONS, _POSITION):
         there = [name for name in group if name in columns]
         if not there:
@@ -169,13 +245,13 @@ def _base(columns: dict[str, Array], recording: Recording) -> tuple[Array | None
         if len(there) < len(group):
             lacking = ", ".join(name for name in group if name not in columns)
             raise TrajectoryError(
-                f"{recording.where}: base motion with {', '.join(there)}, without {lacking}; add it or leave them out"
+                f"{table.where}: base motion with {', '.join(there)}, without {lacking}; add it or leave them out"
             )
         values = np.stack([columns[name] for name in group], axis=-1)
         if group is _POSITION:
             positions = values
         elif quaternions is not None:
-            raise TrajectoryError(f"{recording.where}: the attitude of the base stands twice, as qx and as base_qx")
+            raise TrajectoryError(f"{table.where}: the attitude of the base stands twice, as qx and as base_qx")
         else:
             quaternions = values
     attitude = None if quaternions is None else _attitude(quaternions, recording)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import math
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from ...arguments import check_time_steps
-from ...arrays import Array
+from ...arrays import Array, Integers
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 
 MOST_BYTES = 256 * 2**20
@@ -21,36 +21,84 @@ _UNEVEN_STEPS = 100.0
 """A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """The columns of a motion file.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Table:
+    """What a reader found in a file, under the labels that columns have there.
 
     Attributes
     ----------
     where : the file, for messages
     format : the kind of file, for people
-    times : (N,) from 0 [s]
-    columns : name in the file -> (N,)
-    row : the word for a sample in messages, "row" or "point"
+    columns : label -> (N,) as they stand there; NaN where no number does
     rows : (N,) the numbers of the samples in messages
+    row : the word for a sample in messages, "row" or "point"
+    times : (N,) [s]; None: one of the columns has them
+    clock : (N,) as the file tells the time; None: these times, or that column
+    by_format : whether the kind of file itself says that times are in seconds, and angles in radians or `degrees`
     degrees : whether turning joints are in degrees; None: the file ought to say so and does not
+    units : label -> unit, where it is said elsewhere than in the label
+    faults : label -> sample -> what stands there and is no number, of the first of them
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
     """
 
     where: str
     format: str
-    times: Array
     columns: dict[str, Array]
-    row: str
     rows: Sequence[int]
+    row: str = "row"
+    times: Array | None = None
+    clock: Array | None = None
+    by_format: bool = False
     degrees: bool | None = False
+    units: Mapping[str, str] = field(default_factory=dict)
+    faults: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     base_quat_xyzw: Array | None = None
     base_position: Array | None = None
 
+    def check_column(self, label: str) -> None:
+        """Raise TrajectoryError for the first entry of a column that is no finite number."""
+        bad = np.flatnonzero(~np.isfinite(self.columns[label]))
+        if len(bad):
+            text = self.faults.get(label, {}).get(int(bad[0]), str(self.columns[label][bad[0]]))
+            raise no_number(text, f"{self.where}: {self.row} {self.rows[int(bad[0])]}, column {label!r}")
+
+    def kept(self, samples: Integers) -> Table:
+        """Some of the samples, by their places."""
+        places = samples.tolist()
+        new = {old: k for k, old in enumerate(places)}
+        faults = {
+            label: {new[k]: text for k, text in found.items() if k in new} for label, found in self.faults.items()
+        }
+        part = {
+            name: None if (values := getattr(self, name)) is None else values[samples]
+            for name in ("times", "clock", "base_quat_xyzw", "base_position")
+        }
+        columns = {label: values[samples] for label, values in self.columns.items()}
+        return replace(self, columns=columns, rows=[self.rows[k] for k in places], faults=faults, **part)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A table whose times are known.
+
+    Attributes
+    ----------
+    table : the columns, without that of the times
+    times : (N,) from 0 [s]
+    first, last : of the times kept, as the file tells them
+    time_unit : in which the file tells them
+    """
+
+    table: Table
+    times: Array
+    first: float
+    last: float
+    time_unit: str
+
     def place(self, index: int) -> str:
         """The file and the sample, for messages."""
-        return f"{self.where}: {self.row} {self.rows[index]}"
+        return f"{self.table.where}: {self.table.row} {self.table.rows[index]}"
 
 
 def warn(message: str) -> None:
@@ -119,10 +167,15 @@ def number(entry: str, place: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        text = entry.strip()
-        shown = repr(text if len(text) < 40 else text[:40] + "...")
-        raise TrajectoryError(f"{place}: {shown} is no finite number{_way_out(text)}")
+        raise no_number(entry, place)
     return float(value)
+
+
+def no_number(entry: str, place: str) -> TrajectoryError:
+    """The error for what is no finite number."""
+    text = entry.strip()
+    shown = repr(text if len(text) < 40 else text[:40] + "...")
+    return TrajectoryError(f"{place}: {shown} is no finite number{_way_out(text)}")
 
 
 def plain_numbers(entries: Sequence[str]) -> list[float] | None:
@@ -189,6 +242,4 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
 def _way_out(text: str) -> str:
     if not text or text.lower() in ("nan", ".nan", "na", "null", "none", "~"):
         return "; fill the gap or drop the row"
-    if text.count(",") == 1 and text.replace(",", "").lstrip("+-").isdigit():
-        return "; write the decimal comma as a point"
     return ""

@@ -8,28 +8,31 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_object
+from ...arguments import check_object, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
-from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
+from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
 from ..shape_path import ShapePath
-from ._joint_columns import matched
-from ._motion_arrays import read_arrays
-from ._motion_tables import read_delimited, read_opensim
-from ._recording import Recording, digest
-from ._ros_motion_files import read_bag, read_ros_yaml
+from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
+from ._labels import SI, mapping_argument
+from ._recording import Recording, Table
+from ._inputs import read_input
+from ._times import doubtful_steps, recording_of, trim_argument
+from ._unit_doubts import doubtful_turns
+from .mapping_files import read_names
 from .smoothing import smoothed_path
 
 _WRITTEN = (".csv", ".npz", ".tsv")
-_TABLES = {".csv": read_delimited, ".tsv": read_delimited, ".mot": read_opensim, ".sto": read_opensim}
-_ARRAYS = (".npz", ".npy")
-_YAML = (".yaml", ".yml")
-_BAGS = (".bag", ".mcap", ".db3")
+_MOST_SHOWN = 200
+"""Columns that an error about an unknown one lists."""
+_MOST_SAMPLES = 2_000_000
+"""Memory: samples of a path that is resampled, as lines of a table."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +42,13 @@ class RecordedMotion:
     Attributes
     ----------
     path : the joints of the body, in its order; it carries the SHA-256 of the file
-    residual : (n,) rms of the samples minus the path [rad or m]; zero without smoothing
+    residual : (n,) rms of the samples minus the path [rad or m]; zero where it goes through all of them
     times : (N,) of the samples, from 0 [s]
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
     format : the kind of file
+    record : what was read and what was done to it, as JSON can hold it: the file with its hash, samples and times,
+        columns and units of joints, where the others rest, what was left out, smoothed, resampled
     """
 
     path: ShapePath
@@ -52,46 +57,68 @@ class RecordedMotion:
     base_attitude: Array | None
     base_position: Array | None
     format: str
+    record: Mapping[str, Any]
 
 
 def read_recorded_motion(
-    file: str | os.PathLike[str],
+    file: Any,
     body: Body,
     *,
-    names: Mapping[str, str | None] | None = None,
+    names: Mapping[str, str | None] | str | os.PathLike[str] | None = None,
+    degrees: bool | None = None,
+    time_unit: str | None = None,
+    timestep: float | None = None,
+    topic: str | None = None,
+    rest: Mapping[str, float | str] | None = None,
+    rest_missing: bool = False,
+    ignore_extra: bool = False,
+    trim: tuple[float, float] | None = None,
+    resample: float | None = None,
     smooth: float | Mapping[str, float] | None = None,
     periodic: bool | None = None,
-    degrees: bool | None = None,
-    topic: str | None = None,
-    timestep: float | None = None,
 ) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
     By the file's ending:
 
-    - `.csv`, `.tsv`: the header `time,<joint names>` in any order, `_deg` behind a name for degrees, separated by
-      commas, tabs or semicolons; the base as `qx,qy,qz,qw` and `base_x_m,base_y_m,base_z_m`.
+    - `.csv`, `.tsv`, `.txt`: a header `time,<joint names>` in any order, separated by commas, tabs or semicolons;
+      decimal points or decimal commas; the base as `qx,qy,qz,qw` and `base_x_m,base_y_m,base_z_m`.
+    - `.xlsx`: such a table in a sheet of Excel. `.parquet`: such a table, also of pandas.
+    - `.mot`, `.sto`: OpenSim; its header says whether turning coordinates are in degrees. Locked coordinates and
+      coupled ones that are no joints of the body are left out.
+    - `.mat`, `.h5`: vectors `time` and one for each joint, or a matrix `shapes` beside `joint_names`; on top or in a
+      structure.
+    - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on; no markers.
     - `.npz`: `time` (N,), `shapes` (N, n), `joint_names` (n,); the base as `base_quat_xyzw` (N, 4), `base_position`
       (N, 3).
-    - `.mot`, `.sto`: OpenSim; its header says whether turning coordinates are in degrees.
     - `.yaml`: ROS, a `JointTrajectory`, also inside a goal, or `JointState` messages one after the other.
     - `.bag`, `.mcap`, `.db3`, a rosbag2 folder: messages of these two types. A trajectory's velocities are not used.
     - `.npz` with `qpos` and `time` or `timestep`, or `.npy` with the argument `timestep`: MuJoCo. With a free joint,
       the first seven columns are x y z and the quaternion w x y z; then one column for each joint, by the array
       `joint_names` or, without it, **in the order of `body.joint_names`**, which a MuJoCo model may not have.
 
-    Every joint of the body must be there; times are in seconds. Angles are taken as written: a joint that turns
-    without end is not unwrapped.
+    Units stand in the labels, as `knee [deg]`, `knee (deg)`, `knee_deg`, `boom [mm]`, `Time [ms]`, or in a row of
+    units below them. Without, times are in seconds, angles in radians and lengths in metres; where they look like
+    milliseconds, degrees or millimetres, this is an error that says how to tell. Angles are taken as written: a
+    joint that turns without end is not unwrapped.
 
     Parameters
     ----------
-    names : name in the file -> name of the joint; None instead of a joint leaves the column out
+    file : name of a file, "-" for standard input, a pandas `DataFrame`, or a `Dataset` or `DataArray` of xarray
+    names : name in the file -> name of the joint, also with a unit as `"boom [mm]"`, or "time"; None instead of a
+        joint leaves the column out; or the name of a file with them, see `read_names`
+    degrees : whether turning joints are in degrees, above what the file says; None: as the file says
+    time_unit : of the times: "s", "ms", "us", "ns" or "min"; None: as the file says
+    timestep : between samples, for a file without times [s]
+    topic : which part of a file with more than one motion: topic of a bag, sheet of a workbook, structure of a `.mat`
+    rest : joint -> value [rad or m], or a text as "30deg" or "5 mm", for joints without a column
+    rest_missing : whether all other joints without a column rest at zero, or at their limit next to it
+    ignore_extra : whether columns that are no joints are left out
+    trim : the first and the last time to be kept, as the file tells the time (its unit, its start)
+    resample : the path goes through this many of its own values a second instead, evenly spaced [1/s]
     smooth : noise level of the samples, rms [rad or m], one for all joints or by joint (the others are interpolated);
         None: the path goes through all samples. See `smoothing.smoothed_path`.
     periodic : smooth where the end meets the start; None: when the last sample equals the first to 1e-9
-    degrees : whether turning joints are in degrees, above what the file says; None: as the file says
-    topic : of a bag with more than one motion
-    timestep : of a `qpos` file without times [s]
 
     Raises
     ------
@@ -100,9 +127,9 @@ def read_recorded_motion(
     UnknownNameError
         If a column is no joint of the body, or the file's ending is unknown.
     TrajectoryError
-        For any other fault of the file; row and column or joint are named.
+        For any other fault of the file; row and column or joint are named. For a unit that can only be guessed.
     MissingExtraError
-        For a ROS file without the extra `ros`.
+        For ROS without the extra `ros`; for `.xlsx`, `.parquet`, `.c3d`, HDF5 without the extra `data`.
 
     Warns
     -----
@@ -110,40 +137,84 @@ def read_recorded_motion(
         For what can be read and is probably not meant: limits left, gaps, jumps of a whole turn.
     """
     check_object(body, "Body", "body")
-    where = Path(file)
-    recording = _read(where, body, topic, timestep)
-    motion = matched(recording, body, names, degrees)
+    kept = trim_argument(trim)
+    rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
+    given, step = read_input(file, body, topic, timestep)
+    table = given.table
+    mapping = _mapping(read_names(names) if isinstance(names, str | os.PathLike) else names, table)
+    recording = recording_of(table, body.joint_names, mapping, time_unit, step, kept)
+    choices = JointChoices(
+        names=mapping, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
+    )
+    motion = matched(recording, body, choices)
     try:
         noise = _noise_levels(smooth, body)
         path, residual = smoothed_path(recording.times, motion.shapes, noise, periodic, body.joint_names)
     except (TrajectoryError, ShapeError) as error:
-        raise TrajectoryError(f"{where}: {error}") from None
-    if smooth is None:
+        raise TrajectoryError(f"{table.where}: {error}") from None
+    if rate is not None:
+        path = _resampled(path, rate, table.where)
+    if smooth is None and rate is None:
         residual = np.zeros(body.n_shape)
-    path = replace(path, sha256=digest(where))
-    return RecordedMotion(path, residual, recording.times, motion.base_attitude, motion.base_position, recording.format)
+    elif rate is not None:
+        residual = np.sqrt(np.mean((motion.shapes - path.shape(recording.times)) ** 2, axis=0))
+    record = {
+        "file": given.name,
+        "sha256": given.sha256,
+        "samples_in_file": len(table.rows),
+        **_record(recording, motion),
+        "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
+        "resampled_to_hz": None if rate is None else (len(path.breaks) - 1) / path.duration,
+    }
+    path = replace(path, sha256=given.sha256)
+    return RecordedMotion(
+        path=path,
+        residual=residual,
+        times=recording.times,
+        base_attitude=motion.base_attitude,
+        base_position=motion.base_position,
+        format=table.format,
+        record=record,
+    )
 
 
 def read_shape_path(
-    file: str | os.PathLike[str],
+    file: Any,
     body: Body,
     *,
-    names: Mapping[str, str | None] | None = None,
+    names: Mapping[str, str | None] | str | os.PathLike[str] | None = None,
+    degrees: bool | None = None,
+    time_unit: str | None = None,
+    timestep: float | None = None,
+    topic: str | None = None,
+    rest: Mapping[str, float | str] | None = None,
+    rest_missing: bool = False,
+    ignore_extra: bool = False,
+    trim: tuple[float, float] | None = None,
+    resample: float | None = None,
     smooth: float | Mapping[str, float] | None = None,
     periodic: bool | None = None,
-    degrees: bool | None = None,
-    topic: str | None = None,
-    timestep: float | None = None,
 ) -> ShapePath:
     """The path of `read_recorded_motion`: a C2 spline, periodic where the last sample equals the first.
 
     Kinds of file, parameters and errors as there.
     """
-    check_object(body, "Body", "body")
-    motion = read_recorded_motion(
-        file, body, names=names, smooth=smooth, periodic=periodic, degrees=degrees, topic=topic, timestep=timestep
-    )
-    return motion.path
+    return read_recorded_motion(
+        file,
+        body,
+        names=names,
+        degrees=degrees,
+        time_unit=time_unit,
+        timestep=timestep,
+        topic=topic,
+        rest=rest,
+        rest_missing=rest_missing,
+        ignore_extra=ignore_extra,
+        trim=trim,
+        resample=resample,
+        smooth=smooth,
+        periodic=periodic,
+    ).path
 
 
 def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: ArrayLike | None = None) -> None:
@@ -152,6 +223,9 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     Parameters
     ----------
     times : (N,) of the samples [s]; None: `path.sample_times`. A spline is read back as it was.
+
+    Labels of a table say a unit, `[s]` or `[SI]` (rad or m), where `read_shape_path` would ask for it: of times more
+    than a second apart, and of joints that turn more than two times.
 
     Raises
     ------
@@ -175,28 +249,47 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
         return
     text = io.StringIO()
     writer = csv.writer(text, delimiter="\t" if suffix == ".tsv" else ",", lineterminator="\n")
-    writer.writerow(["time", *path.joint_names])
+    turning = np.abs(shapes).max(axis=0) > 2.0 * np.pi
+    labels = [
+        f"{name} [{SI}]" if turning[k] or doubtful_turns(shapes[:, k]) else name
+        for k, name in enumerate(path.joint_names)
+    ]
+    writer.writerow(["time [s]" if len(t) > 1 and doubtful_steps(t) else "time", *labels])
     writer.writerows([[repr(float(v)) for v in row] for row in np.column_stack([t, shapes])])
     write_whole(where, lambda stream: stream.write(text.getvalue().encode()))
 
 
-def _read(where: Path, body: Body, topic: str | None, timestep: float | None) -> Recording:
-    suffix = where.suffix.lower()
-    bag = suffix in _BAGS or os.path.isdir(where)
-    if not bag and suffix not in (*_TABLES, *_ARRAYS, *_YAML):
-        kinds = (".csv", ".npz", *_TABLES, *_ARRAYS, *_YAML, *_BAGS)
-        raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
-    if not os.path.exists(where):
-        raise InputFileNotFoundError(f"{where}: there is no such file")
-    if topic is not None and not bag:
-        raise TrajectoryError(f"{where}: topic={topic!r} is for bags; this file has no topics")
-    if timestep is not None and suffix not in _ARRAYS:
-        raise TrajectoryError(f"{where}: timestep is for MuJoCo's qpos without times; this file has its times")
-    if bag:
-        return read_bag(where, topic)
-    if suffix in _YAML:
-        return read_ros_yaml(where)
-    return read_arrays(where, body.joint_names, timestep) if suffix in _ARRAYS else _TABLES[suffix](where)
+def _mapping(names: Mapping[str, str | None] | None, table: Table) -> dict[str, str | None]:
+    """A user's mapping by the labels of a table. Raises UnknownNameError for a column that is not there."""
+    labels = [text for text in table.columns if len(text) <= LONGEST_NAME]
+    try:
+        return mapping_argument(names, labels)
+    except KeyError as error:
+        raise unknown_name(f"column of {table.where} in names", error.args[0], labels[:_MOST_SHOWN]) from None
+
+
+def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
+    """What was read, as JSON can hold it."""
+    return {
+        "format": recording.table.format,
+        "samples": len(recording.times),
+        "first_time": recording.first,
+        "last_time": recording.last,
+        "time_unit": recording.time_unit,
+        "columns": motion.columns,
+        "units": motion.units,
+        "at_rest": motion.at_rest,
+        "left_out": motion.left_out,
+    }
+
+
+def _resampled(path: ShapePath, rate: float, where: str) -> ShapePath:
+    """The spline through evenly spaced values of a path, about so many a second."""
+    count = max(round(path.duration * rate), 2)
+    if count > _MOST_SAMPLES:
+        raise TrajectoryError(f"{where}: resample: {count} samples; up to {_MOST_SAMPLES} are made")
+    times = np.linspace(0.0, path.duration, count + 1)
+    return ShapePath.spline(times, path.shape(times), joint_names=path.joint_names)
 
 
 def _noise_levels(smooth: float | Mapping[str, float] | None, body: Body) -> Array:

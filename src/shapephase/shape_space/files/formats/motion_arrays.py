@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array, finite_array
-from ...errors import ShapeError, TrajectoryError
-from ...files import npy_array, npz_arrays
-from ._recording import MOST_BYTES, Recording, file_bytes, times_from_zero
+from ....arrays import Array, finite_array
+from ....errors import ShapeError, TrajectoryError
+from ....files import npy_array, npz_arrays
+from .._recording import MOST_BYTES, Table
 
 # Entries of a free joint in MuJoCo's qpos: a position and a quaternion.
 _FREE_JOINT = 7
@@ -19,7 +19,7 @@ _FREE_JOINT = 7
 _SCALAR_FIRST = [1, 2, 3, 0]
 
 
-def read_arrays(where: Path, joint_names: Sequence[str], timestep: float | None) -> Recording:
+def read_arrays(where: Path, data: bytes, joint_names: Sequence[str], timestep: float | None) -> Table:
     """An NPZ file with `shapes`, `time`, `joint_names`, or with MuJoCo's `qpos`; an NPY file is `qpos` alone.
 
     Of `qpos` (N, 7 + n), the first seven columns are the free joint, x y z and the quaternion w x y z, MuJoCo's
@@ -34,10 +34,9 @@ def read_arrays(where: Path, joint_names: Sequence[str], timestep: float | None)
 
     Raises
     ------
-    InputFileNotFoundError, TrajectoryError
-        For a file that is not there; for faults, with the array and the entry.
+    TrajectoryError
+        For faults, with the array and the entry.
     """
-    data = file_bytes(where)
     arrays = {"qpos": _loaded(data, where)} if where.suffix.lower() == ".npy" else _members(data, where)
     try:
         if "qpos" in arrays:
@@ -49,7 +48,7 @@ def read_arrays(where: Path, joint_names: Sequence[str], timestep: float | None)
         raise TrajectoryError(str(error)) from None
 
 
-def _shapes(arrays: dict[str, Any], where: Path) -> Recording:
+def _shapes(arrays: dict[str, Any], where: Path) -> Table:
     for name in ("time", "shapes", "joint_names"):
         if name not in arrays:
             raise TrajectoryError(f"{where}: the array {name!r} is missing; there are {', '.join(sorted(arrays))}")
@@ -61,10 +60,10 @@ def _shapes(arrays: dict[str, Any], where: Path) -> Recording:
         quaternions = _array(quaternions, where, "base_quat_xyzw", (len(times), 4))
     if positions is not None:
         positions = _array(positions, where, "base_position", (len(times), 3), "m")
-    return _recording(where, "NPZ", times, shapes, names, quaternions, positions)
+    return _table(where, "NPZ", times, shapes, names, quaternions, positions)
 
 
-def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], timestep: float | None) -> Recording:
+def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], timestep: float | None) -> Table:
     if "shapes" in arrays:
         raise TrajectoryError(f"{where}: both 'shapes' and 'qpos' are there; keep one")
     qpos = _array(arrays["qpos"], where, "qpos", (None, None))
@@ -78,7 +77,7 @@ def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], tim
     times = _mujoco_times(arrays, where, len(qpos), timestep)
     quaternions = qpos[:, 3:_FREE_JOINT][:, _SCALAR_FIRST] if free else None
     positions = qpos[:, :3] if free else None
-    return _recording(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions)
+    return _table(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions)
 
 
 def _mujoco_times(arrays: dict[str, Any], where: Path, count: int, timestep: float | None) -> Array:
@@ -96,7 +95,7 @@ def _mujoco_times(arrays: dict[str, Any], where: Path, count: int, timestep: flo
     return np.arange(count) * step.ravel()[0]
 
 
-def _recording(
+def _table(
     where: Path,
     kind: str,
     times: Array,
@@ -104,11 +103,18 @@ def _recording(
     names: list[str],
     quaternions: Array | None,
     positions: Array | None,
-) -> Recording:
-    rows = range(len(times))
-    columns = {name: np.ascontiguousarray(column) for name, column in zip(names, shapes.T, strict=True)}
-    shifted = times_from_zero(times, str(where), "sample", rows)
-    return Recording(str(where), kind, shifted, columns, "sample", rows, False, quaternions, positions)
+) -> Table:
+    return Table(
+        where=str(where),
+        format=kind,
+        columns={name: np.ascontiguousarray(column) for name, column in zip(names, shapes.T, strict=True)},
+        rows=range(len(times)),
+        row="sample",
+        times=times,
+        by_format=True,
+        base_quat_xyzw=quaternions,
+        base_position=positions,
+    )
 
 
 def _array(value: Any, where: Path, name: str, trailing: tuple[int | None, ...], unit: str = "") -> Array:

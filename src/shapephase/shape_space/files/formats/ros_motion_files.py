@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
-from ...errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
-from ._recording import Recording, check_size, check_text, file_bytes, number, times_from_zero
-from ._strict_yaml import Word, yaml_documents
+from ....arrays import Array
+from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
+from .._recording import Table, check_size, check_text, number
+from .strict_yaml import Word, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-_MOST_YAML = 16 * 2**20
+MOST_YAML = 16 * 2**20
 """Size of a YAML file [bytes]; parsed entry by entry in Python, larger ones are slow."""
 _MOST_METADATA = 2**20
 """Size of a bag's metadata.yaml [bytes]."""
@@ -48,17 +48,16 @@ class _Trajectory(NamedTuple):
     positions: list[list[float]]
 
 
-def read_ros_yaml(where: Path) -> Recording:
+def read_ros_yaml(where: Path, data: bytes) -> Table:
     """A `JointTrajectory` in YAML, bare or in a goal, or documents of several, or of `JointState` messages.
 
     Several trajectories follow each other by their header stamps; states are merged as in a bag.
 
     Raises
     ------
-    InputFileNotFoundError, TrajectoryError, MissingExtraError
-        For a file that is not there; for faults, with line or point; without PyYAML.
+    TrajectoryError, MissingExtraError
+        For faults, with line or point; without PyYAML.
     """
-    data = file_bytes(where, _MOST_YAML)
     check_text(data, where)
     documents = [_unwrapped(document) for document in yaml_documents(data.decode("utf-8-sig"), str(where))]
     states = [_is(document, "name", "position") for document in documents]
@@ -78,7 +77,7 @@ def read_ros_yaml(where: Path) -> Recording:
     return _of_trajectories(trajectories, str(where), "ROS YAML JointTrajectory")
 
 
-def read_bag(where: Path, topic: str | None) -> Recording:
+def read_bag(where: Path, topic: str | None) -> Table:
     """The states or trajectories of one topic of a rosbag1 file, a rosbag2 folder, an MCAP or a SQLite file.
 
     The time of a state is that of its header, or the time of recording where all headers are without. Messages
@@ -129,7 +128,7 @@ def _check_database(where: Path) -> None:
         raise TrajectoryError(f"{where}: computed tables ({', '.join(computed)!s:.100}) are not read; record plainly")
 
 
-def _read_messages(where: Path, topic: str | None) -> Recording:
+def _read_messages(where: Path, topic: str | None) -> Table:
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
     from rosbags.typesys import Stores, get_typestore
@@ -192,7 +191,7 @@ def _bag_time(time: Any) -> int:
     return time.sec * _NANO + time.nanosec
 
 
-def _of_states(messages: list[_State], where: str, label: str) -> Recording:
+def _of_states(messages: list[_State], where: str, label: str) -> Table:
     """Messages with some of the joints each, merged by their times."""
     stamped = any(message.stamp for message in messages)
     # A clock may start at zero; a zero later on is a header that was not filled in.
@@ -224,10 +223,10 @@ def _of_states(messages: list[_State], where: str, label: str) -> Recording:
                 "joints are needed at each time: record one topic with all, choose it by topic=, or resample to a table"
             )
     table = np.array([[row[name] for name in joints] for row in rows.values()]).reshape(len(rows), len(joints))
-    return _recording(where, label, list(rows), np.zeros(len(rows)), joints, table, "message", list(numbers.values()))
+    return _table(where, label, list(rows), np.zeros(len(rows)), joints, table, "message", list(numbers.values()))
 
 
-def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Recording:
+def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Table:
     """One trajectory, or several one after the other by the times of their headers."""
     joints = trajectories[0].names if trajectories else []
     for count, trajectory in enumerate(trajectories, start=1):
@@ -255,10 +254,10 @@ def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) ->
         table[first : first + len(part)] = part[:, [place[name] for name in joints]]
         first += len(part)
     rows = list(range(1, len(nanoseconds) + 1))
-    return _recording(where, label, nanoseconds, seconds, joints, table, "point", rows)
+    return _table(where, label, nanoseconds, seconds, joints, table, "point", rows)
 
 
-def _recording(
+def _table(
     where: str,
     label: str,
     nanoseconds: list[int],
@@ -267,7 +266,7 @@ def _recording(
     table: Array,
     row: str,
     rows: list[int],
-) -> Recording:
+) -> Table:
     start = nanoseconds[0] if nanoseconds else 0
     # Whole nanoseconds are subtracted first: as doubles, those of today's clocks are 200 ns apart.
     times = np.array([(time - start) / _NANO for time in nanoseconds]) + seconds
@@ -276,9 +275,16 @@ def _recording(
         raise TrajectoryError(
             f"{where}: {row} {rows[i]}: joint {joints[j]} is {table[i, j]}, no finite number; drop the {row}"
         )
-    shifted = times_from_zero(times, where, row, rows)
-    columns = {name: np.ascontiguousarray(table[:, j]) for j, name in enumerate(joints)}
-    return Recording(where, label, shifted, columns, row, rows)
+    return Table(
+        where=where,
+        format=label,
+        columns={name: np.ascontiguousarray(table[:, j]) for j, name in enumerate(joints)},
+        rows=rows,
+        row=row,
+        times=times,
+        clock=start / _NANO + times,
+        by_format=True,
+    )
 
 
 def _unwrapped(document: Any) -> Any:

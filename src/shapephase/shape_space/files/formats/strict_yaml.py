@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...errors import MissingExtraError, TrajectoryError
+from ....errors import MissingExtraError, TrajectoryError
 
 # Lists and mappings inside each other: a ROS message nests half as many.
 _MOST_DEPTH = 16

@@ -1,0 +1,130 @@
+"""Where a motion comes from: the kinds of file by their endings, standard input, tables in memory."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ...body.body import Body
+from ...errors import InputFileNotFoundError, TrajectoryError, unknown_name
+from ._recording import MOST_BYTES, Table, digest, file_bytes
+from .formats.c3d import INVERSE_KINEMATICS, read_c3d
+from .formats.frames import is_frame, read_frame
+from .formats.hdf5 import read_hdf5
+from .formats.matlab import read_matlab
+from .formats.motion_arrays import read_arrays
+from .formats.opensim import END, read_opensim
+from .formats.ros_motion_files import MOST_YAML, read_bag, read_ros_yaml
+from .formats.spreadsheets import read_excel, read_parquet
+from .formats.text_tables import read_delimited
+
+STANDARD_INPUT = "-"
+"""Instead of a file's name: a text table, or a motion of OpenSim."""
+_TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
+    ".csv": read_delimited,
+    ".tsv": read_delimited,
+    ".txt": read_delimited,
+    ".mot": read_opensim,
+    ".sto": read_opensim,
+    ".yaml": read_ros_yaml,
+    ".yml": read_ros_yaml,
+    ".parquet": read_parquet,
+    ".c3d": read_c3d,
+}
+_WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
+    ".xlsx": read_excel,
+    ".xlsm": read_excel,
+    ".mat": read_matlab,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+}
+_ARRAYS = (".npz", ".npy")
+_BAGS = (".bag", ".mcap", ".db3")
+_YAML = (".yaml", ".yml")
+# What comes near, and how it becomes a motion of joints.
+_OTHERS = {
+    ".trc": INVERSE_KINEMATICS,
+    ".xls": "Excel's older files are not read; save it as .xlsx or .csv",
+    ".ods": "save it as .xlsx or .csv",
+    ".numbers": "save it as .xlsx or .csv",
+    ".bvh": "convert it to a table of joint angles first; BVH has rotations of a skeleton of its own",
+}
+
+
+class Input(NamedTuple):
+    """What was found, the name of where for people, and the SHA-256 of its bytes, None where it has none."""
+
+    table: Table
+    name: str
+    sha256: str | None
+
+
+def read_input(source: Any, body: Body, topic: str | None, timestep: float | None) -> tuple[Input, float | None]:
+    """The table of a file, of standard input (`-`), or of a frame in memory; and the time step, if it is still needed.
+
+    Parameters
+    ----------
+    topic : which part of a bag, a workbook or a `.mat` file; None: the only one
+    timestep : [s], for what has no times
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    UnknownNameError
+        For an unknown ending of the file, or an unknown part.
+    TrajectoryError
+        For faults of the file.
+    """
+    if is_frame(source):
+        _no_topic(topic, "a table in memory")
+        table = read_frame(source)
+        return Input(table, table.where, None), timestep
+    if source == STANDARD_INPUT:
+        _no_topic(topic, "standard input")
+        return _standard_input(), timestep
+    where = Path(source)
+    suffix = where.suffix.lower()
+    if suffix in _BAGS or os.path.isdir(where):
+        if timestep is not None:
+            raise TrajectoryError(f"{where}: timestep is for files without times; this one has its times")
+        _check_exists(where)
+        return Input(read_bag(where, topic), str(source), digest(where)), None
+    if suffix in _OTHERS:
+        raise TrajectoryError(f"{where}: {suffix} files are not read: {_OTHERS[suffix]}")
+    if suffix not in (*_TEXTS, *_WITH_PARTS, *_ARRAYS):
+        kinds = (".csv", ".npz", *_TEXTS, *_WITH_PARTS, *_ARRAYS, *_BAGS)
+        raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
+    _check_exists(where)
+    if topic is not None and suffix not in _WITH_PARTS:
+        raise TrajectoryError(f"{where}: topic={topic!r} is for bags, workbooks and .mat files; this one has no parts")
+    data = file_bytes(where, MOST_YAML if suffix in _YAML else MOST_BYTES)
+    sha256 = hashlib.sha256(data).hexdigest()
+    if suffix in _ARRAYS:
+        return Input(read_arrays(where, data, body.joint_names, timestep), str(source), sha256), None
+    table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
+    return Input(table, str(source), sha256), timestep
+
+
+def _standard_input() -> Input:
+    where = Path("standard input")
+    data = sys.stdin.buffer.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise TrajectoryError(f"{where}: more than {MOST_BYTES >> 20} MiB; write a file")
+    opensim = any(line.strip().lower() == END.encode() for line in data[:65536].splitlines())
+    table = read_opensim(where, data) if opensim else read_delimited(where, data)
+    return Input(table, str(where), hashlib.sha256(data).hexdigest())
+
+
+def _check_exists(where: Path) -> None:
+    if not os.path.exists(where):
+        raise InputFileNotFoundError(f"{where}: there is no such file")
+
+
+def _no_topic(topic: str | None, what: str) -> None:
+    if topic is not None:
+        raise TrajectoryError(f"topic={topic!r} is for bags, workbooks and .mat files, and this is {what}")

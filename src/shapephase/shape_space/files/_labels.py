@@ -1,0 +1,173 @@
+"""Labels of columns, such as `knee [deg]`: a name and a unit, in the spellings that programs and people use."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import ShapeError, TrajectoryError
+
+_DEGREE = np.pi / 180.0
+ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}
+"""Units of angles -> their size [rad]."""
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""Units of lengths -> their size [m]."""
+IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
+"""Units of time -> how many there are in a second: whole milliseconds are divided by it without loss."""
+SI = "SI"
+"""The unit of a column in rad or m, whichever its joint has; `write_shape_path` says so where else one would ask."""
+_SPELLINGS = {
+    "rad": ("rad", "rads", "radian", "radians"),
+    "deg": ("deg", "degs", "degree", "degrees", "°"),
+    "mrad": ("mrad", "milliradian", "milliradians"),
+    "m": ("m", "metre", "metres", "meter", "meters"),
+    "cm": ("cm", "centimetre", "centimetres", "centimeter", "centimeters"),
+    "mm": ("mm", "millimetre", "millimetres", "millimeter", "millimeters"),
+    "s": ("s", "sec", "secs", "second", "seconds"),
+    "ms": ("ms", "msec", "msecs", "millisecond", "milliseconds"),
+    "us": ("us", "µs", "μs", "usec", "microsecond", "microseconds"),
+    "ns": ("ns", "nsec", "nanosecond", "nanoseconds"),
+    "min": ("min", "minute", "minutes"),
+    SI: ("si",),
+}
+_UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
+_BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))", re.DOTALL)
+# Behind an underscore any unit stands, behind a blank or a point only a word that is no part of a name.
+_SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
+_WORDS = {"rad", "deg", "ms"}
+_QUANTITY = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]*|°)")
+
+
+class Label(NamedTuple):
+    """The name of a column without its unit, and the unit; None where none stands there."""
+
+    name: str
+    unit: str | None
+
+
+def label(text: str) -> Label:
+    """The parts of a label: `knee [deg]`, `knee (deg)`, `knee_deg`, `knee deg` and `knee°` are the knee in degrees.
+
+    What stands in brackets and is no unit belongs to the name.
+    """
+    bracketed = _BRACKETED.fullmatch(text)
+    if bracketed is not None:
+        inside = bracketed["square"] if bracketed["square"] is not None else bracketed["round"]
+        unit = unit_of(inside)
+        return Label(bracketed["name"], unit) if unit is not None else Label(text, None)
+    suffixed = _SUFFIXED.fullmatch(text)
+    if suffixed is not None:
+        unit = unit_of(suffixed["unit"])
+        if unit is not None and (suffixed["mark"] == "_" or unit in _WORDS):
+            return Label(suffixed["name"], unit)
+    return Label(text, None)
+
+
+def unit_of(text: str) -> str | None:
+    """A unit by one of its spellings; None: it is none."""
+    return _UNITS.get(text.strip().lower())
+
+
+def in_square_brackets(text: str) -> str | None:
+    """What stands in square brackets behind a name: a unit, or what was meant as one."""
+    bracketed = _BRACKETED.fullmatch(text)
+    return bracketed["square"] if bracketed is not None else None
+
+
+def time_unit_argument(unit: str | None) -> str | None:
+    """A user's unit of time. Raises TrajectoryError."""
+    if unit is None:
+        return None
+    found = unit_of(unit) if isinstance(unit, str) else None
+    if found not in IN_A_SECOND:
+        raise TrajectoryError(f"time_unit: one of {', '.join(IN_A_SECOND)} is needed, got {unit!r:.40}")
+    return found
+
+
+def quantity(value: object, unit: str, what: str) -> float:
+    """A number in the unit of a joint, "rad" or "m", or a text such as `30deg` or `5 mm`: in SI units.
+
+    Raises TrajectoryError, which begins with `what`.
+    """
+    number, said = _number_and_unit(value, what)
+    sizes = ANGLES if unit == "rad" else LENGTHS
+    if said is not None and said not in sizes:
+        kind = "turns" if unit == "rad" else "slides"
+        raise TrajectoryError(
+            f"{what}: {value!r:.40} is in {said}, and the joint {kind}; give it in {', '.join(sizes)}"
+        )
+    return number * (1.0 if said is None else sizes[said])
+
+
+def amounts(value: object, what: str) -> dict[str, float]:
+    """How much of an angle and of a length: {"rad": ..., "m": ...}.
+
+    A number is both; a text such as `3deg` or `3deg,5mm` says which, and what it does not name is zero.
+
+    Raises TrajectoryError, which begins with `what`.
+    """
+    found: dict[str, float] = {}
+    for part in value.split(",") if isinstance(value, str) else [value]:
+        number, said = _number_and_unit(part, what)
+        if number < 0.0:
+            raise TrajectoryError(f"{what}: zero or more is needed, got {value!r:.40}")
+        kinds = ["rad", "m"] if said is None else ["rad" if said in ANGLES else "m"]
+        for kind in kinds:
+            if kind in found:
+                raise TrajectoryError(f"{what}: {value!r:.40} says two amounts of one kind")
+            found[kind] = number * (1.0 if said is None else (ANGLES | LENGTHS)[said])
+    return {"rad": 0.0, "m": 0.0} | found
+
+
+def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:
+    if isinstance(value, str):
+        match = _QUANTITY.fullmatch(value.strip()) if value.isascii() or "°" in value else None
+        said = unit_of(match["unit"]) if match is not None and match["unit"] else None
+        if match is None or (match["unit"] and said not in ANGLES | LENGTHS):
+            units = ", ".join(ANGLES | LENGTHS)
+            raise TrajectoryError(
+                f"{what}: a number is needed, with one of {units} behind it or none; got {value!r:.40}"
+            )
+        number = float(match["number"])
+    else:
+        try:
+            number, said = float(value), None  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            raise TrajectoryError(f"{what}: a number or a text such as '30deg' is needed, got {value!r:.40}") from None
+    if not np.isfinite(number):
+        raise TrajectoryError(f"{what}: a finite number is needed, got {value!r:.40}")
+    return number, said
+
+
+def mapping_argument(names: Mapping[str, str | None] | None, labels: Iterable[str]) -> dict[str, str | None]:
+    """A user's mapping with the labels as they stand in the file: the name without its unit will do, too.
+
+    Raises
+    ------
+    ShapeError
+        If it is no mapping of texts.
+    KeyError
+        With the name, if no label has it; TrajectoryError if several do.
+    """
+    if names is None:
+        return {}
+    if not isinstance(names, Mapping):
+        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {type(names).__name__}")
+    there = list(labels)
+    plain: dict[str, list[str]] = {}
+    for text in there:
+        plain.setdefault(label(text).name, []).append(text)
+    found: dict[str, str | None] = {}
+    for old, new in names.items():
+        if not isinstance(old, str) or not (new is None or isinstance(new, str)):
+            raise ShapeError(f"names: texts are needed (None leaves a column out), got {old!r:.40}: {new!r:.40}")
+        candidates = [old] if old in there else plain.get(old, [])
+        if not candidates:
+            raise KeyError(old)
+        if len(candidates) > 1:
+            raise TrajectoryError(f"names: {old!r} may be {' or '.join(map(repr, candidates))}; write it in full")
+        found[candidates[0]] = new
+    return found

@@ -1,0 +1,176 @@
+"""The times of a table: which column has them and in which unit, and the stretch that is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...arguments import positive_argument
+from ...arrays import Array, Mask, finite_array
+from ...errors import ShapeError, TrajectoryError
+from ._labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
+from ._recording import Recording, Table, times_from_zero
+
+_TIMES = ("time", "times", "t", "timestamp", "timestamps")
+"""Names of a column of times, in small letters and without its unit."""
+_LONG_STEP = 10.0
+"""Steps as long as this [s] are rather those of another unit: a motion of joints is recorded more often."""
+_LONG_STEP_OF_MANY = 1.0
+"""The same [s] where samples are many, as in a recording: milliseconds at a thousand samples a second."""
+_MANY = 10
+"""Samples; a path written by hand has fewer."""
+_USUAL_STEP = 0.1
+"""[s]; what records joints takes ten samples a second or more."""
+
+
+def recording_of(
+    table: Table,
+    joint_names: Collection[str],
+    names: Mapping[str, str | None],
+    time_unit: str | None,
+    timestep: float | None,
+    trim: tuple[float, float] | None,
+) -> Recording:
+    """The samples of a table between two of its times, with times that begin at 0.
+
+    Parameters
+    ----------
+    joint_names : of the body: a joint of the name `t` has no times
+    names : label -> name or None, as `_labels.mapping_argument` gives it
+    time_unit : of the column of times; None: as the file says
+    timestep : [s], where no column has times
+    trim : the first and the last time to be kept, as the file tells them
+
+    Raises
+    ------
+    TrajectoryError
+        If there are no times, they do not ascend, or their unit can only be guessed.
+    """
+    unit = time_unit_argument(time_unit)
+    guessed = False
+    if table.times is None:
+        column = _time_column(table, joint_names, names)
+        table, unit, guessed = _timed(table, column, unit, timestep)
+    else:
+        if timestep is not None:
+            raise TrajectoryError(f"{table.where}: timestep is for files without times; this one has its times")
+        if unit not in (None, "s"):
+            raise TrajectoryError(
+                f"{table.where}: times of {table.format} files are in s, and time_unit={unit!r} was given"
+            )
+        unit = "s"
+    if trim is not None:
+        table = _trimmed(table, _clock(table), trim)
+    assert table.times is not None
+    shifted = times_from_zero(table.times, table.where, table.row, table.rows)
+    if guessed:
+        _check_unit(shifted, table)
+    ends = _clock(table)[[0, -1]].tolist()
+    return Recording(table, shifted, ends[0], ends[1], unit)
+
+
+def doubtful_steps(times: Array) -> bool:
+    """Whether times [s] would be taken for another unit where the file does not say that they are in seconds."""
+    step = float(np.median(np.diff(times)))
+    return step >= (_LONG_STEP_OF_MANY if len(times) >= _MANY else _LONG_STEP)
+
+
+def _time_column(table: Table, joint_names: Collection[str], names: Mapping[str, str | None]) -> str | None:
+    """The label of the column of times, or None."""
+    called = {old: old if (new := names.get(old, old)) is None else new for old in table.columns}
+    found = [
+        old
+        for old, name in called.items()
+        if name not in joint_names and label(name).name.strip().lower() in _TIMES and names.get(old, old) is not None
+    ]
+    plain = [old for old in found if called[old] == "time"]
+    if len(plain) == 1:
+        return plain[0]
+    if len(found) > 1:
+        listed = " and ".join(repr(old) for old in found[:4])
+        raise TrajectoryError(
+            f"{table.where}: columns {listed} are both times; leave one out, with names={{{found[-1]!r}: None}}"
+        )
+    return found[0] if found else None
+
+
+def _timed(table: Table, column: str | None, unit: str | None, timestep: float | None) -> tuple[Table, str, bool]:
+    """The table with its times, their unit, and whether that could only be guessed."""
+    if column is None:
+        if timestep is None:
+            raise TrajectoryError(
+                f"{table.where}: the header has no column `time`; it reads {_some(list(table.columns))}. Name the one "
+                "that has the times with names={column: 'time'}, or give the time between samples as timestep"
+            )
+        step = positive_argument(timestep, "timestep")
+        return replace(table, times=step * np.arange(len(table.rows))), "s", False
+    if timestep is not None:
+        raise TrajectoryError(
+            f"{table.where}: timestep is for files without times; this one has its times in column {column!r}"
+        )
+    table.check_column(column)
+    said = table.units.get(column) or label(column).unit or ("s" if table.by_format else None)
+    if said is not None and said not in IN_A_SECOND:
+        raise TrajectoryError(f"{table.where}: column {column!r} is in {said}, no unit of time")
+    if said is None and in_square_brackets(column) is not None:
+        raise TrajectoryError(
+            f"{table.where}: column {column!r}: the unit is not known; give time_unit, one of {', '.join(IN_A_SECOND)}"
+        )
+    if unit is not None and said is not None and unit != said:
+        raise TrajectoryError(f"{table.where}: column {column!r} is in {said}, and time_unit={unit!r} was given")
+    columns = {name: values for name, values in table.columns.items() if name != column}
+    clock = table.columns[column]
+    times = clock / IN_A_SECOND[unit or said or "s"]
+    return replace(table, columns=columns, times=times, clock=clock), unit or said or "s", unit is None and said is None
+
+
+def _clock(table: Table) -> Array:
+    times = table.times if table.clock is None else table.clock
+    assert times is not None
+    return times
+
+
+def _trimmed(table: Table, clock: Array, trim: tuple[float, float]) -> Table:
+    samples = np.flatnonzero(_within(clock, trim))
+    if len(samples) < 2:
+        raise TrajectoryError(
+            f"{table.where}: {len(samples)} samples from {trim[0]:.9g} to {trim[1]:.9g}, two or more are needed; the "
+            f"file's own times go from {clock.min():.9g} to {clock.max():.9g}"
+            if len(clock)
+            else f"{table.where}: two samples or more are needed, got 0"
+        )
+    return table.kept(samples)
+
+
+def trim_argument(trim: tuple[float, float] | None) -> tuple[float, float] | None:
+    """A user's two times, the first before the last. Raises ShapeError."""
+    if trim is None:
+        return None
+    ends = finite_array(trim, "trim", (2,))
+    if ends.ndim != 1 or not ends[0] < ends[1]:
+        raise ShapeError(f"trim: two times, the first before the last, are needed, got {trim!r}")
+    return float(ends[0]), float(ends[1])
+
+
+def _within(clock: Array, trim: tuple[float, float]) -> Mask:
+    return (clock >= trim[0]) & (clock <= trim[1])
+
+
+def _check_unit(times: Array, table: Table) -> None:
+    """Raise where times without a unit are rather no seconds."""
+    if not doubtful_steps(times):
+        return
+    step = float(np.median(np.diff(times)))
+    likely = next((unit for unit in ("ms", "us", "ns") if step / IN_A_SECOND[unit] <= _USUAL_STEP), "ns")
+    raise TrajectoryError(
+        f"{table.where}: {len(times)} samples, one every {step:.6g} s if the times are in seconds; are they in "
+        f"{likely}? Give time_unit={likely!r} (--time-unit {likely}), or time_unit='s' for seconds; or write "
+        f"the unit into the header, as in `time [{likely}]`"
+    )
+
+
+def _some(names: list[str]) -> str:
+    shown = ", ".join(name[:40] for name in names[:12])
+    return shown + (" ..." if len(names) > 12 else "")

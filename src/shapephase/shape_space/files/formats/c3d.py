@@ -1,0 +1,112 @@
+"""Angles in C3D files: what the models of motion-capture programs compute, beside the markers."""
+
+from __future__ import annotations
+
+import importlib.util
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ....errors import MissingExtraError, TrajectoryError
+from .._labels import unit_of
+from .._recording import Table
+from .column_tables import column_table
+from .parser_process import parsed
+
+INVERSE_KINEMATICS = (
+    "positions of markers are no angles of joints; find those by inverse kinematics first (in OpenSim: scale the "
+    "model, run the Inverse Kinematics tool with these markers), and give the `.mot` file that it writes"
+)
+"""The way from markers to joints."""
+_BLOCK = 512
+"""Bytes of a block of a C3D file; its header is one."""
+_KEY = 0x50
+"""The second byte of every C3D file, and of its parameters."""
+_PROCESSORS = (84, 85, 86)
+"""How numbers are written: Intel, DEC, MIPS."""
+_AXES = "xyz"
+
+
+def read_c3d(where: Path, data: bytes) -> Table:
+    """The angles of a C3D file: of each output `A` of the parameter ANGLES, the columns `A_x`, `A_y` and `A_z`.
+
+    The file is parsed in a process of its own: a damaged one can crash ezc3d.
+
+    Raises
+    ------
+    TrajectoryError, MissingExtraError
+        For faults, with the frame; for a file that has markers alone; without ezc3d.
+    """
+    if importlib.util.find_spec("ezc3d") is None:
+        raise MissingExtraError("C3D files need ezc3d; install it with: pip install 'shapephase[data]'")
+    _check_sizes(where, data)
+    found = parsed(where, data, "C3D", __name__)
+    labels, angles = found["labels"].tolist(), set(found["angles"].tolist())
+    values, rate, first = found["points"], float(found["rate"]), int(found["first"])
+    places = [(k, label) for k, label in enumerate(labels[: values.shape[1]]) if label in angles]
+    if not places:
+        raise TrajectoryError(f"{where}: {len(labels)} points and no angles among them: {INVERSE_KINEMATICS}")
+    if not 0.0 < rate < np.inf:
+        raise TrajectoryError(f"{where}: the parameter POINT:RATE, samples a second, is {rate:g}")
+    unit = unit_of(str(found["unit"]))
+    frames = first + np.arange(values.shape[2])
+    columns = [(f"{label}_{axis}", values[row, k]) for k, label in places for row, axis in enumerate(_AXES)]
+    units = {} if unit is None else {name: unit for name, _ in columns}
+    table = column_table(
+        str(where), "C3D", [("time", frames / rate), *columns], units=units | {"time": "s"}, row="frame"
+    )
+    return replace(table, rows=(frames + 1).tolist())
+
+
+def parse(data: bytes) -> dict[str, Any]:
+    """What the process that parses does with the bytes of a file."""
+    import ezc3d
+
+    with tempfile.NamedTemporaryFile(suffix=".c3d") as copy:
+        copy.write(data)
+        copy.flush()
+        file = ezc3d.c3d(copy.name)
+    point = file["parameters"]["POINT"]
+    return {
+        "labels": np.array(_texts(point, "LABELS"), dtype=str),
+        "angles": np.array(_texts(point, "ANGLES"), dtype=str),
+        "unit": np.array("".join(_texts(point, "ANGLE_UNITS")[:1])),
+        "rate": np.array([*np.ravel(point["RATE"]["value"]), np.nan])[0],
+        "first": np.array(int(file["header"]["points"]["first_frame"])),
+        "points": np.asarray(file["data"]["points"], dtype=np.float64),
+    }
+
+
+def _check_sizes(where: Path, data: bytes) -> None:
+    """Raise TrajectoryError where header or parameters promise more than the file has: ezc3d believes them."""
+    words = np.frombuffer(data[:_BLOCK], dtype=np.uint8)
+    place = (int(words[0]) - 1) * _BLOCK if len(words) == _BLOCK else -1
+    if place < 0 or words[1] != _KEY or place + 4 > len(data) or data[place + 3] not in _PROCESSORS:
+        raise TrajectoryError(f"{where}: no C3D file that can be read (its header is damaged)")
+    order = ">" if data[place + 3] == _PROCESSORS[2] else "<"
+    header = np.frombuffer(data[:_BLOCK], dtype=f"{order}u2")
+    points, analog, first, last = (int(header[k]) for k in (1, 2, 3, 4))
+    start = (int(header[8]) - 1) * _BLOCK
+    scale = np.frombuffer(data[12:16], dtype=f"{order}f4")[0]
+    size = 4 if scale < 0.0 else 2
+    frames = last - first + 1
+    if place + data[place + 2] * _BLOCK > len(data) or start < 0 or frames < 1:
+        raise TrajectoryError(f"{where}: no C3D file that can be read (its header is damaged)")
+    if start + frames * (4 * points + analog) * size > len(data):
+        raise TrajectoryError(
+            f"{where}: the header promises {frames} frames of {points} points, and the file is shorter; it is cut off"
+        )
+
+
+def _texts(group: Any, name: str) -> list[str]:
+    """A parameter of texts, and those that continue it under the same name with a number: at most 255 fit into one."""
+    found: list[str] = []
+    for k in range(1, 100):
+        key = name if k == 1 else f"{name}{k}"
+        if key not in group:
+            break
+        found += [str(text).strip() for text in np.ravel(group[key]["value"]).tolist()]
+    return found

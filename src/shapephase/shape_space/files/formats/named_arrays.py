@@ -1,0 +1,96 @@
+"""Arrays by name, as in files of MATLAB and HDF5: which of them are the times and the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ....errors import TrajectoryError, unknown_name
+from .._recording import Table
+from .column_tables import column_table
+
+_MATRICES = ("shapes", "data", "q", "values")
+_NAMES = ("joint_names", "names", "colheaders", "labels", "columns", "headers")
+_DEEPEST = 4
+"""Structures inside each other that are looked into."""
+
+
+def arrays_table(
+    where: str, kind: str, entries: Mapping[str, Any], chosen: str | None, units: Mapping[str, str] | None = None
+) -> Table:
+    """The table that arrays by name hold: vectors of one length, or a matrix beside the names of its columns.
+
+    Parameters
+    ----------
+    entries : name -> array of numbers, list of texts, or entries of a structure
+    chosen : the structure that has the motion; None: the arrays on top, or the only structure
+
+    Raises
+    ------
+    TrajectoryError, UnknownNameError
+        If there is no motion, more than one, or no such structure.
+    """
+    inside: Mapping[str, Any] = entries
+    if chosen is not None:
+        groups = {name for name, value in entries.items() if isinstance(value, Mapping)}
+        if chosen not in groups:
+            raise unknown_name(f"structure in {where}", chosen, sorted(groups))
+        inside = entries[chosen]
+    for _ in range(_DEEPEST):
+        columns = _matrix(where, inside) or _vectors(inside)
+        if columns:
+            return column_table(where, kind, columns, units=units, row="sample")
+        groups = {name: value for name, value in inside.items() if isinstance(value, Mapping)}
+        if len(groups) != 1:
+            break
+        (inside,) = groups.values()
+    groups = [name for name, value in inside.items() if isinstance(value, Mapping)]
+    if len(groups) > 1:
+        raise TrajectoryError(f"{where}: several structures, choose one with topic=: {', '.join(groups[:20])}")
+    listed = ", ".join(f"{name} {_described(value)}" for name, value in list(inside.items())[:12]) or "nothing"
+    raise TrajectoryError(
+        f"{where}: no motion; vectors of one length, named `time` and as the joints, or a matrix `shapes` beside the "
+        f"names of its columns in `joint_names`, are needed; there is {listed}"
+    )
+
+
+def _matrix(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
+    """The columns of a matrix that has names, and of vectors as long as it."""
+    names = next((entries[key] for key in _NAMES if _are_texts(entries.get(key))), None)
+    found = [key for key in _MATRICES if isinstance(value := entries.get(key), np.ndarray) and value.ndim == 2]
+    if names is None or not found:
+        return []
+    matrix = entries[found[0]]
+    if matrix.shape[1] != len(names):
+        raise TrajectoryError(f"{where}: {found[0]} has {matrix.shape[1]} columns, and there are {len(names)} names")
+    others = [
+        (name, vector)
+        for name, value in entries.items()
+        if name != found[0] and (vector := _vector(value)) is not None and len(vector) == len(matrix)
+    ]
+    return [*others, *((name, matrix[:, k]) for k, name in enumerate(names))]
+
+
+def _vectors(entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
+    """Vectors as long as the longest; single numbers, such as a sampling rate, are none."""
+    vectors = {name: vector for name, value in entries.items() if (vector := _vector(value)) is not None}
+    return list(vectors.items())
+
+
+def _vector(value: Any) -> Any:
+    """A vector of two entries or more, a matrix of one row or column among them; None for anything else."""
+    if not isinstance(value, np.ndarray) or value.size < 2 or value.size != max(value.shape, default=0):
+        return None
+    return value.ravel() if value.dtype.kind in "fiumM" else None
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(entry, str) for entry in value)
+
+
+def _described(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{value.shape} of {value.dtype}"
+    return "(a structure)" if isinstance(value, Mapping) else "(texts)" if isinstance(value, list) else "(not read)"
