@@ -68,8 +68,9 @@ class OutputFileError(ShapePhaseError, OSError):
 class TrajectoryError(ShapePhaseError, ValueError):
     """A trajectory that cannot be used as a function of time: its times, joints, values or ends.
 
-    Remedy: the message names file, row and joint; times must ascend, every joint of the body must be there, angles
-    are in radians unless the file says degrees.
+    Remedy: the message names file, row and joint; times must ascend, every joint of the body must be there or rest
+    somewhere, angles are in radians unless the file or the caller says degrees. A unit that can only be guessed is an
+    error that names the argument to give.
     """
 
 

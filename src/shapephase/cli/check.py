@@ -18,6 +18,7 @@ def check_command(
     from ..body.catalog import load_body
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import joint_motion
+    from .recording_text import recording_data, recording_lines
     from .text import body_lines, path_data, path_lines, plain, record_data
 
     loaded = load_body(body, isolate=True)
@@ -26,6 +27,6 @@ def check_command(
     if motion is not None:
         path, recorded = joint_motion(motion, loaded, recording)
         moved = path_summary(loaded, path)
-        lines += ["", *path_lines(loaded, motion, moved, recorded)]
-        data["motion"] = path_data(moved) | record_data(loaded, recorded)
+        lines += ["", *path_lines(loaded, motion, moved, recorded), *recording_lines(loaded, recorded)]
+        data["motion"] = path_data(moved) | record_data(loaded, recorded) | recording_data(recorded)
     return Outcome("\n".join(lines), data, with_verdict=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,13 @@ from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.fast.switch import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
+from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
 from .options import AS_RECORDED, FlightOptions, RecordingOptions
 
+_STANDARD_INPUT = "-"
+"""Instead of the name of a file."""
 _SAMPLES_A_BREAK = 5
 """Of the body between two knots of a recording, or more."""
 DEFAULT_TOLERANCE = 1e-9
@@ -62,11 +65,38 @@ def joint_motion(
 ) -> tuple[ShapePath, RecordedMotion | None]:
     """The path of a motion, and its record if it comes from a file."""
     if motion in MOTIONS and not os.path.isfile(motion):
-        for option, given in (("--smooth", recording.smooth), ("--topic", recording.topic)):
-            if given is not None:
+        for field in fields(recording):
+            if getattr(recording, field.name) != field.default:
+                option = f"--{field.name.replace('_', '-')}"
                 raise ShapeError(f"{option} is for recorded motions; {motion} is a motion of the library")
         return named_motion(motion), None
-    if not Path(motion).suffix and not os.path.exists(motion):
+    if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
-    recorded = read_recorded_motion(motion, body, smooth=recording.smooth, topic=recording.topic)
+    said = vars(recording) | {"names": _names(recording.names), "rest": _rest(recording.rest)}
+    recorded = read_recorded_motion(motion, body, **said)
     return recorded.path, recorded
+
+
+def _names(words: tuple[str, ...]) -> dict[str, str | None]:
+    """The mapping of `--names`: pairs, and files of pairs. Raises ShapeError for a column that stands twice."""
+    found: dict[str, str | None] = {}
+    for word in words:
+        pairs = dict([name_pair(word, "--names")]) if "=" in word else read_names(word)
+        doubled = [old for old in pairs if old in found]
+        if doubled:
+            raise ShapeError(f"--names: column {doubled[0]!r:.60} stands twice")
+        found |= pairs
+    return found
+
+
+def _rest(words: tuple[str, ...]) -> dict[str, str]:
+    """The joints of `--rest` with their values as written. Raises ShapeError."""
+    found: dict[str, str] = {}
+    for word in words:
+        joint, mark, value = word.partition("=")
+        if not mark or not joint.strip() or not value.strip():
+            raise ShapeError(f"--rest: JOINT=VALUE is needed, got {word!r:.60}")
+        if joint.strip() in found:
+            raise ShapeError(f"--rest: joint {joint.strip()!r:.60} stands twice")
+        found[joint.strip()] = value.strip()
+    return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -25,8 +25,9 @@ BodyArgument = Annotated[
 MotionArgument = Annotated[
     str,
     Parameter(
-        help="The motion of its joints: a file (CSV, NPZ, OpenSim, ROS, MuJoCo qpos) or a name from "
-        "`shapephase robots`; for example `fall.csv` or `cat_righting`."
+        allow_leading_hyphen=True,  # standard input is a hyphen
+        help="The motion of its joints: a file (CSV, Excel, Parquet, NPZ, MATLAB, HDF5, OpenSim, C3D, ROS, MuJoCo "
+        "qpos), `-` for standard input, or a name from `shapephase robots`; for example `fall.csv` or `cat_righting`.",
     ),
 ]
 Momentum = Annotated[
@@ -104,23 +105,91 @@ class FlightOptions:
     ] = (0.0, 0.0, 0.0, 1.0)
 
 
+def _motion_option(text: str, **more: Any) -> Parameter:
+    return Parameter(help=text, show_default=False, **more)
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class RecordingOptions:
-    """How a file of recorded samples is read."""
+    """How a file of recorded samples is read; each is an argument of `read_recorded_motion`."""
 
-    smooth: Annotated[
-        float | None,
-        Parameter(
-            help="Noise of the recorded samples, rms, in rad or m; without it the path goes through all of them. For "
-            "example `--smooth 0.01`."
+    names: Annotated[
+        tuple[str, ...],
+        _motion_option(
+            "Which column is which joint: COLUMN=JOINT, COLUMN= to leave a column out, or a file of such lines (or of "
+            "JSON); for example `--names LKnee=left_knee frame=` or `--names lab.txt`.",
+            negative_iterable="",
+            consume_multiple=True,
         ),
+    ] = ()
+    degrees: Annotated[
+        bool | None,
+        _motion_option(
+            "Turning joints are in degrees, or in radians; without it, as the file says. For example `--degrees`.",
+            negative="--radians",
+        ),
+    ] = None
+    time_unit: Annotated[
+        str | None,
+        _motion_option(
+            "Unit of the times: s, ms, us, ns or min; without it, as the file says. For example `--time-unit ms`."
+        ),
+    ] = None
+    timestep: Annotated[
+        float | None,
+        _motion_option("Time between samples, in s, for a file without times; for example `--timestep 0.01`."),
     ] = None
     topic: Annotated[
         str | None,
-        Parameter(
-            help="Of a ROS bag, the topic that holds the motion; needed if there is more than one. For example "
-            "`--topic /joint_states`."
+        _motion_option(
+            "Which part of a file with more than one motion: the topic of a ROS bag, the sheet of a workbook, the "
+            "structure of a .mat file; for example `--topic /joint_states`."
+        ),
+    ] = None
+    rest: Annotated[
+        tuple[str, ...],
+        _motion_option(
+            "Where joints rest that have no column: JOINT=VALUE, in rad or m or with a unit; for example "
+            "`--rest neck=0.1 left_elbow=30deg`.",
+            negative_iterable="",
+            consume_multiple=True,
+        ),
+    ] = ()
+    rest_missing: Annotated[
+        bool,
+        _motion_option(
+            "All other joints without a column rest at zero, or at their limit next to it; for example "
+            "`--rest-missing`.",
+            negative="",
+        ),
+    ] = False
+    ignore_extra: Annotated[
+        bool,
+        _motion_option(
+            "Columns that are no joints of the body are left out; for example `--ignore-extra`.", negative=""
+        ),
+    ] = False
+    trim: Annotated[
+        tuple[float, float] | None,
+        _motion_option(
+            "Keep the samples from the first to the last of two times, as the file itself tells the time; for example "
+            "`--trim 12.5 13.9`.",
+            negative_iterable="",
+        ),
+    ] = None
+    resample: Annotated[
+        float | None,
+        _motion_option(
+            "Put the path through so many of its own values a second instead, evenly spaced, in 1/s; for example "
+            "`--resample 100`."
+        ),
+    ] = None
+    smooth: Annotated[
+        float | None,
+        _motion_option(
+            "Noise of the recorded samples, rms, in rad or m; without it the path goes through all of them. For "
+            "example `--smooth 0.01`."
         ),
     ] = None
 

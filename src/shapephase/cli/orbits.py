@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .options import AS_TEXT, BodyArgument, PrintOptions
+from .options import AS_RECORDED, AS_TEXT, BodyArgument, MotionArgument, PrintOptions, RecordingOptions
 from .outcome import Outcome
 from .progress import steps
 
@@ -16,7 +16,7 @@ _MOMENTA = 1000
 
 def orbits_command(
     body: BodyArgument,
-    motion: str,
+    motion: MotionArgument,
     magnitude: float,
     /,
     *,
@@ -27,14 +27,13 @@ def orbits_command(
             "example `--gauge base`."
         ),
     ] = "horizontal",
+    recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Find the motions whose shape and momentum close together, and split each.
 
     Parameters
     ----------
-    motion
-        A closed motion of the joints, a file or a name as for split; for example `cat_righting`.
     magnitude
         Of the angular momentum, in kg m^2/s; for example `0.02`.
     """
@@ -49,12 +48,13 @@ def orbits_command(
     from ..phases.return_map import fixed_points
     from ..reconstruction.reconstruction import reconstruct
     from .motion import joint_motion
+    from .recording_text import recording_data, recording_lines
     from .text import orbit_data, orbit_lines, rotation_line
 
     with steps(3) as work:
         work.begin("loading")
         loaded = load_body(body, isolate=True)
-        path, _ = joint_motion(motion, loaded)
+        path, recorded = joint_motion(motion, loaded, recording)
         deformation = articulated(loaded, path)
         seen = named_gauge(deformation, gauge)
         work.begin("finding what closes")
@@ -66,5 +66,11 @@ def orbits_command(
         splits = [split(orbit, "base") for orbit in moved]
         holonomy = split(reconstruct(deformation, np.zeros(3))).holonomy
     result = (loaded, motion, gauge, found, found.directions @ seen.frame(0.0), splits)
-    lines = [*orbit_lines(*result), "", rotation_line("shape holonomy (base axes)", holonomy)]
-    return Outcome("\n".join(lines), orbit_data(*result) | {"holonomy": holonomy.tolist()})
+    lines = [
+        *orbit_lines(*result),
+        "",
+        rotation_line("shape holonomy (base axes)", holonomy),
+        *recording_lines(loaded, recorded),
+    ]
+    data = orbit_data(*result) | {"holonomy": holonomy.tolist()} | recording_data(recorded)
+    return Outcome("\n".join(lines), data)

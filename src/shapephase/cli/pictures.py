@@ -49,6 +49,7 @@ def view_command(
     """
     from ..plotting.viewer import motion_page, view
     from . import motion as motions
+    from .recording_text import recording_data
 
     aside = check_writable(html, "--html", ".html")
     with steps(2) as work:
@@ -58,7 +59,7 @@ def view_command(
             work.begin("recording the animation")
             motion_page(flown.motion, html, trail=trail, speed=speed)
             say_written(html)
-            return Outcome("", {"html": str(html)}, aside=aside)
+            return Outcome("", {"html": str(html)} | recording_data(flown.recorded), aside=aside)
     live = view(flown.motion, trail=trail, speed=speed, notebook=False)
     if live is not None:
         with live:
@@ -88,6 +89,7 @@ def plot_command(
     """
     from ..plotting.named_figures import FIGURES, write_figure
     from . import motion as motions
+    from .recording_text import recording_data
 
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
@@ -98,4 +100,4 @@ def plot_command(
         work.begin(f"drawing {kind.replace('_', ' ')}")
         write_figure(kind, flown.motion, out, flown.path, gauge)
         say_written(out)
-    return Outcome("", {"figure": str(out)})
+    return Outcome("", {"figure": str(out)} | recording_data(flown.recorded))

@@ -44,6 +44,7 @@ def split_command(
     """
     from ..phases.phases import split
     from . import motion as motions
+    from .recording_text import recording_data, recording_lines
     from .text import recorded_base_text, split_data, split_lines
 
     aside = check_writable(out, "--out", ".npz")
@@ -63,5 +64,10 @@ def split_command(
             write_report(flown.motion, result, html, shape_path=flown.path, title=title, begin=work.begin)
             say_written(html)
     lines, data = recorded_base_text(flown.motion, flown.recorded)
-    text = [*split_lines(flown.body, motion, flown.motion, result), *lines]
-    return Outcome("\n".join(text), split_data(flown.body, motion, flown.motion, result) | data, aside=aside)
+    text = [
+        *split_lines(flown.body, motion, flown.motion, result),
+        *lines,
+        *recording_lines(flown.body, flown.recorded),
+    ]
+    data = split_data(flown.body, motion, flown.motion, result) | data | recording_data(flown.recorded)
+    return Outcome("\n".join(text), data, aside=aside)

@@ -143,9 +143,6 @@ def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMo
     lines = [f"{name}: {summary.duration:g} s, {summary.breaks} breaks", f"{'closes':24}{closes}"]
     if recorded is not None:
         lines.insert(1, f"{'recorded':24}{len(recorded.times)} samples, {recorded.format}")
-        if recorded.residual.any():
-            joint = int(np.argmax(recorded.residual))
-            lines.append(f"{'largest residual':24}{recorded.residual[joint]:.3g} rms, {body.joint_names[joint]}")
         if recorded.base_attitude is not None:
             lines.append(f"{'base':24}recorded too")
     for title, names in (("beyond their limits", summary.joints_beyond_limits), ("at rest", summary.still_joints)):

@@ -19,10 +19,10 @@ from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
 from ..shape_path import ShapePath
+from ._inputs import read_input
 from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
 from ._labels import SI, mapping_argument
 from ._recording import Recording, Table
-from ._inputs import read_input
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
 from .mapping_files import read_names
@@ -162,6 +162,7 @@ def read_recorded_motion(
         "file": given.name,
         "sha256": given.sha256,
         "samples_in_file": len(table.rows),
+        "trim": kept,
         **_record(recording, motion),
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
         "resampled_to_hz": None if rate is None else (len(path.breaks) - 1) / path.duration,

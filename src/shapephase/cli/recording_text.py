@@ -1,0 +1,89 @@
+"""What was read of a recording, and what was done to it, as text for people and as plain data for programs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..body.body import Body
+from ..shape_space.files.read import RecordedMotion
+
+_MOST_NAMES = 8
+"""Names that one line lists."""
+
+
+def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
+    """What was done to a recording on the way to the path, for people; nothing where that is nothing."""
+    if recorded is None:
+        return []
+    record = recorded.record
+    lines = [
+        *_unit_lines(record),
+        *_column_lines(body, record),
+        *_change_lines(record, recorded),
+    ]
+    return ["", *lines] if lines else []
+
+
+def recording_data(recorded: RecordedMotion | None) -> dict[str, Any]:
+    """The same for programs, under `recording`."""
+    return {} if recorded is None else {"recording": dict(recorded.record)}
+
+
+def _unit_lines(record: Any) -> list[str]:
+    """Units other than those of the library."""
+    found = [] if record["time_unit"] == "s" else [f"times in {record['time_unit']}"]
+    for unit in ("deg", "mrad", "mm", "cm"):
+        count = sum(said == unit for said in record["units"].values())
+        if count:
+            found.append(f"{count} {'joint' if count == 1 else 'joints'} in {unit}")
+    return [f"{'read':24}{', '.join(found)}"] if found else []
+
+
+def _column_lines(body: Body, record: Any) -> list[str]:
+    """Columns under other names, joints without a column, columns without a joint."""
+    lines = []
+    renamed = [f"{name} from {column!r}" for name, column in record["columns"].items() if not column.startswith(name)]
+    if renamed:
+        lines.append(f"{'columns':24}{_listed(renamed)}")
+    if record["at_rest"]:
+        held = [f"{name} {_value(body, name, value)}" for name, value in record["at_rest"].items()]
+        lines.append(f"{'without a column':24}{_listed(held)}")
+    for column, why in list(record["left_out"].items())[:_MOST_NAMES]:
+        lines.append(f"{'left out':24}{column}: {why}")
+    if len(record["left_out"]) > _MOST_NAMES:
+        lines.append(f"{'left out':24}and {len(record['left_out']) - _MOST_NAMES} more columns")
+    return lines
+
+
+def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
+    """What makes the path another than the samples."""
+    lines = []
+    if record["trim"] is not None:
+        lines.append(
+            f"{'kept':24}{record['samples']} of {record['samples_in_file']} samples, from {record['first_time']:.9g} "
+            f"to {record['last_time']:.9g} {record['time_unit']}"
+        )
+    if record["smooth"] is not None:
+        levels = sorted(set(record["smooth"].values()) - {0.0})
+        said = f"{levels[0]:.6g}" if len(levels) == 1 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
+        lines.append(f"{'smoothed':24}noise {said} rad or m, rms")
+    if record["resampled_to_hz"] is not None:
+        lines.append(f"{'resampled':24}{record['resampled_to_hz']:.6g} samples a second")
+    if (record["resampled_to_hz"] is not None or record["smooth"] is not None) and recorded.residual.any():
+        joint = int(np.argmax(recorded.residual))
+        names = recorded.path.joint_names or ()
+        lines.append(f"{'off the samples':24}{recorded.residual[joint]:.3g} rms at most, {names[joint]}")
+    return lines
+
+
+def _value(body: Body, name: str, value: float) -> str:
+    """Where a joint rests, in degrees or metres."""
+    turns = body.joint_units[body.joint_index(name)] == "rad"
+    return f"{np.degrees(value) + 0.0:.4g} deg" if turns else f"{value:.4g} m"
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return ", ".join(names[:_MOST_NAMES]) + more
