@@ -150,7 +150,9 @@ def test_integrals_of_the_steps_are_those_of_the_curve(name: str, tolerance: flo
         assert abs(found.dynamic.sum() - dynamic) < near
         whole = found.slivers.sum() + sphere.polygon_area(found.corners)[0]
         assert abs(sphere.wrapped(np.array(whole - area))) < near
-        assert found.error[0] < 0.1 * motion.error_estimate + 1e-13
+        # The dynamic phase and the area of each step are rounded by a few units of the last place of a radian.
+        rounding = 4.0 * np.finfo(float).eps * solution.dynamics.shape[1]
+        assert found.error[0] < 0.1 * motion.error_estimate + rounding
 
 
 def test_integrals_do_not_depend_on_how_many_steps_are_taken_at_once(monkeypatch: pytest.MonkeyPatch):

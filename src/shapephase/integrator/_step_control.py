@@ -13,13 +13,17 @@ from .interpolant import Interpolant
 # Of the formula.
 ORDER = 8.0
 # Significant Chebyshev degrees of a panel that one step may span, so that half as many steps still see all of them.
-_DEGREES_A_STEP = 2.6
+_DEGREES_A_STEP = 2.4
 # The error of the steps, as a part of their distance from half as many. An eighth-order formula would allow 1/255; that
-# is the median of 600 random motions, half of them with bumps and ramps that hide. It grows with the degrees
-# that a step spans of terms that are not small against the distance.
-_NOT_SMALL = 0.1
-_DEGREES = np.array([1.6, 2.2, 3.0, 5.0])
-_PARTS = np.array([1.0 / 30.0, 1.0 / 12.0, 1.0 / 8.0, 1.0])
+# is the median of 1,200 random motions, half of them with bumps and ramps that hide. It is less sure the more degrees
+# a step spans of terms that are not small against the distance.
+_NOT_SMALL = 0.02
+_DEGREES = np.array([1.6, 1.9, 2.4, 3.0, 3.5, 5.0])
+_PARTS = np.array([1.0 / 80.0, 1.0 / 40.0, 1.0 / 12.0, 1.0 / 6.0, 1.0 / 4.0, 1.0])
+# The distance of steps that span so many degrees may be small by chance: then the error is at least a part of the
+# tolerance, though no more than the distance.
+_CHANCE_DEGREES = np.array([1.6, 2.4])
+_CHANCE_PARTS = np.array([0.0, 0.02])
 # Numbers compared at once.
 _MOST_COMPARED = 4_000_000
 # [rad] bound of the turn in one step; it is up to twice the turn itself.
@@ -34,7 +38,7 @@ _VERY_FAR = 100.0
 # [rad] on a panel, that a plan of steps is made for.
 _MOST_TURN = 1e9
 # A term of the rate of turning, times the panel's width, is significant above this part of the tolerance.
-_SIGNIFICANT = 0.001
+_SIGNIFICANT = 0.2
 # The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
 # each the sum of its terms times the eighth power of their degree over half the steps. Three of four random motions
 # need no more.
@@ -55,6 +59,7 @@ class StepRequirements(NamedTuple):
     degree : (P,) the last significant degree there
     rates : (P, n) the size of each term of the rate of turning, times the panel's width [rad]
     whole_turn : the bound for all panels and loops [rad]
+    tolerance : of the attitude [rad]
     loops : how often the panels are repeated
     """
 
@@ -63,6 +68,7 @@ class StepRequirements(NamedTuple):
     degree: Array
     rates: Array
     whole_turn: float
+    tolerance: float
     loops: int
 
     @classmethod
@@ -87,6 +93,7 @@ class StepRequirements(NamedTuple):
             degree=last,
             rates=rates,
             whole_turn=interpolant.loops * float(turn.sum()),
+            tolerance=tolerance,
             loops=interpolant.loops,
         )
 
@@ -122,7 +129,9 @@ class StepRequirements(NamedTuple):
             part = slice(first, first + at_once)
             counts = self.rates > _NOT_SMALL * distance[part, None, None]
             most[part] = (counts * spanned).max(axis=(1, 2), initial=0.0)
-        return distance * np.exp(np.interp(most, _DEGREES, np.log(_PARTS)))
+        by_chance = self.tolerance * np.interp(most, _CHANCE_DEGREES, _CHANCE_PARTS)
+        part = np.exp(np.interp(most, _DEGREES, np.log(_PARTS)))
+        return np.maximum(part * distance, np.minimum(by_chance, distance))
 
 
 def even_steps(planned: Array, subdivide: Integers | int) -> Integers:
