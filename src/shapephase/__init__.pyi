@@ -24,6 +24,7 @@ from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body
 from .errors import (
     CompiledCodeWarning,
     IgnoredElementWarning,
+    ImplausibleBodyWarning,
     ShapePhaseError,
     TrajectoryWarning,
     UnphysicalInertiaWarning,
@@ -78,6 +79,7 @@ __all__ = [
     "FixedPoints",
     "HorizontalLift",
     "IgnoredElementWarning",
+    "ImplausibleBodyWarning",
     "Motion",
     "OrbitBranch",
     "PathSummary",

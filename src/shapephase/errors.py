@@ -185,6 +185,10 @@ class UnphysicalInertiaWarning(UserWarning):
     """Links whose inertia is doubtful, accepted because the caller allows it or because it does no harm."""
 
 
+class ImplausibleBodyWarning(UserWarning):
+    """Numbers of a body that hardly any real one has: other units, or a slip in its file."""
+
+
 class IgnoredElementWarning(UserWarning):
     """An element of a file that has no meaning for a free-floating body; the message names it."""
 

@@ -15,8 +15,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
+from shapephase import so3
+from shapephase.body import _drawing_limits, catalog
 from shapephase.body import appearance as visuals
-from shapephase.body import catalog
 from shapephase.body.appearance import inertia_box
 from shapephase.errors import VisualWarning
 from support.bodies import BODIES, joint, link, random_shapes, urdf
@@ -496,3 +497,88 @@ def test_every_moving_part_with_mass_is_shown(name):
     linked = list(itertools.chain.from_iterable(part.links for part in body.moving_parts))
     assert sorted(linked) == sorted(body.link_names)
     assert sum(part.mass for part in body.moving_parts) == pytest.approx(body.mass, rel=1e-12)
+
+
+# ---- Very much to show ----------------------------------------------------------------------------------------------
+
+
+def crowd(folder, meshes, visuals_of_each=1, kind="mesh", flat=False):
+    """Two links, the first with many visuals, of icospheres in files or of balls."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    if flat:
+        ball.vertices[:, 2] = 0.0
+    shapes = []
+    for k in range(meshes):
+        if kind == "mesh":
+            ball.export(folder / f"ball{k}.stl")
+        shape = f"<mesh filename='ball{k}.stl' scale='.1 .1 .1'/>" if kind == "mesh" else "<sphere radius='.1'/>"
+        place = f"<origin xyz='{0.01 * k} 0 0'/>"
+        shapes += [f"<visual>{place}<geometry>{shape}</geometry></visual>"] * visuals_of_each
+    inertia = "<mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/>"
+    (folder / "crowd.urdf").write_text(
+        f"<robot name='r'><link name='a'><inertial>{inertia}</inertial>{''.join(shapes)}</link>"
+        f"<link name='b'><inertial>{inertia}</inertial>"
+        "<visual><geometry><sphere radius='1'/></geometry></visual></link>"
+        "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint></robot>"
+    )
+    return sp.load_body(folder / "crowd.urdf")
+
+
+def reach_of(shapes, directions):
+    """How far shapes reach in directions (3, M), by all their points."""
+    points = [
+        np.asarray(s.vertices if len(s.vertices) else s.corners) @ s.pose[:3, :3].T + s.pose[:3, 3] for s in shapes
+    ]
+    return (np.concatenate(points) @ directions).max(axis=0)
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_more_triangles_than_a_page_holds_are_drawn_as_hulls(tmp_path, monkeypatch, rng, flat):
+    """1,280 triangles each; the hull of some points of a ball reaches at least as far as 0.97 of its radius."""
+    body = crowd(tmp_path, 6, 2, flat=flat)
+    monkeypatch.setattr(_drawing_limits, "_MOST_FACES", 5_000)
+    with pytest.warns(VisualWarning, match="meshes are drawn as their convex hulls: all have 15360 triangles together"):
+        shapes = visuals.visuals(body)
+    assert len(shapes) == 13
+    assert 1280 < sum(len(shape.faces) for shape in shapes) <= 5_000
+    if flat:
+        boxes = [shape for shape in shapes if shape.kind == "box"]
+        assert boxes
+        for box in boxes:
+            np.testing.assert_allclose(box.dimensions, [0.2, 0.2, 2e-4], rtol=1e-3)
+        return
+    import trimesh
+
+    for shape in shapes[:12]:
+        drawn = trimesh.Trimesh(shape.vertices, shape.faces, validate=True)
+        assert drawn.is_watertight
+        assert 0.9 < drawn.volume / (4.0 / 3.0 * np.pi * 1e-3) < 1.0
+    directions = so3.normalised(rng.normal(size=(50, 3))).T
+    monkeypatch.setattr(_drawing_limits, "_MOST_FACES", 10**9)
+    whole = visuals.visuals(body)
+    np.testing.assert_allclose(reach_of(shapes[:12], directions), reach_of(whole[:12], directions), rtol=0.03)
+
+
+def test_more_shapes_than_a_page_holds_are_drawn_as_one_hull(tmp_path, monkeypatch):
+    body = crowd(tmp_path, 30, kind="ball")
+    monkeypatch.setattr(_drawing_limits, "_MOST_SHAPES", 20)
+    with pytest.warns(VisualWarning, match="1 links, 'a' first, are drawn as the hull of what they show: .* 31 shapes"):
+        hull, ball = visuals.visuals(body)
+    assert (hull.link, hull.kind, ball.kind) == ("a", "mesh", "sphere")
+    np.testing.assert_allclose([hull.vertices.min(axis=0), hull.vertices.max(axis=0)], [[-0.1] * 3, [0.39, 0.1, 0.1]])
+
+
+def test_more_mesh_files_than_memory_holds_are_not_read(tmp_path, monkeypatch):
+    body = crowd(tmp_path, 4)
+    monkeypatch.setattr(visuals, "_MOST_BYTES_IN_ALL", 2 * (tmp_path / "ball0.stl").stat().st_size)
+    with pytest.warns(VisualWarning, match="2 meshes are not read: all have more than"):
+        shapes = visuals.visuals(body)
+    assert [shape.kind for shape in shapes] == ["mesh", "mesh", "sphere"]
+
+
+def test_visuals_of_one_mesh_share_its_numbers(tmp_path):
+    first, second, *_ = visuals.visuals(crowd(tmp_path, 1, 2))
+    assert first.vertices is second.vertices
+    assert first.faces is second.faces

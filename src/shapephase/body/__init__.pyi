@@ -4,6 +4,7 @@ from .catalog import example_file, example_names, load_body, robot_names, robots
 from .family import BodyFamily
 from .joint_chain import JointChain
 from .moving_parts import MovingPart
+from .plausibility import implausible
 
 __all__ = [
     "Body",
@@ -13,6 +14,7 @@ __all__ = [
     "Visual",
     "example_file",
     "example_names",
+    "implausible",
     "inertia_box",
     "load_body",
     "robot_names",

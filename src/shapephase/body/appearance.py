@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Array, Integers
 from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
+from ._drawing_limits import within_limits
 from ._mjcf import Placed, contents_of, settings_of, with_defaults
 from ._mjcf_geometry import placed_geom
 from ._urdf import rpy_matrix
@@ -25,6 +26,7 @@ from .body import Body, MovingPart
 from .catalog import example_folder
 
 Colour = tuple[float, float, float, float]
+_Piece = tuple[Array, Integers, Colour | None]
 
 PLAIN: Colour = (0.72, 0.74, 0.78, 1.0)
 BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)
@@ -33,12 +35,16 @@ _MUJOCO_GREY: Colour = (0.5, 0.5, 0.5, 1.0)
 _MESHES = (".stl", ".obj", ".dae", ".ply")
 _MOST_BYTES = 64 * 2**20
 """Size of a mesh file [bytes]."""
+_MOST_BYTES_IN_ALL = 128 * 2**20
+"""Size of all mesh files of a body [bytes]."""
 _MOST_NAMED = 10
 """Faults that one warning lists."""
 _THINNEST = 0.01
 """Edge of an inertia box, as a share of its longest: a flat box is still seen from the side."""
 _WATER = 1000.0
 """Density of the ball that stands for a point mass [kg/m^3]."""
+_CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, 8).T
+"""Of the cube [-1, 1]^3: (8, 3)."""
 # MuJoCo's own viewer shows these groups of geoms; the others are for collisions.
 _SHOWN_GROUPS = (0.0, 1.0, 2.0)
 
@@ -68,6 +74,22 @@ class Visual:
     vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
     faces: Integers = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
 
+    @property
+    def corners(self) -> Array:
+        """Corners of the box around the shape, in its own axes: (8, 3) [m]."""
+        if self.kind == "mesh":
+            low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+            return 0.5 * (low + high) + 0.5 * (high - low) * _CORNERS
+        lengths = self.dimensions
+        halves: dict[str, tuple[float, ...]] = {
+            "sphere": lengths * 3,
+            "ellipsoid": lengths,
+            "box": tuple(0.5 * edge for edge in lengths),
+            "cylinder": (lengths[0], lengths[0], 0.5 * lengths[-1]),
+            "capsule": (lengths[0], lengths[0], 0.5 * lengths[-1] + lengths[0]),
+        }
+        return np.array(halves[self.kind]) * _CORNERS
+
 
 def visuals(body: Body) -> tuple[Visual, ...]:
     """The shapes to draw of a body, by link.
@@ -82,17 +104,26 @@ def visuals(body: Body) -> tuple[Visual, ...]:
         If the file is gone or no longer the one that was loaded (all is drawn as boxes then), or something in it cannot
         be shown: a mesh that is not found or cannot be read, a faulty element.
     """
+    found, doubts = drawn_shapes(body)
+    shown = {shape.link for shape in found}
+    boxes = [_part_box(part) for part in body.moving_parts if part.mass > 0.0 and shown.isdisjoint(part.links)]
+    if doubts:
+        more = len(doubts) - _MOST_NAMED
+        text = "; ".join(doubts[:_MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
+        warnings.warn(f"{text}. Parts with nothing to show are drawn as inertia boxes", VisualWarning, stacklevel=2)
+    return (*found, *boxes)
+
+
+def drawn_shapes(body: Body) -> tuple[list[Visual], list[str]]:
+    """What a body's file has to show, and what in it cannot be shown."""
     looks = _Looks(body.file.parent if body.file else Path())
     root = _unchanged(body, looks.doubts)
     if root is not None:
         (_read_mjcf if root.tag == "mujoco" else _read_urdf)(root, looks)
-    shown = {shape.link for shape in looks.found}
-    boxes = [_part_box(part) for part in body.moving_parts if part.mass > 0.0 and shown.isdisjoint(part.links)]
-    if looks.doubts:
-        more = len(looks.doubts) - _MOST_NAMED
-        text = "; ".join(looks.doubts[:_MOST_NAMED]) + (f"; and {more} more" if more > 0 else "")
-        warnings.warn(f"{text}. Parts with nothing to show are drawn as inertia boxes", VisualWarning, stacklevel=2)
-    return (*looks.found, *boxes)
+    if looks.unread:
+        looks.doubts.append(f"{looks.unread} meshes are not read: all have more than {_MOST_BYTES_IN_ALL >> 20} MiB")
+    shapes, simplified = within_limits(looks.found)
+    return shapes, looks.doubts + simplified
 
 
 def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
@@ -121,7 +152,10 @@ class _Looks:
     folder: Path
     found: list[Visual] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
-    meshes: dict[Path, list[tuple[Array, Integers, Colour | None]]] = field(default_factory=dict)
+    meshes: dict[Path, list[_Piece]] = field(default_factory=dict)
+    scaled: dict[tuple[Path, tuple[float, ...]], list[_Piece]] = field(default_factory=dict)
+    mesh_bytes: int = 0
+    unread: int = 0
 
     def attempt(self, shapes: Callable[[], list[Visual]]) -> None:
         """Take what can be read; what is faulty spoils the picture only."""
@@ -235,15 +269,22 @@ def _mesh_shapes(node: Node, empty: Visual, colour: Colour | None, owner: str, l
     if path.suffix.lower() not in _MESHES:
         raise node.fault(owner, f"the mesh {quoted(name)!r}: files {', '.join(_MESHES)} can be read")
     if path not in looks.meshes:
+        looks.mesh_bytes += path.stat().st_size
+        if looks.mesh_bytes > _MOST_BYTES_IN_ALL:
+            looks.unread += 1
+            return []
         looks.meshes[path] = _mesh_pieces(path, node, owner)
     scale = np.array(empty.dimensions)
-    pieces = []
-    for vertices, faces, own in looks.meshes[path]:
-        # A mirror image has its faces the other way round.
-        turned = faces if np.prod(scale) > 0.0 else faces[:, ::-1]
-        look = colour or own or PLAIN
-        pieces.append(replace(empty, colour=look, mesh=path, vertices=vertices * scale, faces=turned))
-    return pieces
+    # A mirror image has its faces the other way round.
+    order = 1 if np.prod(scale) > 0.0 else -1
+    # Visuals of one mesh share their arrays.
+    key = (path, empty.dimensions)
+    if key not in looks.scaled:
+        looks.scaled[key] = [(vertices * scale, faces[:, ::order], own) for vertices, faces, own in looks.meshes[path]]
+    return [
+        replace(empty, colour=colour or own or PLAIN, mesh=path, vertices=vertices, faces=faces)
+        for vertices, faces, own in looks.scaled[key]
+    ]
 
 
 def _mesh_places(name: str, folder: Path) -> Iterator[Path]:
@@ -271,7 +312,7 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _mesh_pieces(path: Path, node: Node, owner: str) -> list[tuple[Array, Integers, Colour | None]]:
+def _mesh_pieces(path: Path, node: Node, owner: str) -> list[_Piece]:
     """Vertices, faces and colour of each piece."""
     missing = {"trimesh": "trimesh", **({"collada": "pycollada"} if path.suffix.lower() == ".dae" else {})}
     for module, package in missing.items():

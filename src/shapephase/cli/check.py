@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+
+from ..errors import ImplausibleBodyWarning
 from .options import AS_RECORDED, AS_TEXT, BodyArgument, MotionArgument, PrintOptions, RecordingOptions
 from .outcome import Outcome
 
@@ -14,14 +17,17 @@ def check_command(
     recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
-    """Check a body, and a joint motion for it: what was read, and whether it can be used."""
+    """Check a body, and a joint motion for it: what was read, what is unlikely of it, and whether it can be used."""
     from ..body.catalog import load_body
+    from ..body.plausibility import implausible
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import joint_motion
     from .recording_text import recording_data, recording_lines
     from .text import body_lines, path_data, path_lines, plain, record_data
 
     loaded = load_body(body, isolate=True)
+    for doubt in implausible(loaded):
+        warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)
     lines, data = body_lines(summary), {"body": plain(summary)}
     if motion is not None:

@@ -128,11 +128,26 @@ def body_lines(summary: BodySummary) -> list[str]:
         f"{'principal moments':24}{_numbers(summary.principal_moments)}   kg m^2",
         f"{'sha256':24}{summary.sha256 or 'none: not from a file'}",
         "",
-        f"{'joint':<{width}}  {'kind':<10}{'lower':>12}{'upper':>12}",
+        f"{'joint':<{width}}  {'kind':<10}{'lower':>12}{'upper':>12}{'range':>16}",
     ]
     for joint in summary.joints:
         limits = "".join(f"{_limit(value):>12}" for value in (joint.lower, joint.upper))
-        lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {joint.unit}")
+        span = _limit(joint.upper - joint.lower)
+        lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {joint.unit:<3}{span:>12}")
+    return [*lines, "", *_part_lines(summary)]
+
+
+def _part_lines(summary: BodySummary) -> list[str]:
+    """What moves as one, by its first link and how many are fixed to it."""
+    names = [
+        part.links[0] if len(part.links) == 1 else f"{part.links[0]} +{len(part.links) - 1}" for part in summary.parts
+    ]
+    width = max(map(len, ("link", *names)))
+    lines = [f"{'link':<{width}}{'kg':>13}  {'centre of mass [m]':^38}  {'principal moments [kg m^2]':^38}".rstrip()]
+    for name, part in zip(names, summary.parts, strict=True):
+        lines.append(
+            f"{name:<{width}}{part.mass:13.6g}  {_numbers(part.centre_of_mass)}  {_numbers(part.principal_moments)}"
+        )
     return lines
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array
+from ..body._drawing_limits import hull
 from ..body.appearance import BOX_COLOUR, Visual, visuals
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription, Description, ParticleDescription
@@ -23,10 +23,10 @@ from ..reconstruction.reconstruction import Motion
 _MAX_FRAMES = 10_000
 # Shortest edge of the box of an inertia, of its longest: the box of a flat body stays visible.
 _MIN_THICKNESS = 0.01
+# Of the boxes around the shapes of a node: of more, those inside are left out.
+_FEW_CORNERS = 64
 # Radius of the heaviest particle, of the largest distance from the centre of mass.
 _PARTICLE_RADIUS = 0.06
-# Corners of the cube [-1, 1]^3: (8, 3).
-_CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, 8).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,14 +96,15 @@ class MovingScene:
 
     @cached_property
     def corners(self) -> Array:
-        """Corners of boxes around all shapes: (F, K, 3)."""
+        """Corners of boxes around all shapes of a node, the outermost of many: (F, K, 3)."""
         found = []
         for node in self.nodes:
             pose = self.world_pose(node)
-            for shape in node.shapes:
-                points = _corners(shape) @ shape.pose[:3, :3].T + shape.pose[:3, 3]
-                stretched = points[None] if node.scales is None else points * node.scales[:, None]
-                found.append(stretched @ so3.transpose(pose[:, :3, :3]) + pose[:, None, :3, 3])
+            points = np.concatenate([s.corners @ s.pose[:3, :3].T + s.pose[:3, 3] for s in node.shapes])
+            outermost = hull(points) if len(points) > _FEW_CORNERS else None
+            points = points if outermost is None else outermost[0]
+            stretched = points[None] if node.scales is None else points * node.scales[:, None]
+            found.append(stretched @ so3.transpose(pose[:, :3, :3]) + pose[:, None, :3, 3])
         return np.concatenate(found, axis=1) if found else self.centre[:, None]
 
 
@@ -223,23 +224,3 @@ def _continuous_axes(deformation: Deformation, moment: Array, times: Array) -> A
         return so3.transpose(principal_frames(deformation)(times)[0])
     except ShapePhaseError:
         return principal_axes(moment)[1]
-
-
-def _corners(shape: Visual) -> Array:
-    """Corners of the box around a shape, in its own axes: (8, 3)."""
-    if shape.kind == "mesh":
-        low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
-        return 0.5 * (low + high) + 0.5 * (high - low) * _CORNERS
-    return _half_extents(shape) * _CORNERS
-
-
-def _half_extents(shape: Visual) -> Array:
-    dimensions = shape.dimensions
-    halves: Mapping[str, tuple[float, ...]] = {
-        "sphere": dimensions * 3,
-        "ellipsoid": dimensions,
-        "box": tuple(0.5 * edge for edge in dimensions),
-        "cylinder": (dimensions[0], dimensions[0], 0.5 * dimensions[-1]),
-        "capsule": (dimensions[0], dimensions[0], 0.5 * dimensions[-1] + dimensions[0]),
-    }
-    return np.array(halves[shape.kind])

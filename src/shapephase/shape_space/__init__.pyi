@@ -11,13 +11,14 @@ from .connection import (
 from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .many_paths import FinalAttitudes, final_attitudes
 from .shape_path import ShapePath
-from .summaries import BodySummary, JointSummary, PathSummary, body_summary, path_summary
+from .summaries import BodySummary, JointSummary, PartSummary, PathSummary, body_summary, path_summary
 
 __all__ = [
     "BodySummary",
     "FinalAttitudes",
     "HorizontalLift",
     "JointSummary",
+    "PartSummary",
     "PathSummary",
     "ShapePath",
     "body_summary",

@@ -29,6 +29,24 @@ class JointSummary:
 
 
 @dataclass(frozen=True, eq=False)
+class PartSummary:
+    """What moves as one: a link and those that are fixed to it.
+
+    Attributes
+    ----------
+    links : their names
+    mass : [kg]
+    centre_of_mass : (3,) axes of the first link [m]
+    principal_moments : (3,) ascending, about the centre of mass [kg m^2]
+    """
+
+    links: tuple[str, ...]
+    mass: float
+    centre_of_mass: Array
+    principal_moments: Array
+
+
+@dataclass(frozen=True, eq=False)
 class BodySummary:
     """A body at its neutral shape.
 
@@ -42,6 +60,7 @@ class BodySummary:
     triangle_defect : by how much the largest moment is above the sum of the others, relative; not above 0 for real mass
     joints : the independent ones, in the order of the shape vector
     links : all of them, by name
+    parts : what moves as one, the base first
     """
 
     name: str
@@ -53,6 +72,7 @@ class BodySummary:
     triangle_defect: float
     joints: tuple[JointSummary, ...]
     links: tuple[str, ...]
+    parts: tuple[PartSummary, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +126,15 @@ def body_summary(body: Body) -> BodySummary:
             for name, kind, (lower, upper), unit in joints
         ),
         links=body.link_names,
+        parts=tuple(
+            PartSummary(
+                links=part.links,
+                mass=part.mass,
+                centre_of_mass=part.centre,
+                principal_moments=principal_axes(part.inertia)[0],
+            )
+            for part in body.moving_parts
+        ),
     )
 
 
