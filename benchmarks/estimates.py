@@ -1,8 +1,9 @@
-"""Error estimates beside true errors: `python -m benchmarks.estimates [harmonics] [mixed] [--runs N] [--seed S]`.
+"""Error estimates beside true errors: `python -m benchmarks.estimates [FAMILY ...] [--runs N] [--seed S]`.
 
 The true error of a run is the largest angle at sixty random times and the end, against an integration in extended
 precision. `harmonics` are loops of one or two harmonics up to the 24th on all bodies that come with the library;
-`mixed` are also random bodies along paths of all kinds. Each run depends on seed and number alone.
+`mixed` are also random bodies along paths of all kinds; `recordings` have up to some thousand rows. Each run depends on
+seed and number alone.
 
     --jobs J     in J processes
     --kept FILE  every run is a line of this file; runs that it has are not made again
@@ -32,10 +33,10 @@ import numpy as np
 import shapephase as sp
 
 from .extended import TooLong, Truth, angles_between, prepare
-from .random_motions import Trial, harmonics, mixed
+from .random_motions import Trial, harmonics, mixed, recordings
 
 TIMES = 60
-FAMILIES = {"harmonics": harmonics, "mixed": mixed}
+FAMILIES = {"harmonics": harmonics, "mixed": mixed, "recordings": recordings}
 _HARMLESS = 30.0
 """How far below the tolerance a truth has to be for its refusal to be a fault."""
 _FRAME_SECONDS = 2.5e-5

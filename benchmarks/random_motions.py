@@ -80,6 +80,13 @@ def mixed(number: int, rng: np.random.Generator) -> Trial:
     return _trial(body, kind(body, rng), rng, resting=rng.random() < 0.4, seed=(number,))
 
 
+def recordings(number: int, rng: np.random.Generator) -> Trial:
+    """Recorded paths of some hundred to some thousand rows, smooth or noisy, on all kinds of bodies."""
+    names = sp.robot_names()
+    body = shipped(str(rng.choice(names))) if rng.random() < 0.6 else random_body(rng)
+    return _trial(body, _recording(body, rng), rng, resting=rng.random() < 0.5, seed=(number,))
+
+
 def _trial(body: sp.Body, way: Way, rng: np.random.Generator, *, resting: bool, seed: tuple[int, ...]) -> Trial:
     tolerance = 10.0 ** rng.uniform(*_TOLERANCES)
     momentum = np.zeros(3)
@@ -167,6 +174,40 @@ def _spline(body: sp.Body, rng: np.random.Generator) -> Way:
         points -= np.linspace(0.0, 1.0, count)[:, None] * (points[-1] - points[0])
     path = sp.ShapePath.spline(_times(count, rng), points)
     return Way(f"spline of {count}{', closed' if closed else ''}", path, (_whole(path),))
+
+
+def _recording(body: sp.Body, rng: np.random.Generator) -> Way:
+    """Rows of a few harmonics, with or without noise, rests, a single wrong sample, and rounding to six digits."""
+    count, noise = int(rng.choice([66, 100, 200, 400, 1000, 2500])), float(rng.choice([0.0, 1e-6, 1e-4, 1e-3, 1e-2]))
+    reach, times = (
+        _reach(body),
+        _times(count, rng) if rng.random() < 0.3 else np.linspace(0.0, 10.0 ** rng.uniform(-1.0, 1.0), count),
+    )
+    phase, closed = times[:, None] / times[-1], bool(rng.random() < 0.4)
+    rows = np.zeros((count, body.n_shape))
+    size = 10.0 ** rng.uniform(-1.5, 0.2)
+    for k in range(1, int(rng.integers(2, 7))):
+        turns = 2.0 * np.pi * k * (1.0 if closed else rng.uniform(0.5, 1.5))
+        rows += (
+            size
+            * reach
+            * rng.normal(size=body.n_shape)
+            / k
+            * np.sin(turns * phase + rng.uniform(0.0, 6.0, body.n_shape))
+        )
+    if rests := rng.random() < 0.2:
+        rows *= np.clip((phase - 0.4) / 0.3, 0.0, 1.0) ** 2
+    if wrong := rng.random() < 0.15:
+        rows[int(rng.integers(1, count - 1))] += reach * 10.0 ** rng.uniform(-6.0, -1.0)
+    rows += noise * reach * rng.normal(size=rows.shape)
+    if rounded := rng.random() < 0.2:
+        rows = np.round(rows, 6)
+    if closed:
+        rows[-1] = rows[0]
+    path = sp.ShapePath.spline(times, rows, periodic=closed)
+    said = {"closed": closed, "resting at times": rests, "one wrong": wrong, "rounded": rounded}
+    extra = "".join(f", {name}" for name, holds in said.items() if holds)
+    return Way(f"{count} rows, noise {noise:g}{extra}", path, (_whole(path),))
 
 
 def _times(count: int, rng: np.random.Generator) -> np.ndarray:

@@ -190,7 +190,7 @@ def enclosure(
     Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
     """
     start, end = interval_argument(interval, deformation.duration)
-    sampler = deformation.sampler()
+    sampler = deformation.sampler(pointwise=True)
     sampler.refine(magnitude or 1.0, tolerance)
     sampled = sampler.interpolant()
     error = _sampling_error(deformation, sampled)

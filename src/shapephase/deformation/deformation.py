@@ -161,17 +161,23 @@ class Deformation:
         least, when = least_over(lambda t: -triangle_defect(self.description.sample(t)[0]), self.breaks)
         return -least, when
 
-    def sampler(self) -> Sampler:
+    def sampler(self, *, pointwise: bool = False) -> Sampler:
         """A fresh sampler for the integrator, of the kind that suits what the description says of itself.
+
+        Along a recorded path panels span several knots, so that attitudes are right, but I^-1 and I^-1 L_o at a single
+        time only to the tolerance over the width of a panel. `pointwise`: no panel spans a knot.
 
         Raises SingularInertiaError for particles that are on one line at some time.
         """
-        return self.samplers().fresh()
+        return self.samplers(pointwise=pointwise).fresh()
 
-    def samplers(self) -> Samplers:
-        """Fresh samplers that share what they find out, for many motions of this deformation. Raises as `sampler`."""
+    def samplers(self, *, pointwise: bool = False) -> Samplers:
+        """Fresh samplers that share what they find out, for many motions of this deformation. As `sampler`."""
         known = self.description
-        return Samplers(known.sample, **vars(known.smoothness(self.breaks)), directly=known.channels)
+        smoothness = known.smoothness(self.breaks)
+        if pointwise:
+            smoothness = replace(smoothness, knots=None)
+        return Samplers(known.sample, **vars(smoothness), directly=known.channels)
 
 
 def articulated(body: Body, path: ShapePath) -> Deformation:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -18,7 +18,8 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
-from ..shape_space.body_path import channels_along
+from ..integrator.recorded.knot_path import KnotPath
+from ..shape_space.body_path import channels_along, recorded_path
 from ..shape_space.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.scanning import scanned
 from ..shape_space.shape_path import ShapePath
@@ -161,7 +162,15 @@ class ArticulatedDescription(UngaugedDescription):
         return self.body.link_pose(shapes, link)[:, :3, :3], self.body.link_angular_velocity(shapes, rates, link)
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
-        return self.path.smoothness
+        return replace(self.path.smoothness, knots=self._knots)
+
+    @cached_property
+    def _knots(self) -> KnotPath | None:
+        return recorded_path(self.body, self.path)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: what was found out about the path is found out again."""
+        return {"body": self.body, "path": self.path}
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,8 @@ from ._panel_sampling import PanelSampler
 from ._spectral_error import Channels, Directly, Evaluate
 from .fast import engine
 from .interpolant import Interpolant
+from .recorded.knot_path import KnotPath
+from .recorded.knot_sampling import KnotSampler
 from .resolved import ResolvedPath
 
 # Panels to begin with for a loop too rough for even samples.
@@ -63,6 +65,7 @@ def sampler(
     resolved: ResolvedPath | None = None,
     directly: Directly | None = None,
     checked: bool = False,
+    knots: KnotPath | None = None,
 ) -> Sampler:
     """The sampler that suits a deformation.
 
@@ -81,7 +84,10 @@ def sampler(
     directly : times (N,) -> I^-1 and I^-1 L_o (N, 9) as channels, sooner than by `evaluate`; None, or None as its
         result: `evaluate` is asked
     checked : it depends on more, and is checked between nodes nevertheless
+    knots : the first loop of a recorded path, whose knots are the breaks: panels may span several of them
     """
+    if knots is not None:
+        return KnotSampler(knots, loops)
     channels = Channels(evaluate, directly)
     period = float(breaks[-1]) / loops
     if smooth_loop and oscillations is not None:
@@ -105,15 +111,19 @@ class Samplers:
         self._evaluate, self._breaks, self._smoothness = evaluate, breaks, smoothness
         self._channels = Channels(evaluate, directly if engine.is_ready() else None)
         self._known: dict[bytes, Array] = {}
+        self._of_knots: list[KnotSampler] = []
 
     @property
     def evaluations(self) -> int:
         """How many times the deformation was evaluated so far."""
-        return self._channels.count
+        return self._channels.count + sum(one.evaluations for one in self._of_knots)
 
     def fresh(self) -> Sampler:
         """A sampler that knows nothing yet."""
-        return sampler(self._evaluate, self._breaks, directly=self._remembered, **self._smoothness)
+        made = sampler(self._evaluate, self._breaks, directly=self._remembered, **self._smoothness)
+        if isinstance(made, KnotSampler):
+            self._of_knots.append(made)
+        return made
 
     def _remembered(self, times: Array) -> Array:
         key = times.tobytes()

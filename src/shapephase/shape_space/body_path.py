@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
 from .. import so3
@@ -9,8 +12,20 @@ from ..arrays import Array
 from ..body.body import Body
 from ..errors import OpenPathError
 from ..integrator.fast.tree import tree_channels
+from ..integrator.recorded.knot_path import KnotPath, Slopes
 from ..integrator.sampling import Sampler, Samplers
+from .curves import PiecewisePolynomial, many_pieces
 from .shape_path import CLOSED, ShapePath
+
+# [rad or m] the joint that moves farthest goes between times at which the slopes of a body's channels are computed.
+_WAY_BETWEEN_SLOPES = 0.25
+_LEAST_SLOPES = 9
+_MOST_SLOPES = 8192
+# Of those times, one in so many for how the slopes change, which costs more and matters less.
+_SLOPES_FOR_A_CHANGE = 16
+_LEAST_CHANGES = 3
+# Entries xx yy zz yz xz xy of a matrix row by row.
+_VOIGT = [0, 4, 8, 5, 2, 1]
 
 
 def path_gap(body: Body, path: ShapePath) -> Array:
@@ -44,7 +59,8 @@ def path_samplers(body: Body, path: ShapePath) -> Samplers:
     def directly(times: Array) -> Array | None:
         return channels_along(body, path, times)
 
-    return Samplers(evaluate, **vars(path.smoothness), directly=directly)
+    smoothness = replace(path.smoothness, knots=recorded_path(body, path))
+    return Samplers(evaluate, **vars(smoothness), directly=directly)
 
 
 def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
@@ -52,4 +68,55 @@ def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
 
     None where a tensor is nearly singular or a number is not finite.
     """
-    return tree_channels(body.chain.rows, *path.curve(times))
+    return channels_at(body, *path.curve(times))
+
+
+def channels_at(body: Body, shapes: Array, rates: Array) -> Array | None:
+    """The same at shapes and rates (N, n)."""
+    return tree_channels(body.chain.rows, shapes, rates)
+
+
+def recorded_path(body: Body, path: ShapePath) -> KnotPath | None:
+    """A recorded path, whose columns are in the body's order, with how the body follows it; None: it is none."""
+    pieces = recorded_pieces(path)
+    if pieces is None:
+        return None
+    return KnotPath(
+        knots=pieces.knots,
+        coefficients=pieces.coefficients,
+        slopes=partial(_slopes, body, pieces),
+        follow=body.sample,
+        directly=partial(channels_at, body),
+    )
+
+
+def recorded_pieces(path: ShapePath) -> PiecewisePolynomial | None:
+    """The first loop of a path as polynomials between its breaks, where these are many; else None."""
+    return many_pieces(path.curve, path.breaks[path.breaks <= path.duration / path.loops * (1.0 + 1e-12)])
+
+
+def _slopes(body: Body, pieces: PiecewisePolynomial) -> Slopes:
+    """How a body's channels follow its joints, at times between which these move little."""
+    shapes = pieces.coefficients[0]
+    ends = np.concatenate([shapes, pieces(pieces.knots[-1:])[0]])
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(ends, axis=0)).max(axis=1, initial=0.0)))
+    # What rests moves on a little nevertheless, so that times ascend.
+    way += 1e-3 * (1.0 + way[-1]) * pieces.knots / pieces.knots[-1]
+    count = int(np.clip(np.ceil(way[-1] / _WAY_BETWEEN_SLOPES), _LEAST_SLOPES, _MOST_SLOPES))
+    times, few = (
+        np.interp((np.arange(n) + 0.5) / n * way[-1], way, pieces.knots)
+        for n in (count, max(count // _SLOPES_FOR_A_CHANGE, _LEAST_CHANGES))
+    )
+    there, rarely = pieces(times)[0], pieces(few)[0]
+    inverse, matrix = np.linalg.inv(body.locked_inertia(rarely)), body.momentum_matrix(rarely)
+    changes = body.angular_map_gradient(rarely)
+    of_inverse = -inverse[:, None] @ changes[..., :3] @ inverse[:, None]
+    entries = of_inverse.reshape(*of_inverse.shape[:2], 9)[:, :, _VOIGT] * np.sqrt([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+    return Slopes(
+        times=times,
+        drift=np.asarray(np.linalg.solve(body.locked_inertia(there), body.momentum_matrix(there)), dtype=np.float64),
+        change_times=few,
+        drift_changes=inverse[:, None] @ changes[..., 3:] + of_inverse @ matrix[:, None],
+        inverse_changes=np.swapaxes(entries, 1, 2),
+        inverse_norm=float(np.linalg.norm(inverse, axis=(1, 2)).max()),
+    )

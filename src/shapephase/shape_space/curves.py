@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from math import comb
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +18,10 @@ from ..errors import ShapeError, TrajectoryError
 CLOSED = 1e-9
 """[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
 _WHOLE_TURN = 2.0 * np.pi
+# Breaks of a loop from which on it is taken for a recording.
+_MANY_BREAKS = 64
+# Knots of a loop repeated that are still written out.
+_MOST_REPEATED = 100_000
 
 
 class Curve(Protocol):
@@ -67,18 +72,69 @@ class PiecewisePolynomial:
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
         piece = np.searchsorted(self.knots[1:-1], times, side="right")
-        powers = (times - self.knots[piece])[:, None] ** np.arange(len(self.coefficients))
-        both = (powers[:, None] @ self._by_piece[piece])[:, 0]
-        n_shape = self.coefficients.shape[2]
-        return both[:, :n_shape], both[:, n_shape:]
+        since = (times - self.knots[piece])[:, None]
+        shapes, rates = np.zeros((2, len(times), self.coefficients.shape[2]))
+        for coefficients in self.coefficients[::-1]:
+            rates *= since
+            rates += shapes
+            shapes *= since
+            shapes += coefficients[piece]
+        return shapes, rates
 
-    @cached_property
-    def _by_piece(self) -> Array:
-        """Coefficients of the shapes and of the rates, side by side: (pieces, order, 2 n)."""
-        shapes = np.moveaxis(self.coefficients, 0, 1)
-        rates = np.zeros_like(shapes)
-        rates[:, :-1] = shapes[:, 1:] * np.arange(1.0, shapes.shape[1])[:, None]
-        return np.concatenate([shapes, rates], axis=2)
+
+def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
+    """The same curve as polynomials between knots; None where it is none."""
+    if isinstance(curve, PiecewisePolynomial):
+        return curve
+    if isinstance(curve, Joined):
+        first, second = polynomial_pieces(curve.first), polynomial_pieces(curve.second)
+        if first is None or second is None:
+            return None
+        return _joined_pieces([first, second], [np.zeros_like(curve.offset), curve.offset])
+    inner = polynomial_pieces(curve.curve) if isinstance(curve, Reversed | Stretched | Reordered | Repeated) else None
+    if inner is None:
+        return None
+    if isinstance(curve, Reversed):
+        return _reversed_pieces(inner)
+    if isinstance(curve, Stretched):
+        powers = curve.factor ** -np.arange(len(inner.coefficients), dtype=np.float64)
+        return PiecewisePolynomial(curve.factor * inner.knots, inner.coefficients * powers[:, None, None])
+    if isinstance(curve, Reordered):
+        return PiecewisePolynomial(inner.knots, inner.coefficients[:, :, curve.order])
+    if isinstance(curve, Repeated) and curve.count * len(inner.knots) <= _MOST_REPEATED:
+        return _joined_pieces([inner] * curve.count, [loop * curve.turns for loop in range(curve.count)])
+    return None
+
+
+def many_pieces(curve: Curve, breaks: Array) -> PiecewisePolynomial | None:
+    """The first of those polynomials, between breaks (M,) that are many; else None."""
+    found = polynomial_pieces(curve) if len(breaks) > _MANY_BREAKS else None
+    if found is None or len(found.knots) < len(breaks):
+        return None
+    return PiecewisePolynomial(breaks, found.coefficients[:, : len(breaks) - 1])
+
+
+def _joined_pieces(parts: list[PiecewisePolynomial], offsets: list[Array]) -> PiecewisePolynomial:
+    order = max(len(part.coefficients) for part in parts)
+    coefficients: list[Array] = []
+    knots, start = [np.zeros(1)], 0.0
+    for part, offset in zip(parts, offsets, strict=True):
+        padded = np.zeros((order, *part.coefficients.shape[1:]))
+        padded[: len(part.coefficients)] = part.coefficients
+        padded[0] += offset
+        coefficients.append(padded)
+        knots.append(start + part.knots[1:])
+        start += float(part.knots[-1])
+    return PiecewisePolynomial(np.concatenate(knots), np.concatenate(coefficients, axis=1))
+
+
+def _reversed_pieces(inner: PiecewisePolynomial) -> PiecewisePolynomial:
+    order, lengths = len(inner.coefficients), np.diff(inner.knots)[:, None]
+    coefficients = np.zeros_like(inner.coefficients)
+    for power in range(order):
+        for k in range(power, order):
+            coefficients[power] += (-1.0) ** power * comb(k, power) * lengths ** (k - power) * inner.coefficients[k]
+    return PiecewisePolynomial(inner.knots[-1] - inner.knots[::-1], coefficients[:, ::-1])
 
 
 def returned_pair(returned: object) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..arrays import Array
+from ..integrator.recorded.knot_path import KnotPath
 from ..integrator.resolved import ResolvedPath
 
 
@@ -24,6 +25,7 @@ class Smoothness:
         rates; None: there is none
     resolved : the first loop of what it depends on as series, where that is all there is to know; None: unknown
     checked : whether there is more to know, so that it is compared with its samples between the nodes all the same
+    knots : the first loop as polynomials that a body follows, panels of which may span several breaks; None: it is none
     """
 
     breaks: Array
@@ -34,3 +36,4 @@ class Smoothness:
     probe: Callable[[Array], Array] | None = None
     resolved: ResolvedPath | None = None
     checked: bool = False
+    knots: KnotPath | None = None

@@ -1,0 +1,1 @@
+"""Recorded paths: polynomials between many knots, sampled on panels that span several of them."""
