@@ -61,6 +61,26 @@ def test_what_was_done_is_on_the_card(take, capsys):
     assert "61 of 61 samples, from 0 to 1000 ms" in text
 
 
+def test_a_cycle_is_closed_for_split_and_orbits(tmp_path, capsys):
+    rows = [f"{t!r},{0.4 * w + 0.01 * t!r},{0.8 * w * w!r}" for t, w in zip(TIMES.tolist(), WAVE.tolist(), strict=True)]
+    joints = "left_shoulder_abduction,right_shoulder_abduction"
+    (tmp_path / "m.csv").write_text("\n".join([f"time,{joints}", *rows]))
+    take = str(tmp_path / "m.csv")
+    assert answer(capsys, "split", "diver", take)["is_loop"] is False
+    for by in ("drift", "geodesic"):
+        found = answer(capsys, "split", "diver", take, "--close", "1deg", "--close-by", by)
+        assert found["is_loop"] is True
+        closing = found["recording"]["closing"]
+        assert closing["by"] == by
+        assert closing["gap"]["left_shoulder_abduction"] == pytest.approx(0.01)
+        assert 0.0 < np.linalg.norm(closing["holonomy_change_rotation_vector_rad"]) < 0.01
+    assert len(answer(capsys, "orbits", "diver", take, "5", "--close", "1deg")["orbits"]) >= 2
+    main(["check", "diver", take, "--close", "0.02"])
+    text = capsys.readouterr().out
+    assert "by the drift; left_shoulder_abduction ended 0.573 deg off" in text
+    assert "the holonomy   changes by" in text
+
+
 def test_standard_input_is_a_hyphen(take, capsys, monkeypatch):
     class Input:
         buffer = io.BytesIO(Path(take).read_bytes())
@@ -89,6 +109,7 @@ def test_joints_rest_where_one_says(tmp_path, capsys):
         (["--rest", "knee=1", "knee=2"], 2, "--rest: joint 'knee' stands twice"),
         (["--time-unit", "h"], 4, "time_unit: one of s, ms"),
         (["--trim", "5", "1"], 2, "trim: two times"),
+        (["--close", "much"], 4, "close: a number is needed"),
         (["--degrees"], 4, "--time-unit ms"),
         (["--time-unit", "ms"], 4, "unknown column"),
     ],

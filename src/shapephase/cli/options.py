@@ -192,6 +192,21 @@ class RecordingOptions:
             "example `--smooth 0.01`."
         ),
     ] = None
+    close: Annotated[
+        str | None,
+        _motion_option(
+            "Make a loop of a cycle whose ends are apart by no more than this, in rad or m or with units; for example "
+            "`--close 3deg` or `--close 3deg,5mm`."
+        ),
+    ] = None
+    close_by: Annotated[
+        str | None,
+        _motion_option(
+            "How that is done: drift (the gap is taken off evenly in time), smooth (a smoother that runs on from the "
+            "end to the start, where --smooth is given) or geodesic (the shortest way back is put at the end); for "
+            "example `--close-by geodesic`."
+        ),
+    ] = None
 
 
 AS_TEXT = PrintOptions()

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..body.body import Body
+from ..shape_space.files.closing import Closing
 from ..shape_space.files.read import RecordedMotion
 
 _MOST_NAMES = 8
@@ -28,7 +29,13 @@ def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
 
 def recording_data(recorded: RecordedMotion | None) -> dict[str, Any]:
     """The same for programs, under `recording`."""
-    return {} if recorded is None else {"recording": dict(recorded.record)}
+    if recorded is None:
+        return {}
+    record = dict(recorded.record)
+    if recorded.closing is not None:
+        change = recorded.closing.holonomy_change.tolist()
+        record["closing"] = record["closing"] | {"holonomy_change_rotation_vector_rad": change}
+    return {"recording": record}
 
 
 def _unit_lines(record: Any) -> list[str]:
@@ -69,17 +76,32 @@ def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
         levels = sorted(set(record["smooth"].values()) - {0.0})
         said = f"{levels[0]:.6g}" if len(levels) == 1 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
         lines.append(f"{'smoothed':24}noise {said} rad or m, rms")
+    if recorded.closing is not None:
+        lines += _closing_lines(recorded.closing)
     if record["resampled_to_hz"] is not None:
         lines.append(f"{'resampled':24}{record['resampled_to_hz']:.6g} samples a second")
-    if (record["resampled_to_hz"] is not None or record["smooth"] is not None) and recorded.residual.any():
+    if recorded.residual.any():
         joint = int(np.argmax(recorded.residual))
         names = recorded.path.joint_names or ()
         lines.append(f"{'off the samples':24}{recorded.residual[joint]:.3g} rms at most, {names[joint]}")
     return lines
 
 
+def _closing_lines(closing: Closing) -> list[str]:
+    """The gap that was closed, and what that did."""
+    joint = int(np.argmax(np.abs(closing.gap)))
+    names = closing.body.joint_names
+    change = float(np.degrees(np.linalg.norm(closing.holonomy_change)))
+    way = {"smooth": "by a periodic smoother", "drift": "by the drift", "geodesic": "by a geodesic"}[closing.by]
+    added = f", which takes {closing.seconds_added:.4g} s" if closing.seconds_added else ""
+    return [
+        f"{'closed':24}{way}{added}; {names[joint]} ended {_value(closing.body, names[joint], closing.gap[joint])} off",
+        f"{'by that, the holonomy':24}changes by {change:.4g} deg",
+    ]
+
+
 def _value(body: Body, name: str, value: float) -> str:
-    """Where a joint rests, in degrees or metres."""
+    """A coordinate of a joint in degrees or metres."""
     turns = body.joint_units[body.joint_index(name)] == "rad"
     return f"{np.degrees(value) + 0.0:.4g} deg" if turns else f"{value:.4g} m"
 

@@ -64,7 +64,7 @@ class Plan:
     ----------
     body : the body that turns
     path : of all its joints; a C2 spline with not-a-knot ends, also where it closes: a file of its samples is read back
-        unchanged with `read_shape_path(..., periodic=False)`
+        unchanged with `read_shape_path(..., close=False)`
     motion : its reconstruction, to 1e-10 rad: independent of how the plan was found
     cost_name : "kinetic", "rate", "acceleration" or "time"
     cost : of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]

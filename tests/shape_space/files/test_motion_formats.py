@@ -296,13 +296,13 @@ def test_what_looks_like_degrees_is_refused_until_it_is_said(tmp_path):
     np.testing.assert_allclose(path.shape(1.0), [45.0, 90.0], atol=1e-13, rtol=0)
 
 
-def test_periodic_is_passed_on(tmp_path):
+def test_what_closes_is_a_loop_unless_one_says_no(tmp_path):
     file = three(tmp_path / "m.csv", f"time,{LEFT},{RIGHT}", tuple((k / 8, *np.sin([k, 2 * k])) for k in range(8)))
-    with pytest.raises(TrajectoryError, match=r"m\.csv: a periodic spline needs the last sample to equal the first"):
-        read_shape_path(file, DIVER, periodic=True)
+    with pytest.raises(TrajectoryError, match=r"m\.csv: joint .* deg from its start, and gaps up to 0 rad"):
+        read_shape_path(file, DIVER, close=0.0)
     rows = [(k / 8, np.sin(np.pi * k / 4) + k**2 * (8 - k) / 500, 0.2) for k in range(8)] + [(1.0, 0.0, 0.2)]
     file = three(tmp_path / "m.csv", f"time,{LEFT},{RIGHT}", rows)
-    ends = [read_shape_path(file, DIVER, periodic=p).rate([0.0, 1.0])[:, 0] for p in (None, False)]
+    ends = [read_shape_path(file, DIVER, close=c).rate([0.0, 1.0])[:, 0] for c in (None, False)]
     assert ends[0][0] == pytest.approx(ends[0][1], abs=1e-12)
     assert abs(ends[1][0] - ends[1][1]) > 1e-6
 

@@ -1,8 +1,10 @@
+from .closing import Closing
 from .mapping_files import read_names
 from .read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .smoothing import smoothed_path
 
 __all__ = [
+    "Closing",
     "RecordedMotion",
     "read_names",
     "read_recorded_motion",

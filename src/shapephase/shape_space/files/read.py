@@ -25,6 +25,7 @@ from ._labels import SI, mapping_argument
 from ._recording import Recording, Table
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
+from .closing import Closing, close_argument, closed_path
 from .mapping_files import read_names
 from .smoothing import smoothed_path
 
@@ -48,7 +49,8 @@ class RecordedMotion:
     base_position : (N, 3) recorded position of the base [m], or None
     format : the kind of file
     record : what was read and what was done to it, as JSON can hold it: the file with its hash, samples and times,
-        columns and units of joints, where the others rest, what was left out, smoothed, resampled
+        columns and units of joints, where the others rest, what was left out, smoothed, closed, resampled
+    closing : how a cycle was closed, and what that changed; None: it was not
     """
 
     path: ShapePath
@@ -58,6 +60,7 @@ class RecordedMotion:
     base_position: Array | None
     format: str
     record: Mapping[str, Any]
+    closing: Closing | None = None
 
 
 def read_recorded_motion(
@@ -75,7 +78,8 @@ def read_recorded_motion(
     trim: tuple[float, float] | None = None,
     resample: float | None = None,
     smooth: float | Mapping[str, float] | None = None,
-    periodic: bool | None = None,
+    close: float | str | bool | None = None,
+    close_by: str | None = None,
 ) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
@@ -118,7 +122,12 @@ def read_recorded_motion(
     resample : the path goes through this many of its own values a second instead, evenly spaced [1/s]
     smooth : noise level of the samples, rms [rad or m], one for all joints or by joint (the others are interpolated);
         None: the path goes through all samples. See `smoothing.smoothed_path`.
-    periodic : smooth where the end meets the start; None: when the last sample equals the first to 1e-9
+    close : the largest gap between the ends of a cycle that is closed, a number [rad or m] or a text as "3deg" or
+        "3deg,5mm"; None: what meets to 1e-9 runs smoothly from its end to its start, else the ends stay apart; False:
+        they are not joined even then
+    close_by : "smooth", a smoother that runs on from the end to the start (where `smooth` is given, else "drift");
+        "drift", the gap is taken off evenly in time; "geodesic", the shortest way back in the metric of the kinetic
+        energy is put at the end
 
     Raises
     ------
@@ -138,6 +147,7 @@ def read_recorded_motion(
     """
     check_object(body, "Body", "body")
     kept = trim_argument(trim)
+    within = close_argument(close)
     rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
     given, step = read_input(file, body, topic, timestep)
     table = given.table
@@ -149,14 +159,13 @@ def read_recorded_motion(
     motion = matched(recording, body, choices)
     try:
         noise = _noise_levels(smooth, body)
-        path, residual = smoothed_path(recording.times, motion.shapes, noise, periodic, body.joint_names)
+        path, closing = _path(recording.times, motion.shapes, noise, body, within, close_by, loop=close is None)
     except (TrajectoryError, ShapeError) as error:
         raise TrajectoryError(f"{table.where}: {error}") from None
     if rate is not None:
         path = _resampled(path, rate, table.where)
-    if smooth is None and rate is None:
-        residual = np.zeros(body.n_shape)
-    elif rate is not None:
+    residual = np.zeros(body.n_shape)
+    if smooth is not None or rate is not None or closing is not None:
         residual = np.sqrt(np.mean((motion.shapes - path.shape(recording.times)) ** 2, axis=0))
     record = {
         "file": given.name,
@@ -165,6 +174,7 @@ def read_recorded_motion(
         "trim": kept,
         **_record(recording, motion),
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
+        "closing": None if closing is None else _closing_record(closing, body),
         "resampled_to_hz": None if rate is None else (len(path.breaks) - 1) / path.duration,
     }
     path = replace(path, sha256=given.sha256)
@@ -176,6 +186,7 @@ def read_recorded_motion(
         base_position=motion.base_position,
         format=table.format,
         record=record,
+        closing=closing,
     )
 
 
@@ -194,7 +205,8 @@ def read_shape_path(
     trim: tuple[float, float] | None = None,
     resample: float | None = None,
     smooth: float | Mapping[str, float] | None = None,
-    periodic: bool | None = None,
+    close: float | str | bool | None = None,
+    close_by: str | None = None,
 ) -> ShapePath:
     """The path of `read_recorded_motion`: a C2 spline, periodic where the last sample equals the first.
 
@@ -214,7 +226,8 @@ def read_shape_path(
         trim=trim,
         resample=resample,
         smooth=smooth,
-        periodic=periodic,
+        close=close,
+        close_by=close_by,
     ).path
 
 
@@ -267,6 +280,36 @@ def _mapping(names: Mapping[str, str | None] | None, table: Table) -> dict[str, 
         return mapping_argument(names, labels)
     except KeyError as error:
         raise unknown_name(f"column of {table.where} in names", error.args[0], labels[:_MOST_SHOWN]) from None
+
+
+def _path(
+    times: Array,
+    shapes: Array,
+    noise: Array,
+    body: Body,
+    within: float | str | None,
+    close_by: str | None,
+    *,
+    loop: bool,
+) -> tuple[ShapePath, Closing | None]:
+    """The path through samples or near them, and how it was closed; `loop`: what meets anyway runs on smoothly."""
+    if within is not None:
+        return closed_path(times, shapes, noise, body, within=within, by=close_by)
+    if close_by is not None:
+        raise TrajectoryError(
+            f"close_by={close_by!r:.40}: how large a gap is to be closed? Give close, as 0.05 or '3deg'"
+        )
+    path, _ = smoothed_path(times, shapes, noise, None if loop else False, body.joint_names)
+    return path, None
+
+
+def _closing_record(closing: Closing, body: Body) -> dict[str, Any]:
+    """How a cycle was closed, as JSON can hold it."""
+    return {
+        "by": closing.by,
+        "gap": dict(zip(body.joint_names, closing.gap.tolist(), strict=True)),
+        "seconds_added": closing.seconds_added,
+    }
 
 
 def _record(recording: Recording, motion: Matched) -> dict[str, Any]:

@@ -120,7 +120,7 @@ def _check_gap(gap: Array, noise: Array, joint_names: Sequence[str]) -> None:
         joint = int(np.argmax(np.where(wide, np.abs(gap), 0.0)))
         raise TrajectoryError(
             f"a periodic path closes within the noise, and joint {joint_names[joint]} ends {gap[joint]:.6g} from its "
-            f"start with a noise level of {noise[joint]:.6g}; cut the recording at a full cycle, or leave periodic out"
+            f"start with a noise level of {noise[joint]:.6g}; cut the recording at a full cycle, or close it by drift"
         )
 
 

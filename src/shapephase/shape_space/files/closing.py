@@ -1,0 +1,189 @@
+"""Recorded cycles whose ends nearly meet, made loops: by a periodic smoother, by the drift, or by a geodesic."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...errors import TrajectoryError, unknown_name
+from ..connection import horizontal_lift
+from ..curves import CLOSED, PiecewisePolynomial
+from ..shape_geodesic import shape_geodesic, shape_speed
+from ..shape_path import ShapePath
+from ._labels import amounts
+from .smoothing import smoothed_path
+
+WAYS = ("smooth", "drift", "geodesic")
+"""A smoother that runs on from the end to the start; the gap taken off evenly in time; a geodesic put at the end."""
+_WHOLE_TURN = 2.0 * np.pi
+_PIECES = 4
+"""Cubics that a geodesic is written as; each is within some 1e-9 of a geodesic of a tenth of a radian."""
+
+
+@dataclass(frozen=True, eq=False)
+class Closing:
+    """How a recorded cycle was made a loop.
+
+    Attributes
+    ----------
+    by : "smooth", "drift" or "geodesic"
+    gap : (n,) of the samples, the last from the first, whole turns of endless joints taken off [rad or m]
+    opened : the path without closing
+    closed : the path with it
+    body : whose joints these are
+    """
+
+    by: str
+    gap: Array
+    opened: ShapePath
+    closed: ShapePath
+    body: Body
+
+    @property
+    def seconds_added(self) -> float:
+        """Duration of what was put at the end [s]."""
+        return self.closed.duration - self.opened.duration
+
+    @cached_property
+    def holonomy_change(self) -> Array:
+        """Rotation vector from the lift's end along the open path to the holonomy of the loop: (3,), base axes [rad].
+
+        Raises AccuracyNotReached as `horizontal_lift`.
+        """
+        ends = [horizontal_lift(self.body, path).end for path in (self.opened, self.closed)]
+        return so3.log(so3.transpose(ends[0]) @ ends[1])
+
+
+def closed_path(
+    times: Array, shapes: Array, noise: Array, body: Body, *, within: float | str, by: str | None
+) -> tuple[ShapePath, Closing]:
+    """The loop of a recorded cycle.
+
+    Parameters
+    ----------
+    times, shapes : (N,) from 0 [s], (N, n) [rad or m]
+    noise : (n,) rms of the samples [rad or m]
+    within : the largest gap that is closed, a number in rad or m, or a text as "3deg" or "3deg,5mm"
+    by : one of `WAYS`; None: a periodic smoother where a noise is given, else by the drift
+
+    Raises
+    ------
+    UnknownNameError
+        For another way.
+    TrajectoryError
+        If the ends differ by more, or a joint that does not close has no noise to smooth.
+    """
+    way = ("smooth" if noise.any() else "drift") if by is None else by
+    if way not in WAYS:
+        raise unknown_name("way of closing", str(way)[:40], WAYS)
+    whole = shapes[-1] - shapes[0]
+    turns = np.where(body.continuous, _WHOLE_TURN * np.round(whole / _WHOLE_TURN), 0.0)
+    gap = whole - turns
+    _check_gap(gap, amounts(within, "close"), body)
+    opened, _ = smoothed_path(times, shapes, noise, False, body.joint_names)
+    if way == "geodesic":
+        return _with_geodesic(opened, turns, gap, body)
+    if way == "smooth":
+        _check_noise(gap, noise, body)
+    share = times[:, None] / times[-1]
+    even = shapes - share * turns - (share * gap if way == "drift" else 0.0)
+    if way == "drift":
+        even[-1] = even[0]
+    loop, _ = smoothed_path(times, even, noise, True, body.joint_names)
+    closed = _with_turns(loop, turns)
+    return closed, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)
+
+
+def close_argument(close: Any) -> float | str | None:
+    """How large a gap a caller wants closed; None for none. Raises TrajectoryError."""
+    if close is None or close is False:
+        return None
+    if close is True:
+        raise TrajectoryError("close: how large a gap may be closed, such as close=0.05 or close='3deg', is needed")
+    amounts(close, "close")
+    return close
+
+
+def _check_gap(gap: Array, within: dict[str, float], body: Body) -> None:
+    allowed = np.array([within[unit] for unit in body.joint_units]).reshape(gap.shape)
+    excess = np.abs(gap) - np.maximum(allowed, CLOSED)
+    if np.any(excess > 0.0):
+        joint = int(np.argmax(excess))
+        name, unit = body.joint_names[joint], body.joint_units[joint]
+        shown = f"{np.degrees(gap[joint]):.4g} deg" if unit == "rad" else f"{gap[joint]:.4g} m"
+        raise TrajectoryError(
+            f"joint {name} ends {shown} from its start, and gaps up to {allowed[joint]:.6g} {unit} are to be closed; "
+            "cut the recording at a full cycle (trim, --trim), or allow more (close, --close)"
+        )
+
+
+def _check_noise(gap: Array, noise: Array, body: Body) -> None:
+    without = (noise == 0.0) & (np.abs(gap) > CLOSED)
+    if without.any():
+        name = body.joint_names[int(np.flatnonzero(without)[0])]
+        raise TrajectoryError(
+            f"joint {name} does not close, and no noise is given that a smoother could use; give smooth (--smooth), or "
+            "close it by drift or geodesic (close_by, --close-by)"
+        )
+
+
+def _with_turns(loop: ShapePath, turns: Array) -> ShapePath:
+    """A loop whose endless joints turn on evenly, by so much in all."""
+    if not turns.any():
+        return loop
+    curve = loop.curve
+    assert isinstance(curve, PiecewisePolynomial)
+    rate = turns / loop.duration
+    coefficients = curve.coefficients.copy()
+    coefficients[0] += curve.knots[:-1, None] * rate
+    coefficients[1] += rate
+    return _cubics(curve.knots, coefficients, loop.joint_names)
+
+
+def _with_geodesic(opened: ShapePath, turns: Array, gap: Array, body: Body) -> tuple[ShapePath, Closing]:
+    """The open path, and from its end to its start a geodesic, as fast as the path itself, rms."""
+    curve = opened.curve
+    assert isinstance(curve, PiecewisePolynomial)
+    first, last = opened.curve(np.array([0.0, opened.duration]))[0]
+    way = shape_geodesic(body, last, first + turns)
+    speeds = shape_speed(body, *opened.curve(opened.breaks))
+    speed = float(np.sqrt(np.mean(speeds**2)))
+    if way.length == 0.0 or speed == 0.0:
+        return opened, Closing(by="geodesic", gap=gap, opened=opened, closed=opened, body=body)
+    edges = np.linspace(0.0, 1.0, _PIECES + 1)
+    fit = polynomial.polyfit(way.nodes, way.shapes, len(way.nodes) - 1)
+    shapes = np.array(polynomial.polyval(edges, fit).T, dtype=np.float64)
+    shapes[[0, -1]] = last, first + turns
+    rates = np.array(polynomial.polyval(edges, polynomial.polyder(fit)).T, dtype=np.float64)
+    seconds = way.length / speed
+    knots = np.concatenate([curve.knots, curve.knots[-1] + seconds * edges[1:]])
+    pieces = _hermite(seconds / _PIECES, shapes, rates / seconds)
+    coefficients = np.concatenate([curve.coefficients, pieces], axis=1)
+    closed = _cubics(knots, coefficients, opened.joint_names)
+    return closed, Closing(by="geodesic", gap=gap, opened=opened, closed=closed, body=body)
+
+
+def _hermite(step: float, values: Array, slopes: Array) -> Array:
+    """Cubics on pieces of one length with these values and slopes at their ends: (4, pieces, n)."""
+    rise = (values[1:] - values[:-1]) / step
+    start, end = slopes[:-1], slopes[1:]
+    return np.stack([values[:-1], start, (3.0 * rise - 2.0 * start - end) / step, (start + end - 2.0 * rise) / step**2])
+
+
+def _cubics(knots: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
+    return ShapePath(
+        PiecewisePolynomial(knots, coefficients),
+        float(knots[-1]),
+        knots,
+        coefficients.shape[2],
+        None if joint_names is None else tuple(joint_names),
+        0.5,
+    )

@@ -1,0 +1,150 @@
+"""The shortest way between two near shapes, in the metric of the kinetic energy of a body without angular momentum."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import check_object
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import TrajectoryError
+from .connection import mechanical_connection
+
+_DEGREE = 6
+"""Of the polynomial for the acceleration along the way: between near shapes it is next to constant."""
+_ROUNDS = 40
+"""Of the iteration, which gains a factor of about the distance [rad] in each."""
+_SETTLED = 1e-10
+"""Change of the way, relative to its length, at which the iteration ends."""
+_STEP = 1e-4
+"""Of the central differences [rad or m]: their error is a few 1e-8 of a correction that is small itself."""
+
+
+class ShapeGeodesic(NamedTuple):
+    """A geodesic on [0, 1], at constant speed.
+
+    Attributes
+    ----------
+    nodes : (N,) from 0 to 1
+    shapes : (N, n) there [rad or m]
+    rates : (N, n) by the parameter [rad or m]
+    length : in the metric of the kinetic energy [kg^(1/2) m]
+    """
+
+    nodes: Array
+    shapes: Array
+    rates: Array
+    length: float
+
+
+def shape_speed(body: Body, shape: ArrayLike, rate: ArrayLike) -> Array:
+    """Speed of a joint motion in the metric of the kinetic energy: (..., n), (..., n) -> (...) [kg^(1/2) m/s].
+
+    The square is twice the kinetic energy about the centre of mass of the body without angular momentum, whose base
+    turns at -A rate. Source: Montgomery 1993; theory.md A6, B1.
+    """
+    check_object(body, "Body", "body")
+    shapes, rates = np.broadcast_arrays(finite_array(shape, "shape", (None,)), finite_array(rate, "rate", (None,)))
+    return np.sqrt(np.maximum(2.0 * _energy(body, np.array(shapes), np.array(rates)), 0.0))
+
+
+def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesic:
+    """The geodesic between two near shapes, by successive approximation from the straight line.
+
+    Its acceleration is g^-1 (grad(r'.g r')/2 - (r'.grad g) r'), integrated twice between the two ends.
+
+    Parameters
+    ----------
+    start, end : (n,) [rad or m], a few tenths apart
+
+    Raises
+    ------
+    TrajectoryError
+        If the shapes are so far apart that the approximation does not settle, or joints move nothing.
+    """
+    check_object(body, "Body", "body")
+    first, last = (
+        finite_array(start, "start", (body.n_shape,)).copy(),
+        finite_array(end, "end", (body.n_shape,)).copy(),
+    )
+    nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)
+    once, twice = _integrals(nodes)
+    straight = last - first
+    shapes = first + nodes[:, None] * straight
+    rates = np.broadcast_to(straight, shapes.shape)
+    scale = float(np.abs(straight).max(initial=0.0))
+    for _ in range(_ROUNDS if scale > 0.0 else 0):
+        acceleration = _acceleration(body, shapes, rates)
+        bent = twice @ acceleration
+        slope = straight - bent[-1]
+        old, shapes = shapes, first + nodes[:, None] * slope + bent
+        rates = slope + once @ acceleration
+        if not np.abs(shapes - old).max() > _SETTLED * scale:
+            break
+        if not np.abs(shapes - first).max() < 10.0 * scale:
+            raise _too_far(scale)
+    else:
+        if scale > 0.0:
+            raise _too_far(scale)
+    return ShapeGeodesic(nodes, shapes, rates, float(shape_speed(body, shapes, rates).mean()))
+
+
+def _too_far(scale: float) -> TrajectoryError:
+    return TrajectoryError(f"no geodesic was found between two shapes whose joints differ by up to {scale:.6g}")
+
+
+def _integrals(nodes: Array) -> tuple[Array, Array]:
+    """Matrices from values at the nodes to the integral from 0 to each node, once and twice."""
+    powers = np.vander(nodes, increasing=True)
+    orders = np.arange(len(nodes))
+    inverse = np.linalg.inv(powers)
+    once = powers * nodes[:, None] / (orders + 1.0)
+    twice = once * nodes[:, None] / (orders + 2.0)
+    return once @ inverse, twice @ inverse
+
+
+def _energy(body: Body, shapes: Array, rates: Array) -> Array:
+    """Kinetic energy about the centre of mass without angular momentum: (..., n), (..., n) -> (...) [J]."""
+    turning = -np.einsum("...ij,...j->...i", mechanical_connection(body, shapes), rates)
+    return body.kinetic_energy(shapes, rates, turning)
+
+
+def _acceleration(body: Body, shapes: Array, rates: Array) -> Array:
+    """Of the geodesics with these rates: (N, n), (N, n) -> (N, n)."""
+    unit = np.eye(body.n_shape)
+    there, along = shapes[:, None, :], rates[:, None, :]
+    # Gradient of the energy, one coordinate after the other.
+    gradient = _energy(body, there + _STEP * unit, along + 0.0 * unit) - _energy(
+        body, there - _STEP * unit, along + 0.0 * unit
+    )
+    # Rate of the metric's momenta g r' while the shape moves and r' stays.
+    step = _STEP / float(np.abs(rates).max())
+    ahead, behind = (_momenta(body, there + sign * step * along, along, unit) for sign in (1.0, -1.0))
+    force = gradient / (2.0 * _STEP) - (ahead - behind) / (2.0 * step)
+    try:
+        return np.asarray(np.linalg.solve(_metric(body, shapes), force[..., None])[..., 0], dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise TrajectoryError("there is no geodesic: some joints move no mass") from None
+
+
+def _momenta(body: Body, there: Array, along: Array, unit: Array) -> Array:
+    """g r' by its products with the unit vectors, from energies: (N, 1, n), (N, 1, n) -> (N, n)."""
+    shapes = there + 0.0 * unit
+    return 0.5 * (_energy(body, shapes, along + unit) - _energy(body, shapes, along - unit))
+
+
+def _metric(body: Body, shapes: Array) -> Array:
+    """The matrices g of twice the energy, r'.g r': (N, n) -> (N, n, n)."""
+    n = body.n_shape
+    unit = np.eye(n)
+    rows, columns = np.triu_indices(n)
+    there = np.repeat(shapes[:, None, :], len(rows), axis=1)
+    plus, minus = (
+        _energy(body, there, np.broadcast_to(unit[rows] + sign * unit[columns], there.shape)) for sign in (1.0, -1.0)
+    )
+    found = np.empty((len(shapes), n, n))
+    found[:, rows, columns] = found[:, columns, rows] = 0.5 * (plus - minus)
+    return found
