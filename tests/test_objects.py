@@ -49,6 +49,12 @@ def objects():
 # ---- Wrong objects --------------------------------------------------------------------------------------------------
 
 
+def kind_of(parameter):
+    """Of the object that an argument is; one for which a family will also do is that one."""
+    first, *others = str(parameter.annotation).split(" | ")
+    return first if others in ([], [f"{first}Family"]) else str(parameter.annotation)
+
+
 def public_functions():
     """Functions of public modules with arguments that are objects of ours."""
     for module in pkgutil.walk_packages(sp.__path__, "shapephase."):
@@ -60,7 +66,7 @@ def public_functions():
             mine = inspect.isfunction(function) and function.__module__ == module.name
             if mine and not name.startswith("_") and not place.startswith(INNER):
                 signature = inspect.signature(function).parameters.values()
-                found = [(p.name, str(p.annotation)) for p in signature if str(p.annotation) in KINDS]
+                found = [(p.name, kind_of(p)) for p in signature if kind_of(p) in KINDS]
                 if found:
                     yield place, function, found
 
@@ -72,7 +78,7 @@ def test_a_wrong_object_gets_a_sentence(objects, function, arguments):
     """Instead of a body, a path, a deformation or a motion: what is needed, what came, how it is made."""
     others = {"str": "cat", "NoneType": None, "ndarray": np.eye(3), "type": sp.Body}
     needed = [p for p in inspect.signature(function).parameters.values() if p.default is p.empty]
-    filled = {p.name: objects.get(str(p.annotation)) for p in needed if p.kind is not p.VAR_KEYWORD}
+    filled = {p.name: objects.get(kind_of(p)) for p in needed if p.kind is not p.VAR_KEYWORD}
     for name, kind in arguments:
         for came, value in [*objects.items(), *others.items()]:
             if came == kind:

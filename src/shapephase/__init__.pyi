@@ -19,7 +19,7 @@ from . import (
 from .body.body import Body
 from .body.catalog import load_body, robot_names
 from .body.family import BodyFamily
-from .deformation.deformation import Deformation, articulated, particles, prescribed, rigid
+from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .errors import (
     CompiledCodeWarning,
@@ -46,6 +46,7 @@ from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .plotting import plots
 from .plotting.viewer import motion_page, view
+from .reconstruction.motion_family import MotionFamily
 from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
 from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body import geodesics
@@ -74,6 +75,7 @@ __all__ = [
     "CompiledCodeWarning",
     "Crossings",
     "Deformation",
+    "DeformationFamily",
     "EulerTop",
     "FinalAttitudes",
     "FixedPoints",
@@ -81,6 +83,7 @@ __all__ = [
     "IgnoredElementWarning",
     "ImplausibleBodyWarning",
     "Motion",
+    "MotionFamily",
     "OrbitBranch",
     "PathSummary",
     "PhaseSplit",

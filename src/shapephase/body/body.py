@@ -118,7 +118,7 @@ class Body:
 
         Each argument is for all moving parts, in the order of `moving_parts`, or for some: a mapping from the first
         link of a part. What is not given stays as it is. A leading axis N of anything that is given makes a
-        `BodyFamily`, a sequence of N bodies.
+        `BodyFamily`, a sequence of N bodies that `articulated` and `reconstruct` take as one.
 
         Parameters
         ----------

@@ -9,7 +9,7 @@ from typing import overload
 
 import numpy as np
 
-from ..arrays import Array, lock_arrays
+from ..arrays import Array, Integers, lock_arrays, read_only
 from ._changed_body import changed_body
 from .body import Body
 from .inertial_regressor import inertial_regressor
@@ -24,7 +24,8 @@ _OF_A_LINK = 150
 class BodyFamily(Sequence[Body]):
     """N bodies that differ in their inertias only: a sequence of them, made by `Body.with_inertias`.
 
-    Where the links are and how they move is the same for all, and computed once.
+    `articulated` and `reconstruct` take it as they take a body. Where the links are and how they move is the same for
+    all, and computed once.
 
     Attributes
     ----------
@@ -52,9 +53,14 @@ class BodyFamily(Sequence[Body]):
     def __getitem__(self, index: slice) -> BodyFamily: ...
 
     def __getitem__(self, index: int | slice) -> Body | BodyFamily:
-        """One of the bodies, made when it is asked for, or a family of some of them."""
-        chosen = self.masses[index], self.centres[index], self.tensors[index]
-        return BodyFamily(self.body, *chosen) if isinstance(index, slice) else changed_body(self.body, *chosen)
+        """One of the bodies, made when it is asked for, or a family of those of a slice."""
+        if isinstance(index, slice):
+            return self.some(index)
+        return changed_body(self.body, self.masses[index], self.centres[index], self.tensors[index])
+
+    def some(self, rows: slice | Integers) -> BodyFamily:
+        """A family of some of the bodies."""
+        return BodyFamily(self.body, self.masses[rows], self.centres[rows], self.tensors[rows])
 
     def __repr__(self) -> str:
         """One line for people."""
@@ -83,4 +89,4 @@ class BodyFamily(Sequence[Body]):
         rows = np.empty((len(self), *own.rows.shape))
         rows[..., :GEOMETRY] = own.rows[:, :GEOMETRY]
         rows[..., GEOMETRY:] = inertial_numbers(own.bases, self.masses, self.centres, self.tensors)
-        return rows
+        return read_only(rows)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,11 +20,13 @@ from ..arguments import (
 )
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
+from ..body.family import BodyFamily
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import Sampler, Samplers
 from ..shape_space.body_path import path_gap
+from ..shape_space.family_variants import FamilyVariants
 from ..shape_space.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
@@ -180,8 +183,48 @@ class Deformation:
         return Samplers(known.sample, **vars(smoothness), directly=known.channels)
 
 
-def articulated(body: Body, path: ShapePath) -> Deformation:
-    """The deformation of a body whose joints follow a path.
+@dataclass(frozen=True, eq=False)
+class DeformationFamily(Sequence[Deformation]):
+    """The deformations of N bodies of a family along one path: a sequence of them, made by `articulated`.
+
+    Attributes
+    ----------
+    bodies : the family
+    path : with columns in the order of the bodies' joints
+    """
+
+    bodies: BodyFamily
+    path: ShapePath
+
+    def __len__(self) -> int:
+        """N."""
+        return len(self.bodies)
+
+    @overload
+    def __getitem__(self, index: int) -> Deformation: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> DeformationFamily: ...
+
+    def __getitem__(self, index: int | slice) -> Deformation | DeformationFamily:
+        """One of them, made when it is asked for, or those of a slice."""
+        return articulated(self.bodies[index], self.path)
+
+    def variants(self) -> FamilyVariants:
+        """All of them for the integrator, to be sampled side by side."""
+        return FamilyVariants(self.bodies, self.path)
+
+
+@overload
+def articulated(body: Body, path: ShapePath) -> Deformation: ...
+
+
+@overload
+def articulated(body: BodyFamily, path: ShapePath) -> DeformationFamily: ...
+
+
+def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | DeformationFamily:
+    """The deformation of a body whose joints follow a path; of a `BodyFamily` those of all its bodies.
 
     Joints are matched by name where the path has names, else by order.
 
@@ -190,6 +233,9 @@ def articulated(body: Body, path: ShapePath) -> Deformation:
     UnknownNameError, TrajectoryError
         If the path has other joints than the body.
     """
+    if isinstance(body, BodyFamily):
+        check_object(path, "ShapePath", "path")
+        return DeformationFamily(body, path.matched(body.body.joint_names, body.body.name))
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)

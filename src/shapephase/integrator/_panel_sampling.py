@@ -36,7 +36,7 @@ _TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
+class PanelGroup:
     """Panels of one degree."""
 
     degree: int
@@ -51,11 +51,12 @@ class _Group:
     def width(self) -> Array:
         return self.right - self.left
 
-    def kept(self, rows: Mask) -> _Group:
-        return _group(self.degree, self.left[rows], self.right[rows], self.values[rows], self.gaps[rows])
+    def kept(self, rows: Mask) -> PanelGroup:
+        return panel_group(self.degree, self.left[rows], self.right[rows], self.values[rows], self.gaps[rows])
 
 
-def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> _Group:
+def panel_group(degree: int, left: Array, right: Array, values: Array, gaps: Array | None = None) -> PanelGroup:
+    """Panels of one degree with their values (G, degree + 1, 9), their series and the errors of these."""
     rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
     coefficients = values_to_coefficients(degree) @ values
     estimate = estimate_spectrum(spectral_norms(coefficients), rounding)
@@ -64,13 +65,13 @@ def _group(degree: int, left: Array, right: Array, values: Array, gaps: Array | 
     seen = ~np.isnan(gaps[:, 0])
     if seen.any():
         estimate = estimate.raised_to(2.0 * np.nan_to_num(gaps), seen)
-    return _Group(
+    return PanelGroup(
         degree=degree, left=left, right=right, values=values, coefficients=coefficients, gaps=gaps, estimate=estimate
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _PanelsToSample:
+class PanelsToSample:
     """Panels to be sampled at a degree; `known` are the values at a lower degree that divides it."""
 
     degree: int
@@ -135,8 +136,8 @@ class PanelSampler:
         ends = [np.linspace(left, right, pieces + 1) for left, right in pairwise(breaks)]
         self._left, self._right = np.concatenate([e[:-1] for e in ends]), np.concatenate([e[1:] for e in ends])
         self._at_rest = oscillations == 0.0
-        self._groups: dict[int, _Group] = {}
-        self._known_hidden: dict[int, tuple[_Group, Hidden]] = {}
+        self._groups: dict[int, PanelGroup] = {}
+        self._known_hidden: dict[int, tuple[PanelGroup, Hidden]] = {}
         self._interpolant: Interpolant | None = None
 
     def refine(self, momentum: float, tolerance: float) -> None:
@@ -144,14 +145,12 @@ class PanelSampler:
         if not self._groups and self._resolved is not None:
             first = self._resolved.first_panels(_HIDDEN_SHARE * tolerance)
             rows = [(int(d), first.degree == d) for d in np.unique(first.degree)]
-            self._add([_PanelsToSample(d, first.left[r], first.right[r], None) for d, r in rows])
+            self._add([PanelsToSample(d, first.left[r], first.right[r], None) for d, r in rows])
         elif not self._groups:
             of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
             at_rest = self._panels_at_rest()
             parts = ((0, at_rest), (of_many if len(self._left) > 4 else of_few, ~at_rest))
-            self._add(
-                [_PanelsToSample(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()]
-            )
+            self._add([PanelsToSample(d, self._left[rows], self._right[rows], None) for d, rows in parts if rows.any()])
         while True:
             hidden = {d: self._hidden(d, momentum)[0] for d in self._groups}
             errors = {
@@ -178,7 +177,7 @@ class PanelSampler:
             hidden, noise = self._hidden(degree, momentum)
             total += float(np.maximum(g.estimate.error(momentum, g.width, 2.0 * degree), hidden).sum())
             noises.append(noise)
-        return self._loops * (total + _sum_of_noise(np.concatenate(noises)))
+        return self._loops * (total + sum_of_noise(np.concatenate(noises)))
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
@@ -208,7 +207,7 @@ class PanelSampler:
             seen = 0.5 * g.width * (np.nan_to_num(g.gaps) @ np.array([momentum, 1.0]))
             hidden += float((between + seen).sum())
             noises.append(noise)
-        hidden += _sum_of_noise(np.concatenate(noises))
+        hidden += sum_of_noise(np.concatenate(noises))
         interpolant, order = self.interpolant(), np.argsort(left)
         widths = np.diff(interpolant.edges[: len(left) + 1])
         make = partial(perturbed_series, interpolant.coefficients, degrees[order], widths, momentum)
@@ -216,7 +215,7 @@ class PanelSampler:
 
     def _refine_panels(self, rough: dict[int, Mask], errors: dict[int, Array], tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
-        to_sample: list[_PanelsToSample] = []
+        to_sample: list[PanelsToSample] = []
         too_many = self._panel_count > self._most_panels
         for degree, rows in rough.items():
             if not rows.any():
@@ -241,12 +240,12 @@ class PanelSampler:
             for times in (2, 3, 4):
                 grows = rows & (factor == times)
                 if grows.any():
-                    to_sample.append(_PanelsToSample(times * degree, g.left[grows], g.right[grows], g.values[grows]))
+                    to_sample.append(PanelsToSample(times * degree, g.left[grows], g.right[grows], g.values[grows]))
             if halves.any():
                 left, right = g.left[halves], g.right[halves]
                 middle = 0.5 * (left + right)
                 ends = np.concatenate([left, middle]), np.concatenate([middle, right])
-                to_sample.append(_PanelsToSample(_HALF_DEGREE, *ends, None))
+                to_sample.append(PanelsToSample(_HALF_DEGREE, *ends, None))
         self._add(to_sample)
 
     def _hidden(self, degree: int, momentum: float) -> tuple[Array, Array]:
@@ -256,12 +255,22 @@ class PanelSampler:
             return np.zeros(len(g.left)), np.zeros(len(g.left))
         if self._known_hidden.get(degree, (None,))[0] is not g:
             self._known_hidden[degree] = g, self._resolved.hidden(g.left, g.right, degree)
-        hidden = self._known_hidden[degree][1]
-        # A shape that is off turns the body by the inertia, for as long as the panel lasts.
-        turn = momentum * g.estimate.inverse_norm * g.width
-        share = averaged_share(2.0 * degree, turn + g.width * g.estimate.drift_norm)
-        shapes, rates = (share[:, None] * hidden.higher + hidden.misfit).T
-        return shapes * turn + rates, hidden.noise * (1.0 + turn)
+        return hidden_errors(self._known_hidden[degree][1], g, momentum)
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether its interpolant is compared with the deformation between the nodes."""
+        return not self._is_bandlimited
+
+    @property
+    def panels(self) -> list[tuple[PanelsToSample, Hidden | None]]:
+        """The panels of each degree so far, and what of a resolved path lies beyond it."""
+        found = []
+        for degree, g in sorted(self._groups.items()):
+            resolved = self._resolved if degree else None
+            hidden = None if resolved is None else resolved.hidden(g.left, g.right, degree)
+            found.append((PanelsToSample(degree, g.left, g.right, None), hidden))
+        return found
 
     def _panels_at_rest(self) -> Mask:
         """Panels on which nothing moves: one sample each is enough."""
@@ -281,7 +290,7 @@ class PanelSampler:
     def _panel_count(self) -> int:
         return sum(len(g.left) for g in self._groups.values())
 
-    def _add(self, to_sample: list[_PanelsToSample]) -> None:
+    def _add(self, to_sample: list[PanelsToSample]) -> None:
         """Sample new panels, and those whose degree is raised; one call for all points."""
         self._interpolant = None
         times = [panels.new_points() for panels in to_sample]
@@ -297,7 +306,7 @@ class PanelSampler:
                 left, right = np.concatenate([g.left, left]), np.concatenate([g.right, right])
                 whole = np.concatenate([g.values, whole])
             gaps = None if self._is_bandlimited else gaps
-            self._groups[panels.degree] = _group(panels.degree, left, right, whole, gaps)
+            self._groups[panels.degree] = panel_group(panels.degree, left, right, whole, gaps)
 
     def _check_between_nodes(self) -> bool:
         """Compare new panels of a black box with samples between their nodes. False: no panel was new."""
@@ -314,10 +323,10 @@ class PanelSampler:
             truth = self._channels(between.ravel()).reshape(*points.shape, 9)
             gaps = g.gaps.copy()
             gaps[rows] = spectral_norms(there @ g.values[rows] - truth).max(axis=1)
-            self._groups[degree] = _group(degree, g.left, g.right, g.values, gaps)
+            self._groups[degree] = panel_group(degree, g.left, g.right, g.values, gaps)
         return found
 
-    def _suspicious_points(self, g: _Group, rows: Integers) -> Array:
+    def _suspicious_points(self, g: PanelGroup, rows: Integers) -> Array:
         """Where in the panels (in [0, 1]) the probe is farthest from its own interpolant: (R, k)."""
         if self._probe is None:
             return np.broadcast_to(_TEST_FRACTIONS[::16], (len(rows), 4))
@@ -331,6 +340,15 @@ class PanelSampler:
         return _TEST_FRACTIONS[np.stack(worst, axis=-1)]
 
 
-def _sum_of_noise(noise: Array) -> float:
+def hidden_errors(hidden: Hidden, g: PanelGroup, momentum: float) -> tuple[Array, Array]:
+    """What lies beyond the nodes of panels turns a body, and its noise: (G,) [rad]."""
+    # A shape that is off turns the body by the inertia, for as long as the panel lasts.
+    turn = momentum * g.estimate.inverse_norm * g.width
+    share = averaged_share(2.0 * g.degree, turn + g.width * g.estimate.drift_norm)
+    shapes, rates = (share[:, None] * hidden.higher + hidden.misfit).T
+    return shapes * turn + rates, hidden.noise * (1.0 + turn)
+
+
+def sum_of_noise(noise: Array) -> float:
     """Of panels whose noise is independent of one another: (P,)."""
     return min(float(noise.sum()), _NOISE_FACTOR * float(np.sqrt((noise * noise).sum())))

@@ -66,18 +66,28 @@ class Channels:
         return self._inverted(times) if channels is None else channels
 
     def _inverted(self, times: Array) -> Array:
-        inertia, momentum = self._evaluate(times)
-        flat = np.empty((len(times), 12))
-        flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
-        channels = map_rows(inverse_channels, 12, flat)
-        if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
-            inverse = inverse_inertia(inertia, times)
-            channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
-            channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
-        if not isfinite(channels[:, :9].sum()):
-            row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
-            raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
-        return channels[:, :9]
+        return inverted(*self._evaluate(times), times)
+
+
+def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
+    """The channels of I and L_o: (N, 3, 3), (N, 3) -> (N, 9); messages have the times (N,) [s].
+
+    Raises
+    ------
+    SingularInertiaError, ShapeError
+        If a tensor is singular, or a momentum not finite.
+    """
+    flat = np.empty((len(times), 12))
+    flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
+    channels = map_rows(inverse_channels, 12, flat)
+    if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
+        inverse = inverse_inertia(inertia, times)
+        channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
+        channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
+    if not isfinite(channels[:, :9].sum()):
+        row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
+        raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
+    return channels[:, :9]
 
 
 def inverse_channels(entries: list[Any]) -> list[Any]:

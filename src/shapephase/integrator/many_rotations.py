@@ -140,7 +140,7 @@ def rotations_of_each(
     AccuracyNotReached
         If an estimate stays above the tolerance; in a batch the message has its row.
     """
-    ceilings = _rounded_up(norms(momentum), _CLASSES)
+    ceilings = rounded_up(norms(momentum), _CLASSES)
     parts: list[RotationPart] = []
     for ceiling in np.unique(ceilings) if len(ceilings) else (0.0,):
         rows = np.flatnonzero(ceilings == ceiling)
@@ -228,10 +228,10 @@ def _rounded(refinement: Refinement) -> Refinement:
 
 
 def _up(number: float, steps: int) -> float:
-    return float(_rounded_up(np.array([number]), steps)[0])
+    return float(rounded_up(np.array([number]), steps)[0])
 
 
-def _rounded_up(numbers: Array, steps: int) -> Array:
+def rounded_up(numbers: Array, steps: int) -> Array:
     """To the next of `steps` geometric steps in each factor of two, exactly alike for equal numbers; zero is zero."""
     mantissa, exponent = np.frexp(numbers)
     marks = 0.5 * 2.0 ** (np.arange(steps + 1) / steps)

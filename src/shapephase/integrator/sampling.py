@@ -89,12 +89,36 @@ def sampler(
     if knots is not None:
         return KnotSampler(knots, loops)
     channels = Channels(evaluate, directly)
+    # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
+    if smooth_loop and oscillations is not None and not sparse:
+        return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations)
+    return _on_panels(
+        channels,
+        breaks,
+        oscillations=oscillations,
+        loops=loops,
+        smooth_loop=smooth_loop,
+        probe=probe,
+        resolved=resolved,
+        checked=checked,
+    )
+
+
+def _on_panels(
+    channels: Channels,
+    breaks: Array,
+    *,
+    oscillations: float | None = None,
+    loops: int = 1,
+    smooth_loop: bool = False,
+    probe: Callable[[Array], Array] | None = None,
+    resolved: ResolvedPath | None = None,
+    checked: bool = False,
+) -> PanelSampler:
+    """Arguments as of `sampler`."""
     period = float(breaks[-1]) / loops
     if smooth_loop and oscillations is not None:
-        # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
-        if sparse:
-            return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe)
-        return LoopSampler(channels, period, loops, oscillations)
+        return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe)
     ends = breaks[breaks <= period * (1.0 + 1e-12)] if loops > 1 else breaks
     return PanelSampler(channels, ends, loops, oscillations, probe, resolved, checked=checked)
 
@@ -124,6 +148,11 @@ class Samplers:
         if isinstance(made, KnotSampler):
             self._of_knots.append(made)
         return made
+
+    def on_panels(self) -> PanelSampler:
+        """One that knows nothing yet and samples on panels between breaks whatever the deformation is."""
+        smoothness = {name: value for name, value in self._smoothness.items() if name not in ("sparse", "knots")}
+        return _on_panels(Channels(self._evaluate, self._remembered), self._breaks, **smoothness)
 
     def _remembered(self, times: Array) -> Array:
         key = times.tobytes()

@@ -78,7 +78,7 @@ class SteppedRotation:
     @property
     def error_estimate(self) -> Array:
         """Estimate of the largest attitude error over the interval, rounding included: (B,) [rad]."""
-        return (1.0 + _DENSE_SHARE) * self._error_at_ends
+        return estimate_from_ends(self._error_at_ends)
 
     @property
     def _error_at_ends(self) -> Array:
@@ -166,6 +166,11 @@ class SteppedRotation:
     def inverse_and_drift(self, t: Array) -> tuple[Array, Array]:
         """I^-1 and I^-1 L_o at times: (N,) -> (N, 3, 3), (N, 3)."""
         return self.interpolant.inverse_and_drift(t)
+
+
+def estimate_from_ends(error: Array) -> Array:
+    """The error over the whole interval, from that at the ends of the steps: (B,) -> (B,) [rad]."""
+    return (1.0 + _DENSE_SHARE) * error
 
 
 def for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotation:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from ..arguments import (
     tolerance_argument,
 )
 from ..arrays import Array, Integers, finite_array, lock_arrays
-from ..deformation.deformation import Deformation
+from ..deformation.deformation import Deformation, DeformationFamily
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -31,6 +31,9 @@ from ..integrator.stepped import SteppedRotation
 from ..run_progress import RunProgress, watched
 from ._solvers import METHODS, SOLVERS, Solution
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
+
+if TYPE_CHECKING:
+    from .motion_family import MotionFamily
 
 _COLUMNS = (
     "time",
@@ -304,6 +307,7 @@ class Motion:
         return total / h[:, None]
 
 
+@overload
 def reconstruct(
     deformation: Deformation,
     momentum: ArrayLike,
@@ -313,20 +317,47 @@ def reconstruct(
     method: str = "auto",
     threads: int | None = None,
     progress: Callable[[RunProgress], Any] | None = None,
-) -> Motion:
+) -> Motion: ...
+
+
+@overload
+def reconstruct(
+    deformation: DeformationFamily,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    *,
+    tolerance: float = 1e-9,
+    method: str = "auto",
+    threads: int | None = None,
+    progress: Callable[[RunProgress], Any] | None = None,
+) -> MotionFamily: ...
+
+
+def reconstruct(
+    deformation: Deformation | DeformationFamily,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    *,
+    tolerance: float = 1e-9,
+    method: str = "auto",
+    threads: int | None = None,
+    progress: Callable[[RunProgress], Any] | None = None,
+) -> Motion | MotionFamily:
     """The motion of a free body with a known change of shape and a given angular momentum.
 
     Solves R' = R hat(I^-1 (R^T momentum - L_o)).
 
     Parameters
     ----------
-    momentum : (..., 3) about the centre of mass, inertial axes [kg m^2/s]; zero is allowed
+    deformation : or those of a family of N bodies, each of which then moves as if it were alone
+    momentum : (..., 3) about the centre of mass, inertial axes [kg m^2/s]; zero is allowed. Of a family (3,) or (N, 3)
     attitude : (..., 3, 3) of the deformation's frame at t = 0, to inertial axes; None: the identity. Leading
         axes of both broadcast.
     tolerance : of the attitude, over the whole interval, between 1e-13 and 1e-4 [rad]
     method : "auto" or "collocation" (the deformation sampled at Chebyshev points, the attitude stepped on the
         interpolant), "closed_form" (of a rigid body, by elliptic functions: `rigid_body.EulerTop`), or "dop853"
         (SciPy's integrator on the deformation itself, an independent check)
+    threads : at most, for many momenta or bodies; None: one for each processor. Results do not depend on it
     progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
         falls, and what is being done; if it returns something true, the run stops
 
@@ -343,14 +374,19 @@ def reconstruct(
 
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
     """
+    goal, workers = tolerance_argument(tolerance), threads_argument(threads)
+    if isinstance(deformation, DeformationFamily):
+        from .motion_family import reconstruct_family
+
+        with watched(progress):
+            return reconstruct_family(deformation, momentum, attitude, goal, method, workers)
     check_object(deformation, "Deformation", "deformation")
     if method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
-    goal = tolerance_argument(tolerance)
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     with watched(progress):
-        solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal, threads_argument(threads))
+        solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal, workers)
     return Motion(
         deformation=deformation,
         momentum=spatial,

@@ -162,24 +162,28 @@ def _write(total, lane, inverted, out):
 
 
 @kernel
-def sample_tree(parents, turning, leads, rows, mass, shapes, rates, inverted, lanes, values):
-    """I^-1 and I^-1 L_o, or I and L_o, about the centre of mass, base axes; whether all can be relied on.
+def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted, lanes, values, reliable):
+    """Of trees that differ in their masses, I^-1 and I^-1 L_o, or I and L_o, about the centre of mass, base axes.
 
-    parents, turning, leads, rows, mass: as `LinkRows` has them, rows as one array
+    parents, turning, leads: as `LinkRows` has them
+    rows: (V, (k + 1) 22) of each tree, their geometry the same
+    masses: (V,) of each tree
     shapes, rates: (N, joints) of all joints
     inverted: whether I^-1 and I^-1 L_o are wanted, not I and L_o
     lanes: LANES
-    values: (N, 9) to be filled: xx yy zz yz xz xy, and three of the momentum
+    values: (V, N, 9) to be filled: xx yy zz yz xz xy, and three of the momentum
+    reliable: (V,) to be filled: whether all can be relied on
     """
-    joints, count, reliable = len(parents), len(shapes), True
+    joints, count = len(parents), len(shapes)
     frames = np.zeros((joints + 1, _FRAME * LANES))
     total, centre = np.empty(_TOTAL * LANES), np.empty(6 * LANES)
     shape, rate, cosine, sine = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    geometry = rows[0]
     for i in range(LANES):
         frames[0, i] = frames[0, 4 * LANES + i] = frames[0, 8 * LANES + i] = 1.0
+    for tree in range(len(rows)):
+        reliable[tree] = True
     for first in range(0, count, LANES):
-        total[:] = 0.0
-        _add_link(rows[:_NUMBERS], frames[0], total, lanes)
         for joint in range(joints):
             far = 0.0
             for i in range(LANES):
@@ -193,14 +197,16 @@ def sample_tree(parents, turning, leads, rows, mass, shapes, rates, inverted, la
                         if not abs(shape[i]) < MOST_ANGLE:
                             cosine[i], sine[i] = math.cos(shape[i]), math.sin(shape[i])
             start = (joint + 1) * _NUMBERS
-            body, after = rows[start : start + _NUMBERS], frames[joint + 1]
+            body, after = geometry[start : start + _NUMBERS], frames[joint + 1]
             before = frames[parents[joint]]
             _move_frame(body, before, after, turning[joint], leads[joint], cosine, sine, shape, rate, lanes)
-            _add_link(body, after, total, lanes)
-        _centres(total, mass, centre, lanes)
-        for frame in range(joints + 1):
-            _add_point(rows[frame * _NUMBERS + 12], frames[frame], centre, total, lanes)
-        for i in range(min(LANES, count - first)):
-            fine = _write(total, i, inverted, values[first + i])
-            reliable = reliable and fine
-    return reliable
+        for tree in range(len(rows)):
+            total[:] = 0.0
+            for frame in range(joints + 1):
+                _add_link(rows[tree, frame * _NUMBERS : (frame + 1) * _NUMBERS], frames[frame], total, lanes)
+            _centres(total, masses[tree], centre, lanes)
+            for frame in range(joints + 1):
+                _add_point(rows[tree, frame * _NUMBERS + 12], frames[frame], centre, total, lanes)
+            for i in range(min(LANES, count - first)):
+                fine = _write(total, i, inverted, values[tree, first + i])
+                reliable[tree] = reliable[tree] and fine

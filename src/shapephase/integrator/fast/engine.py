@@ -14,14 +14,15 @@ from importlib import import_module
 from pathlib import Path
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import marches, tree
+from . import marches, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, may_compile
 
 _KERNELS = {
-    "sample_tree": "._tree_kernel",
+    "sample_trees": "._tree_kernel",
     "march_momenta": "._march_kernel",
     "march_at_rest": "._march_kernel",
+    "march_variants": "._variant_kernel",
     "largest_growths": "._growth_kernel",
     "step_derivatives": "._derivative_kernel",
 }
@@ -108,12 +109,10 @@ def _are_kept() -> bool:
 
 @contextmanager
 def _announced() -> Iterator[None]:
-    """Say what takes so long: a line on a terminal, else a message to the log; nothing where the log wants none."""
+    """Say what takes so long: a line on a terminal, else a message to the log."""
     what = "compiling the innermost loops for this machine, once"
-    log = logging.getLogger("shapephase")
-    on_terminal = sys.stderr is not None and sys.stderr.isatty()
-    if not (on_terminal and log.isEnabledFor(logging.WARNING)):
-        log.warning("%s", what)
+    if not sys.stderr.isatty():
+        logging.getLogger("shapephase").warning("%s", what)
         yield
         return
     start = time.perf_counter()
@@ -126,3 +125,4 @@ def _warm() -> None:
     """Call every kernel, so that it is loaded, or compiled and kept."""
     tree.warm()
     marches.warm()
+    variants.warm()

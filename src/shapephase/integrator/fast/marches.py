@@ -61,7 +61,7 @@ def march_in_threads(
     )
     starts, sizes, places = plain(directions), plain(magnitudes), np.array(marks, dtype=np.int64)
     lanes = 1 if batch == 1 else module.LANES
-    segments = _SEGMENTS_OF_LOOPS if loops > 1 else 1 if batch == 1 else _SEGMENTS_OF_MANY
+    segments = segments_of(batch, loops)
     propagators = whole.propagators.reshape(batch, len(marks), 9)
 
     def run(rows: slice) -> None:
@@ -145,8 +145,13 @@ def warm() -> None:
     derivatives(np.zeros((1, 108)), 1, direction[0], direction, 1.0, steps)
 
 
+def segments_of(batch: int, loops: int) -> int:
+    """How many segments a chunk of steps has."""
+    return _SEGMENTS_OF_LOOPS if loops > 1 else 1 if batch == 1 else _SEGMENTS_OF_MANY
+
+
 def _workers(batch: int, threads: int | None) -> int:
-    return max(1, min(_processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
+    return max(1, min(processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
 
 
 def _parts(batch: int, lanes: int, workers: int) -> list[slice]:
@@ -156,6 +161,6 @@ def _parts(batch: int, lanes: int, workers: int) -> list[slice]:
 
 
 @lru_cache(maxsize=1)
-def _processors() -> int:
+def processors() -> int:
     """That this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Mask
 from ._plain import plain
 
 
@@ -50,30 +50,46 @@ def tree_channels(tree: LinkRows, shapes: Array, rates: Array) -> Array | None:
 
     None where a tensor is nearly singular or a number is not finite: slower code says what is wrong.
     """
-    values, reliable = _sampled(tree, shapes, rates, inverted=True)
-    return values if reliable else None
+    values, reliable = _sampled(tree, tree.rows[None], np.array([tree.mass]), shapes, rates, inverted=True)
+    return values[0] if reliable[0] else None
 
 
 def tree_inertia_and_momentum(tree: LinkRows, shapes: Array, rates: Array) -> tuple[Array, Array]:
     """I and L_o about the centre of mass, axes of the base: (N, n), (N, n) -> (N, 3, 3), (N, 3)."""
-    values, _ = _sampled(tree, shapes, rates, inverted=False)
+    (values,), _ = _sampled(tree, tree.rows[None], np.array([tree.mass]), shapes, rates, inverted=False)
     return values[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(-1, 3, 3), values[:, 6:]
 
 
 def warm() -> None:
     """Call the kernel with the least that it takes."""
-    _sampled(_OneLink(), np.zeros((1, 0)), np.zeros((1, 0)), inverted=True)
+    tree_channels(_OneLink(), np.zeros((1, 0)), np.zeros((1, 0)))
 
 
-def _sampled(tree: LinkRows, shapes: Array, rates: Array, *, inverted: bool) -> tuple[Array, bool]:
+def trees_channels(tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array) -> tuple[Array, Mask]:
+    """As `tree_channels` of trees that differ from one in their masses, each as if alone, and which can be relied on.
+
+    Parameters
+    ----------
+    rows, masses : (V, k + 1, 22), (V,) as `LinkRows` has them
+
+    Returns
+    -------
+    (V, N, 9), (V,)
+    """
+    return _sampled(tree, rows, masses, shapes, rates, inverted=True)
+
+
+def _sampled(
+    tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array, *, inverted: bool
+) -> tuple[Array, Mask]:
     module = _kernel()
-    values = np.empty((len(shapes), 9))
+    values, reliable = np.empty((len(rows), len(shapes), 9)), np.empty(len(rows), dtype=np.bool_)
     coordinates, speeds = tree.coordinates(shapes, rates)
-    reliable = module.sample_tree(
-        tree.parents, tree.turning, tree.leads, tree.rows.reshape(-1), tree.mass, plain(coordinates), plain(speeds),
-        inverted, module.LANES, values,
+    module.sample_trees(
+        tree.parents, tree.turning, tree.leads, plain(rows).reshape(len(rows), -1), plain(masses), plain(coordinates),
+        plain(speeds), inverted, module.LANES, values, reliable,
     )  # fmt: skip
-    return values, bool(reliable)
+    return values, reliable
 
 
 @lru_cache(maxsize=1)

@@ -1,0 +1,43 @@
+"""The bodies of a family along one path, as the integrator takes them side by side."""
+
+from __future__ import annotations
+
+from ..arrays import Array, Integers, Mask
+from ..body.family import BodyFamily
+from ..integrator.fast import engine
+from ..integrator.fast.tree import trees_channels
+from ..integrator.sampling import Samplers
+from ..integrator.variants.channels import many_inverted
+from .body_path import path_samplers
+from .shape_path import ShapePath
+
+
+class FamilyVariants:
+    """The bodies of a family along one path with columns in their order, planned by the one they were made from."""
+
+    def __init__(self, family: BodyFamily, path: ShapePath) -> None:
+        self._family, self._path = family, path
+        self.model = path_samplers(family.body, path)
+        self._known: dict[bytes, tuple[Array, Array]] = {}
+
+    def __len__(self) -> int:
+        """How many they are."""
+        return len(self._family)
+
+    def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
+        """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
+        shapes, rates = self._curve(times)
+        if engine.is_ready():
+            masses = self._family.mass[rows]
+            return trees_channels(self._family.body.chain.rows, self._family.rows[rows], masses, shapes, rates)
+        return many_inverted(*self._family.some(rows).sample(shapes, rates), times)
+
+    def alone(self, row: int) -> Samplers:
+        """Of one of them."""
+        return path_samplers(self._family[row], self._path)
+
+    def _curve(self, times: Array) -> tuple[Array, Array]:
+        key = times.tobytes()
+        if key not in self._known:
+            self._known[key] = self._path.curve(times)
+        return self._known[key]
