@@ -302,8 +302,8 @@ def files(tmp_path):
         (5, "view rod.urdf j.csv --html x.html"),
         (6, "view cat cat_righting --html folder.html"),
         (2, "plot nothing cat cat_righting --out x.svg"),
-        (3, "plot phases bad.urdf j.csv --out x.svg"),
-        (4, "plot phases rod.urdf late.csv --out x.svg"),
+        (3, "plot attitude bad.urdf j.csv --out x.svg"),
+        (4, "plot attitude rod.urdf late.csv --out x.svg"),
         (5, "plot attitude rod.urdf j.csv --out x.svg"),
         (6, "plot phases cat cat_righting --out folder.svg"),
         (2, "plan cat_two_halves"),
@@ -351,6 +351,41 @@ def test_options_that_do_not_fit_are_refused_at_once(capfd, arguments, words):
     assert code == ExitCode.USAGE
     assert words in said
     assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("split cat cat_righting --tolerance 1", "tolerance: a number from 1e-13"),
+        ("split cat cat_righting --gauge nosuch", "unknown gauge 'nosuch'"),
+        ("split cat cat_righting --gauge link:nosuch", "unknown link of cat 'nosuch'"),
+        ("split cat cat_righting --attitude 0 0 0 0", "attitude: a quaternion"),
+        ("split cat cat_righting --momentum nan 0 0", "momentum: entry [0] is nan"),
+        ("view cat cat_righting --html x.html --trail nosuch", "unknown link of cat 'nosuch'"),
+        ("view cat cat_righting --html x.html --speed -2", "--speed: seconds of motion in a second"),
+        ("plot momentum cat cat_righting --out x.svg", "needs an angular momentum: give one by --momentum"),
+        ("plot phases cat cat_righting --momentum 0 0 1 --gauge nosuch --out x.svg", "unknown gauge 'nosuch'"),
+        ("orbits cat cat_righting 0.02 --tolerance 1", "tolerance: a number from 1e-13"),
+        ("orbits cat cat_righting 0.02 --gauge nosuch", "unknown gauge 'nosuch'"),
+        ("orbits cat cat_righting 0", "magnitude: a number above 0"),
+    ],
+)
+def test_what_needs_no_motion_is_checked_before_there_is_one(capfd, tmp_path, monkeypatch, arguments, words):
+    def never(*_, **__):
+        raise AssertionError("it was read")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("shapephase.cli.motion.joint_motion", never)
+    code, _, said = ended(capfd, *arguments.split())
+    assert code == ExitCode.USAGE
+    assert words in said
+    assert said.count("\n") == 1
+
+
+def test_orbits_takes_a_tolerance(capfd):
+    code, out, _ = ended(capfd, "orbits", "cat", "cat_righting", "0.02", "--tolerance", "1e-7", "--json")
+    assert code == 0
+    assert json.loads(out)["tolerance_rad"] == 1e-7
 
 
 @pytest.mark.parametrize("place", ["body", "motion"])
@@ -420,7 +455,7 @@ def test_every_option_has_a_sentence_and_an_example(name):
         if option not in ("--quiet", "--verbose", "--help", "--version"):
             assert "for example" in words.lower(), words
         if re.search(r"\b(FLOAT|INT)\b", words) and option not in ("--starts", "--seed", "--order"):
-            assert re.search(r"\bin (rad|s|kg|degrees|sqrt)|[Tt]urns|without unit|Seconds|sqrt\(kg\)", words), words
+            assert re.search(r"\bin (rad|s|1/s|kg|degrees|sqrt)|[Tt]urns|without unit|Seconds|sqrt\(kg\)", words), words
 
 
 def coloured(*arguments, **environment):

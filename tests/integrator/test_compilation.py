@@ -14,6 +14,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.cli.main import main
+from shapephase.cli.terminal import spoken
 from shapephase.errors import CompilerError, MissingExtraError
 from shapephase.integrator.fast import cache_folder, engine, switch
 
@@ -139,6 +140,25 @@ def test_a_numba_that_does_not_work_is_told_once(monkeypatch):
     assert not engine.is_ready()
     with pytest.raises(CompilerError, match="needs NumPy"):
         sp.compile_steps()
+
+
+@pytest.mark.usefixtures("fast", "home")
+@pytest.mark.parametrize("terminal", [True, False])
+@pytest.mark.parametrize("quiet", [True, False])
+def test_a_quiet_command_does_not_announce_it(monkeypatch, capfd, terminal, quiet):
+    monkeypatch.setattr(engine, "_is_ready", False)
+    monkeypatch.setattr(engine, "_warm", lambda: None)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: terminal, raising=False)
+    level = logging.getLogger("shapephase").level
+    handler = logging.StreamHandler(sys.stderr)
+    logging.getLogger("shapephase").addHandler(handler)
+    try:
+        with spoken(["compile", *(["--quiet"] if quiet else [])]):
+            assert engine.is_ready()
+    finally:
+        logging.getLogger("shapephase").removeHandler(handler)
+    assert logging.getLogger("shapephase").level == level
+    assert ("compiling" in capfd.readouterr().err) == (not quiet)
 
 
 @pytest.mark.usefixtures("fast")

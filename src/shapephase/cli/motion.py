@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from .. import so3
+from ..arguments import tolerance_argument
+from ..arrays import finite_array
 from ..body.body import Body
 from ..body.catalog import load_body
 from ..deformation.deformation import articulated
+from ..deformation.frames import gauge_link
 from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.fast.switch import expect_work
@@ -50,13 +53,25 @@ def flight(
     recording: RecordingOptions,
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[RunProgress], Any] | None = None,
+    *,
+    gauge: str = "base",
+    trail: str | None = None,
 ) -> Flight:
-    """The motion that the arguments and options of a command describe."""
-    loaded = load_body(body, isolate=True)
-    path, recorded = joint_motion(motion, loaded, recording)
+    """The motion that the arguments and options of a command describe.
+
+    What needs no motion to be checked is checked before: also the gauge, and the link of a trail, that the command is
+    to use later.
+    """
     start = so3.quat_argument(options.attitude, "attitude")
+    goal = tolerance_argument(tolerance)
+    momentum = finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
+    loaded = load_body(body, isolate=True)
+    for link in (gauge_link(gauge), trail):
+        if link is not None:
+            loaded.link_pose(loaded.shape(), link)
+    path, recorded = joint_motion(motion, loaded, recording)
     expect_work(samples=_SAMPLES_A_BREAK * len(path.breaks))
-    moved = reconstruct(articulated(loaded, path), options.momentum, start, tolerance=tolerance, progress=progress)
+    moved = reconstruct(articulated(loaded, path), momentum, start, tolerance=goal, progress=progress)
     return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
 
 

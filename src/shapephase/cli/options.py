@@ -173,8 +173,8 @@ class RecordingOptions:
     trim: Annotated[
         tuple[float, float] | None,
         _motion_option(
-            "Keep the samples from the first to the last of two times, as the file itself tells the time; for example "
-            "`--trim 12.5 13.9`.",
+            "Keep the samples from the first to the last of two times, in s or the unit in which the file itself tells "
+            "the time; for example `--trim 12.5 13.9`.",
             negative_iterable="",
         ),
     ] = None

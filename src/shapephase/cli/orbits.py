@@ -27,6 +27,7 @@ def orbits_command(
             "example `--gauge base`."
         ),
     ] = "horizontal",
+    tolerance: float | None = None,
     recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
@@ -36,12 +37,17 @@ def orbits_command(
     ----------
     magnitude
         Of the angular momentum, in kg m^2/s; for example `0.02`.
+    tolerance
+        Of the attitude, from 1e-13 to 1e-4, in rad; without it 1e-11, or the tightest of 1e-10 to 1e-8 that can be met
+        where errors grow too much for that. For example `--tolerance 1e-7`.
     """
     import numpy as np
 
     from .. import so3
+    from ..arguments import magnitude_argument, tolerance_argument
     from ..body.catalog import load_body
     from ..deformation.deformation import articulated
+    from ..deformation.frames import gauge_link
     from ..deformation.gauge import named_gauge
     from ..integrator.fast.switch import expect_work
     from ..phases.phases import split
@@ -51,15 +57,20 @@ def orbits_command(
     from .recording_text import recording_data, recording_lines
     from .text import orbit_data, orbit_lines, rotation_line
 
+    magnitude = magnitude_argument(magnitude)
+    goal = None if tolerance is None else tolerance_argument(tolerance)
+    link = gauge_link(gauge)
     with steps(3) as work:
         work.begin("loading")
         loaded = load_body(body, isolate=True)
+        if link is not None:
+            loaded.link_pose(loaded.shape(), link)
         path, recorded = joint_motion(motion, loaded, recording)
         deformation = articulated(loaded, path)
         seen = named_gauge(deformation, gauge)
         work.begin("finding what closes")
         expect_work(momenta=_MOMENTA)
-        found = fixed_points(seen, magnitude)
+        found = fixed_points(seen, magnitude, tolerance=goal)
         upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
         work.begin("splitting")
         moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=found.tolerance) for attitude in upright]

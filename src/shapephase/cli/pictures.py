@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
-from ..errors import unknown_name
+from ..errors import ShapeError, unknown_name
 from .options import (
     AS_RECORDED,
     AS_TEXT,
@@ -51,10 +52,12 @@ def view_command(
     from . import motion as motions
     from .recording_text import recording_data
 
+    if speed is not None and not 0.0 < speed < math.inf:
+        raise ShapeError(f"--speed: seconds of motion in a second of playing, above 0, are needed, got {speed:g}")
     aside = check_writable(html, "--html", ".html")
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, progress=work.watch)
+        flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail)
         if html is not None:
             work.begin("recording the animation")
             motion_page(flown.motion, html, trail=trail, speed=speed)
@@ -94,9 +97,11 @@ def plot_command(
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     check_writable(out, "--out", ".svg", ".pdf", ".png")
+    if FIGURES[kind].with_momentum and not any(flight.momentum):
+        raise ShapeError(f"the figure {kind!r} needs an angular momentum: give one by --momentum")
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, progress=work.watch)
+        flown = motions.flight(body, motion, flight, recording, progress=work.watch, gauge=gauge)
         work.begin(f"drawing {kind.replace('_', ' ')}")
         write_figure(kind, flown.motion, out, flown.path, gauge)
         say_written(out)

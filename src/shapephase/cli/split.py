@@ -51,7 +51,7 @@ def split_command(
     aside = check_writable(html, "--html", ".html") or aside
     with steps(13 if html else 2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch)
+        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
         if out is not None:

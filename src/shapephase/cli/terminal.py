@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import enum
+import logging
 import os
 import sys
 import unicodedata
@@ -40,9 +41,14 @@ def spoken(words: Sequence[str]) -> Iterator[None]:
     quiet, verbose = {"-q", "--quiet"} & {*words}, {"-v", "--verbose"} & {*words}
     chosen = Verbosity.QUIET if quiet else Verbosity.VERBOSE if verbose else Verbosity.NORMAL
     token = _VERBOSITY.set(chosen)
+    log = logging.getLogger("shapephase")
+    before = log.level
+    if quiet:
+        log.setLevel(logging.ERROR)
     try:
         yield
     finally:
+        log.setLevel(before)
         _VERBOSITY.reset(token)
 
 

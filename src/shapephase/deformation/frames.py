@@ -346,10 +346,16 @@ _NAMED: dict[str, Callable[[Deformation], Frames]] = {"principal": principal_fra
 GAUGES = ("horizontal", "base", *_NAMED)
 
 
+def gauge_link(name: str) -> str | None:
+    """The link that a gauge is named after, None for another. Raises UnknownNameError if there is no such gauge."""
+    if name.startswith(_LINK):
+        return name.removeprefix(_LINK)
+    if name not in GAUGES:
+        raise unknown_name("gauge", name, (*GAUGES, f"{_LINK}NAME"))
+    return None
+
+
 def named_frames(deformation: Deformation, name: str) -> Frames:
     """U(t) and its body rates of a gauge that is neither the base nor the horizontal one. Raises as `named_gauge`."""
-    if name.startswith(_LINK):
-        return link_frames(deformation, name.removeprefix(_LINK))
-    if name not in _NAMED:
-        raise unknown_name("gauge", name, (*GAUGES, f"{_LINK}NAME"))
-    return _NAMED[name](deformation)
+    link = gauge_link(name)
+    return _NAMED[name](deformation) if link is None else link_frames(deformation, link)

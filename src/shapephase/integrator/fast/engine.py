@@ -109,10 +109,12 @@ def _are_kept() -> bool:
 
 @contextmanager
 def _announced() -> Iterator[None]:
-    """Say what takes so long: a line on a terminal, else a message to the log."""
+    """Say what takes so long: a line on a terminal, else a message to the log; nothing where the log wants none."""
     what = "compiling the innermost loops for this machine, once"
-    if not sys.stderr.isatty():
-        logging.getLogger("shapephase").warning("%s", what)
+    log = logging.getLogger("shapephase")
+    on_terminal = sys.stderr is not None and sys.stderr.isatty()
+    if not (on_terminal and log.isEnabledFor(logging.WARNING)):
+        log.warning("%s", what)
         yield
         return
     start = time.perf_counter()
