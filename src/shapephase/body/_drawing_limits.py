@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from ..arrays import Array
 
@@ -33,6 +32,8 @@ def within_limits(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
 
 def hull(points: Array) -> tuple[Array, Array] | None:
     """Vertices and faces, seen from outside, of the convex hull of points (N, 3); None if they lie in a plane."""
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         found = ConvexHull(points)
     except (QhullError, ValueError):

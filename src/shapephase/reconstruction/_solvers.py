@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,7 +14,7 @@ from .. import so3
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
-from ..errors import AccuracyNotReached, unknown_name
+from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
 from ..integrator.dop853 import dop853_rotation
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
@@ -24,6 +25,8 @@ _TURN_OF_A_STEP = 0.3
 """[rad]; quadrature by the step is exact to rounding for turns this short."""
 _MOST_STEPS = 10_000_000
 """More would fill the memory of a workstation."""
+_MOST_PIECES = 250_000
+"""Stretches between the breaks of a motion: some five gigabytes of memory where each of them bends."""
 _LEAST_RTOL = 1e-12
 """SciPy's DOP853 gains nothing from a tighter relative tolerance."""
 
@@ -184,3 +187,20 @@ SOLVERS: dict[str, Solver] = {
     "dop853": _by_dop853,
 }
 METHODS = tuple(SOLVERS)
+
+
+def check_pieces(deformation: Deformation) -> None:
+    """Raise TrajectoryError, before any memory is taken, for a recording that is too long."""
+    pieces = (len(deformation.breaks) - 1) // deformation.loops
+    if pieces > _MOST_PIECES:
+        raise TrajectoryError(
+            f"a motion in {pieces} pieces, as a recording of as many samples has; up to {_MOST_PIECES} are integrated "
+            f"at once: read the recording with resample={_rounded_down(_MOST_PIECES / deformation.duration):g} or less "
+            "(--resample), or a part of it with trim= (--trim)"
+        )
+
+
+def _rounded_down(number: float) -> float:
+    """To two digits."""
+    unit = 10.0 ** (math.floor(math.log10(number)) - 1)
+    return math.floor(number / unit) * unit

@@ -29,7 +29,7 @@ from ..integrator.lift import lift_along
 from ..integrator.many_rotations import GroupedRotations, assembled
 from ..integrator.stepped import SteppedRotation
 from ..run_progress import RunProgress, watched
-from ._solvers import METHODS, SOLVERS, Solution
+from ._solvers import METHODS, SOLVERS, Solution, check_pieces
 from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
 
 if TYPE_CHECKING:
@@ -369,6 +369,8 @@ def reconstruct(
         If the locked inertia is not positive definite somewhere.
     AccuracyNotReached
         If the tolerance cannot be met.
+    TrajectoryError
+        For more than 250,000 pieces between breaks in one loop, as a recording of as many samples has.
     RunStopped
         If `progress` stopped the run.
 
@@ -383,6 +385,7 @@ def reconstruct(
     check_object(deformation, "Deformation", "deformation")
     if method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
+    check_pieces(deformation)
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     with watched(progress):
