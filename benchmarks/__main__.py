@@ -233,8 +233,8 @@ def print_workloads(contestants: list[Contestant], numbers: list[int], *, quick:
     print_table("after a reconstruction", contestants, "afterwards", turns, numbers)
     print_table("recorded motions", contestants, "recorded", 3, rows)
     print_table("many momenta", contestants, "many_momenta", many, 20 if quick else 100)
-    print_table("threads, by the clock", contestants, "threads", many)
-    print_table("many bodies", contestants, "inertia_variants", few)
+    print_table("threads, by the clock", contestants, "threads", many, few)
+    print_table("many bodies", contestants, "inertia_variants", few, 20)
 
 
 def print_table(title: str, contestants: list[Contestant], workload: str, *arguments: object) -> None:

@@ -36,7 +36,9 @@ def compiled() -> str:
 
 _case = cache(numbered_case)
 _CAT_LOOP = 2
-"""Number of the case in which many momenta or bodies share one path."""
+"""Number of the case in which many momenta share one path."""
+_FAMILIES = (_CAT_LOOP, 8)
+"""Numbers of the cases in which many bodies do: the cat and a human."""
 
 
 @cache
@@ -138,41 +140,64 @@ def _momenta(case: Case, speed: float, count: int, rng: np.random.Generator) -> 
     return speed * moment * axes / np.linalg.norm(axes, axis=1, keepdims=True)
 
 
-def threads(count: int) -> dict[str, float]:
-    """How many times as fast two threads are as one, by the clock, on the same momenta."""
+def threads(momenta: int, bodies: int) -> dict[str, float]:
+    """How many times as fast two threads are as one, by the clock, on the same momenta and on the same bodies."""
     if "threads" not in inspect.signature(sp.reconstruct).parameters:
         return {}
     case = _case(_CAT_LOOP)
-    deformation = sp.articulated(case.body, case.path)
-    momenta = _momenta(case, 4.0, count, np.random.default_rng(0))
-    taken = [[_clock(_in_threads, deformation, momenta, number) for number in (1, 2)] for _ in range(5)]
-    return {"momenta, two threads / one": float(np.median([one / two for one, two in taken[1:]]))}
+    many = sp.articulated(case.body, case.path), _momenta(case, 4.0, momenta, np.random.default_rng(0))
+    runs = {"momenta": many}
+    if hasattr(case.body, "with_inertias"):
+        for number in _FAMILIES:
+            case = _case(number)
+            runs[f"bodies, {case.name}"] = sp.articulated(_variants(case, bodies), case.path), case.momentum
+    found = {}
+    for name, run in runs.items():
+        taken = [[_clock(_in_threads, *run, number) for number in (1, 2)] for _ in range(5)]
+        found[f"{name}, two threads / one"] = float(np.median([one / two for one, two in taken[1:]]))
+    return found
 
 
-def _in_threads(deformation: sp.Deformation, momenta: np.ndarray, number: int) -> object:
+def _in_threads(deformation: Any, momenta: np.ndarray, number: int) -> object:
     keywords: dict[str, Any] = {"threads": number}
     return sp.reconstruct(deformation, momenta, tolerance=TOLERANCE, **keywords)
 
 
-def inertia_variants(count: int) -> dict[str, float]:
-    """One loop of the cat with the inertias of its links changed at random: time of each variant [ms]."""
-    case = _case(_CAT_LOOP)
-    make = getattr(case.body, "with_inertias", None)
-    chain = case.body.chain
-    if make is None:
-        return {}
-    rng = np.random.default_rng(0)
-    factors = np.exp(0.1 * rng.normal(size=(count, len(chain.masses))))
-    try:
-        bodies = make(
-            masses=factors * chain.masses, inertias=factors[..., None, None] * chain.inertias,
-            centres=np.broadcast_to(chain.centres, (count, *chain.centres.shape)),
-        )  # fmt: skip
-    except TypeError as error:
-        return {f"inertia variants: {error}": np.nan}
-    began = time.process_time()
-    sp.reconstruct(sp.articulated(bodies, case.path), case.momentum, tolerance=TOLERANCE)
-    return {f"{count} inertia variants, each [ms]": 1e3 * (time.process_time() - began) / count}
+def inertia_variants(count: int, checked: int) -> dict[str, float]:
+    """Loops of bodies with the inertias of their links changed at random: processor time of each, alone and together.
+
+    And the largest error of some, as a part of the tolerance.
+    """
+    found: dict[str, float] = {}
+    for number in _FAMILIES:
+        case = _case(number)
+        if not hasattr(case.body, "with_inertias"):
+            return {}
+        made = seconds(lambda case=case: _variants(case, count))
+        deformations = sp.articulated(_variants(case, count), case.path)
+        motions = sp.reconstruct(deformations, case.momentum, tolerance=TOLERANCE)
+        together = [seconds(partial(sp.reconstruct, deformations, case.momentum)) for _ in range(3)]
+        some = [deformations[row] for row in range(0, count, max(1, count // checked))]
+        alone = [seconds(partial(sp.reconstruct, one, case.momentum)) for one in some]
+        exact = [sp.reconstruct(one, case.momentum, tolerance=_EXACT).final_attitude for one in some]
+        errors = np.linalg.norm(exact - motions.final_attitude[:: max(1, count // checked)], axis=(1, 2)) / np.sqrt(2.0)
+        found[f"{case.name}: {count} variants, each [us]"] = 1e6 * float(np.median(together)) / count
+        found[f"  to make each [us]{' ' * len(found)}"] = 1e6 * made / count
+        found[f"  one by one, each [us]{' ' * len(found)}"] = 1e6 * float(np.median(alone))
+        found[f"  error / tolerance{' ' * len(found)}"] = float(errors.max()) / TOLERANCE
+    return found
+
+
+def _variants(case: Case, count: int) -> Any:
+    """Masses and inertias by a tenth, centres of mass by a twentieth of their places."""
+    rng, parts = np.random.default_rng(0), case.body.moving_parts
+    shares = np.exp(0.1 * rng.normal(size=(2, count, len(parts))))
+    places = 1.0 + 0.05 * rng.normal(size=(count, len(parts), 3))
+    return case.body.with_inertias(
+        masses=np.array([part.mass for part in parts]) * shares[0],
+        centres=np.array([part.centre for part in parts]) * places,
+        inertias=np.array([part.inertia for part in parts]) * shares[1][..., None, None],
+    )
 
 
 # ---- Recorded motions -----------------------------------------------------------------------------------------------

@@ -46,6 +46,7 @@ _WAYS = {
         "": "make it with load_body(file or name)",
         "Deformation": "of one made by articulated, it is deformation.description.body",
         "Motion": "of one made by articulated, it is motion.deformation.description.body",
+        "BodyFamily": "take one of its bodies, family[0]",
     },
     "ShapePath": {
         "": "make it with read_shape_path(file, body), or ShapePath.fourier, spline, waypoints or function",
@@ -57,11 +58,13 @@ _WAYS = {
         "": "make it with articulated(body, path), particles, prescribed or rigid",
         "RecordedMotion": "make it with articulated(body, recorded.path)",
         "Motion": "it is motion.deformation",
+        "DeformationFamily": "take one of them, family[0]",
     },
     "Motion": {
         "": "make it with reconstruct(deformation, momentum)",
         "ShapePath": "make it with reconstruct(articulated(body, path), momentum)",
         "Body": "make it with reconstruct(articulated(body, path), momentum)",
+        "MotionFamily": "take one of its motions, family[0]",
         "str": "read it with load_motion(file)",
         "PosixPath": "read it with load_motion(file)",
     },

@@ -14,7 +14,7 @@ from benchmarks.extended import Truth, angles_between
 import shapephase as sp
 from shapephase.arrays import Array
 from shapephase.body.family import BodyFamily
-from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError
+from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError, WrongObjectError
 from shapephase.integrator.fast import engine
 from shapephase.integrator.variants import rotations
 from support.bodies import joint, link, urdf
@@ -220,6 +220,18 @@ def test_arguments_are_checked():
         sp.reconstruct(deformations, np.zeros(3), threads=0)
     with pytest.raises(sp.ShapePhaseError, match="joint"):
         sp.articulated(deformations.bodies, sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [1.0]]))
+
+
+def test_where_one_is_needed_the_sentence_says_how_to_take_it():
+    deformations = family(CAT, box=False)[:2]
+    motions = sp.reconstruct(deformations, np.zeros(3))
+    for function, arguments in (
+        (sp.holonomy, (deformations.bodies, deformations.path)),
+        (sp.horizontal_gauge, (deformations,)),
+        (sp.split, (motions,)),
+    ):
+        with pytest.raises(WrongObjectError, match=r"family\[0\]"):
+            function(*arguments)
 
 
 def test_a_family_of_motions_is_a_sequence():
