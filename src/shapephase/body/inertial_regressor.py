@@ -87,6 +87,36 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
     return InertialRegressor(np.ascontiguousarray(matrices), chain.centres)
 
 
+def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving: bool = True) -> Array:
+    """Sums over N shapes of row . (dI spin + dL_o) by the ten parameters of each link: (k, 10 links).
+
+    The same derivatives as those of the regressor, at the body itself, without its matrices.
+
+    Parameters
+    ----------
+    rows : (N, k, 3)
+    spins : (N, 3)
+    moving : whether the links move as seen from the base; else the sums are of row . dI spin
+    """
+    all_spins = spins[:, None] + (links.spins if moving else 0.0)
+    speeds = so3.cross(spins[:, None], links.places) + (links.speeds if moving else 0.0)
+    # Axes: shapes, links, rows, components.
+    across = rows[:, None]
+    arms = so3.cross(across, links.places[:, :, None])
+    moments = so3.cross(speeds[:, :, None], across) + so3.cross(arms, all_spins[:, :, None])
+    turning = (all_spins[:, :, None] @ links.turns)[:, :, 0]
+    found = np.empty((rows.shape[1], links.places.shape[1], PARAMETERS))
+    found[..., 0] = (arms @ speeds[..., None])[..., 0].sum(axis=0).T
+    found[..., 1:4] = np.swapaxes((moments @ links.turns).sum(axis=0), 0, 1)
+    # Sums over shapes, for each link a product of matrices.
+    near = np.moveaxis(across @ links.turns, 0, -1).reshape(found.shape[1], -1, len(rows))
+    products = (near @ np.moveaxis(turning, 0, 1)).reshape(found.shape[1], -1, 3, 3)
+    symmetric = np.swapaxes(products + so3.transpose(products), 0, 1)
+    for entry, (i, j) in enumerate(_VOIGT):
+        found[..., 4 + entry] = symmetric[..., i, j] * (0.5 if i == j else 1.0)
+    return found.reshape(len(found), -1)
+
+
 def parameters(masses: Array, centres: Array, inertias: Array, about: Array) -> Array:
     """Mass, first moment and inertia about given points: (V, k), (V, k, 3), (V, k, 3, 3), (k, 3) -> (V, 10 k)."""
     offsets = centres - about

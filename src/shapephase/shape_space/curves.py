@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,12 +60,19 @@ class Fourier:
         return harmonics, np.concatenate([of_cosines, of_sines])
 
 
+Interpolation = Literal["not-a-knot", "periodic", "rest to rest"]
+
+
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:
-    """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n)."""
+    """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n).
+
+    `through`: by which rule the polynomials follow from their values at the knots; None: by none.
+    """
 
     knots: Array
     coefficients: Array
+    through: Interpolation | None = None
 
     __post_init__ = lock_arrays
 

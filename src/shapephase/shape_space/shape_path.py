@@ -20,6 +20,7 @@ from .curves import (
     Curve,
     Fourier,
     Function,
+    Interpolation,
     Joined,
     PiecewisePolynomial,
     Reordered,
@@ -143,7 +144,8 @@ class ShapePath:
         use_period = closes if periodic is None else periodic
         if use_period:
             r = np.concatenate([r[:-1], r[:1]])
-        return _piecewise(t, _spline_coefficients(t, r, use_period), joint_names)
+        through: Interpolation = "periodic" if use_period else "not-a-knot"
+        return _piecewise(t, _spline_coefficients(t, r, use_period), joint_names, through)
 
     @staticmethod
     def waypoints(times: ArrayLike, shapes: ArrayLike, *, joint_names: Sequence[str] | None = None) -> ShapePath:
@@ -159,7 +161,7 @@ class ShapePath:
         for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
             coefficients[power] = factor * moves / steps**power
         coefficients[0] = r[:-1]
-        return _piecewise(t, coefficients, joint_names)
+        return _piecewise(t, coefficients, joint_names, "rest to rest")
 
     @staticmethod
     def function(
@@ -379,9 +381,11 @@ class ShapePath:
         return shapes.reshape(expected_shape), rates.reshape(expected_shape)
 
 
-def _piecewise(times: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
+def _piecewise(
+    times: Array, coefficients: Array, joint_names: Sequence[str] | None, through: Interpolation
+) -> ShapePath:
     n_shape = coefficients.shape[2]
-    curve = PiecewisePolynomial(times, coefficients)
+    curve = PiecewisePolynomial(times, coefficients, through)
     return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape), 0.5)
 
 

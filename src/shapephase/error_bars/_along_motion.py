@@ -1,0 +1,136 @@
+"""What the derivatives of a motion's results are integrals of, at the nodes of a quadrature.
+
+With eta the turn of the attitude by a small change, inertial axes, and G = R I^-1 R^T,
+
+    eta' = G (l x eta + s),
+
+where s is what the change adds to the angular momentum, seen from inertial axes. Its adjoint Lambda' = l x (G Lambda),
+Lambda = 1 at the end, makes one integral of every change: eta(T) = integral of Lambda^T G s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..inertia_tensor import inverse_inertia
+from ..integrator.many_rotations import GroupedRotations
+from ..integrator.stepped import SteppedRotation
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.shape_path import ShapePath
+
+# Gauss nodes on each piece: its rule has the order ten, a step of the motion's eight.
+_NODES = 5
+# Steps of the motion's in one piece, at most.
+_STEPS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class AlongMotion:
+    """A motion at N nodes.
+
+    Attributes
+    ----------
+    times, weights : (N,) [s]
+    shapes, rates : (N, n)
+    attitudes, lifted : (N, 3, 3) of the motion and of its horizontal lift, base axes to inertial axes
+    inverse : (N, 3, 3) I^-1 [1/(kg m^2)]
+    spins, lifted_spins : (N, 3) angular velocity of both, base axes [rad/s]
+    adjoint : (N, 3, 3) Lambda
+    adjoint_at_start : (3, 3)
+    """
+
+    times: Array
+    weights: Array
+    shapes: Array
+    rates: Array
+    attitudes: Array
+    lifted: Array
+    inverse: Array
+    spins: Array
+    lifted_spins: Array
+    adjoint: Array
+    adjoint_at_start: Array
+
+
+def along_motion(motion: Motion, body: Body, path: ShapePath) -> AlongMotion:
+    """A motion that is no batch, of an articulated body."""
+    stepped = _one_rotation(motion)
+    edges = _pieces(stepped, path)
+    nodes, shares, _ = _rule()
+    widths = np.diff(edges)
+    times = (edges[:-1, None] + widths[:, None] * nodes).ravel()
+    shapes, rates = path.curve(times)
+    inertia, internal = body.sample(shapes, rates)
+    inverse = inverse_inertia(inertia, times)
+    start = motion.initial_attitude
+    attitudes = start @ stepped.rotation(times)[0]
+    lifted = start @ motion.horizontal_lift.rotation(times)[0]
+    momentum = so3.apply(so3.transpose(attitudes), motion.momentum)
+    by_turning = so3.hat(motion.momentum) @ attitudes @ inverse @ so3.transpose(attitudes)
+    adjoint, at_start = _adjoint(by_turning.reshape(len(widths), _NODES, 3, 3), widths)
+    return AlongMotion(
+        times=times,
+        weights=(widths[:, None] * shares).ravel(),
+        shapes=shapes,
+        rates=rates,
+        attitudes=attitudes,
+        lifted=lifted,
+        inverse=inverse,
+        spins=so3.apply(inverse, momentum - internal),
+        lifted_spins=so3.apply(inverse, -internal),
+        adjoint=adjoint.reshape(-1, 3, 3),
+        adjoint_at_start=at_start,
+    )
+
+
+def _one_rotation(motion: Motion) -> SteppedRotation:
+    """The steps of a motion that is no batch."""
+    stepped = motion.stepped
+    return stepped.finest if isinstance(stepped, GroupedRotations) else stepped
+
+
+def _pieces(stepped: SteppedRotation, path: ShapePath) -> Array:
+    """The edges of what Gauss's rule is used on: steps, a few together, that no break of the path is within."""
+    first = np.flatnonzero(np.diff(stepped.panel, prepend=-1))
+    within = np.arange(len(stepped.panel)) - first[np.cumsum(np.isin(np.arange(len(stepped.panel)), first)) - 1]
+    chosen = stepped.times[:-1][within % _STEPS == 0]
+    edges = np.union1d(np.append(chosen, stepped.times[-1]), path.breaks)
+    # Ends of loops and breaks that differ by rounding are one.
+    apart = np.diff(edges) > 8.0 * np.finfo(float).eps * edges[-1]
+    return np.append(edges[0], edges[1:][apart])
+
+
+def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
+    """Lambda' = slope Lambda backwards from one at the end: pieces (P, m, 3, 3), (P,) -> (P, m, 3, 3), (3, 3).
+
+    By Gauss collocation, whose end values are of order 2 m.
+    """
+    _, shares, matrix = _rule()
+    count, m = slopes.shape[:2]
+    scaled = widths[:, None, None, None] * slopes
+    # Rows count nodes and components: X_i - sum_j a_ij slope_j X_j = 1.
+    system = -np.einsum("ij,pjab->piajb", matrix, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
+    inner = np.linalg.solve(system, np.tile(np.eye(3), (m, 1))).reshape(count, m, 3, 3)
+    across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", shares, scaled, inner)
+    at_left = np.empty((count, 3, 3))
+    right = np.eye(3)
+    for piece in range(count - 1, -1, -1):
+        right = np.linalg.solve(across[piece], right)
+        at_left[piece] = right
+    return inner @ at_left[:, None], right
+
+
+@lru_cache(maxsize=1)
+def _rule() -> tuple[Array, Array, Array]:
+    """Gauss nodes and weights on [0, 1], and the integrals of Lagrange's polynomials from 0 to each node."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    powers = np.vander(0.5 * (nodes + 1.0), _NODES, increasing=True)
+    exponents = np.arange(1.0, _NODES + 1.0)
+    matrix = (powers * (0.5 * (nodes + 1.0))[:, None] / exponents) @ np.linalg.inv(powers)
+    return 0.5 * (nodes + 1.0), 0.5 * weights, matrix

@@ -1,0 +1,157 @@
+"""The samples that a path was put through: derivatives by them, and the path through others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, Integers
+from ..errors import WrongObjectError
+from ..shape_space.curves import PiecewisePolynomial, Reordered
+from ..shape_space.shape_path import ShapePath
+
+# The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
+_REST_TO_REST = (10.0, -15.0, 6.0)
+
+
+@dataclass(frozen=True, eq=False)
+class PathSamples:
+    """Samples of a path, its joints in the order of the path's columns.
+
+    Attributes
+    ----------
+    curve : the polynomials through the samples
+    order : (n,) which column of theirs is which of the path's
+    """
+
+    curve: PiecewisePolynomial
+    order: Integers
+
+    @property
+    def count(self) -> int:
+        """How many samples there are that may differ: of a periodic path the last is the first."""
+        return len(self.curve.knots) - (self.curve.through == "periodic")
+
+    @property
+    def values(self) -> Array:
+        """(count, n) [rad or m]."""
+        return self.curve(self.curve.knots[: self.count])[0][:, self.order]
+
+    def path_through(self, values: Array) -> ShapePath:
+        """The path of the same kind through other samples (count, n)."""
+        times = self.curve.knots
+        if self.curve.through == "rest to rest":
+            return ShapePath.waypoints(times, values)
+        periodic = self.curve.through == "periodic"
+        return ShapePath.spline(times, np.concatenate([values, values[:1]]) if periodic else values, periodic)
+
+    def derivative(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
+        """Sums over times of (N, k, n) derivatives by shapes and rates, by the samples: (k, count n)."""
+        curve = self.curve
+        order, pieces, n_shape = curve.coefficients.shape
+        piece = np.searchsorted(curve.knots[1:-1], times, side="right")
+        exponents = np.arange(order)
+        powers = (times - curve.knots[piece])[:, None] ** exponents
+        slopes = np.zeros_like(powers)
+        slopes[:, 1:] = exponents[1:] * powers[:, :-1]
+        count = by_shape.shape[1]
+        by_coefficients = np.zeros((order, pieces, count * n_shape))
+        for power in range(order):
+            part = powers[:, power, None, None] * by_shape + slopes[:, power, None, None] * by_rate
+            np.add.at(by_coefficients[power], piece, part.reshape(len(times), -1))
+        rule = _rest_to_rest if curve.through == "rest to rest" else _spline
+        found = rule(np.diff(curve.knots), by_coefficients, curve.through == "periodic")
+        return np.moveaxis(found.reshape(self.count, count, n_shape), 0, 1).reshape(count, -1)
+
+
+def path_samples(path: ShapePath) -> PathSamples:
+    """The samples of a path; WrongObjectError if it was not put through any."""
+    curve, order = path.curve, np.arange(path.n_shape)
+    while isinstance(curve, Reordered):
+        curve, order = curve.curve, curve.order[order]
+    if not isinstance(curve, PiecewisePolynomial) or curve.through is None:
+        raise WrongObjectError(
+            "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
+            "ShapePath.waypoints and of recorded motions that were not smoothed"
+        )
+    return PathSamples(curve, order)
+
+
+def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
+    """From derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
+    by_move = sum(
+        factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(_REST_TO_REST, 3)
+    )
+    found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
+    found[:-1] += by_coefficients[0] - by_move
+    found[1:] += by_move
+    return found
+
+
+def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
+    """As above, of the C2 cubic spline with slopes s at the knots: on a piece c1 = s and, with the mean slope m,
+    c2 = (3 m - 2 s - s_next)/h, c3 = (s + s_next - 2 m)/h^2."""
+    from scipy.sparse.linalg import splu
+
+    h = widths[:, None]
+    pieces = len(widths)
+    by_slope = np.zeros((pieces + 1, by_coefficients.shape[2]))
+    by_slope[:-1] += by_coefficients[1] - 2.0 * by_coefficients[2] / h + by_coefficients[3] / h**2
+    by_slope[1:] += by_coefficients[3] / h**2 - by_coefficients[2] / h
+    by_mean = 3.0 * by_coefficients[2] / h - 2.0 * by_coefficients[3] / h**2
+    left, right = _slope_equations(widths, periodic)
+    if periodic:
+        by_slope[0] += by_slope[-1]
+        by_slope = by_slope[:-1]
+    by_mean = by_mean + right.T @ splu(left.T.tocsc()).solve(by_slope)
+    found = np.zeros((pieces + 1, by_coefficients.shape[2]))
+    found[:-1] += by_coefficients[0] - by_mean / h
+    found[1:] += by_mean / h
+    if periodic:
+        found[0] += found[-1]
+        found = found[:-1]
+    return found
+
+
+def _slope_equations(h: Array, periodic: bool) -> tuple[Any, Any]:
+    """The equations left @ slopes = right @ means of a C2 cubic spline, periodic or with ends that are no knots."""
+    from scipy.sparse import lil_array
+
+    pieces = len(h)
+    count = pieces if periodic else pieces + 1
+    left, right = lil_array((count, count)), lil_array((count, pieces))
+    for knot in range(0 if periodic else 1, pieces):
+        before, after = h[knot - 1], h[knot]
+        left[knot, knot] += 2.0 * (before + after)
+        left[knot, knot - 1] += after
+        left[knot, (knot + 1) % count] += before
+        right[knot, knot - 1] += 3.0 * after
+        right[knot, knot] += 3.0 * before
+    if not periodic:
+        _end_equation(left, right, h, 0, 1)
+        _end_equation(left, right, h, -1, -1)
+    return left.tocsc(), right.tocsc()
+
+
+def _end_equation(left: Any, right: Any, h: Array, end: int, inward: int) -> None:
+    """That the first two pieces, or the last two, are one cubic; of two pieces one parabola, of one a line."""
+    pieces = len(h)
+    knots, piece = pieces + 1, end % pieces
+    here, next_knot = end % knots, (end + inward) % knots
+    left[here, here] = 1.0
+    if pieces == 1:
+        right[here, 0] = 1.0
+        return
+    if pieces == 2:
+        # The second derivative at the end is the one of the whole parabola.
+        left[here, next_knot] = 1.0
+        right[here, piece] = 2.0
+        return
+    other = (piece + inward) % pieces
+    near, far = h[piece], h[other]
+    both = near + far
+    left[here, here], left[here, next_knot] = far, both
+    right[here, piece] = (near + 2.0 * both) * far / both
+    right[here, other] = near * near / both
