@@ -35,4 +35,5 @@ def check_command(
         moved = path_summary(loaded, path)
         lines += ["", *path_lines(loaded, motion, moved, recorded), *recording_lines(loaded, recorded)]
         data["motion"] = path_data(moved) | record_data(loaded, recorded) | recording_data(recorded)
-    return Outcome("\n".join(lines), data, with_verdict=True)
+    made_from = {} if motion is None else {"joints": list(loaded.joint_names)}
+    return Outcome("\n".join(lines), data, with_verdict=True, made_from=made_from)

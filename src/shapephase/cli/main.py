@@ -18,6 +18,7 @@ from cyclopts import App, CycloptsError
 
 from ..errors import OutputFileError, ShapePhaseError
 from ..integrator.fast.switch import begin_command
+from ..provenance import command_line, provenance
 from .check import check_command
 from .conjugate import conjugate_command
 from .ctrl_c import was_pressed
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     begin_command()
-    with spoken(tokens):
+    with spoken(tokens), command_line(tokens):
         try:
             code = _ran(tokens, as_json="--json" in tokens)
         except BrokenPipeError:
@@ -97,7 +98,10 @@ def _ran(tokens: list[str], *, as_json: bool) -> int:
         return _reported(outcome, as_json=as_json)
     if not isinstance(outcome, Outcome):
         return ExitCode.DONE
+    # The recording is part of the result already.
+    made_from = {name: value for name, value in outcome.made_from.items() if name != "recording"}
     data, text = {"shapephase": version("shapephase"), **outcome.data, "warnings": messages}, outcome.text
+    data["provenance"] = provenance(made_from)
     if outcome.with_verdict:
         many = "1 warning" if len(messages) == 1 else f"{len(messages)} warnings"
         verdict = f"usable, with {many}" if messages else "no fault found"

@@ -84,4 +84,4 @@ def orbits_command(
         *recording_lines(loaded, recorded),
     ]
     data = orbit_data(*result) | {"holonomy": holonomy.tolist()} | recording_data(recorded)
-    return Outcome("\n".join(lines), data)
+    return Outcome("\n".join(lines), data, made_from=deformation.made_from)

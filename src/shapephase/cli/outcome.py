@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ class Outcome:
     data : for programs, printed with `--json`
     with_verdict : whether a line at the end says that no fault was found, or how many warnings there are
     code : the exit code
+    made_from : the body and the recording that it is about, for its provenance
     aside : whether standard output was taken by a file, so that the text goes to standard error
     """
 
@@ -31,6 +33,7 @@ class Outcome:
     with_verdict: bool = False
     code: ExitCode = ExitCode.DONE
     aside: bool = False
+    made_from: Mapping[str, Any] = field(default_factory=dict)
 
 
 def check_writable(out: Path | None, option: str, *endings: str) -> bool:

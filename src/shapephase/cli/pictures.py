@@ -62,7 +62,8 @@ def view_command(
             work.begin("recording the animation")
             motion_page(flown.motion, html, trail=trail, speed=speed)
             say_written(html)
-            return Outcome("", {"html": str(html)} | recording_data(flown.recorded), aside=aside)
+            data = {"html": str(html)} | recording_data(flown.recorded)
+            return Outcome("", data, aside=aside, made_from=flown.motion.deformation.made_from)
     live = view(flown.motion, trail=trail, speed=speed, notebook=False)
     if live is not None:
         with live:
@@ -105,4 +106,5 @@ def plot_command(
         work.begin(f"drawing {kind.replace('_', ' ')}")
         write_figure(kind, flown.motion, out, flown.path, gauge)
         say_written(out)
-    return Outcome("", {"figure": str(out)} | recording_data(flown.recorded))
+    data = {"figure": str(out)} | recording_data(flown.recorded)
+    return Outcome("", data, made_from=flown.motion.deformation.made_from)

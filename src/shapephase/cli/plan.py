@@ -128,7 +128,9 @@ def plan_command(
             write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
             say_written(html)
     text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
-    return Outcome(text, data | {"status": status or "found"}, code=code, aside=aside)
+    return Outcome(
+        text, data | {"status": status or "found"}, code=code, aside=aside, made_from=found.motion.deformation.made_from
+    )
 
 
 def _check_goal(rotate: float | None, about: str | None, somersaults: float | None, half_twists: float | None) -> None:

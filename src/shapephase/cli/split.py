@@ -70,4 +70,4 @@ def split_command(
         *recording_lines(flown.body, flown.recorded),
     ]
     data = split_data(flown.body, motion, flown.motion, result) | data | recording_data(flown.recorded)
-    return Outcome("\n".join(text), data, aside=aside)
+    return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

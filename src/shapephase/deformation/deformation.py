@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +58,7 @@ class Deformation:
     label : what it is, for people
     loops : the deformation is its first `duration / loops` seconds, this many times
     inputs : SHA-256 of the files it was made from, "body" and "path", if it was made from files
+    made_from : the body, its joints, the recording and what was done to it, as JSON can hold it: for `provenance`
     """
 
     description: Description
@@ -68,6 +69,7 @@ class Deformation:
     label: str
     loops: int = 1
     inputs: Mapping[str, str] = field(default_factory=dict)
+    made_from: Mapping[str, Any] = field(default_factory=dict)
 
     __post_init__ = lock_arrays
 
@@ -245,7 +247,18 @@ def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | Defor
     files = {"body": body.sha256, "path": route.sha256}
     inputs = {name: digest for name, digest in files.items() if digest}
     label = f"{body.name} along a path"
-    return Deformation(description, route.duration, route.breaks, closure, gap, label, route.loops, inputs)
+    made_from = _origin(body, route)
+    return Deformation(description, route.duration, route.breaks, closure, gap, label, route.loops, inputs, made_from)
+
+
+def _origin(body: Body, path: ShapePath | None = None) -> dict[str, Any]:
+    """The body, its joints and the recording of a path, with the hashes of their files, as JSON can hold it."""
+    found: dict[str, Any] = {"body": {"name": body.name, "sha256": body.sha256}, "joints": list(body.joint_names)}
+    if path is not None and path.sha256 is not None:
+        found["path"] = {"sha256": path.sha256}
+    if path is not None and path.record is not None:
+        found["recording"] = dict(path.record)
+    return found
 
 
 def rigid(inertia: ArrayLike, duration: float) -> Deformation:
@@ -382,10 +395,13 @@ def sampled_deformation(
     shape_gap: float,
     label: str,
     inputs: Mapping[str, str],
+    made_from: Mapping[str, Any],
 ) -> Deformation:
     """A deformation known only by its interpolant, as kept in a file; `centre` are Chebyshev coefficients (P, n, 3)."""
     description = SampledDescription(interpolant, centre)
-    return Deformation(description, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs)
+    return Deformation(
+        description, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs, made_from=made_from
+    )
 
 
 def _best_turn(masses: Array, start: Array, end: Array) -> Array:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 import html
 import os
-from collections.abc import Callable
-from importlib.metadata import version
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..arguments import check_object
 from ..arrays import Array
 from ..files import write_whole
 from ..phases.phases import PhaseSplit
+from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._letters import printable
@@ -162,7 +163,27 @@ def _input_rows(motion: Motion) -> list[tuple[str, str, str]]:
         ("Deformation", "", motion.deformation.label),
     ]
     rows += [(f"SHA-256, {name}", "", digest) for name, digest in motion.deformation.inputs.items()]
-    return [*rows, ("Computed by", "", f"shapephase {version('shapephase')}, NumPy {np.__version__}")]
+    return [*rows, *_origin_rows(motion.deformation.made_from)]
+
+
+def _origin_rows(made_from: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """The joints, the recording and what was done to it, and when, how and by what all was computed."""
+    found = provenance()
+    rows = [("Joints", "", ", ".join(made_from.get("joints", ())))] if made_from.get("joints") else []
+    for name, value in made_from.get("recording", {}).items():
+        if value not in (None, {}, []):
+            rows.append((f"Recording, {name.replace('_', ' ')}", "", _plain_text(value)))
+    versions = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
+    rows += [("Command line", "", found["command"])] if found["command"] else []
+    return [*rows, ("Computed by", "", versions), ("Date", "", found["date"])]
+
+
+def _plain_text(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {_plain_text(entry)}" for name, entry in value.items())
+    if isinstance(value, list | tuple):
+        return " ".join(_plain_text(entry) for entry in value)
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
 def _table(rows: list[tuple[str, str, str]]) -> str:

@@ -21,6 +21,7 @@ from ..files import npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.stepped import Perturbed, SteppedRotation
+from ..provenance import provenance
 
 _FORMAT = "shapephase motion 3"
 _STEPS = (
@@ -66,6 +67,7 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "numpy": np.__version__,
         "deformation": deformation.label,
         "sha256": dict(deformation.inputs),
+        "provenance": provenance(deformation.made_from),
         "tolerance": record.tolerance,
         "method": record.method,
         "evaluations": record.evaluations,
@@ -160,6 +162,7 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         float(header["shape_gap"]),
         str(header["deformation"]),
         {str(name): str(digest) for name, digest in header["sha256"].items()},
+        _made_from(header),
     )
     return MotionRecord(
         deformation,
@@ -170,6 +173,15 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         int(header["evaluations"]),
         _solution(header, arrays, interpolant),
     )
+
+
+def _made_from(header: Mapping[str, Any]) -> dict[str, Any]:
+    """What a stored motion was made from, and when and how it was stored; nothing of files older than that."""
+    stored = header.get("provenance", {})
+    if not isinstance(stored, dict):
+        raise TypeError("its provenance is no object")
+    how = {name: stored[name] for name in ("date", "command", "versions") if name in stored}
+    return {name: value for name, value in stored.items() if name not in how} | ({"computed": how} if how else {})
 
 
 def _solution(

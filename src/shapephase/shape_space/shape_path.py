@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,6 +56,7 @@ class ShapePath:
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
     sparse : whether harmonics below the highest are missing in a smooth loop
     sha256 : of the file it was read from, whatever was done to it since; None without a file
+    record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
     scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
     """
 
@@ -68,6 +70,7 @@ class ShapePath:
     smooth_loop: bool = False
     sparse: bool = False
     sha256: str | None = None
+    record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
 
     __post_init__ = lock_arrays

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from ... import so3
+from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError, unknown_name
@@ -81,6 +82,7 @@ def closed_path(
     TrajectoryError
         If the ends differ by more, or a joint that does not close has no noise to smooth.
     """
+    check_object(body, "Body", "body")
     way = ("smooth" if noise.any() else "drift") if by is None else by
     if way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
+from ...provenance import provenance
 from ..shape_path import ShapePath
 from ._inputs import read_input
 from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
@@ -177,7 +179,7 @@ def read_recorded_motion(
         "closing": None if closing is None else _closing_record(closing, body),
         "resampled_to_hz": None if rate is None else (len(path.breaks) - 1) / path.duration,
     }
-    path = replace(path, sha256=given.sha256)
+    path = replace(path, sha256=given.sha256, record=record)
     return RecordedMotion(
         path=path,
         residual=residual,
@@ -258,7 +260,13 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     t = path.sample_times if times is None else finite_array(times, "times", (None,), unit="s")
     shapes = path.shape(t)
     if suffix == ".npz":
-        arrays = {"time": t, "shapes": shapes, "joint_names": np.array(path.joint_names)}
+        made_from = {"joints": list(path.joint_names), "recording": None if path.record is None else dict(path.record)}
+        arrays = {
+            "time": t,
+            "shapes": shapes,
+            "joint_names": np.array(path.joint_names),
+            "provenance": np.array(json.dumps(provenance(made_from))),
+        }
         write_whole(where, lambda stream: np.savez(stream, **arrays))
         return
     text = io.StringIO()
