@@ -15,6 +15,7 @@ from shapephase.body._changed_body import changed_body
 from shapephase.body.body import Body
 from shapephase.body.family import BodyFamily
 from shapephase.body.inertial_regressor import inertial_regressor, parameters
+from shapephase.body.link_rows import link_rows
 from shapephase.errors import ShapeError, UnknownNameError, UnphysicalInertiaError, UnphysicalInertiaWarning
 from support.bodies import joint, link, random_shapes, urdf
 
@@ -161,7 +162,8 @@ def test_a_family_is_its_bodies(body, rng):
         )
         assert np.array_equal(one.chain.inertias, alone.chain.inertias)
         assert np.array_equal(family.rows[number], alone.chain.rows.rows)
-        assert family.mass[number] == one.chain.rows.mass
+        assert np.array_equal(link_rows(one.chain).rows, one.chain.rows.rows)
+        assert family.mass[number] == one.chain.rows.mass == link_rows(one.chain).mass
         expected = alone.sample(shapes, rates)
         assert np.abs(inertia[number] - expected[0]).max() < 1e-13 * np.abs(expected[0]).max()
         assert np.abs(momentum[number] - expected[1]).max() < 1e-13 * np.abs(momentum[number]).max()

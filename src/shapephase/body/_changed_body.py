@@ -5,7 +5,6 @@ from __future__ import annotations
 # Pinocchio fills its namespace at import time, where a type checker cannot look.
 # pyright: reportAttributeAccessIssue=false
 from copy import copy
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pinocchio as pin
@@ -22,7 +21,7 @@ def changed_body(body: Body, masses: Array, centres: Array, tensors: Array) -> B
     changed = copy(body)
     changed._model = model_with(body._model, masses, centres, tensors)
     changed.mass = float(pin.computeTotalMass(changed._model))
-    changed.chain = replace(body.chain, masses=masses, centres=centres, inertias=tensors)
+    changed.chain = body.chain.with_inertias(masses, centres, tensors)
     # It is no longer what the file says.
     changed.sha256 = changed.file = None
     return changed

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
-from .link_rows import LinkRows, link_rows
+from .link_rows import LinkRows, link_rows, rows_with
 
 # Pinocchio's number of the free-flyer: joint 0 is the universe.
 _BASE = 1
@@ -55,6 +55,13 @@ class JointChain:
     def rows(self) -> LinkRows:
         """The same for loops in machine code, made when first needed."""
         return link_rows(self)
+
+    def with_inertias(self, masses: Array, centres: Array, inertias: Array) -> JointChain:
+        """The same joints between other links; what is known of the joints' rows goes with them."""
+        changed = replace(self, masses=masses, centres=centres, inertias=inertias)
+        if "rows" in vars(self):
+            vars(changed)["rows"] = rows_with(self.rows, masses, centres, inertias)
+        return changed
 
 
 def joint_chain(model: Any, mimics: Mapping[str, Mimic]) -> JointChain:

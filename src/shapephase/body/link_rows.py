@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,6 +84,13 @@ def link_rows(chain: JointChain) -> LinkRows:
         offset=None if plain else chain.offset,
         bases=axes,
     )
+
+
+def rows_with(rows: LinkRows, masses: Array, centres: Array, inertias: Array) -> LinkRows:
+    """The rows of a chain with other inertias: its joints are the same."""
+    changed = rows.rows.copy()
+    changed[:, GEOMETRY:] = inertial_numbers(rows.bases, masses, centres, inertias)
+    return replace(rows, rows=changed, mass=float(masses.sum()))
 
 
 def inertial_numbers(bases: Any, masses: Array, centres: Array, inertias: Array) -> Array:
