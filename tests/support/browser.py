@@ -9,6 +9,9 @@ import shutil
 import numpy as np
 import pytest
 
+# Frames that a browser draws from one picture to the next, and how many like the first show that nothing moves.
+_FRAMES_BETWEEN = 3
+_PICTURES_ALIKE = 3
 CHROMIUM_FLAGS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -45,12 +48,16 @@ def seen(page, scene, second):
     from PIL import Image
 
     scene.locator("input").first.fill(str(second))
-    before = None
+    before, same = None, 0
     for _ in range(600):
-        page.wait_for_timeout(200)
+        # On a busy machine frames are drawn seldom, and two pictures are alike before the new one is there.
+        for _ in range(_FRAMES_BETWEEN):
+            scene.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+        page.wait_for_timeout(100)
         shot = scene.locator("canvas").first.screenshot()
         picture = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=int)
-        if before is not None and np.array_equal(picture, before) and np.ptp(picture) > 100:
+        same = same + 1 if before is not None and np.array_equal(picture, before) and np.ptp(picture) > 100 else 0
+        if same == _PICTURES_ALIKE:
             return picture
         before = picture
     raise AssertionError("the picture never came to rest")

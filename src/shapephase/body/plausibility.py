@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from ..arguments import check_object
 from ..arrays import Array
 from .appearance import Visual, drawn_shapes, inertia_box
 from .body import Body
@@ -36,6 +37,7 @@ def implausible(body: Body) -> tuple[str, ...]:
     masses of neighbours that differ ten thousandfold; joints that are not limited although their kind is, or beyond a
     whole turn; lengths that look like millimetres. Nothing of this makes a body unusable.
     """
+    check_object(body, "Body", "body")
     chain = body.chain
     names = [""] * len(chain.masses)
     for link, (frame, _) in chain.link_frames.items():
