@@ -229,10 +229,10 @@ def _deviations(given: Array, name: str) -> Array:
     return given
 
 
-def _covariance(given: Array, name: str, size: int) -> Array:
-    if given.shape != (size, size):
+def _covariance(given: Array, name: str, numbers: int) -> Array:
+    if given.shape != (numbers, numbers):
         raise ShapeError(
-            f"{name}: one standard deviation or a covariance ({size}, {size}) is needed, got {given.shape}"
+            f"{name}: one standard deviation or a covariance ({numbers}, {numbers}) is needed, got {given.shape}"
         )
     scale = np.abs(given).max(initial=0.0)
     if np.abs(given - given.T).max(initial=0.0) > _NEGATIVE * scale:
