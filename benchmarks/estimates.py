@@ -160,9 +160,7 @@ def judged(family: str, seed: int, most: float, number: int) -> Run:
         loosened = loosened or _attempt(trial, factor * trial.tolerance)[0]
     ended = time.process_time()
     try:
-        terms = max(segment.terms for segment in trial.segments)
-        steps = most / (_FRAME_SECONDS * (len(body.chain.names) + 1) + _TERM_SECONDS * terms)
-        exact, bound = _truth(body).along(trial.segments, trial.momentum, times, steps)
+        exact, bound = _truth(body).along(trial.segments, trial.momentum, times, most_steps(trial, most))
     except (TooLong, ArithmeticError):
         return run("left out", message=message, seconds=(ended - began, time.process_time() - ended))
     bound += _time_rounding(trial, path)
@@ -174,6 +172,12 @@ def judged(family: str, seed: int, most: float, number: int) -> Run:
         "done", error=error, bound=bound, estimate=float(motion.error_estimate), evaluations=motion.evaluations,
         seconds=seconds,
     )  # fmt: skip
+
+
+def most_steps(trial: Trial, seconds: float) -> float:
+    """Of the extended integrator, in about so many seconds."""
+    terms = max(segment.terms for segment in trial.segments)
+    return seconds / (_FRAME_SECONDS * (len(trial.body.chain.names) + 1) + _TERM_SECONDS * terms)
 
 
 def _attempt(trial: Trial, tolerance: float) -> tuple[sp.Motion | None, str]:

@@ -46,19 +46,19 @@ def triangle_area(reference: Array, start: Array, end: Array) -> Array:
     return 2.0 * np.arctan2(volume, denominator)
 
 
-def polygon_area(corners: Array) -> Array:
+def polygon_area(corners: Array, references: Array | None = None) -> Array:
     """Signed area of a closed polygon of great-circle arcs, the last corner joined to the first: (..., N, 3) -> (...).
 
-    Counted from the region that holds the direction farthest from the corners. Opposite ends are joined through
-    `so3.middle`.
+    Counted from the region that holds the direction farthest from the corners, opposite `references` (..., 3) where
+    these are known. Opposite ends are joined through `so3.middle`.
     """
-    flat = corners.reshape(-1, *corners.shape[-2:])
-    areas = np.empty(len(flat))
-    for row, polygon in enumerate(flat):
-        closing = np.stack([so3.middle(polygon[-1], polygon[0]), polygon[0]])
-        closed = np.concatenate([polygon, closing])
-        areas[row] = triangle_area(far_reference(polygon), closed[:-1], closed[1:]).sum()
-    return areas.reshape(corners.shape[:-2])[()]
+    if references is None:
+        found = [far_reference(polygon) for polygon in corners.reshape(-1, *corners.shape[-2:])]
+        references = np.reshape(found, (*corners.shape[:-2], 3))
+    first, last = corners[..., :1, :], corners[..., -1:, :]
+    closed = np.concatenate([corners, so3.middle(last, first), first], axis=-2)
+    areas = triangle_area(references[..., None, :], closed[..., :-1, :], closed[..., 1:, :])
+    return areas.sum(axis=-1)[()]
 
 
 def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import subprocess
 import sys
 
@@ -34,7 +35,9 @@ def failed(capsys, *arguments):
 
 def test_the_cat_s_righting_as_a_table(capsys):
     text = run(capsys, *CAT)
-    assert "total rotation                180.000000   ( 1.000000  0.000000  0.000000)" in text
+    assert re.search(
+        r"total rotation                180\.000000    \d\.\de-1\d   \( 1\.000000  0\.000000  0\.000000\)", text
+    )
     assert "no angular momentum" in text
     assert "error estimate" in text
 
@@ -46,6 +49,10 @@ def test_json_holds_the_split(capsys):
     split = sp.split(motion)
     for name in ("total_rotation", "holonomy", "dynamical_rotation", "tilt", "montgomery_phase", "residual", "gauge"):
         assert np.all(np.array(data[name]) == np.array(getattr(split, name)))
+    for name, error in data["error_estimates"].items():
+        assert error == getattr(split.error_estimates, name)
+        assert 0.0 < error < 1e-8
+        assert name in data
     assert data["is_loop"] is True
     assert data["has_phase"] is True
     assert data["momentum_kg_m2_s"] == [0.01, -0.02, 0.0]
@@ -59,6 +66,22 @@ def test_gauge_and_tolerance(capsys):
     table = run(capsys, *CAT, "--momentum", 0.01, 0, 0)
     assert "seen in the horizontal gauge" in table
     assert "Montgomery phase" in table
+
+
+def test_every_number_of_the_table_has_its_error_beside_it(capsys):
+    """And an axis the digits that its error leaves: with a looser tolerance fewer."""
+    command = (*CAT, "--momentum", 1e-6, 0, 0)
+    data = json.loads(run(capsys, *command, "--tolerance", 1e-5, "--json"))
+    lines = {line[:24].strip(): line for line in run(capsys, *command, "--tolerance", 1e-5).splitlines()}
+    rows = {"total rotation", "shape holonomy", "dynamical rotation", "Montgomery phase", "dynamic phase", "tilt"}
+    for row in rows | {"geometric phase", "momentum gap"}:
+        name = row.lower().replace(" ", "_").replace("shape_", "")
+        assert lines[row][40:51] == f"{data['error_estimates'][name]:11.1e}"
+    turn = so3.angle(np.array(data["dynamical_rotation"]))
+    known = data["error_estimates"]["dynamical_rotation"] / turn
+    shown = lines["dynamical rotation"][51:].strip(" ()").split()
+    assert 1e-6 < known < 1.0
+    assert all(10.0 ** -len(entry.partition(".")[2]) >= known for entry in shown)
 
 
 def test_files_in_and_out(capsys, tmp_path):

@@ -15,6 +15,7 @@ from shapephase.integrator.curve_integrals import curve_integrals
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.sampling import FinishedSampler
 from shapephase.integrator.stepped import SteppedRotation
+from shapephase.phases._momentum_curve import momentum_curve
 from support.independent import BODIES, body_of, random_loop, random_vector
 
 NAMES = ("cat", "astronaut", "example:human")
@@ -134,7 +135,7 @@ def test_integrals_of_the_steps_are_those_of_the_curve(name: str, tolerance: flo
     magnitude, axis = np.linalg.norm(truth.momentum), truth.momentum / np.linalg.norm(truth.momentum)
     edges = truth.solution.times
     nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
-    for lift in (None, motion.horizontal_lift):
+    for lift in (None, motion.lift_with_errors):
 
         def curve(times: np.ndarray, horizontal: bool = lift is not None) -> tuple[np.ndarray, np.ndarray]:
             direction = so3.apply(so3.transpose(truth.attitude(times)), axis)
@@ -151,14 +152,15 @@ def test_integrals_of_the_steps_are_those_of_the_curve(name: str, tolerance: flo
         whole = found.slivers.sum() + sphere.polygon_area(found.corners)[0]
         assert abs(sphere.wrapped(np.array(whole - area))) < near
         # The dynamic phase and the area of each step are rounded by a few units of the last place of a radian.
-        rounding = 4.0 * np.finfo(float).eps * solution.dynamics.shape[1]
-        assert found.error[0] < 0.1 * motion.error_estimate + rounding
+        rounding = 24.0 * np.finfo(float).eps * solution.dynamics.shape[1]
+        of_split = momentum_curve(motion, "base" if lift is None else "horizontal")
+        assert of_split.error[0] < 0.2 * motion.error_estimate + rounding
 
 
 def test_integrals_do_not_depend_on_how_many_steps_are_taken_at_once(monkeypatch: pytest.MonkeyPatch):
     motion = motion_of("cat", 1e-9)
-    whole = curve_integrals(solution_of(motion), motion.horizontal_lift)
+    whole = curve_integrals(solution_of(motion), motion.lift_with_errors)
     monkeypatch.setattr("shapephase.integrator.curve_integrals._MOST_STEPS", 5)
-    parts = curve_integrals(solution_of(motion), motion.horizontal_lift)
+    parts = curve_integrals(solution_of(motion), motion.lift_with_errors)
     for one, other in zip(whole, parts, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-15)

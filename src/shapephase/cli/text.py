@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -18,28 +18,36 @@ from ..reconstruction.recorded_base import base_difference
 from ..shape_space.files.read import RecordedMotion
 from ..shape_space.summaries import BodySummary, PathSummary
 
+# Digits after the point of an axis.
+_AXIS_DIGITS = 6
+# [rad] A smaller turn has no axis worth showing.
+_NO_TURN = 1e-12
+
 
 def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> list[str]:
     """A split for people."""
     momentum = " ".join(f"{v:g}" for v in motion.momentum)
+    errors = result.error_estimates
     lines = [
         f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_shape} joints, {body.mass:.6g} kg, "
         f"momentum ({momentum}) kg m^2/s",
         "",
-        f"{'':24}{'angle [deg]':>16}   axis (inertial)",
-        rotation_line("total rotation", result.total_rotation),
-        rotation_line("  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy),
-        rotation_line("  dynamical rotation", result.dynamical_rotation),
+        f"{'':24}{'angle [deg]':>16}{'± [rad]':>11}   axis (inertial)",
+        rotation_line("total rotation", result.total_rotation, errors.total_rotation),
+        rotation_line(
+            "  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy, errors.holonomy
+        ),
+        rotation_line("  dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
         "",
     ]
     if result.has_phase:
         lines += [
-            f"{f'seen in the {result.gauge} gauge':24}{'[deg]':>16}{'[rad]':>20}",
-            _phase_line("Montgomery phase", result.montgomery_phase),
-            _phase_line("  dynamic phase", result.dynamic_phase),
-            _phase_line("  geometric phase", result.geometric_phase),
-            rotation_line("tilt", result.tilt),
-            f"{'momentum gap':24}{np.degrees(result.momentum_gap):16.6f} deg",
+            f"{f'seen in the {result.gauge} gauge':30}{'[deg]':>10}{'± [rad]':>11}{'[rad]':>20}",
+            _phase_line("Montgomery phase", result.montgomery_phase, errors.montgomery_phase),
+            _phase_line("  dynamic phase", result.dynamic_phase, errors.dynamic_phase),
+            _phase_line("  geometric phase", result.geometric_phase, errors.geometric_phase),
+            rotation_line("tilt", result.tilt, errors.tilt),
+            _phase_line("momentum gap", result.momentum_gap, errors.momentum_gap),
             f"{'residual':24}{result.residual:16.2e} rad   (phase by formula against attitude)",
         ]
     else:
@@ -53,16 +61,25 @@ def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit
     return lines
 
 
-def rotation_line(name: str, rotation: Array) -> str:
-    """Angle and axis of a rotation."""
+def rotation_line(name: str, rotation: Array, error: Array | None = None) -> str:
+    """Angle and axis of a rotation, with the angle by which it may be off [rad] where that is known.
+
+    The axis has no more digits than the error leaves it: it is the less certain the smaller the angle.
+    """
     vector = so3.log(rotation)
     turn = float(np.linalg.norm(vector))
-    axis = "" if turn < 1e-12 else "   (" + " ".join(f"{v + 0.0:9.6f}" for v in np.round(vector / turn, 6)) + ")"
-    return f"{name:24} {np.degrees(turn):15.6f}{axis}"
+    digits, column = _AXIS_DIGITS, ""
+    if error is not None:
+        column = f"{float(error):11.1e}"
+        digits = int(np.clip(-np.log10(float(error) / max(2.0 * math.sin(0.5 * turn), 1e-300) + 1e-300), 0, digits))
+    axis = ""
+    if turn >= _NO_TURN and digits:
+        axis = "   (" + " ".join(f"{v + 0.0:9.{digits}f}" for v in np.round(vector / turn, digits)) + ")"
+    return f"{name:24} {np.degrees(turn):15.6f}{column}{axis}"
 
 
-def _phase_line(name: str, phase: Array) -> str:
-    return f"{name:24}{np.degrees(phase):16.6f}{phase:20.9f}"
+def _phase_line(name: str, phase: Array, error: Array) -> str:
+    return f"{name:24}{np.degrees(phase):16.6f}{float(error):11.1e}{phase:20.9f}"
 
 
 def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> dict[str, Any]:
@@ -189,8 +206,11 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
 
 
 def plain(result: Any) -> dict[str, Any]:
-    """The fields of a result as JSON can hold them; infinite limits become null."""
-    return {key: _as_json(value) for key, value in asdict(result).items()}
+    """The fields of a result as JSON can hold them, and its error estimates; infinite limits become null."""
+    shown = {field.name: getattr(result, field.name) for field in fields(result) if field.repr}
+    if isinstance(result, PhaseSplit):
+        shown["error_estimates"] = result.error_estimates
+    return {key: _as_json(value) for key, value in shown.items()}
 
 
 _PATH_KEYS = {"joints_beyond_limits": "beyond", "still_joints": "resting"}
@@ -203,7 +223,7 @@ def path_data(summary: PathSummary) -> dict[str, Any]:
 
 
 def _as_json(value: Any) -> Any:
-    value = value.tolist() if hasattr(value, "tolist") else value
+    value = value.tolist() if hasattr(value, "tolist") else plain(value) if is_dataclass(value) else value
     if isinstance(value, dict):
         return {key: _as_json(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

@@ -217,6 +217,23 @@ def end_channels(interpolant: Interpolant, steps: Integers, which: Integers, cou
     return np.ascontiguousarray(channels.transpose(3, 2, 1, 0)), whole[:, 2 * TERMS :].transpose(1, 2, 0)
 
 
+def piece_channels(interpolant: Interpolant, edges: Array) -> Array:
+    """Taylor terms as those of `end_channels`, for pieces between any edges (M + 1,) [s], each within one panel."""
+    lengths = np.diff(edges)
+    panel = interpolant.panel_of(edges[:-1] + 0.5 * lengths)
+    widths = interpolant.edges[panel + 1] - interpolant.edges[panel]
+    count, degrees, _ = interpolant.coefficients.shape
+    slopes, _ = _calculus(degrees)
+    series = interpolant.series
+    x = series.local(np.stack([edges[:-1], edges[1:]], axis=-1), panel)
+    basis = chebyshev(x, degrees)
+    derivatives = slopes.reshape(degrees, TERMS, degrees).transpose(1, 0, 2) @ interpolant.coefficients[:, None]
+    terms = basis[:, None] @ derivatives[panel % count]
+    # A piece's length to the power of the term, in a variable that goes from 0 to 1.
+    terms *= ((2.0 * lengths / widths)[:, None] ** np.arange(TERMS) * lengths[:, None])[:, :, None, None]
+    return np.ascontiguousarray(terms.transpose(3, 1, 2, 0))
+
+
 @lru_cache(maxsize=512)
 def _taylor_matrix(degrees: int, count: int) -> Array:
     """Chebyshev coefficients of a panel -> for each of its pieces Taylor terms at both ends and misses at three places.

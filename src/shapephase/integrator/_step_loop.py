@@ -74,9 +74,9 @@ def integrate_steps(
         starts = directions[rows], magnitudes[rows]
         record(whole, rows, channels, interpolant.loops, *starts)
         half = attitudes(coarse, interpolant.loops, *starts)
-        whole.stepping[rows] = _largest_angle(whole.quaternions[rows, ::2], half)
+        whole.stepping[rows] = largest_angle(whole.quaternions[rows, ::2], half)
         if cut is not None:
-            whole.truncation[rows] = _largest_angle(half, attitudes(cut, interpolant.loops, *starts))
+            whole.truncation[rows] = largest_angle(half, attitudes(cut, interpolant.loops, *starts))
     return whole
 
 
@@ -93,7 +93,7 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
     truncation = 0.0
     if perturbed is not None:
         cut = _quaternions_at_rest(interpolant, perturbed, steps // 2)
-        truncation = _largest_angle(half, cut)
+        truncation = largest_angle(half, cut)
     nothing = np.zeros((1, len(whole) - 1))
     return StepRecord(
         quaternions=whole[None],
@@ -101,8 +101,36 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
         turns=nothing,
         dynamics=nothing,
         propagators=np.empty((1, 0, 3, 3)),
-        stepping=np.array([_largest_angle(whole[::2], half)]),
+        stepping=np.array([largest_angle(whole[::2], half)]),
         truncation=np.array([truncation]),
+    )
+
+
+def quaternions_alone(
+    interpolant: Interpolant,
+    coefficients: Array,
+    steps: Integers,
+    directions: Array | None = None,
+    magnitudes: Array | None = None,
+) -> Array:
+    """At the ends of all steps, other series in the interpolant's place: (B, K + 1, 4), nothing else being integrated.
+
+    Parameters as of `integrate_steps`; no directions and magnitudes: without momentum, B = 1.
+    """
+    run_progress.begin(run_progress.STEPPING, interpolant.loops * int(steps.sum()))
+    if directions is None or magnitudes is None:
+        return _quaternions_at_rest(interpolant, coefficients, steps)[None]
+    if engine.is_ready():
+        widths, none = np.diff(interpolant.edges[: len(steps) + 1]), np.zeros(0, dtype=int)
+        record = march_in_threads(
+            widths, coefficients, None, steps, interpolant.loops, directions, magnitudes, marks=none
+        )
+        return record.quaternions
+    channels, batch = _channels_at_stages(interpolant, coefficients, steps), len(magnitudes)
+    at_once, attitudes = (1, _attitudes_of_one) if batch <= FEW else (_ROWS_AT_ONCE, _attitudes_of_many)
+    parts = (slice(first, first + at_once) for first in range(0, batch, at_once))
+    return np.concatenate(
+        [attitudes(channels, interpolant.loops, directions[rows], magnitudes[rows]) for rows in parts]
     )
 
 
@@ -142,7 +170,7 @@ def _stage_matrix(degree_count: int, count: int) -> Array:
     return chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(STAGES * count, degree_count) / count
 
 
-def _largest_angle(a: Array, b: Array) -> Any:
+def largest_angle(a: Array, b: Array) -> Any:
     """The largest angle between attitudes that are near each other: (..., K, 4) quaternions -> (...) [rad]."""
     apart, opposite = a - b, a + b
     # A quaternion and its negative are one attitude.

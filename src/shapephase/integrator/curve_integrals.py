@@ -14,75 +14,94 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._dense_output import TERMS, convolved, direction_terms, end_channels, hermite_matrix, transported
+from ._dense_output import TERMS, convolved, direction_terms, end_channels, hermite_matrix, piece_channels, transported
+from .lift import Lift
 from .stepped import SteppedRotation
 
 # Of the error that is estimated by the decay of three rules.
-_SAFETY_FACTOR = 2.0
-# Steps at once: their terms take twenty megabytes.
+_SAFETY_FACTOR = 12.0
+# Pieces at once: their terms take twenty megabytes.
 _MOST_STEPS = 10_000
 # Keeps the decay defined where all differences are zero.
 _TINY = 1e-300
 
 
 class CurveIntegrals(NamedTuple):
-    """Of the momentum's curve on the sphere of a gauge, for a batch of B motions of K steps."""
+    """Of the momentum's curve on the sphere of a gauge, for a batch of B motions in M pieces."""
 
-    dynamic: Array  # (B, K) integral of the gauge's omega . Pi/|Pi| over each step [rad]
-    slivers: Array  # (B, K) signed area between each step's arc and its chord [sr]
-    corners: Array  # (B, K + 1, 3) directions at the ends of the steps, gauge axes
+    dynamic: Array  # (B, M) integral of the gauge's omega . Pi/|Pi| over each piece [rad]
+    slivers: Array  # (B, M) signed area between each piece's arc and its chord [sr]
+    corners: Array  # (B, M + 1, 3) directions at the ends of the pieces, gauge axes
     error: Array  # (B,) estimate of the error of both sums [rad]
+    slopes: Array  # (B, M + 1, 3) rates of the directions at the ends of the pieces, in the gauge but body axes [rad/s]
+    by_momentum: Array  # (B, M + 1, 3) the part of it that is due to I^-1 Pi
+    directions: Array  # (B, M + 1, 3) as the corners, in body axes
 
 
-def curve_integrals(rotation: SteppedRotation, lift: SteppedRotation | None = None) -> CurveIntegrals:
-    """In the base gauge, or in the horizontal one, whose lift has the ends of the steps among its own."""
-    batch, total = rotation.turns.shape
-    magnitude = np.linalg.norm(rotation.momentum, axis=-1)
-    ends = np.moveaxis(rotation.directions, -1, 0)
-    # The gauge's frame at the step ends, body axes to gauge axes.
+def curve_integrals(rotation: SteppedRotation, lift: Lift | None = None, edges: Array | None = None) -> CurveIntegrals:
+    """In the base gauge, or in the horizontal one, whose lift has the ends of the steps among its own.
+
+    `edges` (M + 1,) [s], the ends of the steps among them, are the ends of the pieces; None: those of the steps.
+    """
+    batch, magnitude = len(rotation.momentum), np.linalg.norm(rotation.momentum, axis=-1)
+    # The gauge's frame, body axes to gauge axes.
     frames = None
-    if lift is not None:
-        finer = np.tile(np.repeat(lift.steps // rotation.steps, rotation.steps), rotation.interpolant.loops)
-        frames = so3.matrix_from_quat(lift.quaternions[0, np.append(0, np.cumsum(finer))])
-    corners = rotation.directions if frames is None else so3.apply(frames, rotation.directions)
-    dynamic, slivers = np.empty((batch, total)), np.empty((batch, total))
+    lengths = np.maximum(np.diff(rotation.times if edges is None else edges), _TINY)
+    total = len(lengths)
+    if edges is None:
+        directions = rotation.directions
+        if lift is not None:
+            frames = so3.matrix_from_quat(lift.rotation.quaternions[0, lift.ends])
+    else:
+        directions = so3.apply(so3.transpose(rotation.rotation(edges)), rotation.directions[:, :1])
+        frames = None if lift is None else lift.rotation.rotation(edges)[0]
+    corners = directions if frames is None else so3.apply(frames, directions)
+    ends = np.ascontiguousarray(directions.transpose(2, 0, 1))
+    dynamic, slivers = np.empty((2, batch, total))
+    turning, drift = np.empty((batch, total + 1, 3)), np.empty((total + 1, 3))
     differences = np.zeros((2, 2, batch))
     at_once = max(1, _MOST_STEPS // max(1, batch))
     for first in range(0, total, at_once):
         part = slice(first, min(first + at_once, total))
         after = slice(part.start + 1, part.stop + 1)
-        channels, _ = end_channels(rotation.interpolant, rotation.steps, np.arange(part.start, part.stop))
-        directions = np.stack([ends[:, :, part], ends[:, :, after]], axis=2)
-        p, rates = direction_terms(directions, magnitude, channels)
-        # The step's first corner, as it is seen from the body at both ends.
-        still = np.zeros((3, TERMS, *directions.shape[1:]))
-        of_frame = np.zeros((TERMS, *directions.shape[1:]))
-        if frames is None:
-            still[:, 0] = directions[:, :, :1]
+        if edges is None:
+            channels, _ = end_channels(rotation.interpolant, rotation.steps, np.arange(part.start, part.stop))
         else:
-            carried = so3.apply(so3.transpose(frames[after]), corners[:, part])
-            still[:, 0] = np.stack([directions[:, :, 0], np.moveaxis(carried, -1, 0)], axis=2)
-            drift = channels[6:, :, None]
-            transported(still, -drift)
-            rates = rates + drift
-            of_frame = convolved(p, np.broadcast_to(drift, p.shape))
+            channels = piece_channels(rotation.interpolant, edges[part.start : part.stop + 1])
+        both = np.stack([ends[:, :, part], ends[:, :, after]], axis=2)
+        p, rates = direction_terms(both, magnitude, channels)
+        # The piece's first corner, as it is seen from the body at both ends.
+        still = np.zeros((3, TERMS, *both.shape[1:]))
+        if frames is None:
+            still[:, 0] = both[:, :, :1]
+        else:
+            still[:, 0, :, 0] = both[:, :, 0]
+            still[:, 0, :, 1] = so3.apply(so3.transpose(frames[after]), corners[:, part]).transpose(2, 0, 1)
+            transported(still, -channels[6:, :, None])
+            rates += channels[6:, :, None]
+        if frames is None:
+            drift[part], drift[part.stop] = (channels[6:, 0, 0] / lengths[part]).T, channels[6:, 0, 1, -1]
+            drift[part.stop] /= lengths[part.stop - 1]
+        turning[:, part] = (rates[:, 0, :, 0] / lengths[part]).transpose(1, 2, 0)
+        turning[:, part.stop] = (rates[:, 0, :, 1, -1] / lengths[part.stop - 1]).T
         along = convolved(p, rates)
-        both, cosine = along + convolved(still, rates), convolved(still, p)
+        turn, cosine = along + convolved(still, rates), convolved(still, p)
         cosine[0] += 1.0
         # The rate of the turn about the first corner, a quotient of series.
-        turn = np.empty_like(both)
         for order in range(TERMS):
-            known = (cosine[1 : order + 1] * turn[:order][::-1]).sum(axis=0) if order else 0.0
-            turn[order] = (both[order] - known) / cosine[0]
-        integrands = np.stack([of_frame, along - turn])
+            if order:
+                turn[order] -= (cosine[1 : order + 1] * turn[:order][::-1]).sum(axis=0)
+            turn[order] /= cosine[0]
+        integrands = np.stack([along, along - turn])
         by_rule = _rules() @ integrands.transpose(3, 1, 0, 2, 4).reshape(2 * TERMS, -1)
         by_rule = by_rule.reshape(3, 2, batch, integrands.shape[-1])
-        dynamic[:, part] = rotation.dynamics[:, part] + by_rule[0, 0]
-        slivers[:, part] = by_rule[0, 1]
+        dynamic[:, part], slivers[:, part] = by_rule[0]
         differences += np.abs(by_rule[:2] - by_rule[1:]).sum(axis=-1)
     late, early = differences
     error = _SAFETY_FACTOR * (late * np.minimum(late / (early + _TINY), 1.0)).sum(axis=0)
-    return CurveIntegrals(dynamic, slivers, corners, error)
+    slopes = so3.cross(directions, turning)
+    by_momentum = slopes + so3.cross(directions, drift) if frames is None else slopes
+    return CurveIntegrals(dynamic, slivers, corners, error, slopes, by_momentum, directions)
 
 
 @lru_cache(maxsize=1)

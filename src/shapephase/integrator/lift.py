@@ -1,72 +1,111 @@
-"""The rotation without momentum, on the samples of a motion with it."""
+"""The rotation without momentum beside a motion with it, and how far both may be off at every time."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from .. import so3
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, lock_arrays
 from ._error_propagator import rounding_error
-from ._last_terms import Perturbed
-from ._step_control import StepRequirements, even_steps
-from ._step_loop import integrate_steps_at_rest
-from .interpolant import Interpolant
+from ._step_loop import largest_angle, quaternions_alone
 from .stepped import SteppedRotation
 
 # Of the motion's error estimate: what the steps of its lift are to err by at most.
-_SHARE = 0.05
+_SHARE = 0.1
 # [rad] the same where the motion is as good as exact.
 _ROUNDING = 1e-14
+# Of the distance from twice as many steps, which shows the error of steps but for a part in two hundred.
+_SAFETY_FACTOR = 2.0
 # Times that the steps of a lift are halved to err no more than that.
 _MOST_HALVINGS = 3
 
 
-def lift_along(rotation: SteppedRotation) -> SteppedRotation:
-    """How the shape alone would turn the frame, on the samples of a motion; at the ends of its steps own ones end."""
-    if not rotation.directions.shape[1]:
-        return rotation
-    interpolant = rotation.interpolant
+@dataclass(frozen=True, eq=False)
+class Lift:
+    """How the shape alone would turn the frame, on the samples of a motion; where its steps end own steps end.
+
+    Attributes
+    ----------
+    rotation : of a batch of one; of a motion without momentum its own
+    turns : as of `error_turns`, at the ends of the motion's steps: (2, 1, K + 1, 3)
+    ends : (K + 1,) which ends of its steps are those of the motion's
+    """
+
+    rotation: SteppedRotation
+    turns: Array
+    ends: Integers
+
+    __post_init__ = lock_arrays
+
+
+def lift_along(rotation: SteppedRotation) -> Lift:
+    """The lift of a motion."""
+    interpolant, series = rotation.interpolant, rotation.interpolant.coefficients
+    at_rest, times_finer = not rotation.directions.shape[1], 1
+    quaternions = rotation.quaternions[:1] if at_rest else quaternions_alone(interpolant, series, rotation.steps)
+    finer = quaternions_alone(interpolant, series, 2 * rotation.steps)
+    if at_rest:
+        ends = np.arange(quaternions.shape[1])
+        return Lift(rotation, _turns_of_lift(rotation, quaternions, finer, rotation.steps, ends), ends)
     tolerance = max(_SHARE * float(np.min(rotation.error_estimate)), _ROUNDING)
-    requirements = StepRequirements.from_interpolant(interpolant, 0.0, tolerance)
-    steps = even_steps(requirements.plan(tolerance), rotation.steps)
-    record = integrate_steps_at_rest(interpolant, None, steps)
-    stepping = requirements.stepping_error(steps, record.stepping)
     for _ in range(_MOST_HALVINGS):
-        if stepping[0] <= tolerance:
+        if _SAFETY_FACTOR * float(largest_angle(quaternions, finer[:, ::2])[0]) <= tolerance:
             break
-        steps = 2 * steps
-        record = integrate_steps_at_rest(interpolant, None, steps)
-        stepping = requirements.stepping_error(steps, record.stepping)
-    one, turned = np.ones(1), _perturbed_turns(interpolant, rotation.perturbed, steps, record.quaternions)
-    return SteppedRotation(
+        times_finer *= 2
+        quaternions, finer = finer, quaternions_alone(interpolant, series, 2 * times_finer * rotation.steps)
+    steps, ends = times_finer * rotation.steps, times_finer * np.arange(rotation.quaternions.shape[1])
+    turns = _turns_of_lift(rotation, quaternions, finer, steps, ends)
+    stepping, sampling = np.sqrt(np.einsum("sbki,sbki->sbk", turns, turns).max(axis=-1))
+    one, nothing = np.ones(1), np.zeros((1, quaternions.shape[1] - 1))
+    lift = SteppedRotation(
         interpolant=interpolant,
         momentum=np.zeros((1, 3)),
         steps=steps,
-        quaternions=record.quaternions,
-        directions=record.directions,
-        turns=record.turns,
-        dynamics=record.dynamics,
-        sampling_error=rotation.perturbed.hidden + np.sqrt((turned * turned).sum(axis=-1)).max(axis=-1),
-        stepping_error=stepping,
-        rounding_error=rounding_error(record.propagators, record.quaternions, one, tolerance),
+        quaternions=quaternions,
+        directions=np.empty((1, 0, 3)),
+        turns=nothing,
+        dynamics=nothing,
+        sampling_error=rotation.perturbed.hidden + sampling,
+        stepping_error=_SAFETY_FACTOR * stepping,
+        rounding_error=rounding_error(np.empty((1, 0, 3, 3)), quaternions, one, tolerance),
         amplification=one,
         perturbed=rotation.perturbed,
     )
+    return Lift(lift, turns, ends)
 
 
-def _perturbed_turns(interpolant: Interpolant, perturbed: Perturbed, steps: Integers, quaternions: Array) -> Array:
-    """From a rotation without momentum to that on the perturbed series, at the ends of its steps: (1, K + 1, 3)."""
-    if not perturbed.changes(interpolant.coefficients):
-        return np.zeros((*quaternions.shape[:2], 3))
-    changed = replace(interpolant, coefficients=perturbed.coefficients)
-    return _turns(quaternions, integrate_steps_at_rest(changed, None, steps).quaternions)
+def error_turns(rotation: SteppedRotation, lift: Lift) -> Array:
+    """Small turns from attitudes at the ends of steps to better ones, S exp(hat(turn)), body axes: (2, B, K + 1, 3).
+
+    First to those by twice as many steps, then to those on the perturbed series [rad].
+    """
+    if lift.rotation is rotation:
+        return np.broadcast_to(lift.turns, (2, len(rotation.momentum), *lift.turns.shape[2:]))
+    interpolant, perturbed = rotation.interpolant, rotation.perturbed
+    starts = rotation.directions[:, 0], np.linalg.norm(rotation.momentum, axis=-1)
+    better = np.empty((2, *rotation.quaternions.shape))
+    better[0] = quaternions_alone(interpolant, interpolant.coefficients, 2 * rotation.steps, *starts)[:, ::2]
+    better[1] = quaternions_alone(interpolant, perturbed.coefficients, rotation.steps, *starts)
+    return small_turns(rotation.quaternions, better)
 
 
-def _turns(start: Array, end: Array) -> Array:
-    """Small turns between quaternions xyzw: (..., 4), (..., 4) -> (..., 3)."""
-    v, w, a, b = start[..., :3], end[..., :3], start[..., 3:], end[..., 3:]
+def _turns_of_lift(
+    rotation: SteppedRotation, quaternions: Array, finer: Array, steps: Integers, ends: Integers
+) -> Array:
+    """As `error_turns`, of steps as those of the motion or finer."""
+    other = quaternions_alone(rotation.interpolant, rotation.perturbed.coefficients, steps)
+    return small_turns(quaternions[:, ends], np.stack([finer[:, 2 * ends], other[:, ends]]))
+
+
+def small_turns(start: Array, end: Array) -> Array:
+    """From quaternions xyzw to others near them: (..., 4), (..., 4) -> (..., 3) [rad]."""
+    x, y, z, w = start[..., 0], start[..., 1], start[..., 2], start[..., 3]
+    back = np.empty((*start.shape, 4))
+    back[..., 0, 0] = back[..., 1, 1] = back[..., 2, 2] = back[..., 3, 3] = w
+    back[..., 0, 1], back[..., 1, 0], back[..., 2, 3], back[..., 3, 2] = z, -z, -z, z
+    back[..., 0, 2], back[..., 2, 0], back[..., 1, 3], back[..., 3, 1] = -y, y, -y, y
+    back[..., 1, 2], back[..., 2, 1], back[..., 0, 3], back[..., 3, 0] = x, -x, -x, x
+    between = np.einsum("...ij,...j", back, end)
     # A quaternion and its negative are one attitude.
-    signs = np.where((start * end).sum(axis=-1, keepdims=True) < 0.0, -2.0, 2.0)
-    return signs * (a * w - b * v - so3.cross(v, w))
+    return np.copysign(2.0, between[..., 3:]) * between[..., :3]

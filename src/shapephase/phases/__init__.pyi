@@ -1,4 +1,5 @@
 from .continuation import OrbitBranch, continued_orbits
+from .error_estimates import ArcErrors, RunningErrors, SplitErrors
 from .phases import (
     ArcPhases,
     PhaseSplit,
@@ -13,6 +14,7 @@ from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 
 __all__ = [
+    "ArcErrors",
     "ArcPhases",
     "Crossings",
     "FixedPoints",
@@ -20,7 +22,9 @@ __all__ = [
     "PhaseSplit",
     "ReturnMap",
     "Returns",
+    "RunningErrors",
     "RunningPhases",
+    "SplitErrors",
     "arc_phases",
     "closed_orbits",
     "continued_orbits",

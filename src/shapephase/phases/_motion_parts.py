@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Array
 from ..integrator.many_rotations import assembled
 from ..reconstruction.reconstruction import Motion
+from ._deferred import Deferred
 
 Result = TypeVar("Result")
 
@@ -20,16 +21,24 @@ def by_parts(motion: Motion, compute: Callable[[Motion], Result], shared: tuple[
 
     Parameters
     ----------
-    compute : motion of a batch (n,) -> a dataclass whose arrays have that axis in front
+    compute : motion of a batch (n,) -> a dataclass whose arrays, also those of dataclasses in it, have that axis in
+        front
     shared : fields of the result that do not
     """
-    parts = [(rows, compute(part)) for rows, part in motion.parts]
+    return _joined(motion, [(rows, compute(part)) for rows, part in motion.parts], shared)
+
+
+def _joined(motion: Motion, parts: list[Any], shared: tuple[str, ...] = ()) -> Any:
     first: Any = parts[0][1]
-    given = {field.name: getattr(first, field.name) for field in fields(first) if field.name not in shared}
-    names = [name for name, value in given.items() if isinstance(value, np.ndarray)]
-    return replace(
-        first, **{name: _whole(motion, [(rows, getattr(one, name)) for rows, one in parts]) for name in names}
-    )
+    if isinstance(first, np.ndarray):
+        return _whole(motion, parts)
+    if isinstance(first, Deferred):
+        return Deferred(lambda: _joined(motion, [(rows, one.value) for rows, one in parts]))
+    if not is_dataclass(first):
+        return first
+    names = [field.name for field in fields(first) if field.name not in shared]
+    each = {name: [(rows, getattr(one, name)) for rows, one in parts] for name in names}
+    return type(first)(**vars(first) | {name: _joined(motion, values) for name, values in each.items()})
 
 
 def array_by_parts(motion: Motion, compute: Callable[[Motion], Array]) -> Array:

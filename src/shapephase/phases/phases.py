@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,16 @@ from numpy.typing import ArrayLike
 
 from .. import so3, sphere
 from ..arguments import check_object, times_argument
-from ..arrays import Array, finite_array
+from ..arrays import Array, Mask, finite_array
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
+from ._curve_errors import arc_errors, running_errors, split_errors
+from ._deferred import Deferred
 from ._momentum_curve import Gauge, momentum_curve
 from ._motion_parts import array_by_parts, by_parts
+from .error_estimates import ArcErrors, RunningErrors, SplitErrors
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +69,13 @@ class PhaseSplit:
     shape_gap: float
     residual: Array
     is_loop: bool
-    has_phase: Array
+    has_phase: Mask
+    _errors: Deferred[SplitErrors] = field(repr=False)
+
+    @property
+    def error_estimates(self) -> SplitErrors:
+        """Of each of these numbers; computed when they are first looked at, for about half of what the split took."""
+        return self._errors.value
 
 
 def split(
@@ -112,9 +122,10 @@ def split(
     dynamical = np.where(moving, total @ so3.transpose(holonomy), np.eye(3))
     tilt = np.where(moving, first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
-    area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners), 0.0)
+    area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners, curve.references), 0.0)
     phase = dynamic - area
     read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
+    residual = np.abs(so3.wrap(phase - read_off))
     matrix = (*batch, 3, 3)
     return PhaseSplit(
         gauge=gauge if isinstance(gauge, str) else "given",
@@ -129,9 +140,10 @@ def split(
         tilt=tilt.reshape(matrix),
         momentum_gap=(so3.angle_between(departing, arriving) * has_phase).reshape(batch)[()],
         shape_gap=deformation.shape_gap,
-        residual=np.abs(so3.wrap(phase - read_off)).reshape(batch)[()],
+        residual=residual.reshape(batch)[()],
         is_loop=deformation.closure is not None,
         has_phase=has_phase.reshape(batch)[()],
+        _errors=Deferred(partial(split_errors, motion, curve, residual)),
     )
 
 
@@ -156,6 +168,7 @@ class RunningPhases:
     solid_angle : swept about the reference, minus the geometric phase [sr]
     reference : batch + (3,), in the gauge's frame
     residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
+    error_estimates : of the phases at each time
     """
 
     times: Array
@@ -167,6 +180,7 @@ class RunningPhases:
     solid_angle: Array
     reference: Array
     residual: Array
+    error_estimates: RunningErrors
 
 
 def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") -> RunningPhases:
@@ -192,7 +206,7 @@ def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") ->
     begin = curve.attitudes(np.zeros(1)) @ so3.between(references, curve.corners[:, 0])[:, None]
     seen = so3.angle_about(frames @ so3.transpose(begin), curve.axis[:, None]) * curve.has_phase[:, None]
     phase = dynamic - area
-    shape = (*motion.batch, *times.shape)
+    residual, shape = np.abs(so3.wrap(phase - seen)), (*motion.batch, *times.shape)
     return RunningPhases(
         times=times,
         gauge=gauge if isinstance(gauge, str) else "given",
@@ -202,7 +216,8 @@ def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") ->
         montgomery_angle=so3.wrap(phase).reshape(shape)[()],
         solid_angle=area.reshape(shape)[()],
         reference=references.reshape(*motion.batch, 3),
-        residual=np.abs(so3.wrap(phase - seen)).max(axis=-1, initial=0.0).reshape(motion.batch)[()],
+        residual=residual.max(axis=-1, initial=0.0).reshape(motion.batch)[()],
+        error_estimates=running_errors(motion, curve, flat, residual, shape),
     )
 
 
@@ -228,6 +243,7 @@ class ArcPhases:
     polygon_angle : signed area of the closed polygon of those great circles [sr]
     total_phase : of all arcs as one [rad]
     total_tilt : (3, 3)
+    error_estimates : of each of these numbers
     """
 
     times: Array
@@ -241,6 +257,7 @@ class ArcPhases:
     polygon_angle: Array
     total_phase: Array
     total_tilt: Array
+    error_estimates: ArcErrors
 
 
 def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") -> ArcPhases:
@@ -288,6 +305,21 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     dynamic, area = np.diff(swept_phase, axis=1), np.diff(swept_area, axis=1) + closing
     phase = dynamic - area
     polygon = whole - closing.sum(axis=1)
+    tilts, tilt = (
+        tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:]),
+        tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:]),
+    )
+
+    def apart(phases: Array, starts: Array, stops: Array, transports: Array) -> Array:
+        """Phases against the same angles read off the attitudes."""
+        turns = stops @ so3.transpose(starts) @ so3.transpose(transports)
+        return np.abs(so3.wrap(phases - so3.angle_about(turns, curve.axis[:, None]))) * moving
+
+    total = phase.sum(axis=1) - polygon
+    residuals = (
+        apart(phase, attitudes[:, :-1], attitudes[:, 1:], tilts),
+        apart(total[:, None], attitudes[:, :1], attitudes[:, -1:], tilt),
+    )
     batch, count = motion.batch, len(cuts) - 1
     arcs = (*batch, count)
     return ArcPhases(
@@ -297,11 +329,12 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
         geometric_phase=(0.0 - area).reshape(arcs),
         montgomery_phase=phase.reshape(arcs),
         solid_angle=area.reshape(arcs),
-        tilt=tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:]).reshape(*arcs, 3, 3),
+        tilt=tilts.reshape(*arcs, 3, 3),
         momentum_gap=(so3.angle_between(ends[:, :-1], ends[:, 1:]) * moving).reshape(arcs),
         polygon_angle=polygon.reshape(batch)[()],
-        total_phase=(phase.sum(axis=1) - polygon).reshape(batch)[()],
-        total_tilt=tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:])[:, 0].reshape(*batch, 3, 3),
+        total_phase=total.reshape(batch)[()],
+        total_tilt=tilt[:, 0].reshape(*batch, 3, 3),
+        error_estimates=arc_errors(motion, curve, cuts, residuals),
     )
 
 

@@ -122,35 +122,37 @@ def _lead(motion: Motion) -> str:
 
 
 def _split_rows(result: PhaseSplit) -> list[tuple[str, str, str]]:
+    errors = result.error_estimates
     rows = [
-        _rotation("Total rotation", result.total_rotation),
-        _rotation("Shape holonomy" if result.is_loop else "Shape lift (open path)", result.holonomy),
-        _rotation("Dynamical rotation", result.dynamical_rotation),
+        _rotation("Total rotation", result.total_rotation, errors.total_rotation),
+        _rotation("Shape holonomy" if result.is_loop else "Shape lift (open path)", result.holonomy, errors.holonomy),
+        _rotation("Dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
     ]
     if not result.has_phase:
         return [
             *rows,
             ("Montgomery phase", "", "none: there is no angular momentum, the body turns by its shape alone"),
         ]
+    area = float(result.solid_angle)
     return [
         *rows,
-        _phase("Montgomery phase", result.montgomery_phase, f"{result.gauge} gauge"),
-        _phase("Dynamic phase", result.dynamic_phase, ""),
-        _phase("Geometric phase", result.geometric_phase, f"solid angle {float(result.solid_angle):.9f} sr"),
-        _rotation("Tilt", result.tilt),
-        _phase("Momentum gap", result.momentum_gap, "between the momentum's directions at start and end"),
+        _phase("Montgomery phase", result.montgomery_phase, errors.montgomery_phase, f"{result.gauge} gauge"),
+        _phase("Dynamic phase", result.dynamic_phase, errors.dynamic_phase, ""),
+        _phase("Geometric phase", result.geometric_phase, errors.geometric_phase, f"solid angle {area:.9f} sr"),
+        _rotation("Tilt", result.tilt, errors.tilt),
+        _phase("Momentum gap", result.momentum_gap, errors.momentum_gap, "between its directions at start and end"),
     ]
 
 
-def _rotation(name: str, rotation: Array) -> tuple[str, str, str]:
+def _rotation(name: str, rotation: Array, error: Array) -> tuple[str, str, str]:
     vector = so3.log(rotation)
     angle = float(np.linalg.norm(vector))
     axis = "" if angle < 1e-12 else "about (" + ", ".join(f"{x:.6f}" for x in np.round(vector / angle, 6) + 0.0) + ")"
-    return name, f"{np.degrees(angle):.6f}°", axis
+    return name, f"{np.degrees(angle):.6f}°", f"{axis} ± {float(error):.1e} rad".strip()
 
 
-def _phase(name: str, phase: Array, remark: str) -> tuple[str, str, str]:
-    radians = f"{float(phase):.9f} rad"
+def _phase(name: str, phase: Array, error: Array, remark: str) -> tuple[str, str, str]:
+    radians = f"{float(phase):.9f} ± {float(error):.1e} rad"
     return name, f"{float(np.degrees(phase)):.6f}°", f"{radians}; {remark}" if remark else radians
 
 

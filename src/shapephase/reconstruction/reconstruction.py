@@ -19,13 +19,13 @@ from ..arguments import (
     times_argument,
     tolerance_argument,
 )
-from ..arrays import Array, Integers, finite_array, lock_arrays
+from ..arrays import Array, Integers, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
-from ..integrator.lift import lift_along
+from ..integrator.lift import Lift, error_turns, lift_along
 from ..integrator.many_rotations import GroupedRotations, assembled
 from ..integrator.stepped import SteppedRotation
 from ..run_progress import RunProgress, watched
@@ -201,14 +201,25 @@ class Motion:
         stepped = stepped_rotation(self.deformation.sampler(), start, self.tolerance)
         return stepped.with_rotations(self.solution.rotation(stepped.times), self.solution.error_estimate)
 
-    @cached_property
+    @property
     def horizontal_lift(self) -> SteppedRotation:
         """How the shape motion alone would turn the base, on the samples that the motion already has.
 
         Its steps end where those of the motion do. Integrated once, when it is first needed; every split and every
         gauge shares it.
         """
+        return self.lift_with_errors.rotation
+
+    @cached_property
+    def lift_with_errors(self) -> Lift:
+        """The same, with how far it may be off."""
         return lift_along(self.stepped.finest if isinstance(self.stepped, GroupedRotations) else self.stepped)
+
+    @cached_property
+    def error_turns(self) -> Array:
+        """How far attitudes probably are off at the ends of steps, as of `integrator.lift.error_turns`."""
+        assert isinstance(self.stepped, SteppedRotation), "a batch has them part by part"
+        return read_only(error_turns(self.stepped, self.lift_with_errors))
 
     @property
     def interpolant(self) -> Interpolant:

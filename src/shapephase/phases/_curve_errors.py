@@ -1,0 +1,325 @@
+"""Error estimates of phases: what the errors of an attitude and of its samples do to what is made of them.
+
+Both are known at every time, from finer steps and from a perturbed series (`integrator.lift.error_turns`), and so is
+what they do to a curve. No bound is needed but for what no series shows, and for rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array, Integers
+from ..integrator.stepped import SteppedRotation
+from ..reconstruction.reconstruction import Motion
+from ._momentum_curve import MomentumCurve
+from .error_estimates import ArcErrors, RunningErrors, SplitErrors
+
+# Of what finer steps show, which is the error of steps but for a part in two hundred, and of what the perturbed series
+# shows, which is larger than what is missing.
+_FACTORS = np.array([2.0, 1.0])
+# Of what an error has been at its largest so far: its last value may be small by chance.
+_OF_LARGEST = 0.03
+# Of the turns themselves, for each radian along the curve up to one: what integrals of them are uncertain by, even
+# where they cancel; of steps and of samples.
+_LEAST = np.array([0.05, 0.01])
+# Of what happens at unknown times, for each radian of the curve: most of it cancels as the curve goes round.
+_AT_ANY_TIME = 0.1
+# Of the attitude's error estimate: what is added at times between the ends of steps.
+_BETWEEN_STEPS = 0.02
+# Units of rounding: of any sum of angles; and of each radian that is summed up.
+_ROUNDING = 32.0
+_ROUNDING_OF_RADIANS = 8.0
+_EPS = float(np.finfo(float).eps)
+# Of the linear estimate: up to half the distance from the opposite point the sine is within this of its tangent.
+_BEYOND_LINEAR = 1.05
+# What the area beside the closing great circles adds to the dynamic phase, to the area, and to the phase.
+_CLOSING_SIGNS = np.array([0.0, 1.0, -1.0, -1.0])
+# Keeps quotients defined where there are no errors, and at the point opposite the start.
+_TINY = 1e-300
+
+
+class Stretches(NamedTuple):
+    """Parts of a curve between edges: (N,) places of their starts and ends."""
+
+    first: Integers
+    last: Integers
+
+    @classmethod
+    def of(cls, edges: Array, starts: Array, ends: Array) -> Stretches:
+        """Between times that are edges."""
+        return cls(*np.broadcast_arrays(np.searchsorted(edges, starts), np.searchsorted(edges, ends)))
+
+    def added(self, sums: Array) -> Array:
+        """What is added along each stretch to sums since the start: (..., K + 1) -> (..., N)."""
+        return sums[..., self.last] - sums[..., self.first]
+
+    def largest(self, sums: Array) -> Array:
+        """The largest |growth| on the way: (..., K + 1) -> (..., N)."""
+        if not self.first.any():
+            # All from the start.
+            return np.maximum.accumulate(np.abs(sums), axis=-1)[..., self.last]
+        # Every second one is of a stretch; what lies between two does not count.
+        both = np.stack([self.first, self.last], axis=-1).ravel()
+        high, low = (extreme.reduceat(sums, both, axis=-1)[..., ::2] for extreme in (np.maximum, np.minimum))
+        start = sums[..., self.first]
+        return np.maximum(np.maximum(high - start, start - low), np.abs(self.added(sums)))
+
+
+class Errors(NamedTuple):
+    """Of what is found along stretches of a curve that great circles close: (B, N) each [rad]."""
+
+    dynamic: Array
+    area: Array
+    phase: Array
+    tilt: Array
+    gap: Array  # of the ends of the great circles
+
+
+@dataclass(frozen=True, eq=False)
+class CurveErrors:
+    """The errors of a momentum's curve, from those of attitude and lift at every time.
+
+    Arrays whose first axis is 2 hold what finer steps do, then what the perturbed series does.
+
+    Attributes
+    ----------
+    motion, curve : whose errors they are
+    """
+
+    motion: Motion
+    curve: MomentumCurve
+
+    @property
+    def attitude(self) -> Array:
+        """Of the deformation's own frame, at its end: (B,) [rad]."""
+        found = _at_end(self._of_attitude) + self._unseen
+        return np.minimum(found, self.motion.solution.error_estimate)
+
+    @property
+    def lift(self) -> Array:
+        """Of the horizontal lift at its end: (1,) or (B,) [rad]."""
+        lift = self.motion.lift_with_errors
+        return np.minimum(_at_end(lift.turns) + self._unseen_of_lift, lift.rotation.error_estimate)
+
+    @property
+    def between(self) -> Array:
+        """Of the turn from the lift to the attitude, at the end: (B,) [rad]."""
+        found = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
+        return np.minimum(found, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
+
+    def of(self, stretches: Stretches, residual: Array, targets: Array) -> Errors:
+        """Of stretches of the curve that great circles close, from their ends to targets (B, N, 3), gauge axes.
+
+        Targets are the starts of the stretches, or fixed where all begin with the curve. The residuals (B, N) are those
+        between two ways to their phases.
+        """
+        curve = self.curve
+        displaced, sizes = curve.displaced(self._of_gauge), _norms(self._of_gauge)
+        # Steps displace the curve along which the dynamic phase is summed up, whatever the lift does; samples turn the
+        # body about its momentum by the phase.
+        body = displaced if curve.lift is None else curve.displaced(self._at_edges(self._of_attitude[:1]))
+        dynamic = np.stack([body.area[0] + body.phase[0], displaced.area[1] + displaced.along[1]])
+        ends = curve.corners[:, stretches.last]
+        # The area beside a great circle grows by so much for each radian by which an end is displaced across it.
+        factor = _BEYOND_LINEAR * _norms(targets - ends) / (_norms(targets + ends) + _TINY)
+        beside, closing = self._beside(stretches, targets, ends), np.multiply.outer(_CLOSING_SIGNS**2, factor)
+        # Dynamic phase, area, phase by its integral, and as it could be read off the attitude.
+        responses = np.stack([dynamic, displaced.area, dynamic - displaced.area, displaced.along])
+        lengths, swings, summed = stretches.added(self._lengths)
+        paths = np.stack([lengths + swings, lengths, swings, np.ones_like(lengths)])
+        largest = sizes.max(axis=2, keepdims=True)
+        on_the_way = stretches.largest(responses) + closing[:, None] * largest
+        grown = stretches.added(responses) + np.multiply.outer(_CLOSING_SIGNS, beside)
+        errors = np.einsum("s,qsbn->qbn", _FACTORS, np.abs(grown) + _OF_LARGEST * on_the_way)
+        errors += self._unseen_of_gauge[:, None] * (1.0 + _AT_ANY_TIME * paths + closing)
+        errors += np.tensordot(_LEAST, largest, axes=1) * np.minimum(paths, 1.0)
+        errors += _EPS * (_ROUNDING + _ROUNDING_OF_RADIANS * (summed + lengths)) + curve.error[:, None] + residual
+        turned = _seen_so_far(sizes) + self._unseen_of_gauge[:, None]
+        gap = turned[:, stretches.first] + turned[:, stretches.last]
+        # Near the point opposite the target any displacement turns the great circle round.
+        near, whole = gap > np.arctan2(1.0, factor), 2.0 * np.pi
+        tilt = np.minimum(_BEYOND_LINEAR * gap * np.sqrt(1.0 + factor * factor), np.pi)
+        return Errors(
+            dynamic=errors[0],
+            area=np.where(near, whole, np.minimum(errors[1], whole)),
+            phase=np.where(near, whole, np.minimum(np.minimum(errors[2], errors[3]), whole)),
+            tilt=np.where(near, np.pi, tilt),
+            gap=np.minimum(gap, np.pi),
+        )
+
+    def _beside(self, stretches: Stretches, targets: Array, ends: Array) -> Array:
+        """What the turns do to the area beside the great circles: (2, B, N) [sr]."""
+        cosine = np.einsum("bni,bni->bn", targets, ends)[..., None]
+        across = np.einsum("sbni,bni->sbn", self._in_gauge(stretches.last), targets - cosine * ends)
+        if stretches.first.any():
+            across += np.einsum("sbni,bni->sbn", self._in_gauge(stretches.first), cosine * targets - ends)
+        return -across / (1.0 + cosine[..., 0] + _EPS)
+
+    def _in_gauge(self, place: Integers) -> Array:
+        """The turns at edges, gauge axes: (N,) -> (2, B, N, 3)."""
+        turns, frames = self._of_gauge[:, :, place], self.curve.frame_at(place)
+        return turns if frames is None else so3.apply(frames, turns)
+
+    @cached_property
+    def _stepped(self) -> SteppedRotation:
+        """Of a motion that is no batch of several parts."""
+        stepped = self.motion.stepped
+        assert isinstance(stepped, SteppedRotation)
+        return stepped
+
+    @cached_property
+    def _of_attitude(self) -> Array:
+        """Turns of the deformation's own frame at the ends of steps: (2, B, N, 3)."""
+        return self._weighted(self.motion.error_turns)
+
+    @cached_property
+    def _of_lift(self) -> Array:
+        """Turns of the lift at the ends of the motion's steps: (2, B, N, 3)."""
+        return self._weighted(self.motion.lift_with_errors.turns)
+
+    def _weighted(self, turns: Array) -> Array:
+        """Where the samples are known to be better than the perturbed series, so much of what that does."""
+        if self._stepped is not self.motion.solution:
+            return turns
+        most = _norms(self.motion.error_turns[1]).max(axis=1)
+        share = np.minimum(self._stepped.sampling_error / (most + _TINY), 1.0)
+        return turns * np.stack([np.ones_like(share), share])[:, :, None, None]
+
+    @cached_property
+    def _unseen(self) -> Array:
+        """Of the attitude, what neither finer steps nor the perturbed series show: (B,) [rad]."""
+        stepped = self._stepped
+        hidden = stepped.amplification * stepped.perturbed.hidden
+        if stepped is self.motion.solution:
+            hidden = np.minimum(hidden, stepped.sampling_error)
+        return hidden + stepped.rounding_error
+
+    @cached_property
+    def _unseen_of_lift(self) -> Array:
+        lift = self.motion.horizontal_lift
+        return lift.perturbed.hidden + lift.rounding_error
+
+    @cached_property
+    def _unseen_of_gauge(self) -> Array:
+        found = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
+        if len(self.curve.edges) == self._stepped.quaternions.shape[1]:
+            return found
+        return found + _BETWEEN_STEPS * self.motion.solution.error_estimate
+
+    @cached_property
+    def _of_gauge(self) -> Array:
+        """Turns of the gauge's frame at the edges: (2, B, K + 1, 3)."""
+        turns = self._of_attitude if self.curve.lift is None else self._of_attitude - self._of_lift
+        return self._at_edges(turns)
+
+    def _at_edges(self, turns: Array) -> Array:
+        """Vectors at the ends of steps, between them linearly: (..., N, 3) -> (..., K + 1, 3)."""
+        edges, times = self.curve.edges, self._stepped.times
+        if len(times) == len(edges):
+            return turns
+        right = np.clip(np.searchsorted(times, edges), 1, len(times) - 1)
+        share = ((edges - times[right - 1]) / (times[right] - times[right - 1]))[:, None]
+        return (1.0 - share) * turns[..., right - 1, :] + share * turns[..., right, :]
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """Since the start: of the curve, of its part due to I^-1 Pi, of the dynamic phase: (3, B, K + 1) [rad]."""
+        curve, sums = self.curve, np.zeros((3, *self.curve.corners.shape[:2]))
+        rates = _norms(np.stack([curve.slopes, curve.by_momentum]))
+        np.cumsum(rates[..., :-1] * np.diff(curve.edges), axis=-1, out=sums[:2, :, 1:])
+        np.cumsum(np.abs(curve.dynamic), axis=-1, out=sums[2, :, 1:])
+        return sums
+
+
+def _norms(vectors: Array) -> Array:
+    """Lengths: (..., 3) -> (...)."""
+    return np.sqrt(np.einsum("...i,...i", vectors, vectors))
+
+
+def _seen_so_far(sizes: Array) -> Array:
+    """Error of a frame at each time, from the sizes of its turns: (2, B, N) -> (B, N) [rad]."""
+    return np.tensordot(_FACTORS, sizes + _OF_LARGEST * np.maximum.accumulate(sizes, axis=-1), axes=1)
+
+
+def _at_end(turns: Array) -> Array:
+    """The same at the end alone, from the turns: (2, B, N, 3) -> (B,) [rad]."""
+    sizes = _norms(turns)
+    return np.tensordot(_FACTORS, sizes[..., -1] + _OF_LARGEST * sizes.max(axis=-1), axes=1)
+
+
+def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> SplitErrors:
+    """Of a split with its `residual` (B,)."""
+    errors, batch, edges = CurveErrors(motion, curve), motion.batch, curve.edges
+    whole = errors.of(Stretches.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.corners[:, :1])
+
+    def of(error: Array) -> Array:
+        return (error.reshape(-1) * curve.has_phase).reshape(batch)[()]
+
+    return SplitErrors(
+        total_rotation=errors.attitude.reshape(batch)[()],
+        holonomy=np.broadcast_to(errors.lift, residual.shape).reshape(batch)[()],
+        dynamical_rotation=of(errors.between),
+        montgomery_phase=of(whole.phase),
+        montgomery_angle=of(whole.phase),
+        dynamic_phase=of(whole.dynamic),
+        geometric_phase=of(whole.area),
+        solid_angle=of(whole.area),
+        tilt=of(whole.tilt),
+        momentum_gap=of(whole.gap),
+    )
+
+
+def running_errors(
+    motion: Motion, curve: MomentumCurve, times: Array, residual: Array, shape: tuple[int, ...]
+) -> RunningErrors:
+    """Of phases up to times (N,) that are edges of the curve, which great circles join to its reference.
+
+    `residual` (B, N) is that of the phases at each time; results have the `shape`.
+    """
+    stretches = Stretches.of(curve.edges, np.zeros(1), times)
+    targets = np.broadcast_to(curve.references[:, None], (*residual.shape, 3))
+    parts = CurveErrors(motion, curve).of(stretches, residual, targets)
+
+    def of(error: Array) -> Array:
+        return (error * curve.has_phase[:, None]).reshape(shape)[()]
+
+    return RunningErrors(
+        dynamic_phase=of(parts.dynamic),
+        geometric_phase=of(parts.area),
+        montgomery_phase=of(parts.phase),
+        solid_angle=of(parts.area),
+    )
+
+
+def arc_errors(motion: Motion, curve: MomentumCurve, cuts: Array, residuals: tuple[Array, Array]) -> ArcErrors:
+    """Of the arcs between edges of the curve (K + 1,), and of all as one; `residuals` are (B, K) and (B, 1)."""
+    errors, batch = CurveErrors(motion, curve), motion.batch
+    parts, whole = (
+        errors.of(Stretches.of(curve.edges, starts, ends), residual, curve.directions(starts))
+        for starts, ends, residual in zip((cuts[:-1], cuts[:1]), (cuts[1:], cuts[-1:]), residuals, strict=True)
+    )
+
+    def of(error: Array) -> Array:
+        return (error * curve.has_phase[:, None]).reshape(*batch, -1)
+
+    def of_all(error: Array) -> Array:
+        return of(error)[..., 0][()]
+
+    # The polygon has the arcs' ends for corners; what its area is off by is what its closing great circles are.
+    corners = (parts.tilt.sum(axis=1, keepdims=True) + whole.tilt).clip(max=2.0 * np.pi)
+    return ArcErrors(
+        dynamic_phase=of(parts.dynamic),
+        geometric_phase=of(parts.area),
+        montgomery_phase=of(parts.phase),
+        solid_angle=of(parts.area),
+        tilt=of(parts.tilt),
+        momentum_gap=of(parts.gap),
+        polygon_angle=of_all(corners),
+        total_phase=of_all(whole.phase),
+        total_tilt=of_all(whole.tilt),
+    )

@@ -1,0 +1,60 @@
+"""What is said of the errors of phases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SplitErrors:
+    """Estimates of the errors of a `PhaseSplit`, each of what its name says; fields have the motion's batch axes.
+
+    Near the point opposite its start, the end of the momentum's curve turns the closing great circle round by any
+    small displacement, and what depends on that circle may be off by any angle: up to pi for a tilt, 2 pi for phases.
+
+    Attributes
+    ----------
+    total_rotation, holonomy, dynamical_rotation, tilt : angle from the true rotation [rad]
+    montgomery_phase, dynamic_phase, geometric_phase : modulo 4 pi [rad]
+    montgomery_angle : modulo 2 pi [rad]
+    solid_angle : modulo 4 pi [sr]
+    momentum_gap : [rad]
+    """
+
+    total_rotation: Array
+    holonomy: Array
+    dynamical_rotation: Array
+    montgomery_phase: Array
+    montgomery_angle: Array
+    dynamic_phase: Array
+    geometric_phase: Array
+    solid_angle: Array
+    tilt: Array
+    momentum_gap: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RunningErrors:
+    """Estimates of the errors of `RunningPhases`, modulo 4 pi; fields are batch + t.shape [rad]."""
+
+    dynamic_phase: Array
+    geometric_phase: Array
+    montgomery_phase: Array
+    solid_angle: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ArcErrors:
+    """Estimates of the errors of `ArcPhases`, named and shaped as there, modulo 4 pi; for tilts angles [rad]."""
+
+    dynamic_phase: Array
+    geometric_phase: Array
+    montgomery_phase: Array
+    solid_angle: Array
+    tilt: Array
+    momentum_gap: Array
+    polygon_angle: Array
+    total_phase: Array
+    total_tilt: Array
