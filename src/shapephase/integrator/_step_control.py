@@ -21,9 +21,11 @@ _NOT_SMALL = 0.02
 _DEGREES = np.array([1.6, 1.9, 2.4, 3.0, 3.5, 5.0])
 _PARTS = np.array([1.0 / 80.0, 1.0 / 40.0, 1.0 / 12.0, 1.0 / 6.0, 1.0 / 4.0, 1.0])
 # The distance of steps that span so many degrees may be small by chance: then the error is at least a part of the
-# tolerance, though no more than the distance.
+# tolerance, as far as the distance allows.
 _CHANCE_DEGREES = np.array([1.6, 2.4])
-_CHANCE_PARTS = np.array([0.0, 0.02])
+_CHANCE_PARTS = np.array([0.0, 0.005])
+# Of the distance: more error than that was never hidden by chance.
+_MOST_BY_CHANCE = 0.25
 # Numbers compared at once.
 _MOST_COMPARED = 4_000_000
 # [rad] bound of the turn in one step; it is up to twice the turn itself.
@@ -131,7 +133,7 @@ class StepRequirements(NamedTuple):
             most[part] = (counts * spanned).max(axis=(1, 2), initial=0.0)
         by_chance = self.tolerance * np.interp(most, _CHANCE_DEGREES, _CHANCE_PARTS)
         part = np.exp(np.interp(most, _DEGREES, np.log(_PARTS)))
-        return np.maximum(part * distance, np.minimum(by_chance, distance))
+        return np.maximum(part * distance, np.minimum(by_chance, _MOST_BY_CHANCE * distance))
 
 
 def even_steps(planned: Array, subdivide: Integers | int) -> Integers:
