@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.integrator._spectral_error import estimate_spectrum, estimate_tail
+from shapephase.integrator import _spectral_error
+from shapephase.integrator._spectral_error import estimate_spectrum, estimate_tail, spectral_norms
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.stepped import SteppedRotation
 from support.independent import apart
@@ -91,3 +92,14 @@ def test_both_estimates_of_a_spectrum_agree(degree: int, rng):
         assert plain.decay == pytest.approx(arrays.decay[0], rel=1e-12)
         assert plain.converging == arrays.converging[0]
         assert plain.largest == arrays.inverse_norm[0]
+
+
+def test_norms_of_many_spectra_are_those_of_each(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch):
+    """Frobenius norm of I^-1, whose entries off the diagonal count twice, and norm of I^-1 L_o, in parts too."""
+    series = rng.normal(size=(11, 4, 9))
+    monkeypatch.setattr(_spectral_error, "_NUMBERS_AT_ONCE", 80)
+    found = spectral_norms(series)
+    xx, yy, zz, yz, xz, xy = np.moveaxis(series, 2, 0)[:6]
+    inverse = np.stack([np.stack(row, axis=-1) for row in ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))], axis=-1)
+    assert found[..., 0] == pytest.approx(np.linalg.norm(inverse, axis=(2, 3)), rel=1e-14)
+    assert found[..., 1] == pytest.approx(np.linalg.norm(series[..., 6:], axis=2), rel=1e-14)

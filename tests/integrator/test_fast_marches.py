@@ -11,7 +11,9 @@ from scipy.integrate import DOP853, solve_ivp
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.arrays import read_only
 from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
+from shapephase.integrator.fast._plain import plain
 from shapephase.integrator.fast.marches import (
     amplifications,
     derivatives,
@@ -246,3 +248,16 @@ def test_arrays_of_any_kind_are_taken(path):
     directions.setflags(write=False)
     expected = path.march(np.array([[0.0, 0.0, 1.0]] * 2), np.array([1.0, 2.0]))
     assert np.array_equal(path.march(directions, np.array([1, 2])).quaternions, expected.quaternions)
+
+
+def test_views_that_only_show_an_array_are_not_copied():
+    """An array whose owner may write to it is taken as it is; one that nobody may write to is copied."""
+    array = np.arange(6.0).reshape(2, 3)
+    assert np.shares_memory(plain(read_only(array)), array)
+    locked = array.copy()
+    locked.setflags(write=False)
+    for other in (locked.view(), np.frombuffer(array.tobytes()), array[:, ::2], array.astype(np.float32)):
+        taken = plain(other)
+        assert not np.shares_memory(taken, other)
+        assert taken.flags.writeable
+        np.testing.assert_array_equal(taken, other)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import shutil
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -248,3 +249,21 @@ def test_many_rows_are_sampled_in_blocks(monkeypatch: pytest.MonkeyPatch):
     parts.refine(0.0, 1e-9)
     assert max(sizes) <= 50 < len(path.breaks)
     assert parts.interpolant().coefficients == pytest.approx(whole.interpolant().coefficients, abs=1e-13)
+
+
+def test_samples_of_many_rows_are_kept_once():
+    """Beside the interpolant's own array there is little."""
+    body = sp.load_body("cat_two_halves")
+    times = np.linspace(0.0, 180.0, 5001)
+    shapes = 0.4 * np.sin(times[:, None] * [0.3, 0.5, 0.7]) + 1e-3 * np.random.default_rng(0).normal(size=(5001, 3))
+    sampler = sp.articulated(body, sp.ShapePath.spline(times, shapes)).sampler()
+    # What the first call finds out, and what machine code is loaded for it, is not looked at.
+    sp.articulated(body, sp.ShapePath.spline(times[:100], shapes[:100])).sampler().refine(0.0, 1e-6)
+    tracemalloc.start()
+    try:
+        sampler.refine(0.0, 1e-6)
+        size = sampler.interpolant().coefficients.nbytes
+        kept, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert kept < 1.4 * size

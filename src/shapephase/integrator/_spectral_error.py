@@ -33,6 +33,8 @@ _LEAST_OF_FLOOR = 0.02
 _UNAVERAGED_PHASE = 8.0
 # Times in one call of the body: some seconds of work at most, and its arrays stay within some hundred MB.
 _AT_ONCE = 16_384
+# Numbers in spectra whose norms are computed together: their squares take ten megabytes.
+_NUMBERS_AT_ONCE = 1_000_000
 _VOIGT = np.array([0, 4, 8, 5, 2, 1])
 # Off-diagonal channels stand for two entries of I^-1.
 _SQUARES = np.array([[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T
@@ -236,7 +238,14 @@ def estimate_spectrum(norms: Array, time_rounding: Array | float) -> SpectralEst
 
 def spectral_norms(coefficients: Array) -> Array:
     """Frobenius norm of I^-1 and norm of I^-1 L_o in spectra: (..., 9) -> (..., 2)."""
-    return np.sqrt((coefficients * coefficients) @ _SQUARES)
+    if coefficients.size <= _NUMBERS_AT_ONCE:
+        return np.sqrt((coefficients * coefficients) @ _SQUARES)
+    norms = np.empty((*coefficients.shape[:-1], 2))
+    at_once = max(1, _NUMBERS_AT_ONCE * len(coefficients) // coefficients.size)
+    for first in range(0, len(coefficients), at_once):
+        part = slice(first, first + at_once)
+        norms[part] = spectral_norms(coefficients[part])
+    return norms
 
 
 def fourier_norms(values: Array) -> list[list[float]]:

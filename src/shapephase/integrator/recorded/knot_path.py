@@ -382,4 +382,6 @@ def blocks(rows: Integers, sizes: Integers, most: int = _CHUNK) -> list[Integers
     if not len(rows):
         return []
     number = np.cumsum(sizes) // most
+    if not number[-1]:
+        return [rows]
     return np.split(rows, np.flatnonzero(np.diff(number)) + 1)

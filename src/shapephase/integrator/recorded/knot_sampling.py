@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from ...arrays import Array, Integers, Mask
-from ...chebyshev import nodes_on, values_to_coefficients
+from ...chebyshev import chebyshev, nodes_on, unit_nodes, values_to_coefficients
 from ...errors import AccuracyNotReached
 from .._last_terms import Perturbed
 from .._spectral_error import EPS, Channels, spectral_norms
@@ -67,19 +67,35 @@ _TINY = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Panels of one degree."""
+    """Panels of one degree: rows (G,) of series (P, n, 9), of which no more terms than the degree has are theirs."""
 
     degree: int
     left: Array
     right: Array
-    values: Array  # (G, degree + 1, 9) at the ascending Chebyshev points
+    series: Array
+    rows: Integers
 
     @property
     def width(self) -> Array:
         return self.right - self.left
 
+    @property
+    def coefficients(self) -> Array:
+        """Chebyshev coefficients of the channels, a copy: (G, degree + 1, 9)."""
+        return self.series[self.rows, : self.degree + 1]
+
     def of(self, rows: Mask | Integers) -> _Group:
-        return _Group(self.degree, self.left[rows], self.right[rows], self.values[rows])
+        return replace(self, left=self.left[rows], right=self.right[rows], rows=self.rows[rows])
+
+    def kept(self, rows: Mask) -> _Group:
+        """The same without the series of the others."""
+        found = self.of(rows)
+        return replace(found, series=found.coefficients, rows=np.arange(len(found.left)))
+
+    def joined(self, other: _Group) -> _Group:
+        left, right = np.concatenate([self.left, other.left]), np.concatenate([self.right, other.right])
+        series = np.concatenate([self.coefficients, other.coefficients])
+        return _Group(self.degree, left, right, series, np.arange(len(left)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +121,13 @@ class _PanelErrors:
     hidden: Mask  # whether the path beyond the nodes is the larger part
     at_rounding: Mask
 
+    def of(self, rows: Mask) -> _PanelErrors:
+        return _PanelErrors(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: list[_PanelErrors]) -> _PanelErrors:
+        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
 
 class KnotSampler:
     """Samples a body along a path of polynomials between knots."""
@@ -114,7 +137,9 @@ class KnotSampler:
         self._count = 0
         self._span = float(path.knots[-1])
         self._groups: dict[int, _Group] = {}
-        self._known_errors: dict[int, tuple[_Group, float, _PanelErrors]] = {}
+        # Of the first panels of groups, for a momentum.
+        self._known_errors: dict[int, _PanelErrors] = {}
+        self._known_for = np.nan
         self._planned = np.inf
         self._interpolant: Interpolant | None = None
 
@@ -159,17 +184,22 @@ class KnotSampler:
     def _joined(self) -> Interpolant:
         groups = list(self._groups.values())
         left = np.concatenate([g.left for g in groups])
-        order = np.argsort(left)
-        place = np.empty(len(left), dtype=np.int64)
-        place[order] = np.arange(len(left))
-        coefficients = np.zeros((len(left), max(self._groups) + 1, 9))
-        start = 0
-        for g in groups:
-            rows = place[start : start + len(g.left)]
-            for part in blocks(np.arange(len(rows)), np.full(len(rows), g.degree + 1), _NODES_AT_ONCE):
-                coefficients[rows[part], : g.degree + 1] = values_to_coefficients(g.degree) @ g.values[part]
-            start += len(g.left)
-        edges = np.append(left[order], max(float(g.right.max()) for g in groups))
+        end = max(float(g.right.max()) for g in groups)
+        order, place = _order_and_places(left)
+        coefficients, start = groups[0].series, 0
+        if len(coefficients) > len(left) or any(g.series is not coefficients for g in groups):
+            coefficients = np.zeros((len(left), max(self._groups) + 1, 9))
+        while groups:
+            group = groups.pop(0)
+            rows = place[start : start + len(group.left)]
+            start += len(rows)
+            if group.series is coefficients:
+                continue
+            for part in blocks(np.arange(len(rows)), np.full(len(rows), group.degree + 1), _NODES_AT_ONCE):
+                coefficients[rows[part], : group.degree + 1] = group.of(part).coefficients
+            # Series of its own would be as large again.
+            self._groups[group.degree] = replace(group, series=coefficients, rows=rows)
+        edges = np.append(left[order], end)
         if self._loops > 1:
             starts = edges[-1] * np.arange(self._loops)
             edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
@@ -191,33 +221,38 @@ class KnotSampler:
             order = np.argsort(old.left)
             row = order[np.clip(np.searchsorted(old.left[order], left), 0, len(order) - 1)]
             same = (old.left[row] == left) & (old.right[row] == right) & (degree <= old.degree)
-            if same.any():
-                keep = np.zeros(len(old.left), dtype=bool)
-                keep[row[same]] = True
-                self._groups[old.degree] = old.of(keep)
-                left, right, degree = left[~same], right[~same], degree[~same]
+            keep = np.zeros(len(old.left), dtype=bool)
+            keep[row[same]] = True
+            self._keep(old, keep)
+            left, right, degree = left[~same], right[~same], degree[~same]
         self._sample([_ToSample(int(d), left[degree == d], right[degree == d], None) for d in np.unique(degree)])
 
     def _sample(self, parts: list[_ToSample]) -> None:
         """Sample panels, some thousand neighbours at a time."""
         self._interpolant = None
-        found = [np.empty((len(part.left), part.degree + 1, 9)) for part in parts]
         left = np.concatenate([part.left for part in parts])
         number = np.concatenate([np.full(len(part.left), i) for i, part in enumerate(parts)])
         row = np.concatenate([np.arange(len(part.left)) for part in parts])
-        order = np.argsort(left)
-        for block in blocks(order, np.array([part.degree + 1 for part in parts])[number[order]], _NODES_AT_ONCE):
-            rows = [row[block[number[block] == i]] for i in range(len(parts))]
-            values = self._sampled([part.of(chosen) for part, chosen in zip(parts, rows, strict=True)])
-            for whole, chosen, part in zip(found, rows, values, strict=True):
-                whole[chosen] = part
-        for part, whole in zip(parts, found, strict=True):
-            group = self._groups.get(part.degree)
-            if group is None:
-                self._groups[part.degree] = _Group(part.degree, part.left, part.right, whole)
-                continue
-            ends = np.concatenate([group.left, part.left]), np.concatenate([group.right, part.right])
-            self._groups[part.degree] = _Group(part.degree, *ends, np.concatenate([group.values, whole]))
+        degree = np.array([part.degree for part in parts])[number]
+        order, place = _order_and_places(left)
+        series = np.zeros((len(left), int(degree.max()) + 1, 9))
+        for block in blocks(order, degree[order] + 1, _NODES_AT_ONCE):
+            mine = [block[number[block] == i] for i in range(len(parts))]
+            values = self._sampled([part.of(row[chosen]) for part, chosen in zip(parts, mine, strict=True)])
+            for part, chosen, found in zip(parts, mine, values, strict=True):
+                series[place[chosen], : part.degree + 1] = values_to_coefficients(part.degree) @ found
+        for i, part in enumerate(parts):
+            fresh = _Group(part.degree, part.left, part.right, series, place[number == i])
+            known = self._groups.get(part.degree)
+            self._groups[part.degree] = fresh if known is None else known.joined(fresh)
+
+    def _keep(self, group: _Group, rows: Mask) -> None:
+        """Of a group and its errors only some panels."""
+        errors = self._known_errors.pop(group.degree, None)
+        if rows.any():
+            self._groups[group.degree] = group.kept(rows)
+            if errors is not None:
+                self._known_errors[group.degree] = errors.of(rows)
 
     def _sampled(self, parts: list[_ToSample]) -> list[Array]:
         """The channels at the nodes of panels, (G, degree + 1, 9) for each part.
@@ -284,13 +319,14 @@ class KnotSampler:
                     f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
                     f"{tolerance:.3g} was requested; smooth the data, or loosen the tolerance"
                 )
-            if not rows.all():
-                self._groups[degree] = group.of(~rows)
+            self._keep(group, ~rows)
             first, last = self._path.intervals(group.left, group.right)
             # Over several knots another degree means another polynomial in the place of the path.
             for chosen, known in ((grows & (last - first == 1), True), (grows & (last - first > 1), False)):
                 if chosen.any():
-                    values = group.values[chosen] if known else None
+                    # The series at its own nodes, which are every other one of the new ones.
+                    nodes = chebyshev(unit_nodes(degree), degree + 1)
+                    values = nodes @ group.of(chosen).coefficients if known else None
                     parts.append(_ToSample(2 * degree, group.left[chosen], group.right[chosen], values))
             torn = halves & (last - first > 1) & (last - first <= _SHORT)
             if torn.any():
@@ -311,16 +347,16 @@ class KnotSampler:
     # ---- Errors ----
 
     def _errors_by_degree(self, momentum: float) -> dict[int, _PanelErrors]:
+        if momentum != self._known_for:
+            self._known_errors, self._known_for = {}, momentum
         for degree, group in self._groups.items():
             known = self._known_errors.get(degree)
-            if known is None or known[0] is not group or known[1] != momentum:
-                rows = blocks(np.arange(len(group.left)), np.full(len(group.left), degree + 1), _NODES_AT_ONCE)
-                found = [self._errors_of(group.of(part), momentum) for part in rows]
-                whole = _PanelErrors(
-                    *(np.concatenate([getattr(f, field.name) for f in found]) for field in fields(_PanelErrors))
-                )
-                self._known_errors[degree] = group, momentum, whole
-        return {degree: self._known_errors[degree][2] for degree in self._groups}
+            fresh = np.arange(0 if known is None else len(known.adding), len(group.left))
+            parts = blocks(fresh, np.full(len(fresh), degree + 1), _NODES_AT_ONCE)
+            found = [self._errors_of(group.of(part), momentum) for part in parts]
+            if found:
+                self._known_errors[degree] = _PanelErrors.joined(([] if known is None else [known]) + found)
+        return {degree: self._known_errors[degree] for degree in self._groups}
 
     def _errors_of(self, group: _Group, momentum: float) -> _PanelErrors:
         degree, width = group.degree, group.width
@@ -328,7 +364,7 @@ class KnotSampler:
         if not degree:
             zero = np.zeros(count)
             return _PanelErrors(zero, zero, zero > 0.0, zero == 0.0)
-        norms = spectral_norms(values_to_coefficients(degree) @ group.values)
+        norms = spectral_norms(group.coefficients)
         weights = np.array([momentum, 1.0])
         hidden = self._path.hidden(group.left, group.right, degree, momentum)
         sizes, explained = norms @ weights, hidden.explained @ weights
@@ -375,6 +411,14 @@ class KnotSampler:
             hidden=hidden.adding + hidden.within > smooth + within,
             at_rounding=at_floor & (hidden.adding <= 4.0 * least),
         )
+
+
+def _order_and_places(left: Array) -> tuple[Integers, Integers]:
+    """How panels ascend, and the place of each: (P,), (P,)."""
+    order = np.argsort(left)
+    place = np.empty(len(left), dtype=np.int64)
+    place[order] = np.arange(len(left))
+    return order, place
 
 
 def _largest_of_neighbours(numbers: Array) -> Array:

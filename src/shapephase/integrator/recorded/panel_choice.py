@@ -32,6 +32,8 @@ _SMOOTH_SHARE = 0.1
 _DECAY_OF_SWEEP = 0.25
 # Of those degrees, how many are tried first on single intervals.
 _FEW_DEGREES = 4
+# Up to here, halves of a panel that hides little are not looked at: together they hardly ever need fewer samples.
+_UNHALVED_DEGREE = 24
 # Halves that together need this many times the samples of the whole are not halved further.
 _HOPELESS = 1.2
 # Rounds of the search for the price of an error.
@@ -110,6 +112,9 @@ def _levels(path: KnotPath, start: Integers, stop: Integers, goal: _Goal) -> lis
         if levels:
             worse = np.add.reduceat(own, np.arange(0, len(own), 2)) > _HOPELESS * above
             best[np.repeat(worse, 2)] = 0.0
+        hidden = adding[np.arange(len(own)), np.argmin(samples, axis=1)]
+        enough = hidden <= _ADDING_SHARE * goal.rate * (path.knots[stop] - path.knots[start])
+        best[enough & (best <= _UNHALVED_DEGREE)] = 0.0
         halved = (best > _LEAST_DEGREE) & (stop - start > 1)
         children = np.full(len(start), -1)
         children[halved] = 2 * np.arange(int(halved.sum()))
