@@ -222,6 +222,22 @@ def test_arguments_are_checked():
         sp.articulated(deformations.bodies, sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [1.0]]))
 
 
+def test_all_may_start_at_one_rate():
+    """Then each has a momentum of its own."""
+    deformations, rate = family(CAT, box=False)[:4], np.array([0.3, -0.2, 0.5])
+    momenta = sp.momentum_from_rate(deformations, rate)
+    motions = sp.reconstruct(deformations, momenta)
+    for row, motion in enumerate(motions):
+        assert np.abs(momenta[row] - sp.momentum_from_rate(deformations[row], rate)).max() < 1e-14
+        assert np.abs(motion.angular_velocity(0.0) - rate).max() < 1e-12
+    times = np.array([[0.1, 0.2, 0.3]])
+    assert deformations.inertia(times).shape == (4, 1, 3, 3, 3)
+    assert np.abs(deformations.inertia(times)[2] - deformations[2].inertia(times)).max() < 1e-14
+    assert np.abs(deformations.internal_momentum(times)[2] - deformations[2].internal_momentum(times)).max() < 1e-13
+    with pytest.raises(ShapeError, match="do not broadcast"):
+        sp.momentum_from_rate(deformations, np.zeros((3, 3)))
+
+
 def test_where_one_is_needed_the_sentence_says_how_to_take_it():
     deformations = family(CAT, box=False)[:2]
     motions = sp.reconstruct(deformations, np.zeros(3))

@@ -212,6 +212,25 @@ class DeformationFamily(Sequence[Deformation]):
         """One of them, made when it is asked for, or those of a slice."""
         return articulated(self.bodies[index], self.path)
 
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return self.path.duration
+
+    def inertia(self, t: ArrayLike) -> Array:
+        """Locked inertia of each: times (...) -> (N, ..., 3, 3), base axes, about the centre of mass [kg m^2]."""
+        return self._sampled(t)[0]
+
+    def internal_momentum(self, t: ArrayLike) -> Array:
+        """L_o of each, angular momentum with the base at rest: times (...) -> (N, ..., 3), base axes [kg m^2/s]."""
+        return self._sampled(t)[1]
+
+    def _sampled(self, t: ArrayLike) -> tuple[Array, Array]:
+        times = times_argument(t, self.duration)
+        inertia, momentum = self.bodies.sample(*self.path.curve(times.ravel()))
+        batch = (len(self), *times.shape)
+        return inertia.reshape(*batch, 3, 3), momentum.reshape(*batch, 3)
+
     def variants(self) -> FamilyVariants:
         """All of them for the integrator, to be sampled side by side."""
         return FamilyVariants(self.bodies, self.path)

@@ -70,7 +70,7 @@ class MotionFamily(Sequence[Motion]):
     @property
     def duration(self) -> float:
         """[s]."""
-        return self.deformations.path.duration
+        return self.deformations.duration
 
     @property
     def error_estimate(self) -> Array:

@@ -19,7 +19,7 @@ from ..arguments import (
     times_argument,
     tolerance_argument,
 )
-from ..arrays import Array, Integers, finite_array, lock_arrays, read_only
+from ..arrays import Array, Integers, common_batch, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
@@ -36,11 +36,8 @@ if TYPE_CHECKING:
     from .motion_family import MotionFamily
 
 _COLUMNS = (
-    "time",
-    *("qx", "qy", "qz", "qw"),
-    *("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s"),
-    *("base_x_m", "base_y_m", "base_z_m"),
-)
+    "time", "qx", "qy", "qz", "qw", "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s", "base_x_m", "base_y_m", "base_z_m",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,12 +423,13 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
 
 
 def momentum_from_rate(
-    deformation: Deformation, angular_velocity: ArrayLike, attitude: ArrayLike | None = None
+    deformation: Deformation | DeformationFamily, angular_velocity: ArrayLike, attitude: ArrayLike | None = None
 ) -> Array:
     """The angular momentum of a body that starts with this rate while its shape motion starts too.
 
     Parameters
     ----------
+    deformation : or those of a family of N bodies, where leading axes are () or (N,)
     angular_velocity : (..., 3) of the base at t = 0, base axes [rad/s]
     attitude : (..., 3, 3) at t = 0; None: the identity
 
@@ -441,8 +439,10 @@ def momentum_from_rate(
 
     Source: Cabrera 2006, equation (7).
     """
-    check_object(deformation, "Deformation", "deformation")
+    if not isinstance(deformation, DeformationFamily):
+        check_object(deformation, "Deformation", "deformation")
     omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
     inertia, internal = deformation.inertia(0.0), deformation.internal_momentum(0.0)
+    common_batch(deformation=inertia.shape[:-2], angular_velocity=omega.shape[:-1])
     body = so3.apply(inertia, omega) + internal
     return body if attitude is None else so3.apply(so3.rotation_argument(attitude, "attitude"), body)
