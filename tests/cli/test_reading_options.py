@@ -121,6 +121,13 @@ def test_options_that_cannot_be_are_refused(take, capsys, options, code, words):
     assert words in capsys.readouterr().err
 
 
+def test_a_mistyped_option_is_no_motion(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["check", "diver", "--jsno"])
+    assert ended.value.code == 2
+    assert "there is no option '--jsno'" in capsys.readouterr().err
+
+
 def test_a_motion_of_the_library_has_no_columns(capsys):
     for options in (["--degrees"], ["--names", "a=b"], ["--trim", "0", "1"], ["--rest-missing"]):
         with pytest.raises(SystemExit):

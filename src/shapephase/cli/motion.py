@@ -85,6 +85,8 @@ def joint_motion(
                 option = f"--{field.name.replace('_', '-')}"
                 raise ShapeError(f"{option} is for recorded motions; {motion} is a motion of the library")
         return named_motion(motion), None
+    if motion.startswith("-") and motion != _STANDARD_INPUT and not os.path.exists(motion):
+        raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
     said = vars(recording) | {"names": _names(recording.names), "rest": _rest(recording.rest)}

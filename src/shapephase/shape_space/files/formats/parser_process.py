@@ -17,7 +17,7 @@ from ....errors import TrajectoryError
 from ....files import npz_arrays
 from .._recording import MOST_BYTES
 
-_SECONDS = 60
+_SECONDS = 20
 """Time that parsing may take [s]; it only ends what would never end."""
 _MEMORY = 3 * MOST_BYTES
 """Memory that a parser may take beyond its imports [bytes]: the file, what it holds, and both once more."""
