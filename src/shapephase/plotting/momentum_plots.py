@@ -36,6 +36,9 @@ _KINDS: dict[str, dict[str, Any]] = {
 }
 # Angle between neighbouring points of the curve [rad]: its chords then stay within a line's width of the arc.
 _MAX_ANGLE = 0.02
+# Parts of one step that show how far the curve bends in it; two where there are many, so that there are not many more.
+_FIRST_PARTS = 8
+_MANY_POINTS = 30_000
 # Parts of one step, so that a curve that is very fast somewhere does not fill the memory.
 _MAX_PARTS = 40
 # Length of a curve on the unit sphere [1], some six revolutions, from which on it is drawn in a finer line.
@@ -155,9 +158,13 @@ def plot_fixed_points(
 
 def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
     """The curve, cut so finely that its chords stay within a line's width of it."""
-    curve = momentum_curve(motion, gauge, times=subdivided(motion.solution.times, 8))
+    steps = motion.solution.times
+    first = _FIRST_PARTS if _FIRST_PARTS * len(steps) < _MANY_POINTS else 2
+    curve = momentum_curve(motion, gauge, times=subdivided(steps, first))
     bend = so3.angle_between(curve.corners[0, :-1], curve.corners[0, 1:])
     parts = np.clip(np.ceil(bend / _MAX_ANGLE), 1, _MAX_PARTS).astype(int)
+    if np.all(parts == 1):
+        return curve
     step = np.repeat(np.arange(len(parts)), parts)
     within = np.arange(len(step)) - np.repeat(np.cumsum(parts) - parts, parts)
     times = curve.edges[step] + np.diff(curve.edges)[step] * within / parts[step]
