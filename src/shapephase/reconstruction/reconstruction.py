@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from .motion_family import MotionFamily
 
 _COLUMNS = (
-    "time", "qx", "qy", "qz", "qw", "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s", "base_x_m", "base_y_m", "base_z_m",
+    "time", "qx", "qy", "qz", "qw", "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s",
+    "base_x_m", "base_y_m", "base_z_m",
 )  # fmt: skip
 
 
