@@ -209,6 +209,50 @@ class RecordingOptions:
     ] = None
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class ErrorOptions:
+    """What is not known exactly, for error bars; each is one standard deviation."""
+
+    joint_noise: Annotated[
+        str | None,
+        _motion_option(
+            "Print error bars: one standard deviation of the noise of each sample, in rad or m or with units; for "
+            "example `--joint-noise 0.3deg` or `--joint-noise 0.3deg,1mm`."
+        ),
+    ] = None
+    mass_error: Annotated[
+        float | None,
+        _motion_option("The same of the mass of each link, as a part of it; for example `--mass-error 0.05`."),
+    ] = None
+    centre_error: Annotated[
+        float | None,
+        _motion_option(
+            "The same of the centre of mass of each link along each axis, in radii of gyration of the link; for "
+            "example `--centre-error 0.1`."
+        ),
+    ] = None
+    inertia_error: Annotated[
+        float | None,
+        _motion_option(
+            "The same of the rotational inertia of each link, as a part of it; for example `--inertia-error 0.05`."
+        ),
+    ] = None
+    momentum_error: Annotated[
+        float | None,
+        _motion_option(
+            "The same of each component of the momentum, in kg m^2/s; for example `--momentum-error 0.001`."
+        ),
+    ] = None
+    attitude_error: Annotated[
+        float | None,
+        _motion_option(
+            "The same of the attitude at the start about each axis, in rad; for example `--attitude-error 0.01`."
+        ),
+    ] = None
+
+
 AS_TEXT = PrintOptions()
+EXACT = ErrorOptions()
 AT_REST = FlightOptions()
 AS_RECORDED = RecordingOptions()

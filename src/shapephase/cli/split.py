@@ -8,7 +8,9 @@ from .options import (
     AS_RECORDED,
     AS_TEXT,
     AT_REST,
+    EXACT,
     BodyArgument,
+    ErrorOptions,
     FlightOptions,
     Gauge,
     MotionArgument,
@@ -31,6 +33,7 @@ def split_command(
     gauge: Gauge = "horizontal",
     tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = AS_RECORDED,
+    errors: ErrorOptions = EXACT,
     out: Path | None = None,
     html: ReportFile = None,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
@@ -44,6 +47,7 @@ def split_command(
     """
     from ..phases.phases import split
     from . import motion as motions
+    from .error_bar_text import error_bar_data, error_bar_lines, error_bars
     from .recording_text import recording_data, recording_lines
     from .text import recorded_base_text, split_data, split_lines
 
@@ -54,6 +58,7 @@ def split_command(
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
+        bars = error_bars(flown.motion, errors)
         if out is not None:
             flown.motion.save(out)
             say_written(out)
@@ -66,8 +71,10 @@ def split_command(
     lines, data = recorded_base_text(flown.motion, flown.recorded)
     text = [
         *split_lines(flown.body, motion, flown.motion, result),
+        *error_bar_lines(result, bars),
         *lines,
         *recording_lines(flown.body, flown.recorded),
     ]
-    data = split_data(flown.body, motion, flown.motion, result) | data | recording_data(flown.recorded)
+    data = split_data(flown.body, motion, flown.motion, result) | error_bar_data(bars) | data
+    data |= recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

@@ -18,6 +18,8 @@ from ..deformation.deformation import articulated
 from ..errors import ShapeError, unknown_name
 from ..phases.phases import PhaseSplit, split
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.files._labels import amounts
+from ..shape_space.summaries import body_summary
 from ._path_samples import path_samples
 from .result_derivatives import Derivatives, ResultDerivative, derivatives, described_by
 
@@ -84,7 +86,7 @@ class Uncertainty:
 def uncertainty(
     motion: Motion,
     *,
-    joints: ArrayLike | None = None,
+    joints: ArrayLike | str | None = None,
     inertias: InertiaErrors | None = None,
     momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
@@ -98,8 +100,8 @@ def uncertainty(
     ----------
     motion : of an articulated body
     joints : of the samples that the path goes through: the standard deviation of white noise, one or one for each
-        joint (n,) [rad or m], or the covariance (N n, N n) of all samples, row by row; of a periodic path without the
-        last, which is the first
+        joint (n,) [rad or m], or a text such as "0.3deg" or "0.3deg,1mm"; or the covariance (N n, N n) of all samples,
+        row by row; of a periodic path without the last, which is the first
     inertias : of the body's links
     momentum : the covariance (3, 3) [(kg m^2/s)^2], inertial axes, or one standard deviation of all components
     attitude : of the start, turned to R(0) exp(hat(delta)): the covariance (3, 3) of delta [rad^2], or one standard
@@ -113,6 +115,8 @@ def uncertainty(
         For a batch, and for covariances that are not.
     UnknownNameError
         For a link that the body does not have.
+    TrajectoryError
+        For a text that is no amount.
 
     Source: the derivatives are those of `derivatives`.
     """
@@ -130,7 +134,7 @@ def uncertainty(
 def sampled_uncertainty(
     motion: Motion,
     *,
-    joints: ArrayLike | None = None,
+    joints: ArrayLike | str | None = None,
     inertias: InertiaErrors | None = None,
     momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
@@ -197,7 +201,7 @@ class _Inputs(NamedTuple):
 
 def _inputs(
     motion: Motion,
-    joints: ArrayLike | None,
+    joints: ArrayLike | str | None,
     inertias: InertiaErrors | None,
     momentum: ArrayLike | None,
     attitude: ArrayLike | None,
@@ -207,13 +211,19 @@ def _inputs(
     if joints is not None:
         through = path_samples(path)
         numbers = through.count * path.n_shape
-        given = finite_array(joints, "joints")
+        given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
         if given.shape in ((), (path.n_shape,)):
             samples = np.tile(np.broadcast_to(_deviations(given, "joints"), path.n_shape) ** 2, through.count)
         else:
             samples = _covariance(given, "joints", numbers)
     links = None if inertias is None else _link_variances(body, inertias)
     return _Inputs(samples, links, _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude"))
+
+
+def _by_joint(body: Body, text: str) -> Array:
+    """(n,) standard deviations from a text that says one of angles, of lengths or of both."""
+    said = amounts(text, "joints")
+    return np.array([said[joint.unit] for joint in body_summary(body).joints])
 
 
 def _of_vector(given: ArrayLike | None, name: str) -> Array | None:

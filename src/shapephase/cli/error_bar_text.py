@@ -1,0 +1,77 @@
+"""Error bars of a split as text for people and as plain data for programs."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..phases.phases import PhaseSplit
+from ..reconstruction.reconstruction import Motion
+from .options import ErrorOptions
+from .text import plain
+
+if TYPE_CHECKING:
+    from ..error_bars.covariance import Uncertainty
+
+# Digits of a bar that are shown; the number before it ends where the bar does.
+_DIGITS = 2
+
+
+def error_bars(motion: Motion, options: ErrorOptions) -> Uncertainty | None:
+    """The error bars that were asked for, if any were."""
+    relative = (options.mass_error, options.centre_error, options.inertia_error)
+    if all(given is None for given in (options.joint_noise, *relative, options.momentum_error, options.attitude_error)):
+        return None
+    from ..error_bars.covariance import InertiaErrors, uncertainty
+
+    masses, centres, inertias = (given or 0.0 for given in relative)
+    return uncertainty(
+        motion,
+        joints=options.joint_noise,
+        inertias=InertiaErrors(masses=masses, centres=centres, inertias=inertias) if any(relative) else None,
+        momentum=options.momentum_error,
+        attitude=options.attitude_error,
+    )
+
+
+def error_bar_lines(result: PhaseSplit, found: Uncertainty | None) -> list[str]:
+    """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off."""
+    if found is None:
+        return []
+    lines = ["", "error bars: one standard deviation of what the inputs leave open, to first order"]
+    lines.append(_rotation_line("total rotation", result.total_rotation, found.total_angle, found.total_rotation))
+    name = "  shape holonomy" if result.is_loop else "  shape lift (open)"
+    lines.append(_rotation_line(name, result.holonomy, found.holonomy_angle, found.holonomy))
+    if result.has_phase and result.gauge == "horizontal":
+        for name, phase, bar in (
+            ("Montgomery phase", result.montgomery_phase, found.montgomery_phase),
+            ("  dynamic phase", result.dynamic_phase, found.dynamic_phase),
+            ("  geometric phase", result.geometric_phase, found.solid_angle),
+        ):
+            lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
+    return lines
+
+
+def error_bar_data(found: Uncertainty | None) -> dict[str, Any]:
+    """For programs, under `uncertainty`: covariances [rad^2] and standard deviations [rad]."""
+    return {} if found is None else {"uncertainty": plain(found)}
+
+
+def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) -> str:
+    if math.isfinite(bar):
+        return f"{name:24}{_with_bar(float(so3.angle(rotation)), bar)} deg"
+    widest = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)))
+    return f"{name:24}no bar of its angle, so near 0 or 180 degrees; off by {widest:.2g} deg about the worst axis"
+
+
+def _with_bar(angle: float, bar: float) -> str:
+    """Both in degrees, ending at the same digit."""
+    angle, bar = math.degrees(angle), math.degrees(bar)
+    if not bar:
+        return f"{angle:16.6f} ± 0"
+    digits = max(_DIGITS - 1 - math.floor(math.log10(bar)), 0)
+    return f"{angle:16.{digits}f} ± {bar:.{digits}f}"

@@ -1,0 +1,94 @@
+"""`split` with error bars: what is printed is what `uncertainty` gives."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.cli.error_bar_text import error_bar_lines
+from shapephase.cli.main import main
+
+MOMENTUM = ("--momentum", "2", "3", "20")
+
+
+@pytest.fixture
+def take(tmp_path):
+    times = np.linspace(0.0, 1.0, 31)
+    left, right = 40.0 * np.sin(2.0 * np.pi * times), 30.0 * np.cos(2.0 * np.pi * times)
+    rows = [f"{t:.6f},{a:.6f},{b:.6f}" for t, a, b in zip(times, left, right, strict=True)]
+    header = "time,left_shoulder_abduction_deg,right_shoulder_abduction_deg"
+    file = tmp_path / "take.csv"
+    file.write_text("\n".join([header, *rows]))
+    return file
+
+
+def said(capfd, *arguments):
+    main([str(argument) for argument in arguments])
+    return capfd.readouterr().out
+
+
+def test_bars_of_a_recording_are_those_of_the_library(capfd, take):
+    options = (
+        "--joint-noise",
+        "0.3deg",
+        "--mass-error",
+        "0.02",
+        "--momentum-error",
+        "0.05",
+        "--attitude-error",
+        "0.01",
+    )
+    data = json.loads(said(capfd, "split", "diver", take, *MOMENTUM, *options, "--json"))["uncertainty"]
+    body = sp.load_body("diver")
+    motion = sp.reconstruct(sp.articulated(body, sp.read_shape_path(take, body)), [2.0, 3.0, 20.0])
+    expected = sp.uncertainty(
+        motion,
+        joints=np.radians(0.3),
+        inertias=sp.InertiaErrors(masses=0.02),
+        momentum=0.05,
+        attitude=0.01,
+    )
+    np.testing.assert_allclose(data["holonomy"], expected.holonomy, rtol=1e-9)
+    assert data["montgomery_phase"] == pytest.approx(expected.montgomery_phase, rel=1e-9)
+    lines = said(capfd, "split", "diver", take, *MOMENTUM, *options).splitlines()
+    (shown,) = (line for line in lines if re.match(r"Montgomery phase.* ± .* deg", line))
+    number, bar = map(float, re.search(r"(-?[\d.]+) ± ([\d.]+) deg", shown).groups())
+    found = sp.split(motion)
+    assert bar == pytest.approx(np.degrees(expected.montgomery_phase), rel=0.05)
+    # The number ends where its bar does.
+    assert number == pytest.approx(np.degrees(found.montgomery_phase), abs=0.1 * bar + 1e-6)
+
+
+def test_without_what_is_not_known_there_are_no_bars(capfd, take):
+    assert "±" in said(capfd, "split", "diver", take, *MOMENTUM)
+    assert "error bars" not in said(capfd, "split", "diver", take, *MOMENTUM)
+    assert "uncertainty" not in json.loads(said(capfd, "split", "diver", take, "--json"))
+
+
+def test_an_angle_without_a_bar_is_told_as_such():
+    body = sp.load_body("diver")
+    path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 9), np.zeros((9, 2)), periodic=False)
+    motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3))
+    found = sp.split(motion)
+    lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01))
+    assert sum("no bar of its angle" in line for line in lines) == 2
+    assert not any("phase" in line for line in lines)
+
+
+def test_noise_of_what_was_not_recorded_is_refused(capfd):
+    with pytest.raises(SystemExit) as stopped:
+        main(["split", "cat", "cat_righting", "--joint-noise", "0.3deg"])
+    assert stopped.value.code == 2
+    assert "not put through samples" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("noise", ["-1", "3 apples", "nan"])
+def test_a_noise_that_is_no_amount(capfd, take, noise):
+    with pytest.raises(SystemExit) as stopped:
+        main(["split", "diver", str(take), f"--joint-noise={noise}"])
+    assert stopped.value.code == 4
+    assert "joints" in capfd.readouterr().err
