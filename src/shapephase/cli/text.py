@@ -55,7 +55,7 @@ def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit
     if not result.is_loop:
         lines.append(f"{'shape gap':24}{result.shape_gap:16.6g}       (the shape does not return: no holonomy)")
     lines += [
-        f"{'error estimate':24}{motion.error_estimate:16.2e} rad",
+        f"{'error estimate':24}{motion.error_estimate:16.2e} rad   (of the attitude, at all times)",
         f"{'evaluations':24}{motion.evaluations:16d}",
     ]
     return lines
