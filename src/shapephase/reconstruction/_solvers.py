@@ -25,7 +25,7 @@ _TURN_OF_A_STEP = 0.3
 """[rad]; quadrature by the step is exact to rounding for turns this short."""
 _MOST_STEPS = 10_000_000
 """More would fill the memory of a workstation."""
-_MOST_PIECES = 250_000
+_MOST_PIECES = 400_000
 """Stretches between the breaks of a motion: some five gigabytes of memory where each of them bends."""
 _LEAST_RTOL = 1e-12
 """SciPy's DOP853 gains nothing from a tighter relative tolerance."""

@@ -379,7 +379,7 @@ def reconstruct(
     AccuracyNotReached
         If the tolerance cannot be met.
     TrajectoryError
-        For more than 250,000 pieces between breaks in one loop, as a recording of as many samples has.
+        For more than 400,000 pieces between breaks in one loop, as a recording of as many samples has.
     RunStopped
         If `progress` stopped the run.
 
