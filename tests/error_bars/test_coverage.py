@@ -23,7 +23,7 @@ def swing(name: str) -> sp.ShapePath:
     lift = np.sin(np.pi * share) ** 2
     phases = rng.uniform(0.0, 6.0, body.n_shape)
     samples = lift * (0.6 * rng.normal(size=body.n_shape) + 0.5 * np.sin(2.0 * np.pi * share + phases))
-        0.6 * rng.normal(size=body.n_shape) + 0.5 * np.sin(2.0 * np.pi * share + rng.uniform(0.0, 6.0, body.n_shape))
+    samples[-1] = samples[0]
     return sp.ShapePath.spline(times, samples, periodic=True)
 
 
