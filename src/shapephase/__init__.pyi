@@ -23,6 +23,7 @@ from .body.family import BodyFamily
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .error_bars.covariance import InertiaErrors, Uncertainty, sampled_uncertainty, uncertainty
+from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
 from .error_bars.result_derivatives import Derivatives, ResultDerivative, derivatives
 from .errors import (
     CompiledCodeWarning,
@@ -92,6 +93,7 @@ __all__ = [
     "OrbitBranch",
     "PathSummary",
     "PhaseSplit",
+    "RecordedMomentum",
     "RecordedMotion",
     "ResultDerivative",
     "ReturnMap",
@@ -139,6 +141,7 @@ __all__ = [
     "mechanical_connection",
     "momentum_crossings",
     "momentum_from_rate",
+    "momentum_from_recording",
     "momentum_returns",
     "motion_page",
     "optimal_control",

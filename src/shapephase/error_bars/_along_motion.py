@@ -61,7 +61,7 @@ class AlongMotion:
 def along_motion(motion: Motion, body: Body, path: ShapePath) -> AlongMotion:
     """A motion that is no batch, of an articulated body."""
     stepped = _one_rotation(motion)
-    edges = _pieces(stepped, path)
+    edges = _pieces(stepped, path.breaks)
     nodes, shares, _ = _rule()
     widths = np.diff(edges)
     times = (edges[:-1, None] + widths[:, None] * nodes).ravel()
@@ -95,12 +95,42 @@ def _one_rotation(motion: Motion) -> SteppedRotation:
     return stepped.finest if isinstance(stepped, GroupedRotations) else stepped
 
 
-def _pieces(stepped: SteppedRotation, path: ShapePath) -> Array:
-    """The edges of what Gauss's rule is used on: steps, a few together, that no break of the path is within."""
+def responses(motion: Motion, times: Array) -> Array:
+    """How the attitude turns at each time by turns of the start and by changes of the momentum, inertial axes.
+
+    (N,) ascending -> (N, 3, 6): the first three columns by the start, the last three by the momentum.
+    """
+    stepped = _one_rotation(motion)
+    edges = _pieces(stepped, np.union1d(motion.deformation.breaks, times))
+    nodes, shares, matrix = _rule()
+    widths = np.diff(edges)
+    at = (edges[:-1, None] + widths[:, None] * nodes).ravel()
+    inertia, _ = motion.deformation.description.sample(at)
+    attitudes = motion.initial_attitude @ stepped.rotation(at)[0]
+    turning = attitudes @ inverse_inertia(inertia, at) @ so3.transpose(attitudes)
+    scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)
+    slopes = so3.transpose(so3.hat(motion.momentum) @ scaled) * -1.0
+    inner = _within(slopes)
+    driven = np.einsum("ij,pjab->piab", matrix, scaled)
+    found, reached = np.empty((len(edges), 3, 6)), np.eye(3, 6)
+    found[0] = reached
+    # Within a piece: from its start, and by a unit of momentum.
+    by_momentum = _within(slopes, driven)
+    across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", shares, slopes, inner)
+    added = np.einsum("j,pjab->pab", shares, scaled + slopes @ by_momentum)
+    for piece in range(len(widths)):
+        reached = across[piece] @ reached
+        reached[:, 3:] += added[piece]
+        found[piece + 1] = reached
+    return found[np.abs(edges[:, None] - times).argmin(axis=0)]
+
+
+def _pieces(stepped: SteppedRotation, breaks: Array) -> Array:
+    """The edges of what Gauss's rule is used on: steps, a few together, that no break is within."""
     first = np.flatnonzero(np.diff(stepped.panel, prepend=-1))
     within = np.arange(len(stepped.panel)) - first[np.cumsum(np.isin(np.arange(len(stepped.panel)), first)) - 1]
     chosen = stepped.times[:-1][within % _STEPS == 0]
-    edges = np.union1d(np.append(chosen, stepped.times[-1]), path.breaks)
+    edges = np.union1d(np.append(chosen, stepped.times[-1]), breaks)
     # Ends of loops and breaks that differ by rounding are one.
     apart = np.diff(edges) > 8.0 * np.finfo(float).eps * edges[-1]
     return np.append(edges[0], edges[1:][apart])
@@ -111,12 +141,10 @@ def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
 
     By Gauss collocation, whose end values are of order 2 m.
     """
-    _, shares, matrix = _rule()
-    count, m = slopes.shape[:2]
+    _, shares, _ = _rule()
+    count = len(slopes)
     scaled = widths[:, None, None, None] * slopes
-    # Rows count nodes and components: X_i - sum_j a_ij slope_j X_j = 1.
-    system = -np.einsum("ij,pjab->piajb", matrix, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
-    inner = np.linalg.solve(system, np.tile(np.eye(3), (m, 1))).reshape(count, m, 3, 3)
+    inner = _within(scaled)
     across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", shares, scaled, inner)
     at_left = np.empty((count, 3, 3))
     right = np.eye(3)
@@ -124,6 +152,16 @@ def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
         right = np.linalg.solve(across[piece], right)
         at_left[piece] = right
     return inner @ at_left[:, None], right
+
+
+def _within(scaled: Array, given: Array | None = None) -> Array:
+    """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, 3, 3) -> (P, m, 3, 3)."""
+    _, _, matrix = _rule()
+    count, m = scaled.shape[:2]
+    # Rows count nodes and components.
+    system = -np.einsum("ij,pjab->piajb", matrix, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
+    right = np.tile(np.eye(3), (m, 1)) if given is None else given.reshape(count, 3 * m, 3)
+    return np.linalg.solve(system, right).reshape(count, m, 3, 3)
 
 
 @lru_cache(maxsize=1)

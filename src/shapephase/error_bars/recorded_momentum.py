@@ -1,0 +1,202 @@
+"""The momentum of a recorded flight, from the attitudes of its base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_object, times_argument
+from ..arrays import Array, finite_array, lock_arrays
+from ..deformation.deformation import Deformation
+from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ._along_motion import responses
+
+# Rounds of Gauss and Newton; a flight of many turns takes ten.
+_MOST_ROUNDS = 40
+# Of the deviations that the fit itself leaves open: a smaller step is the last.
+_SMALL_STEP = 1e-3
+# [rad] and of the momentum: where there is no noise.
+_NO_STEP = 1e-11
+# A step is halved so many times, at most, to come nearer to the recording.
+_MOST_HALVINGS = 12
+_UNKNOWNS = 6
+# Attitudes that are fitted first, or up to twice as many.
+_FIRST_TIMES = 6
+# [rad] A recording that stays so far from every motion of the body is none of its flights.
+_NO_FLIGHT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedMomentum:
+    """The momentum and start with which a body comes nearest to the attitudes that were recorded.
+
+    Attributes
+    ----------
+    momentum : (3,) about the centre of mass, the recorder's axes [kg m^2/s]
+    initial_attitude : (3, 3), base axes to the recorder's
+    momentum_covariance : (3, 3) [(kg m^2/s)^2], as `uncertainty` takes it
+    attitude_covariance : (3, 3) of the turn of the start, base axes [rad^2], as `uncertainty` takes it
+    covariance : (6, 6) of both, the turn of the start first
+    noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
+    residuals : (N, 3) from reconstructed to recorded attitudes, rotation vectors in base axes [rad]
+    motion : the one that was fitted
+    """
+
+    momentum: Array
+    initial_attitude: Array
+    momentum_covariance: Array
+    attitude_covariance: Array
+    covariance: Array
+    noise: float
+    residuals: Array
+    motion: Motion
+
+    __post_init__ = lock_arrays
+
+
+def momentum_from_recording(
+    deformation: Deformation,
+    times: ArrayLike,
+    attitudes: ArrayLike,
+    *,
+    noise: float | None = None,
+    tolerance: float = 1e-8,
+) -> RecordedMomentum:
+    """Fit the angular momentum of a flight to recorded attitudes of the base, by reconstructing the whole of it.
+
+    Nothing that was recorded is differentiated: the six numbers of momentum and initial attitude are those whose
+    reconstruction is nearest to all attitudes in the sense of least squares, with the covariance that follows.
+
+    Parameters
+    ----------
+    deformation : how the body changes its shape meanwhile
+    times : (N,) within it, ascending, three or more [s]
+    attitudes : (N, 3, 3), base axes to the recorder's; nearer to each other than half a turn
+    noise : standard deviation of each component of a recorded attitude [rad]; None: what the fit leaves
+    tolerance : of the reconstruction [rad]
+
+    Raises
+    ------
+    ShapeError
+        If the shapes disagree.
+    TrajectoryError
+        If there are fewer than three times, or they do not ascend.
+    AccuracyNotReached
+        If the fit does not settle: the recording is no free flight of this body, or too coarse.
+
+    Source: theory.md section 8 (the response of the attitude to start and momentum).
+    """
+    check_object(deformation, "Deformation", "deformation")
+    at = times_argument(finite_array(times, "times", (None,), unit="s"), deformation.duration)
+    recorded = so3.rotation_argument(attitudes, "attitudes")
+    if at.ndim != 1 or recorded.shape != (len(at), 3, 3):
+        raise ShapeError(f"attitudes: ({at.size}, 3, 3), one for each time, are needed, got {recorded.shape}")
+    if len(at) < 3 or np.any(np.diff(at) <= 0.0):
+        raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
+    if noise is not None and not noise > 0.0:
+        raise ShapeError(f"noise: a positive standard deviation is needed, got {noise}")
+    fit = _Fit(deformation, at, recorded, tolerance)
+    motion, residuals = fit.settled()
+    slopes = fit.slopes(motion)
+    free = residuals.size - _UNKNOWNS
+    if noise is None:
+        noise = float(np.sqrt((residuals**2).sum() / free))
+    covariance = np.asarray(noise**2 * np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
+    return RecordedMomentum(
+        momentum=motion.momentum,
+        initial_attitude=motion.initial_attitude,
+        momentum_covariance=covariance[3:, 3:],
+        attitude_covariance=covariance[:3, :3],
+        covariance=covariance,
+        noise=noise,
+        residuals=residuals,
+        motion=motion,
+    )
+
+
+class _Fit:
+    """Least squares over momentum and start."""
+
+    def __init__(self, deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> None:
+        self._deformation, self._times, self._recorded, self._tolerance = deformation, times, recorded, tolerance
+
+    def settled(self) -> tuple[Motion, Array]:
+        """The nearest motion and its residuals: to the first few attitudes, then to ever more of them.
+
+        So that a momentum that is a little off never loses count of the turns.
+        """
+        counts = [len(self._times)]
+        while counts[0] > 2 * _FIRST_TIMES:
+            counts.insert(0, counts[0] // 2)
+        motion = self._reconstructed(self._first_momentum(), self._recorded[0])
+        whole, residuals = (self._times, self._recorded), np.empty(0)
+        for count in counts:
+            self._times, self._recorded = whole[0][:count], whole[1][:count]
+            motion, residuals = self._nearest(motion)
+        spread = float(np.sqrt((residuals**2).sum(axis=1).mean()))
+        if spread > _NO_FLIGHT:
+            raise AccuracyNotReached(f"{self._apart(spread)}: is it a free flight of this body?")
+        return motion, residuals
+
+    def _nearest(self, motion: Motion) -> tuple[Motion, Array]:
+        """By steps of Gauss and Newton that are halved where they go too far."""
+        residuals = self._residuals(motion)
+        for _ in range(_MOST_ROUNDS):
+            slopes = self.slopes(motion)
+            step = np.asarray(np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0], dtype=np.float64)
+            trial, found = self._nearer(motion, step, float((residuals**2).sum()))
+            done = self._is_small(step, slopes, motion, found)
+            motion, residuals = trial, found
+            if done:
+                return motion, residuals
+        spread = float(np.sqrt((residuals**2).sum(axis=1).mean()))
+        raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {self._apart(spread)}")
+
+    def _apart(self, spread: float) -> str:
+        return f"the reconstruction stays {np.degrees(spread):.3g} degrees (rms) from {len(self._times)} attitudes"
+
+    def slopes(self, motion: Motion) -> Array:
+        """The change of all attitudes by start and momentum, base axes: (3 N, 6)."""
+        found = responses(motion, self._times)
+        found[:, :, :3] = found[:, :, :3] @ motion.initial_attitude
+        return (so3.transpose(motion.attitude(self._times)) @ found).reshape(-1, _UNKNOWNS)
+
+    def _nearer(self, motion: Motion, step: Array, before: float) -> tuple[Motion, Array]:
+        trial, residuals = motion, np.empty(0)
+        for halving in range(_MOST_HALVINGS):
+            change = step * 0.5**halving
+            start = motion.initial_attitude @ so3.exp(change[:3])
+            trial = self._reconstructed(motion.momentum + change[3:], start)
+            residuals = self._residuals(trial)
+            if (residuals**2).sum() <= before:
+                break
+        return trial, residuals
+
+    def _is_small(self, step: Array, slopes: Array, motion: Motion, residuals: Array) -> bool:
+        """Whether a step is far below what the recording leaves open, or next to nothing."""
+        free = residuals.size - _UNKNOWNS
+        by_unit = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
+        noise = float(np.sqrt((residuals**2).sum() / free))
+        floor = np.full(_UNKNOWNS, _NO_STEP)
+        floor[3:] *= float(np.linalg.norm(motion.momentum))
+        # What the tolerance of the reconstruction moves the fit by counts for nothing either.
+        return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self._tolerance) * by_unit + floor))
+
+    def _reconstructed(self, momentum: Array, attitude: Array) -> Motion:
+        return reconstruct(self._deformation, momentum, attitude, tolerance=self._tolerance)
+
+    def _residuals(self, motion: Motion) -> Array:
+        return so3.log(so3.transpose(motion.attitude(self._times)) @ self._recorded)
+
+    def _first_momentum(self) -> Array:
+        """The mean of what the turns between neighbouring attitudes say, each at the middle of its time."""
+        middle = 0.5 * (self._times[1:] + self._times[:-1])
+        turns = so3.log(so3.transpose(self._recorded[:-1]) @ self._recorded[1:])
+        rates = turns / np.diff(self._times)[:, None]
+        inertia, internal = self._deformation.description.sample(middle)
+        seen = self._recorded[:-1] @ so3.exp(0.5 * turns)
+        return so3.apply(seen, so3.apply(inertia, rates) + internal).mean(axis=0)

@@ -1,0 +1,105 @@
+"""The momentum of recorded flights: of simulated ones it is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.error_bars._along_motion import responses
+from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError
+
+_MOMENTUM = np.array([4.0, -6.0, 40.0])
+_START = so3.exp(np.array([0.3, 0.2, 0.1]))
+_NOISE = np.radians(0.5)
+_TIMES = np.arange(61) / 60.0
+
+
+def somersault() -> sp.Deformation:
+    body = sp.load_body("diver")
+    times = np.linspace(0.0, 1.0, 16)
+    arms = np.stack([1.2 + np.sin(2.0 * np.pi * times), 1.0 + np.cos(5.0 * times)], axis=1)
+    return sp.articulated(body, sp.ShapePath.spline(times, arms, periodic=False))
+
+
+def flight(momentum: np.ndarray = _MOMENTUM) -> sp.Motion:
+    return sp.reconstruct(somersault(), momentum, _START, tolerance=1e-10)
+
+
+def noisy(motion: sp.Motion, seed: int) -> np.ndarray:
+    errors = _NOISE * np.random.default_rng(seed).normal(size=(len(_TIMES), 3))
+    return motion.attitude(_TIMES) @ so3.exp(errors)
+
+
+def test_responses_along_the_way_are_the_derivatives_of_the_end_and_of_the_steps():
+    motion = flight()
+    (end,) = responses(motion, np.array([motion.duration]))
+    exact = sp.derivatives(motion)
+    np.testing.assert_allclose(end[:, 3:], exact.by_momentum.final_attitude, atol=1e-11)
+    np.testing.assert_allclose(end[:, :3] @ _START, exact.by_attitude.final_attitude, atol=1e-11)
+    step = 1e-3
+    for axis, unit in enumerate(np.eye(3)):
+        ahead, behind = flight(_MOMENTUM + step * unit), flight(_MOMENTUM - step * unit)
+        at = np.array([0.3, 0.55])
+        found = so3.log(ahead.attitude(at) @ so3.transpose(behind.attitude(at))) / (2.0 * step)
+        np.testing.assert_allclose(responses(motion, at)[:, :, 3 + axis], found, atol=1e-7)
+
+
+@pytest.mark.parametrize("momentum", [_MOMENTUM, np.array([8.0, -20.0, 80.0]), np.array([0.0, 0.0, 0.0])])
+def test_without_noise_the_momentum_is_found(momentum: np.ndarray):
+    """To the tolerance of the reconstruction, a second and some kg m^2 wide."""
+    motion = flight(momentum)
+    found = sp.momentum_from_recording(somersault(), _TIMES, motion.attitude(_TIMES), tolerance=1e-9)
+    np.testing.assert_allclose(found.momentum, momentum, atol=1e-7)
+    assert so3.angle(found.initial_attitude @ _START.T) < 1e-8
+    assert found.noise < 1e-8
+    assert np.abs(found.residuals).max() < 1e-8
+
+
+@pytest.mark.parametrize("draws", [40, pytest.param(400, marks=pytest.mark.full)])
+def test_bars_cover_the_truth(draws: int):
+    """In 95 % of the recordings, each component and the chi-square of all; 92 to 98 % of 400."""
+    motion = flight()
+    errors, bars, squares = np.empty((draws, 6)), np.empty((draws, 6)), np.empty(draws)
+    for row in range(draws):
+        found = sp.momentum_from_recording(somersault(), _TIMES, noisy(motion, row), noise=_NOISE)
+        errors[row, :3] = so3.log(_START.T @ found.initial_attitude)
+        errors[row, 3:] = found.momentum - _MOMENTUM
+        bars[row] = np.sqrt(np.diag(found.covariance))
+        squares[row] = errors[row] @ np.linalg.solve(found.covariance, errors[row])
+    least, most = binom.ppf([5e-4, 1.0 - 5e-4], draws, 0.95) / draws
+    inside = np.mean(np.abs(errors) < 1.959964 * bars, axis=0)
+    assert np.all((inside >= least) & (inside <= most)), inside
+    assert least <= np.mean(squares < chi2.ppf(0.95, 6)) <= most
+
+
+def test_the_noise_is_what_the_fit_leaves():
+    """Of 183 numbers less six: known to 5 %."""
+    found = sp.momentum_from_recording(somersault(), _TIMES, noisy(flight(), 7))
+    assert found.noise == pytest.approx(_NOISE, rel=0.2)
+    again = sp.momentum_from_recording(somersault(), _TIMES, noisy(flight(), 7), noise=2.0 * found.noise)
+    np.testing.assert_allclose(again.covariance, 4.0 * found.covariance, rtol=1e-4)
+    np.testing.assert_allclose(found.covariance[3:, 3:], found.momentum_covariance)
+    bars = sp.uncertainty(found.motion, momentum=found.momentum_covariance, attitude=found.attitude_covariance)
+    assert 0.0 < bars.montgomery_phase < 0.2
+
+
+def test_what_is_no_flight_is_refused():
+    rng = np.random.default_rng(1)
+    wild = so3.exp(rng.normal(size=(len(_TIMES), 3)))
+    with pytest.raises(AccuracyNotReached, match=r"degrees \(rms\) from \d+ attitudes"):
+        sp.momentum_from_recording(somersault(), _TIMES, wild)
+
+
+def test_what_cannot_be_fitted():
+    attitudes = flight().attitude(_TIMES)
+    with pytest.raises(ShapeError, match="one for each time"):
+        sp.momentum_from_recording(somersault(), _TIMES, attitudes[1:])
+    with pytest.raises(TrajectoryError, match="ascend"):
+        sp.momentum_from_recording(somersault(), _TIMES[::-1], attitudes)
+    with pytest.raises(TrajectoryError, match="three or more"):
+        sp.momentum_from_recording(somersault(), _TIMES[:2], attitudes[:2])
+    with pytest.raises(ShapeError, match="positive"):
+        sp.momentum_from_recording(somersault(), _TIMES, attitudes, noise=0.0)
