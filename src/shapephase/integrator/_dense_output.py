@@ -33,8 +33,8 @@ _PLACES = np.array([-0.4, 0.0, 0.4])
 _MOST_HALVINGS = 5
 # [rad] error to which polynomials of quaternions, and its measure, are rounded.
 _ROUNDING = 8.0 * float(np.finfo(float).eps)
-# Polynomials that are kept, and that are made at once: ten megabytes.
-_MOST_PIECES = 20_000
+# Polynomials that are kept, and that are made at once: five megabytes, and sixty on the way.
+_MOST_PIECES = 10_000
 # Keeps the decay of coefficients defined where all are zero.
 _TINY = 1e-300
 
@@ -227,8 +227,9 @@ def piece_channels(interpolant: Interpolant, edges: Array) -> Array:
     series = interpolant.series
     x = series.local(np.stack([edges[:-1], edges[1:]], axis=-1), panel)
     basis = chebyshev(x, degrees)
-    derivatives = slopes.reshape(degrees, TERMS, degrees).transpose(1, 0, 2) @ interpolant.coefficients[:, None]
-    terms = basis[:, None] @ derivatives[panel % count]
+    needed, which = np.unique(panel % count, return_inverse=True)
+    derivatives = slopes.reshape(degrees, TERMS, degrees).transpose(1, 0, 2) @ interpolant.coefficients[needed, None]
+    terms = basis[:, None] @ derivatives[which]
     # A piece's length to the power of the term, in a variable that goes from 0 to 1.
     terms *= ((2.0 * lengths / widths)[:, None] ** np.arange(TERMS) * lengths[:, None])[:, :, None, None]
     return np.ascontiguousarray(terms.transpose(3, 1, 2, 0))

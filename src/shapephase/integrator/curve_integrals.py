@@ -20,8 +20,8 @@ from .stepped import SteppedRotation
 
 # Of the error that is estimated by the decay of three rules.
 _SAFETY_FACTOR = 12.0
-# Pieces at once: their terms take twenty megabytes.
-_MOST_STEPS = 10_000
+# Pieces at once: their terms, and those of the panels that they are in, take some twenty megabytes.
+_MOST_STEPS = 2_000
 # Keeps the decay defined where all differences are zero.
 _TINY = 1e-300
 
