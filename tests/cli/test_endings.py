@@ -217,6 +217,15 @@ def test_ctrl_c_at_any_time_is_one_line_and_130(seed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.fixture
+def ctrl_c_heard():
+    """As on a terminal: of what a shell runs in the background Ctrl-C is ignored, and with it of the tests."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("ctrl_c_heard")
 def test_ctrl_c_within_a_command(capfd, monkeypatch):
     def pressed(*_, **__):
         signal.raise_signal(signal.SIGINT)
@@ -230,6 +239,7 @@ def test_ctrl_c_that_a_compiled_module_turned_into_its_own_error(error):
     """As while a command imports what it needs: the exception that comes out is not KeyboardInterrupt any more."""
     source = f"""
 import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import shapephase.cli.motion as motion
 from shapephase.cli.start import run
 

@@ -52,7 +52,7 @@ def seen(page, scene, second):
     for _ in range(600):
         # On a busy machine frames are drawn seldom, and two pictures are alike before the new one is there.
         for _ in range(_FRAMES_BETWEEN):
-            scene.evaluate("() => new Promise(done => requestAnimationFrame(done))")
+            scene.locator("body").evaluate("() => new Promise(done => requestAnimationFrame(done))")
         page.wait_for_timeout(100)
         shot = scene.locator("canvas").first.screenshot()
         picture = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=int)

@@ -223,19 +223,22 @@ class ErrorOptions:
     ] = None
     mass_error: Annotated[
         float | None,
-        _motion_option("The same of the mass of each link, as a part of it; for example `--mass-error 0.05`."),
+        _motion_option(
+            "The same of the mass of each link, as a part of it, without unit; for example `--mass-error 0.05`."
+        ),
     ] = None
     centre_error: Annotated[
         float | None,
         _motion_option(
-            "The same of the centre of mass of each link along each axis, in radii of gyration of the link; for "
-            "example `--centre-error 0.1`."
+            "The same of the centre of mass of each link along each axis, in radii of gyration of the link, without "
+            "unit; for example `--centre-error 0.1`."
         ),
     ] = None
     inertia_error: Annotated[
         float | None,
         _motion_option(
-            "The same of the rotational inertia of each link, as a part of it; for example `--inertia-error 0.05`."
+            "The same of the rotational inertia of each link, as a part of it, without unit; for example "
+            "`--inertia-error 0.05`."
         ),
     ] = None
     momentum_error: Annotated[
