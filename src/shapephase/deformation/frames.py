@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,21 +102,27 @@ def _turns_of(u: Callable[[Array], Any], times: Array) -> tuple[Array, Array | N
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnsWithRates:
-    """U and its body rates as a function gives them."""
+class _OfFunction:
+    """Frames that a function of a user gives."""
 
-    u: Callable[[Array], Any]
+    function: Callable[[Array], Any]
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled. Raises LocalFunctionError for a lambda."""
-        return _state(self, self.u)
+        check_picklable(self.function, "a gauge")
+        return self.__dict__
 
-    def __deepcopy__(self, _: dict[int, Any]) -> _TurnsWithRates:
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
         """The frames themselves: nothing of them changes."""
         return self
 
+
+@dataclass(frozen=True, eq=False)
+class _TurnsWithRates(_OfFunction):
+    """U and its body rates as the function gives them."""
+
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        turned, rate = _turns_of(self.u, times)
+        turned, rate = _turns_of(self.function, times)
         if rate is None:
             raise ShapeError("u returned body rates at the start, and U alone later on")
         return turned, rate
@@ -126,54 +132,31 @@ class _TurnsWithRates:
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnsAlone:
+class _TurnsAlone(_OfFunction):
     """U as a function gives it, with the slopes of a series of it: times (N,) -> (N, 9)."""
 
-    u: Callable[[Array], Any]
     slopes: PiecewiseChebyshev
 
-    def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
-        return _state(self, self.u)
-
-    def __deepcopy__(self, _: dict[int, Any]) -> _TurnsAlone:
-        """The frames themselves: nothing of them changes."""
-        return self
-
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        turned, _ = _turns_of(self.u, times)
+        turned, _ = _turns_of(self.function, times)
         return turned, so3.vee(so3.transpose(turned) @ self.slopes(times).reshape(-1, 3, 3))
 
     def looked_at(self) -> ScannedFunction:
-        return _look_at_turns(self.u)
+        return _look_at_turns(self.function)
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnsOfRates:
+class _TurnsOfRates(_OfFunction):
     """U from the body rates that a function gives: a start, and how it goes on."""
 
-    rates: Callable[[Array], ArrayLike]
     start: Array
     turned: SteppedRotation
 
-    def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
-        return _state(self, self.rates)
-
-    def __deepcopy__(self, _: dict[int, Any]) -> _TurnsOfRates:
-        """The frames themselves: nothing of them changes."""
-        return self
-
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        return self.start @ self.turned.rotation(times)[0], _spins_of(self.rates, times)
+        return self.start @ self.turned.rotation(times)[0], _spins_of(self.function, times)
 
     def looked_at(self) -> ScannedFunction:
-        return _look_at_rates(self.rates)
-
-
-def _state(frames: object, function: object) -> dict[str, Any]:
-    check_picklable(function, "a gauge")
-    return frames.__dict__
+        return _look_at_rates(self.function)
 
 
 def _look_at_turns(u: Callable[[Array], Any]) -> ScannedFunction:
