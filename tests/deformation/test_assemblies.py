@@ -154,9 +154,13 @@ def test_a_boom_is_made_of_bits_that_keep_their_mass():
         HULL_PART, [boom(8.0, 4.0, ROOT, axis, route) for axis, route in zip(axes, (path, other), strict=True)]
     )
     want = with_hull(np.full(2 * count, 8.0 / count), bits)
-    check_equal(made, want, atol=1e-3)
+    # Bits are points at their middles: what depends on places alone is right to their square, and what depends on
+    # speeds to the one bit that has just left the root, or has not.
+    check_equal(made, want, atol=2.0 / count)
+    inertia = want.inertia(TIMES)
+    np.testing.assert_allclose(made.inertia(TIMES), inertia, rtol=0, atol=np.abs(inertia).max() / count**2)
     found, there = made.description.correlation(TIMES, 0.7), want.description.correlation(TIMES, 0.7)
-    assert np.abs(found[0] - there[0]).max() < 1e-5 * np.abs(there[0]).max()
+    assert np.abs(found[0] - there[0]).max() < np.abs(there[0]).max() / count**2
 
 
 def derivative(function, t, step=4e-3):
