@@ -12,9 +12,10 @@ from benchmarks.body_leaf import extent, random_body
 
 import shapephase as sp
 from shapephase.body._changed_body import changed_body
+from shapephase.body._link_motions import link_motions
 from shapephase.body.body import Body
 from shapephase.body.family import BodyFamily
-from shapephase.body.inertial_regressor import inertial_regressor, parameters
+from shapephase.body.inertial_regressor import by_link_parameters, inertial_regressor, parameters
 from shapephase.body.link_rows import link_rows
 from shapephase.errors import ShapeError, UnknownNameError, UnphysicalInertiaError, UnphysicalInertiaWarning
 from support.bodies import joint, link, random_shapes, urdf
@@ -114,6 +115,19 @@ def a_file(mass: float, centre: tuple[float, float, float], moments: tuple[float
         joint("hinge", "revolute", "base", "arm", axis=(0.0, 1.0, 1.0), xyz=(0.1, 0.2, 0.3), rpy=TURNED),
         joint("weld", "fixed", "arm", "tool", xyz=(0.0, 0.4, 0.1), rpy=TURNED),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_sums_of_the_derivatives_need_no_matrices(body, rng, moving):
+    """Rows times dI spin + dL_o, against the matrices themselves."""
+    shapes, rates = rng.normal(size=(2, 7, body.n_shape))
+    rows, spins = rng.normal(size=(7, 4, 3)), rng.normal(size=(7, 3))
+    matrices = inertial_regressor(body.chain, shapes, rates).matrices
+    inertia = matrices[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(7, 3, 3, -1)
+    added = np.einsum("nabp,nb->nap", inertia, spins) + (matrices[:, 6:9] if moving else 0.0)
+    found = by_link_parameters(link_motions(body.chain, shapes, rates), rows, spins, moving=moving)
+    size = np.einsum("nka,nap->kp", np.abs(rows), np.abs(inertia).sum(axis=2) * np.abs(spins).max() + np.abs(added))
+    np.testing.assert_allclose(found, np.einsum("nka,nap->kp", rows, added), rtol=0, atol=64 * EPS * size.max())
 
 
 def test_a_changed_body_is_the_one_of_a_changed_file(load_urdf, rng):

@@ -109,26 +109,26 @@ def responses(motion: Motion, times: Array) -> Array:
     attitudes = motion.initial_attitude @ stepped.rotation(at)[0]
     turning = attitudes @ inverse_inertia(inertia, at) @ so3.transpose(attitudes)
     scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)
-    slopes = so3.transpose(so3.hat(motion.momentum) @ scaled) * -1.0
-    inner = _within(slopes)
-    driven = np.einsum("ij,pjab->piab", matrix, scaled)
+    slopes = scaled @ so3.hat(motion.momentum)
+    # Within a piece: from its start, and by a unit of momentum.
+    from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", matrix, scaled))
+    across = np.eye(3) + np.einsum("j,pjab->pab", shares, slopes @ from_start)
+    added = np.einsum("j,pjab->pab", shares, scaled + slopes @ by_momentum)
     found, reached = np.empty((len(edges), 3, 6)), np.eye(3, 6)
     found[0] = reached
-    # Within a piece: from its start, and by a unit of momentum.
-    by_momentum = _within(slopes, driven)
-    across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", shares, slopes, inner)
-    added = np.einsum("j,pjab->pab", shares, scaled + slopes @ by_momentum)
     for piece in range(len(widths)):
         reached = across[piece] @ reached
         reached[:, 3:] += added[piece]
         found[piece + 1] = reached
-    return found[np.abs(edges[:, None] - times).argmin(axis=0)]
+    # Of edges that differ from a time by rounding one was kept.
+    return found[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
 
 
 def _pieces(stepped: SteppedRotation, breaks: Array) -> Array:
     """The edges of what Gauss's rule is used on: steps, a few together, that no break is within."""
     first = np.flatnonzero(np.diff(stepped.panel, prepend=-1))
-    within = np.arange(len(stepped.panel)) - first[np.cumsum(np.isin(np.arange(len(stepped.panel)), first)) - 1]
+    counts = np.diff(first, append=len(stepped.panel))
+    within = np.arange(len(stepped.panel)) - np.repeat(first, counts)
     chosen = stepped.times[:-1][within % _STEPS == 0]
     edges = np.union1d(np.append(chosen, stepped.times[-1]), breaks)
     # Ends of loops and breaks that differ by rounding are one.

@@ -128,7 +128,7 @@ def uncertainty(
         for total, name in zip(covariances, _ROTATIONS, strict=True):
             total += _carried(getattr(derivative, name), covariance)
         variances += [_carried(getattr(derivative, name)[None], covariance)[0, 0] for name in _PHASES]
-    return _uncertainty(motion, covariances, np.sqrt(variances), draws=0)
+    return _uncertainty(split(motion), covariances, np.sqrt(variances), draws=0)
 
 
 def sampled_uncertainty(
@@ -180,7 +180,7 @@ def sampled_uncertainty(
             turns[which, row] = so3.log(_rotation(drawn, parts, name) @ _rotation(motion, middle, name).T)
         phases[row] = [getattr(parts, name) for name in _PHASES]
     covariances = [np.cov(one, rowvar=False) for one in turns]
-    return _uncertainty(motion, covariances, phases.std(axis=0, ddof=1), draws=draws)
+    return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), draws=draws)
 
 
 class _Inputs(NamedTuple):
@@ -331,8 +331,7 @@ def _rotation(motion: Motion, parts: PhaseSplit, name: str) -> Array:
     return motion.final_attitude if name == "final_attitude" else getattr(parts, name)
 
 
-def _uncertainty(motion: Motion, covariances: list[Array], deviations: Array, *, draws: int) -> Uncertainty:
-    parts = split(motion)
+def _uncertainty(parts: PhaseSplit, covariances: list[Array], deviations: Array, *, draws: int) -> Uncertainty:
     final, total, holonomy, dynamical = covariances
     return Uncertainty(
         final_attitude=final,

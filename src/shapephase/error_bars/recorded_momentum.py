@@ -99,9 +99,9 @@ def momentum_from_recording(
         raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
     if noise is not None and not noise > 0.0:
         raise ShapeError(f"noise: a positive standard deviation is needed, got {noise}")
-    fit = _Fit(deformation, at, recorded, tolerance)
-    motion, residuals = fit.settled()
-    slopes = fit.slopes(motion)
+    motion, residuals, slopes = _fitted(deformation, at, recorded, tolerance)
+    if _spread(residuals) > _NO_FLIGHT:
+        raise AccuracyNotReached(f"{_apart(residuals)}: is it a free flight of this body?")
     free = residuals.size - _UNKNOWNS
     if noise is None:
         noise = float(np.sqrt((residuals**2).sum() / free))
@@ -118,52 +118,60 @@ def momentum_from_recording(
     )
 
 
+def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> tuple[Motion, Array, Array]:
+    """The nearest motion, its residuals and slopes: to the first few attitudes, then to ever more of them.
+
+    So that a momentum that is a little off never loses count of the turns.
+    """
+    fit = _Fit(deformation, times, recorded, tolerance)
+    half = len(times) // 2
+    if half < _FIRST_TIMES:
+        return fit.settled(fit.first_motion())
+    nearby, _, _ = _fitted(deformation, times[:half], recorded[:half], tolerance)
+    return fit.settled(nearby)
+
+
+@dataclass(frozen=True, eq=False)
 class _Fit:
-    """Least squares over momentum and start."""
+    """Least squares over momentum and start.
 
-    def __init__(self, deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> None:
-        self._deformation, self._times, self._recorded, self._tolerance = deformation, times, recorded, tolerance
+    Attributes
+    ----------
+    deformation, tolerance : as given
+    times, recorded : (N,), (N, 3, 3) what is fitted
+    """
 
-    def settled(self) -> tuple[Motion, Array]:
-        """The nearest motion and its residuals: to the first few attitudes, then to ever more of them.
+    deformation: Deformation
+    times: Array
+    recorded: Array
+    tolerance: float
 
-        So that a momentum that is a little off never loses count of the turns.
-        """
-        counts = [len(self._times)]
-        while counts[0] > 2 * _FIRST_TIMES:
-            counts.insert(0, counts[0] // 2)
-        motion = self._reconstructed(self._first_momentum(), self._recorded[0])
-        whole, residuals = (self._times, self._recorded), np.empty(0)
-        for count in counts:
-            self._times, self._recorded = whole[0][:count], whole[1][:count]
-            motion, residuals = self._nearest(motion)
-        spread = float(np.sqrt((residuals**2).sum(axis=1).mean()))
-        if spread > _NO_FLIGHT:
-            raise AccuracyNotReached(f"{self._apart(spread)}: is it a free flight of this body?")
-        return motion, residuals
-
-    def _nearest(self, motion: Motion) -> tuple[Motion, Array]:
-        """By steps of Gauss and Newton that are halved where they go too far."""
+    def settled(self, motion: Motion) -> tuple[Motion, Array, Array]:
+        """The nearest motion, its residuals and slopes, by steps of Gauss and Newton, halved where they go too far."""
         residuals = self._residuals(motion)
         for _ in range(_MOST_ROUNDS):
-            slopes = self.slopes(motion)
+            slopes = self._slopes(motion)
             step = np.asarray(np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0], dtype=np.float64)
-            trial, found = self._nearer(motion, step, float((residuals**2).sum()))
-            done = self._is_small(step, slopes, motion, found)
-            motion, residuals = trial, found
-            if done:
-                return motion, residuals
-        spread = float(np.sqrt((residuals**2).sum(axis=1).mean()))
-        raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {self._apart(spread)}")
+            if self._is_small(step, slopes, motion, residuals):
+                return motion, residuals, slopes
+            motion, residuals = self._nearer(motion, step, float((residuals**2).sum()))
+        raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {_apart(residuals)}")
 
-    def _apart(self, spread: float) -> str:
-        return f"the reconstruction stays {np.degrees(spread):.3g} degrees (rms) from {len(self._times)} attitudes"
+    def first_motion(self) -> Motion:
+        """By the mean of what the turns between neighbouring attitudes say, each at the middle of its time."""
+        middle = 0.5 * (self.times[1:] + self.times[:-1])
+        turns = so3.log(so3.transpose(self.recorded[:-1]) @ self.recorded[1:])
+        rates = turns / np.diff(self.times)[:, None]
+        inertia, internal = self.deformation.description.sample(middle)
+        seen = self.recorded[:-1] @ so3.exp(0.5 * turns)
+        momenta = so3.apply(seen, so3.apply(inertia, rates) + internal)
+        return self._reconstructed(momenta.mean(axis=0), self.recorded[0])
 
-    def slopes(self, motion: Motion) -> Array:
+    def _slopes(self, motion: Motion) -> Array:
         """The change of all attitudes by start and momentum, base axes: (3 N, 6)."""
-        found = responses(motion, self._times)
+        found = responses(motion, self.times)
         found[:, :, :3] = found[:, :, :3] @ motion.initial_attitude
-        return (so3.transpose(motion.attitude(self._times)) @ found).reshape(-1, _UNKNOWNS)
+        return (so3.transpose(motion.attitude(self.times)) @ found).reshape(-1, _UNKNOWNS)
 
     def _nearer(self, motion: Motion, step: Array, before: float) -> tuple[Motion, Array]:
         trial, residuals = motion, np.empty(0)
@@ -184,19 +192,21 @@ class _Fit:
         floor = np.full(_UNKNOWNS, _NO_STEP)
         floor[3:] *= float(np.linalg.norm(motion.momentum))
         # What the tolerance of the reconstruction moves the fit by counts for nothing either.
-        return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self._tolerance) * by_unit + floor))
+        return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self.tolerance) * by_unit + floor))
 
     def _reconstructed(self, momentum: Array, attitude: Array) -> Motion:
-        return reconstruct(self._deformation, momentum, attitude, tolerance=self._tolerance)
+        return reconstruct(self.deformation, momentum, attitude, tolerance=self.tolerance)
 
     def _residuals(self, motion: Motion) -> Array:
-        return so3.log(so3.transpose(motion.attitude(self._times)) @ self._recorded)
+        return so3.log(so3.transpose(motion.attitude(self.times)) @ self.recorded)
 
-    def _first_momentum(self) -> Array:
-        """The mean of what the turns between neighbouring attitudes say, each at the middle of its time."""
-        middle = 0.5 * (self._times[1:] + self._times[:-1])
-        turns = so3.log(so3.transpose(self._recorded[:-1]) @ self._recorded[1:])
-        rates = turns / np.diff(self._times)[:, None]
-        inertia, internal = self._deformation.description.sample(middle)
-        seen = self._recorded[:-1] @ so3.exp(0.5 * turns)
-        return so3.apply(seen, so3.apply(inertia, rates) + internal).mean(axis=0)
+
+def _spread(residuals: Array) -> float:
+    """Root mean square of the angles [rad]."""
+    return float(np.sqrt((residuals**2).sum(axis=1).mean()))
+
+
+def _apart(residuals: Array) -> str:
+    """How far the reconstruction is from the recording, in words."""
+    spread = np.degrees(_spread(residuals))
+    return f"the reconstruction stays {spread:.3g} degrees (rms) from {len(residuals)} attitudes"
