@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import subprocess
@@ -12,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..child_process import limit_this_process, run_alone
 from ..errors import (
     IgnoredElementWarning,
     MissingExtraError,
@@ -149,17 +149,9 @@ def _path_of(source: str | bytes) -> tuple[Path, bool]:
 
 def _try_in_child(content: bytes, where: str, on_unphysical: str) -> None:
     """Load in a child process, with limits; what kills the child is named here, what it refuses the parent refuses."""
-    # Nothing is to be imported from the current folder.
-    path = os.pathsep.join(entry for entry in sys.path if entry)
-    command = [sys.executable, "-P", "-c", "from shapephase.body import catalog; catalog.load_from_input()"]
+    source = "from shapephase.body import catalog; catalog.load_from_input()"
     try:
-        child = subprocess.run(
-            [*command, where, on_unphysical],
-            input=content,
-            capture_output=True,
-            timeout=_CHILD_SECONDS,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": path},
-        )
+        child = run_alone(source, (where, on_unphysical), content, _CHILD_SECONDS)
     except subprocess.TimeoutExpired:
         raise ModelFileError(f"{where}:1: loading it took more than {_CHILD_SECONDS} s and was stopped") from None
     if child.returncode < 0:
@@ -174,7 +166,7 @@ def _try_in_child(content: bytes, where: str, on_unphysical: str) -> None:
 def load_from_input() -> None:
     """What a child process does: limits itself, then loads the file that comes through standard input."""
     where, on_unphysical = sys.argv[1:3]
-    _limit_this_process()
+    limit_this_process(_CHILD_MEMORY)
     try:
         _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical)
     except MemoryError:
@@ -182,21 +174,6 @@ def load_from_input() -> None:
     except ShapePhaseError:
         # The parent reads the same bytes and says the same.
         pass
-
-
-def _limit_this_process() -> None:
-    """No core dump, and little more memory than what the imports took, where the system can do that."""
-    try:
-        import resource
-    except ImportError:
-        return
-    try:
-        size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    except OSError:
-        size = 0
-    for kind, limit in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_AS, size + _CHILD_MEMORY)):
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(kind, (limit, resource.getrlimit(kind)[1]))
 
 
 def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:

@@ -47,31 +47,22 @@ class Displacements(NamedTuple):
     along: Array  # the turn about the momentum [rad]
 
 
-@dataclass(frozen=True, eq=False)
-class MomentumCurve:
-    """The directions of the body momentum of a batch of motions, seen from a gauge's frame.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CurvePieces:
+    """What is integrated along the curves of a batch of motions, piece by piece.
 
     Attributes
     ----------
-    motion : whose momentum it is
-    lift : of the horizontal gauge, else None
-    frames : U(t) and its rates of another gauge; None too: the deformation's own frame
-    axis : (B, 3) unit vector of the momentum, inertial axes; any where there is none
     edges : (K + 1,) times between which the curve bends little and its integrals are found to rounding
-    dynamic : (B, K) integral of omega . Pi/|Pi| over each step [rad]
-    slivers : (B, K) signed area between each step's arc and its chord [sr]
+    dynamic : (B, K) integral of omega . Pi/|Pi| over each piece [rad]
+    slivers : (B, K) signed area between each piece's arc and its chord [sr]
     corners : (B, K + 1, 3) directions at the edges
     error : (B,) estimate of what the integration along the curve adds to the errors of both sums [rad]
     slopes : (B, K + 1, 3) rates of the directions at the edges, in the gauge but body axes [rad/s]
     by_momentum : (B, K + 1, 3) the part of them that is due to I^-1 Pi [rad/s]
     body_directions : (B, K + 1, 3) directions at the edges in body axes
-    references : (B, 3) for each curve the direction whose opposite is farthest from it
     """
 
-    motion: Motion
-    lift: Lift | None
-    frames: Frames | None
-    axis: Array
     edges: Array
     dynamic: Array
     slivers: Array
@@ -80,6 +71,25 @@ class MomentumCurve:
     slopes: Array
     by_momentum: Array
     body_directions: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MomentumCurve(CurvePieces):
+    """The directions of the body momentum of a batch of motions, seen from a gauge's frame.
+
+    Attributes
+    ----------
+    motion : whose momentum it is
+    lift : of the horizontal gauge, else None
+    frames : U(t) and its rates of another gauge; None too: the deformation's own frame
+    axis : (B, 3) unit vector of the momentum, inertial axes; any where there is none
+    references : (B, 3) for each curve the direction whose opposite is farthest from it
+    """
+
+    motion: Motion
+    lift: Lift | None
+    frames: Frames | None
+    axis: Array
     references: Array
 
     @cached_property
@@ -183,33 +193,29 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     references = np.array(list(map(sphere.far_reference, ends)))
     if times is not None:
         found = _clear(integrals, found, references)
-    return MomentumCurve(motion=motion, lift=lift, frames=frames, axis=axis, references=references, **found._asdict())
-
-
-class _Integrals(NamedTuple):
-    """Fields of `MomentumCurve`."""
-
-    edges: Array
-    dynamic: Array
-    slivers: Array
-    corners: Array
-    error: Array
-    slopes: Array
-    by_momentum: Array
-    body_directions: Array
+    return MomentumCurve(motion=motion, lift=lift, frames=frames, axis=axis, references=references, **vars(found))
 
 
 def _integrals_of(
     motion: Motion, lift: Lift | None, frames: Frames | None, start: Array, goal: Array
-) -> Callable[[Array], _Integrals]:
+) -> Callable[[Array], CurvePieces]:
     """The integrals between any edges (K + 1,), the ends of the motion's steps among them."""
     solution = motion.solution
     if not np.linalg.norm(motion.momentum, axis=-1).any():
 
-        def at_rest(edges: Array) -> _Integrals:
+        def at_rest(edges: Array) -> CurvePieces:
             still, nothing = np.zeros((len(start), len(edges) - 1)), np.zeros((len(start), len(edges), 3))
             there = np.repeat(start[:, None], len(edges), axis=1)
-            return _Integrals(edges, still, still, there, still[:, 0], nothing, nothing, there)
+            return CurvePieces(
+                edges=edges,
+                dynamic=still,
+                slivers=still,
+                corners=there,
+                error=still[:, 0],
+                slopes=nothing,
+                by_momentum=nothing,
+                body_directions=there,
+            )
 
         return at_rest
     if frames is None and isinstance(solution, SteppedRotation):
@@ -257,7 +263,7 @@ def _frames(motion: Motion, gauge: Gauge) -> tuple[Frames, Array]:
     return given.frames, np.union1d(motion.solution.times, given.panel_ends)
 
 
-def _from_steps(solution: SteppedRotation, lift: Lift | None, edges: Array, goal: Array) -> _Integrals:
+def _from_steps(solution: SteppedRotation, lift: Lift | None, edges: Array, goal: Array) -> CurvePieces:
     """From derivatives at the edges; in shorter pieces where these add more than a little to the motion's error."""
     # Where all edges are ends of steps nothing between them is needed.
     found = curve_integrals(solution, lift, None if len(edges) == solution.quaternions.shape[1] else edges)
@@ -272,7 +278,8 @@ def _from_steps(solution: SteppedRotation, lift: Lift | None, edges: Array, goal
         # What does not fall is rounding.
         if np.all(found.error > 0.5 * last.error):
             break
-    return _Integrals(edges, *found)
+    fields = found._asdict()
+    return CurvePieces(edges=edges, body_directions=fields.pop("directions"), **fields)
 
 
 def _joined(found: CurveIntegrals) -> CurveIntegrals:
@@ -285,7 +292,7 @@ def _joined(found: CurveIntegrals) -> CurveIntegrals:
     )
 
 
-def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> _Integrals:
+def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
     """By Gauss's rule, in shorter pieces where the gauge's frame turns faster than the integrator's steps follow."""
     left, right = edges[:-1], edges[1:]
     count = len(left)
@@ -312,7 +319,17 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> _Integrals:
         np.concatenate([part[k] for part in done], axis=1)[:, order] for k in range(1, 8)
     )
     corners, *in_body = (np.concatenate(pair, axis=1) for pair in zip(starts, at_end, strict=True))
-    return _Integrals(np.append(times[order], edges[-1]), dynamic, slivers, corners, missed.sum(axis=1), *in_body)
+    slopes, by_momentum, directions = in_body
+    return CurvePieces(
+        edges=np.append(times[order], edges[-1]),
+        dynamic=dynamic,
+        slivers=slivers,
+        corners=corners,
+        error=missed.sum(axis=1),
+        slopes=slopes,
+        by_momentum=by_momentum,
+        body_directions=directions,
+    )
 
 
 def _by_piece(
@@ -342,7 +359,7 @@ def _last_terms() -> tuple[Array, Array]:
     return terms[:, -4:-2], terms[:, -2:]
 
 
-def _clear(integrals: Callable[[Array], _Integrals], found: _Integrals, references: Array) -> _Integrals:
+def _clear(integrals: Callable[[Array], CurvePieces], found: CurvePieces, references: Array) -> CurvePieces:
     """Pieces so short that the point opposite the reference is never between an arc and its chord."""
     for _ in range(_HALVINGS):
         edges, corners = found.edges, found.corners

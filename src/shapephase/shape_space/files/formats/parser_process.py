@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
-import os
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -13,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ....child_process import limit_this_process, run_alone
 from ....errors import TrajectoryError
 from ....files import npz_arrays
 from .._recording import MOST_BYTES
@@ -28,12 +27,8 @@ def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
 
     Raises TrajectoryError where the parser fails, crashes or does not end.
     """
-    # Nothing is to be imported from the current folder.
-    path = os.pathsep.join(entry for entry in sys.path if entry)
-    command = [sys.executable, "-P", "-c", f"import {module} as m, {__name__} as p; p.answer(m.parse)"]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
     try:
-        child = subprocess.run(command, input=data, capture_output=True, timeout=_SECONDS, env=environment)
+        child = run_alone(f"import {module} as m, {__name__} as p; p.answer(m.parse)", (), data, _SECONDS)
     except subprocess.TimeoutExpired:
         raise TrajectoryError(f"{where}: reading it took more than {_SECONDS} s and was stopped") from None
     if child.returncode:
@@ -46,22 +41,7 @@ def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
 def answer(parse: Callable[[bytes], Mapping[str, Any]]) -> None:
     """What the process does: a file comes through standard input, its arrays go to standard output."""
     data = sys.stdin.buffer.read()
-    _limit_this_process()
+    limit_this_process(_MEMORY)
     stream = io.BytesIO()
     np.savez(stream, **parse(data))
     sys.stdout.buffer.write(stream.getvalue())
-
-
-def _limit_this_process() -> None:
-    """No core dump, and not much more memory than what the imports took, where the system can do that."""
-    try:
-        import resource
-    except ImportError:
-        return
-    try:
-        size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    except OSError:
-        return
-    for kind, limit in ((resource.RLIMIT_CORE, 0), (resource.RLIMIT_AS, size + _MEMORY)):
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(kind, (limit, resource.getrlimit(kind)[1]))
