@@ -65,6 +65,8 @@ def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
     -------
     sn, cn, dn, am : (...) each; dn >= 0; the amplitude [rad] is continuous in u, it grows by pi with every 2K
 
+    Notes
+    -----
     For |u| of a hundred sn and cn are right to 1e-13 and dn to 1e-13 of itself, however small; so is cn except next to
     its zeros. The errors grow as 1e-15 |u|, or less; that of am also as its size.
     """
@@ -157,6 +159,8 @@ def incomplete_pi(n: ArrayLike, phi: ArrayLike, m1: ArrayLike) -> Array:
         For n >= 1, where the integrand has poles, for n < -1e100, and where the integral is infinite: m1 = 0 and
         |phi| >= pi/2 as rounded.
 
+    Notes
+    -----
     Source: for n < 0 Abramowitz and Stegun 17.7.15, the only form whose terms all have the same sign.
     """
     n, phi, m1 = _arguments(n=n, phi=phi, m1=m1)

@@ -101,6 +101,8 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     moments : (..., 3) [kg m^2]
     axes : (..., 3, 3), columns are the axes, determinant +1: inertia = axes diag(moments) axes^T
 
+    Notes
+    -----
     Source: theory.md A11 (Marsden and Ratiu, section 15.3).
     """
     moments, axes = np.linalg.eigh(inertia)
@@ -120,6 +122,8 @@ def ascending_moments(moments: Array) -> tuple[Array, NDArray[np.intp], Array]:
     order : (..., 3) indices with ascending = moments[order]; equal moments keep their order
     parity : (...) 1 for an even permutation, -1 for an odd one
 
+    Notes
+    -----
     Source: theory.md section 1 (table of conventions).
     """
     order = np.argsort(moments, axis=-1, kind="stable")

@@ -115,6 +115,8 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     AccuracyNotReached
         If the rotation has not converged after the steps were halved twelve times.
 
+    Notes
+    -----
     Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
     """
 

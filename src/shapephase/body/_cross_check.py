@@ -64,6 +64,8 @@ def inertia_and_momentum(
     inertia, momentum : (3, 3) [kg m^2], (3,) [kg m^2/s] about the centre of mass, axes of the root link
     extent, motion : the size of the terms they are sums of, seen from the root link; rounding is a share of it
 
+    Notes
+    -----
     Source: theory.md A3, A7.
     """
     names = list(tree.links)

@@ -139,6 +139,8 @@ def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     edges : (..., 3) [m]; zero along an axis where no mass distribution has so large a moment
     axes : (..., 3, 3) its axes as columns, a proper rotation
 
+    Notes
+    -----
     A box has the second moment m a^2 / 12 along an edge a.
     """
     moments, axes = principal_axes(second_moment(inertia))

@@ -170,6 +170,8 @@ class Body:
         ShapeError
             If the last axis is not the body's n joints, or an entry is not finite.
 
+        Notes
+        -----
         Source: Cabrera 2006, section 2.3; theory.md A3.
         """
         r = self._checked(shape)
@@ -186,6 +188,8 @@ class Body:
         -------
         (..., 3, n) about the centre of mass, base axes [kg m^2/s per unit of joint rate]
 
+        Notes
+        -----
         Raises as `locked_inertia`. Source: theory.md A7.
         """
         r = self._checked(shape)
@@ -202,6 +206,8 @@ class Body:
         -------
         (..., 3) base axes [kg m^2/s]
 
+        Notes
+        -----
         Raises as `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
         """
         r, v = self._checked(shape), self._checked(rate, "rate")
@@ -245,6 +251,8 @@ class Body:
         -------
         (..., n, 3) dI/dr_k w + dJ/dr_k rate, base axes [kg m^2/s per unit of joint]
 
+        Notes
+        -----
         One call of Pinocchio for all joints (its derivatives of the centroidal momentum), where `inertia_gradient`
         and `momentum_matrix_gradient` take one for each.
         """
@@ -340,6 +348,8 @@ class Body:
         shape, rate : (..., n) [rad or m], [rad/s or m/s]
         angular_velocity : (..., 3) of the base, base axes [rad/s]; at rest it is T_0
 
+        Notes
+        -----
         Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
         """
         r, v = self._pair(shape, rate)

@@ -114,6 +114,8 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
     ShapeError
         Along the axis, where there is no azimuth, and for a moment that is not above zero.
 
+    Notes
+    -----
     Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
     """
     values, pi = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
@@ -141,6 +143,8 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     ShapeError
         If no axis is certain.
 
+    Notes
+    -----
     Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
     """
     if not certificate.certain:

@@ -187,6 +187,8 @@ def enclosure(
     AccuracyNotReached
         If the deformation is too rough between its breaks to be sampled.
 
+    Notes
+    -----
     Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
     """
     start, end = interval_argument(interval, deformation.duration)

@@ -102,6 +102,8 @@ def energy_bounds(
     AccuracyNotReached
         If the deformation is too rough between its breaks to be sampled.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
     """
     body = body_momentum_argument(momentum, attitude)

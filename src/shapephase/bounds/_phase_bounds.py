@@ -83,6 +83,8 @@ def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     ShapeError
         If no axis is certain, or the sense in which Pi circles it is not.
 
+    Notes
+    -----
     Source: theory.md E8, E13.
     """
     azimuth = azimuth_bounds(certificate)

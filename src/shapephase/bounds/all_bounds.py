@@ -76,6 +76,8 @@ def bounds(
     ShapeError
         If the motion is a batch, or has no momentum, so that there is nothing to bound.
 
+    Notes
+    -----
     Source: theory.md E3, E6 to E14.
     """
     check_object(motion, "Motion", "motion")

@@ -122,6 +122,8 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
     ----------
     magnitude : l, the momentum's norm [kg m^2/s]
 
+    Notes
+    -----
     Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
     """
     check_object(deformation, "Deformation", "deformation")
@@ -139,6 +141,8 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     momentum : (3,) Pi(t), base axes [kg m^2/s]
     count : number of points, 2 or more
 
+    Notes
+    -----
     Source: Cabrera 2006, section 4.1; theory.md E4.
     """
     check_object(deformation, "Deformation", "deformation")

@@ -238,6 +238,8 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     ShapeError
         For a negative eccentricity, or 1.
 
+    Notes
+    -----
     Newton's method from above the root, where the function is convex, so that it always converges.
     """
     mean = finite_array(mean_anomaly, "mean_anomaly", unit="rad")
@@ -320,6 +322,8 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
     AccuracyNotReached
         If the estimate would take too many steps.
 
+    Notes
+    -----
     Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
     """
     check_object(motion, "Motion", "motion")

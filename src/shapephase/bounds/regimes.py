@@ -154,6 +154,8 @@ def regime_certificate(
     interval : (start, end) [s]; None: [0, duration]
     resolution : as for `enclosure`; smaller is sharper and slower
 
+    Notes
+    -----
     Raises as `energy_bounds`.
 
     Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.

@@ -100,6 +100,8 @@ def check_triangle(inertia: Array, times: Array | None, on_unphysical: str) -> N
     UnphysicalInertiaError
         Where `on_unphysical` is "error" and the triangle inequality fails by more than rounding.
 
+    Notes
+    -----
     Source: theory.md A4.
     """
     if on_unphysical == "allow" or not len(inertia):

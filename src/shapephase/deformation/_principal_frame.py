@@ -78,6 +78,8 @@ def principal_frames(deformation: Deformation) -> Frames:
     GaugeError
         If the axes jump where moments meet, or turn by more than 2e8 rad per loop.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
     panels, freedom = _joined(deformation)

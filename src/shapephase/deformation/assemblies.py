@@ -173,6 +173,8 @@ def rigid_part(
     ShapeError, UnphysicalInertiaError
         For a mass that is not positive, a wrong shape, or an inertia that no distribution of mass has.
 
+    Notes
+    -----
     Since masses add up to masses, an assembly of parts that are physical is physical at all times.
     """
     weight = positive_argument(mass, "mass", "a mass in kg")
@@ -202,6 +204,8 @@ def moving_mass(mass: float, path: ShapePath) -> MovingMass:
     TrajectoryError
         If the path has not three columns, or the mass is not positive.
 
+    Notes
+    -----
     Source: Cabrera 2006, example 2.2.
     """
     check_object(path, "ShapePath", "path")
@@ -263,6 +267,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     SingularInertiaError
         If all mass is on one line at some time, which the message names.
 
+    Notes
+    -----
     Source: Cabrera 2006, examples 2.2 and 4.5; theory.md F6.
     """
     everything = (spacecraft, *parts)

@@ -146,6 +146,8 @@ class Deformation:
         GaugeError
             If only the inertia is known, not the masses (`prescribed`, or a motion read from a file).
 
+        Notes
+        -----
         Source: Cabrera 2006, equation (4); theory.md A6.
         """
         times = times_argument(t, self.duration)
@@ -365,6 +367,8 @@ def particles(
         If the particles are on one line at some time, which the message names: for samples at once, for a function
         when the inertia or the motion is computed.
 
+    Notes
+    -----
     Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
     """
     weights = finite_array(masses, "masses", (None,), unit="kg").copy()

@@ -84,6 +84,8 @@ def in_gauge(
     UndeclaredBreakWarning
         Of kinks that are no breaks of the deformation; they are taken as breaks.
 
+    Notes
+    -----
     Source: theory.md B4.
     """
     check_object(deformation, "Deformation", "deformation")
@@ -104,6 +106,8 @@ def link_gauge(deformation: Deformation, link: str) -> Deformation:
     GaugeError
         If the deformation is not that of an articulated body.
 
+    Notes
+    -----
     Source: theory.md B4 with U = R_base_link^T.
     """
     check_object(deformation, "Deformation", "deformation")
@@ -123,6 +127,8 @@ def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deforma
         If only the inertia is known, or the nearest orientation is not unique somewhere (a shape like a mirror
         image of the reference).
 
+    Notes
+    -----
     Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
     """
     check_object(deformation, "Deformation", "deformation")
@@ -173,6 +179,8 @@ def principal_gauge(deformation: Deformation) -> Deformation:
     GaugeError
         If the inertia has no continuous frame of principal axes.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
     check_object(deformation, "Deformation", "deformation")

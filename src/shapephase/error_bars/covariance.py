@@ -118,6 +118,8 @@ def uncertainty(
     TrajectoryError
         For a text that is no amount.
 
+    Notes
+    -----
     Source: the derivatives are those of `derivatives`.
     """
     found = derivatives(motion)
@@ -151,6 +153,8 @@ def sampled_uncertainty(
     draws : how many, two or more
     seed : of the random numbers
 
+    Notes
+    -----
     Raises as `uncertainty` and `reconstruct`.
     """
     if draws < 2:

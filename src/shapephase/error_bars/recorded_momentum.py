@@ -88,6 +88,8 @@ def momentum_from_recording(
     AccuracyNotReached
         If the fit does not settle: the recording is no free flight of this body, or too coarse.
 
+    Notes
+    -----
     Source: theory.md section 8 (the response of the attitude to start and momentum).
     """
     check_object(deformation, "Deformation", "deformation")

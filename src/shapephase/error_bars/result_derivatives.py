@@ -63,6 +63,8 @@ class Derivatives:
     motion : whose they are
     body, path : what moved, and how
 
+    Notes
+    -----
     Source: theory.md section 8.
     """
 

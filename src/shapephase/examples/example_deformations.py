@@ -73,6 +73,8 @@ def homothety(
     AccuracyNotReached
         If the scale has no clock and is too rough for quadrature.
 
+    Notes
+    -----
     Source: Cabrera 2006, example 4.3; theory.md F1.
     """
     growing = pulsation() if scale is None else scale
@@ -121,6 +123,8 @@ def axial_as_printed(
     duration : [s]; None: one loop of Pi
     on_unphysical : as for `prescribed`
 
+    Notes
+    -----
     Source: Cabrera 2006, example 4.4; theory.md F2, C-E13.
     """
     start, across = positive(axial, "axial", "kg m^2"), positive(transverse, "transverse", "kg m^2")
@@ -154,6 +158,8 @@ def axial_stretch(
     speed : above 0 [m/s]
     momentum, duration : as for `axial_as_printed`
 
+    Notes
+    -----
     Source: Cabrera 2006, example 4.4, by what its text describes; theory.md F2b, C-E13.
     """
     weight, wide = positive(mass, "mass", "kg"), positive(radius, "radius", "m")
@@ -200,6 +206,8 @@ def printed_antenna(
     extension_time, coast : how long the moment grows, and how long the body is then rigid [s]
     on_unphysical : as for `prescribed`
 
+    Notes
+    -----
     Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
     """
     if axis not in (1, 3):
@@ -255,6 +263,8 @@ def dipole_antenna(
     reach : distance of each tip mass from the centre at the end [m]
     extension_time, coast : as for `printed_antenna` [s]
 
+    Notes
+    -----
     Source: theory.md F4b, C-E13.
     """
     if axis not in (1, 2, 3):
@@ -289,6 +299,8 @@ def furniture(
     mass, radius : what moves and how far from the centre [kg], [m]
     height : of the circle along axis 3 [m]
 
+    Notes
+    -----
     Source: Cabrera 2006, example 2.2; theory.md F6.
     """
     moments, inner, outer = moments_argument(hub), positive(hub_mass, "hub_mass", "kg"), positive(mass, "mass", "kg")

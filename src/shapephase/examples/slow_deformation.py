@@ -73,6 +73,8 @@ def slow_antenna(
     expansion : relative increase of I_3 where f is 1, above 0
     momentum : (3,), on an orbit about axis 3
 
+    Notes
+    -----
     Source: Cabrera 2006, remark 4.6, with the scale corrected (C-E12); orders derived here; theory.md F5.
     """
     if law not in _LAWS:
@@ -105,6 +107,8 @@ def slow_phase_slope(moments: ArrayLike, momentum: ArrayLike) -> float:
     AccuracyNotReached
         Very near the separatrix.
 
+    Notes
+    -----
     Source: first-order perturbation in Andoyer's variables, derived here.
     """
     start = moments_argument(moments)
@@ -148,6 +152,8 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
     ShapeError
         If no orbit about axis 3 has that area.
 
+    Notes
+    -----
     Source: Ehrenfest's adiabatic invariance, with the area as the action; theory.md F5.
     """
     end, norm = moments_argument(moments), positive(magnitude, "magnitude", "kg m^2/s")
@@ -186,6 +192,8 @@ def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: f
     AccuracyNotReached
         Very near a separatrix.
 
+    Notes
+    -----
     Source: Hannay 1985; derived here, theory.md F5.
     """
     check_object(deformation, "Deformation", "deformation")

@@ -83,6 +83,8 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     PlanNotFound
         If no guess can be reconstructed.
 
+    Notes
+    -----
     Source: Montgomery 1990, isoholonomic problem; theory.md B6.
     """
     curves = [*_circles(task), *_straight(task)]

@@ -152,6 +152,8 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     AccuracyNotReached
         If the integration breaks down before `until`.
 
+    Notes
+    -----
     Source: Agrachev and Sachkov, Control Theory from the Geometric Viewpoint, section 21.
     """
     if motion.energy == 0.0:

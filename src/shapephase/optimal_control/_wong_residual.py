@@ -69,6 +69,8 @@ def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> Wo
     AccuracyNotReached
         If the path is too rough between its breaks for the integral to be found.
 
+    Notes
+    -----
     Source: as `extremal`.
     """
     route = path.matched(body.joint_names, body.name)

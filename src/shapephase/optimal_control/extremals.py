@@ -122,6 +122,8 @@ def extremal(
     AccuracyNotReached
         If the integration breaks down or takes too many steps: such a shape lies ahead, or the charge is too large.
 
+    Notes
+    -----
     Source: Montgomery, Isoholonomic problems and some applications, Comm. Math. Phys. 128 (1990) 565-592, theorem 1 and
     its Hamiltonian form; signs as in theory.md section 1.
     """

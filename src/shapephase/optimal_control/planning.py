@@ -98,6 +98,8 @@ def plan_reorientation(
         If no start came to a local optimum that reaches the goal, or `iteration_callback` stopped the search; it
         carries the best attempt.
 
+    Notes
+    -----
     Source: Montgomery 1990, Isoholonomic problems and some applications.
     """
     check_object(body, "Body", "body")

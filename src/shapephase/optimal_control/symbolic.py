@@ -41,6 +41,8 @@ class SymbolicBody:
         form T_0 - 1/2 L_o I^-1 L_o
     links : name of a link -> pose of its frame, (4, 4), from the base origin
 
+    Notes
+    -----
     Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
     """
 

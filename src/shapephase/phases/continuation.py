@@ -74,6 +74,8 @@ def continued_orbits(
     AccuracyNotReached
         If errors grow so much along the loop that the tolerance cannot be met.
 
+    Notes
+    -----
     Source: theory.md section 2.
     """
     check_object(deformation, "Deformation", "deformation")

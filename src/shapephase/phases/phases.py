@@ -100,6 +100,8 @@ def split(
     RunStopped
         If `progress` stopped it.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
     """
     check_object(motion, "Motion", "motion")
@@ -191,6 +193,8 @@ def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") ->
     t : times (...) [s]
     gauge : as for `split`
 
+    Notes
+    -----
     Raises as `split`. Source: Cabrera 2006, equation (12); theory.md D5, D9; numerics.md section 3 (branch).
     """
     check_object(motion, "Motion", "motion")
@@ -276,6 +280,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     ShapeError
         If the times do not increase.
 
+    Notes
+    -----
     Raises also as `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
     """
     check_object(motion, "Motion", "motion")
@@ -352,6 +358,8 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
     -------
     batch + (..., 3, 3), of the gauge's frame; the attitude itself without momentum
 
+    Notes
+    -----
     Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
     """
     check_object(motion, "Motion", "motion")
@@ -376,6 +384,8 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
     GaugeError
         If the deformation is known by its inertia only.
 
+    Notes
+    -----
     Source: Cabrera 2006, remark 3.7; theory.md D11.
     """
     check_object(motion, "Motion", "motion")

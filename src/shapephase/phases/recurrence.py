@@ -95,6 +95,8 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
     ShapeError
         If the motion is a batch or has no momentum.
 
+    Notes
+    -----
     Source: theory.md section 6 and D12.
     """
     check_object(motion, "Motion", "motion")
@@ -145,6 +147,8 @@ def momentum_crossings(motion: Motion) -> Crossings:
     AccuracyNotReached
         If the curve needs more than 500 000 pieces.
 
+    Notes
+    -----
     Source: theory.md D8.
     """
     check_object(motion, "Motion", "motion")

@@ -125,6 +125,8 @@ def stroboscopic_map(
     ShapeError
         If a direction is zero.
 
+    Notes
+    -----
     Source: theory.md section 2.
     """
     check_object(deformation, "Deformation", "deformation")
@@ -166,6 +168,8 @@ def fixed_points(
     AccuracyNotReached
         If errors grow so much along the loop that the tolerance cannot be met.
 
+    Notes
+    -----
     Source: theory.md section 2, B9, D16.
     """
     check_object(deformation, "Deformation", "deformation")

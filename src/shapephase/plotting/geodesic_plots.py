@@ -54,6 +54,8 @@ def plot_conjugate_locus(
     ------
     MissingExtraError, ShapeError
 
+    Notes
+    -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 4.4; theory.md R12.
     """
     check_flat_axes(ax)
@@ -114,6 +116,8 @@ def plot_ellipsoid_locus(
     ------
     MissingExtraError, ShapeError
 
+    Notes
+    -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 2, the ellipsoid; theory.md P3, P5.
     """
     check_flat_axes(ax)
@@ -161,6 +165,8 @@ def plot_caustic(
     ------
     MissingExtraError, ShapeError, AccuracyNotReached
 
+    Notes
+    -----
     Source: Bates and Fasso 2007, for two equal moments; theory.md Q6.
     """
     check_axes(ax)

@@ -87,6 +87,8 @@ def plot_momentum_curve(
     ShapeError
         If the motion is a batch, or has no momentum.
 
+    Notes
+    -----
     Source: Cabrera 2006, equation (12) and section 4.1; Marsden and Ratiu, figure 15.3.1.
     """
     check_object(motion, "Motion", "motion")
@@ -141,6 +143,8 @@ def plot_fixed_points(
     inertia : (3, 3) of a rigid body whose portrait is drawn behind, the deformation's frame [kg m^2]; None: none
     view : as for `plot_momentum_curve`
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError. Source: theory.md section 2.
     """
     check_axes(ax)

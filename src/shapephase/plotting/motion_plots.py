@@ -60,6 +60,8 @@ def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times:
     gauge : as for `running_phases`
     times : (N,) where to draw [s]; None: several in each step of the integrator
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError, and as `running_phases`. Source: Cabrera 2006, equation (12).
     """
     check_object(motion, "Motion", "motion")
@@ -92,6 +94,8 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     kind : "rotation_vector" [rad] or "quaternion"
     times : as for `plot_phases`
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError, UnknownNameError.
     """
     check_object(motion, "Motion", "motion")
@@ -127,6 +131,8 @@ def plot_inertia(
     kind : "principal" or "entries"
     times : (N,) where to draw [s]; None: evenly between the breaks
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError, UnknownNameError.
     """
     check_object(deformation, "Deformation", "deformation")
@@ -156,6 +162,8 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
     ax : flat axes
     times : as for `plot_inertia`
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError.
     """
     check_object(deformation, "Deformation", "deformation")
@@ -195,6 +203,8 @@ def plot_energy(
     ShapeError
         If the motion is a batch, or has no momentum.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 4.1.1; theory.md E1, E5.
     """
     check_object(motion, "Motion", "motion")

@@ -65,6 +65,8 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     height : [in]
     projection : None: flat; "3d"
 
+    Notes
+    -----
     The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it.
 
     Raises MissingExtraError.

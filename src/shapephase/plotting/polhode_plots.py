@@ -58,6 +58,8 @@ def plot_polhodes(
     ------
     MissingExtraError, ShapeError
 
+    Notes
+    -----
     Source: Marsden and Ratiu, figure 15.3.1.
     """
     check_axes(ax)
@@ -113,6 +115,8 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     ShapeError
         If the number of periods is not above 0, or the top has no momentum.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, section 15.5; theory.md I5.
     """
     check_axes(ax)
@@ -156,6 +160,8 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     ------
     MissingExtraError, ShapeError
 
+    Notes
+    -----
     Source: Marsden and Ratiu, theorem 15.10.1; theory.md M-E10.
     """
     check_axes(ax)

@@ -47,6 +47,8 @@ def plot_crown(
     ------
     MissingExtraError, ShapeError
 
+    Notes
+    -----
     Source: Cabrera 2006, section 4.1; theory.md E8.
     """
     check_flat_axes(ax)

@@ -55,6 +55,8 @@ def plot_shape_path(
         are grey
     times : (N,) where to draw [s]; None: evenly between the breaks
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
     """
     check_object(path, "ShapePath", "path")
@@ -103,6 +105,8 @@ def plot_shape_plane(
     joints : the names or indices of the two; the first is the abscissa
     body, times : as for `plot_shape_path`
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
     """
     check_object(path, "ShapePath", "path")
@@ -143,6 +147,8 @@ def plot_curvature(
     shape : (n,) positions of the other joints; None: neutral
     path : to be drawn; its other joints may move
 
+    Notes
+    -----
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError. Source: theory.md B6.
     """
     check_object(body, "Body", "body")

@@ -130,6 +130,8 @@ def view(
     -------
     the running view, with `url` and `stop()`; None in a notebook
 
+    Notes
+    -----
     Raises and warns as `motion_page`.
     """
     check_object(motion, "Motion", "motion")

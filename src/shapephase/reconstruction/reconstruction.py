@@ -383,6 +383,8 @@ def reconstruct(
     RunStopped
         If `progress` stopped the run.
 
+    Notes
+    -----
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
     """
     goal, workers = tolerance_argument(tolerance), threads_argument(threads)
@@ -439,6 +441,8 @@ def momentum_from_rate(
     -------
     (..., 3) about the centre of mass, inertial axes [kg m^2/s]: R (I omega + L_o)
 
+    Notes
+    -----
     Source: Cabrera 2006, equation (7).
     """
     if not isinstance(deformation, DeformationFamily):

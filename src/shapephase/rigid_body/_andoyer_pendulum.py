@@ -48,6 +48,8 @@ class AndoyerPendulum:
             If a momentum is along the axis of the smallest moment, where y is undefined, or is not three finite
             numbers.
 
+        Notes
+        -----
         Source: Bonnard et al., before (5).
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")

@@ -61,6 +61,8 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     SingularInertiaError
         If a moment is not positive.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1, whose I1 >= I2 >= I3 are our I3, I2, I1;
     theory.md L4.
     """
@@ -122,6 +124,8 @@ def twist_defect(moments: ArrayLike) -> Array:
     ShapeError
         If two moments are equal: there is no intermediate axis.
 
+    Notes
+    -----
     Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
     """
     inertia, _, _ = ascending_moments(_moments(moments))

@@ -166,6 +166,8 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     ShapeError
         If the moments are not such numbers, or the axis is the intermediate one.
 
+    Notes
+    -----
     Source: theory.md section 7.
     """
     values = finite_array(moments, "moments", (3,), unit="kg m^2")

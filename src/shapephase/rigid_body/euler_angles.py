@@ -48,6 +48,8 @@ class EulerChart:
         ShapeError
             If the last axis is not three finite numbers; so do all methods.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.6.1-5), R = P^T; Bonnard et al., section 3.3.
         """
         phi, theta, psi = np.moveaxis(finite_array(angles, "angles", (3,), unit="rad"), -1, 0)
@@ -180,6 +182,8 @@ class EulerChart:
         ChartPoleError
             Within 1e-8 of a pole.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.7.3).
         """
         angles, momentum = _pair(angles, body_momentum, "body_momentum", "kg m^2/s")
@@ -194,6 +198,8 @@ class EulerChart:
         ChartPoleError
             Within 1e-8 of a pole.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.7.4); for ZYZ the brackets in Bonnard et al., proposition 6.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
@@ -213,6 +219,8 @@ class EulerChart:
         ChartPoleError
             Within 1e-8 of a pole.
 
+        Notes
+        -----
         Source: Marsden and Ratiu, exercise 15.7-1.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
@@ -239,6 +247,8 @@ class EulerChart:
         UnphysicalInertiaError, SingularInertiaError
             If an inertia is not symmetric, or not positive definite.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.3.3) with (15.7.2).
         """
         angles, rates = _pair(angles, rates, "rates", "rad/s")
@@ -256,6 +266,8 @@ class EulerChart:
         UnphysicalInertiaError, SingularInertiaError
             If an inertia is not symmetric, or not positive definite.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.7.5), (15.7.6); Bonnard et al., proposition 6.
         """
         momentum = self.body_momentum(angles, momenta)
@@ -274,6 +286,8 @@ class EulerChart:
         UnphysicalInertiaError, SingularInertiaError
             If an inertia is not symmetric, or not positive definite.
 
+        Notes
+        -----
         Source: Marsden and Ratiu, section 15.7, Hamilton's canonical equations.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
@@ -292,6 +306,8 @@ class EulerChart:
         ShapeError
             If a momentum is zero.
 
+        Notes
+        -----
         Source: Bonnard et al., before (4), with H_3 = +|H| cos phi_2; theory.md B-E3.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
@@ -350,6 +366,8 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     ChartPoleError
         If the body's third axis is within 1e-8 of the momentum's line.
 
+    Notes
+    -----
     Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
     """
     momentum, velocity = _pair(body_momentum, angular_velocity, "angular_velocity", "rad/s", first="body_momentum")
@@ -374,6 +392,8 @@ def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
     ShapeError
         If the gradients have different or odd lengths.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.7.7).
     """
     first = finite_array(gradient_f, "gradient_f", (None,))

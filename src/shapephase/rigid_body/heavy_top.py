@@ -62,6 +62,8 @@ class HeavyTop:
     UnphysicalInertiaError, SingularInertiaError
         If a tensor is not symmetric, or not positive definite.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.10.1-3).
     """
 
@@ -318,6 +320,8 @@ def semidirect_bracket(
     df, dg : gradients (F_Pi, F_Gamma), (G_Pi, G_Gamma), each of two (..., 3)
     momentum, gamma : (..., 3) the point
 
+    Notes
+    -----
     Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
     """
     (fp, fg), (gp, gg) = (tuple(finite_array(part, "gradient", (3,)) for part in pair) for pair in (df, dg))

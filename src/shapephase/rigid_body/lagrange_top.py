@@ -125,6 +125,8 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     ShapeError
         If the momentum is not a finite number.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, theorem 15.10.1.
     """
     p = _number(momentum, "momentum")
@@ -199,6 +201,8 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
     ShapeError, SingularInertiaError
         If an argument is of a wrong shape or value, or a moment is not positive.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
     """
     i1, i2, i3, weight, p = _upright(moments, mgl, momentum)
@@ -273,6 +277,8 @@ def stability_chart(
     AccuracyNotReached
         If the simulation needs more than 200 000 steps.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
     """
     ratios, spins = finite_array(axial_ratios, "axial_ratios"), finite_array(momenta, "momenta")

@@ -76,6 +76,8 @@ class RigidBodyPendulum:
         ShapeError
             If a momentum is along the third axis, where the angle is undefined, or is not three finite numbers.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.11.12).
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -168,6 +170,8 @@ class RigidBodyPendulum:
         ShapeError
             For a momentum along the third axis, or with a part below 1e-140 of its largest that is not zero.
 
+        Notes
+        -----
         Source: Marsden and Ratiu (15.11.18); the pendulum's solution in Jacobi's functions is standard.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -272,6 +276,8 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
         If the moments are not positive, or all equal (then every momentum is at rest), or `axes` is not a permutation,
         or the third axis is the intermediate one or shares its moment with another: K is then not an elliptic cylinder.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.11.7) to (15.11.13).
     """
     values = moments_argument(moments)

@@ -345,6 +345,8 @@ def cones(top: EulerTop) -> Cones:
     ShapeError
         If no two moments are equal, or all three, or the momentum is zero.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, 15.8 case 2, whose I1 = I2 are the equal moments and I3 the one about the axis of
     symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
     """

@@ -61,6 +61,8 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     ShapeError
         If two moments are equal: the middle axis is then on a circle of equilibria and there is no separatrix.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
     """
     inertia = moments_argument(moments)

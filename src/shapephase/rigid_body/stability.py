@@ -50,6 +50,8 @@ class SteadyRotation:
     verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals
         exactly one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)
 
+    Notes
+    -----
     A spherical body is "stable" everywhere: every momentum stands still.
     """
 
@@ -96,6 +98,8 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     UnphysicalInertiaError, SingularInertiaError
         If the tensor is not symmetric, or not positive definite.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
     order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
     """
@@ -143,6 +147,8 @@ def steady_rotations(
     ShapeError, UnphysicalInertiaError, SingularInertiaError
         As `steady_rotation`.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, theorem 15.9.1.
     """
     tensor = _tensor(inertia)

@@ -45,6 +45,8 @@ def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
     ShapeError
         If the last axis is not the body's n joints, or an entry is not finite.
 
+    Notes
+    -----
     Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
     """
     check_object(body, "Body", "body")
@@ -64,6 +66,8 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
     -------
     (..., n, n, 3) antisymmetric in i, j; base axes [rad per product of the two joints' units]
 
+    Notes
+    -----
     Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
     """
     check_object(body, "Body", "body")
@@ -100,6 +104,8 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     OpenPathError
         If the path does not close: then the rotation depends on where the base frame is fixed.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
     """
     check_object(body, "Body", "body")
@@ -166,6 +172,8 @@ def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Hor
     AccuracyNotReached
         If the tolerance cannot be met.
 
+    Notes
+    -----
     Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
     """
     check_object(body, "Body", "body")
@@ -214,6 +222,8 @@ def holonomy_derivative(
     AccuracyNotReached
         If the tolerance cannot be met.
 
+    Notes
+    -----
     Source: theory.md B6; numerics.md section 4 (curvature of the connection).
     """
     check_object(body, "Body", "body")

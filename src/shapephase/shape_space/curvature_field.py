@@ -55,6 +55,8 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
     ShapeError
         If the last axis is not the body's n joints, there are no shapes, or the tolerance is not above 0.
 
+    Notes
+    -----
     Source: theory.md B6.
     """
     check_object(body, "Body", "body")
@@ -99,6 +101,8 @@ def curvature_on_plane(
     ShapeError
         If the joints are not two different ones, or an array has the wrong shape.
 
+    Notes
+    -----
     Source: theory.md B6; numerics.md section 4.
     """
     check_object(body, "Body", "body")
@@ -148,6 +152,8 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
     AccuracyNotReached
         If the tolerance cannot be met, as where the cone passes close to such a shape.
 
+    Notes
+    -----
     Source: theory.md B6, B7.
     """
     check_object(body, "Body", "body")

@@ -132,6 +132,8 @@ class AndoyerVariables:
             Within 1e-8 of a pole of the chart, where the two third axes are parallel. Its converse is
             `andoyer_from_euler`.
 
+        Notes
+        -----
         Source: Bonnard et al., section 3.4, the complete relations, of which the last is for phi_3 (theory.md B-E4).
         """
         angles = chart.angles(self.attitude)
@@ -145,6 +147,8 @@ class AndoyerVariables:
         ShapeError, UnphysicalInertiaError, SingularInertiaError
             If the inertia does not go with the variables, is not symmetric, or not positive definite.
 
+        Notes
+        -----
         Source: Bonnard et al. (5), there in principal axes.
         """
         momentum = self.body_momentum
@@ -160,6 +164,8 @@ class AndoyerVariables:
         ShapeError, UnphysicalInertiaError, SingularInertiaError
             As `hamiltonian`.
 
+        Notes
+        -----
         Source: Bonnard et al. (8), there in principal axes.
         """
         inverse = self._inverse(inertia)
@@ -258,6 +264,8 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
     ShapeError
         If an argument is not a finite vector, or a momentum is zero.
 
+    Notes
+    -----
     Source: as `AndoyerVariables.euler_angles`.
     """
     return andoyer_variables(chart.attitude(angles), chart.body_momentum(angles, momenta))
@@ -283,6 +291,8 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     AccuracyNotReached
         If the attitude jumps, or turns so often between the times that it cannot be followed.
 
+    Notes
+    -----
     Source: Cabrera 2006 (13) for the phase; theory.md R1.
     """
     times = finite_array(t, "t", (None,), unit="s")

@@ -76,6 +76,8 @@ def conjugate_points(
     ShapeError
         If the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
 
+    Notes
+    -----
     Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
     """
     _check_order(order)
@@ -151,6 +153,8 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     ShapeError
         If p is that of the equator, where it is infinite, or of no oscillating extremal.
 
+    Notes
+    -----
     Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
     """
     _check_order(order)

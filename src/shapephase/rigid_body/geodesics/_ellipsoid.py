@@ -64,6 +64,8 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
     ShapeError
         If the aspect is not between 0.001 and 1000, or the radius not positive.
 
+    Notes
+    -----
     Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
     """
     epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")

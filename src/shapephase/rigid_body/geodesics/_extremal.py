@@ -183,6 +183,8 @@ def variational_jacobi_field(
     AccuracyNotReached
         If the integration fails.
 
+    Notes
+    -----
     Source: Bonnard et al., definition 2.2.
     """
     t = finite_array(times, "times", (None,))

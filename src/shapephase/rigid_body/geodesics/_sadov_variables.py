@@ -109,6 +109,8 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     ShapeError
         If two moments are equal, or a momentum is zero.
 
+    Notes
+    -----
     Source: theory.md R15.
     """
     metric = serret_andoyer_metric(moments)

@@ -82,6 +82,8 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     AccuracyNotReached
         If no geodesic arrives that is as short as the upper bound says.
 
+    Notes
+    -----
     Source: theory.md Q6.
     """
     matrix = so3.rotation_argument(attitude, "attitude")

@@ -143,6 +143,8 @@ class LeftInvariantMetric:
         AccuracyNotReached
             If none is found in ten thousand steps of the search, because the moments are too unequal.
 
+        Notes
+        -----
         Source: theory.md Q6; `conjugate_times`.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -192,6 +194,8 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     UnphysicalInertiaError, SingularInertiaError
         If a tensor is not symmetric, or not positive definite.
 
+    Notes
+    -----
     Source: Bonnard et al., sections 3.1 and 3.2.
     """
     values = real_array(inertia, "inertia", "kg m^2")

@@ -113,6 +113,8 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
     ShapeError
         If the reach is not positive, or the functions give no finite numbers of the right shape, or F_2 <= 0 inside.
 
+    Notes
+    -----
     Source: Bonnard et al., section 2.1.
     """
     if not (np.isfinite(reach) and reach > 0.0):
@@ -159,6 +161,8 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
     AccuracyNotReached
         If the metric is too rough to be tabulated to rounding.
 
+    Notes
+    -----
     Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
     """
     found = assumptions(profile, reach, meridian)

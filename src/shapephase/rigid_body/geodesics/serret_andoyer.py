@@ -101,6 +101,8 @@ class SerretAndoyerMetric:
         ShapeError
             If an argument is not finite; so do all methods.
 
+        Notes
+        -----
         Source: Bonnard et al., before (7).
         """
         angle = finite_array(y, "y", unit="rad")
@@ -206,6 +208,8 @@ class SerretAndoyerMetric:
         ShapeError
             If a p_theta is beyond `largest_momentum`.
 
+        Notes
+        -----
         Source: Bonnard et al., sections 4.2 and 4.3.
         """
         return GeodesicFamily(constants=constants_of(self.moments, p_theta))

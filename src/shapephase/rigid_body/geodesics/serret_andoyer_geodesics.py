@@ -229,6 +229,8 @@ class GeodesicFamily:
             If the order is no such number, or a geodesic does not oscillate: the others have no conjugate point
             (theory.md R13).
 
+        Notes
+        -----
         Source: Bonnard et al., section 4.4; theory.md R12.
         """
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:

@@ -112,6 +112,8 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     UnphysicalInertiaError, SingularInertiaError
         If the inertia is not symmetric, or not positive definite.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
     """
     tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
@@ -150,6 +152,8 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
     ShapeError
         If the moments are not positive, or the first equals the third.
 
+    Notes
+    -----
     Source: Marsden and Ratiu (15.11.7).
     """
     first, _, third = moments_argument(moments)
@@ -170,6 +174,8 @@ def structure_constants(form: ArrayLike) -> Array:
     ShapeError
         If the matrix is not symmetric.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, theorem 15.11.3 and exercise 14.9-1.
     """
     return np.einsum("ijl,lk->ijk", so3.hat(np.eye(3)).transpose(1, 2, 0) * -1.0, _form(form))
@@ -187,6 +193,8 @@ def lie_group(form: ArrayLike) -> str:
     ShapeError
         If the matrix is not symmetric.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, theorem 15.11.3, which leaves out (+-0) and (000).
     """
     values = np.linalg.eigvalsh(_form(form))

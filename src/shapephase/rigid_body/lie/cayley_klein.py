@@ -66,6 +66,8 @@ def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
     ----------
     first, second : (..., 2) complex, dF/dq + i dF/dp
 
+    Notes
+    -----
     Raises ShapeError.
     """
     f, g = _spinor(first, "first"), _spinor(second, "second")

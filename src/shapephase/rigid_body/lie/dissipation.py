@@ -27,6 +27,8 @@ def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, al
     momentum : (..., 3) body momentum [kg m^2/s]
     alpha : (...) dissipation [s/(kg m^2)], positive where energy is lost
 
+    Notes
+    -----
     Raises ShapeError.
     """
     pi, strength = _momentum(momentum), finite_array(alpha, "alpha")
@@ -62,6 +64,8 @@ def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float,
     alpha : (...) dissipation [s/(kg m^2)]; a negative one drives the body
     times : (N,) strictly ascending [s]
 
+    Notes
+    -----
     Raises as `double_bracket_equations`.
     """
     pi, instants, strength = _momentum(momentum), ascending_times(times), finite_array(alpha, "alpha")[..., None]

@@ -68,6 +68,8 @@ def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: Array
     ShapeError, LieAlgebraError
         If the shapes do not fit, an entry is not finite, or the operator is not symmetric or singular.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, section 15.3 and chapter 13; theory.md G7.
     """
     operator = inertia_operator(algebra, inertia)
@@ -93,6 +95,8 @@ def euler_poincare_motion(
     AccuracyNotReached
         If the motion goes to infinity before the last time, as it can on some algebras.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
     """
     operator, d = inertia_operator(algebra, inertia), algebra.dimension

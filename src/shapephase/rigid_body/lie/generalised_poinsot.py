@@ -91,6 +91,8 @@ def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -
     adjoint : (..., d, d) Ad_g
     point : (..., d) in space
 
+    Notes
+    -----
     Raises ShapeError.
     """
     points = finite_array(point, "point", (None,))
@@ -109,6 +111,8 @@ def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLik
     velocity : (..., d) body velocity xi
     body_point : (..., d) eta; at the contact it is xi, and the velocity is zero
 
+    Notes
+    -----
     Raises ShapeError.
     """
     ad = finite_array(adjoint, "adjoint", (algebra.dimension, algebra.dimension))

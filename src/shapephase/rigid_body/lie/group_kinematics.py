@@ -54,6 +54,8 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
     LieAlgebraError
         If g^-1 V is not an element of the algebra: V is not tangent to the group.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, equation (15.4.4).
     """
     _, inverse = _element(algebra, g)

@@ -79,6 +79,8 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     ShapeError
         If R is not a rotation, or R' is not tangent to the rotations at R.
 
+    Notes
+    -----
     Source: equation (15.2.8).
     """
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))

@@ -49,6 +49,8 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
     ShapeError
         If a shape is wrong or an entry not finite.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
     """
     mu = _momentum(momentum, algebra)
@@ -69,6 +71,8 @@ def bracket_gradient(
     first, second : gradient (..., d) and Hessian (..., d, d) of F and of G at the momenta
     momentum : (..., d)
 
+    Notes
+    -----
     Raises ShapeError.
     """
     d, mu = algebra.dimension, _momentum(momentum, algebra)
@@ -201,6 +205,8 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     ShapeError, SingularInertiaError
         If the inertia is not symmetric positive definite, or the shapes are not right.
 
+    Notes
+    -----
     Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")

@@ -107,6 +107,8 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     ShapeError, SingularInertiaError
         As `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
 
+    Notes
+    -----
     Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
     """
     if isinstance(power, bool) or not isinstance(power, int | np.integer) or power < 1:

@@ -61,6 +61,8 @@ def smoothed_path(
     TrajectoryWarning
         For a joint that moves no more than its noise.
 
+    Notes
+    -----
     Source: Reinsch 1967 (the principle); Dierckx 1993, Curve and Surface Fitting with Splines (the algorithm).
     """
     if not noise.any():
