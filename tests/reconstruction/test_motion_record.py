@@ -265,6 +265,63 @@ def test_every_array_is_needed(saved: Path, tmp_path):
             sp.load_motion(where)
 
 
+def odd_entry(value):
+    """The same array with another first entry."""
+
+    def changed(array):
+        other = array.copy()
+        other.flat[0] = value
+        return other
+
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("spatial_momentum", odd_entry(np.nan), "finite"),
+        ("initial_attitude", lambda a: 2.0 * a, "no rotation"),
+        ("initial_attitude", lambda a: a[:2], "expected shape"),
+        ("closure", lambda a: -a, "no rotation"),
+        ("breaks", lambda a: a[::-1], "breaks do not ascend"),
+        ("breaks", lambda a: 2.0 * a, "breaks end"),
+        ("centre", odd_entry(np.inf), "finite"),
+        ("edges", lambda a: np.zeros_like(a), "edges do not ascend"),
+        ("edges", lambda a: a[:-1], "expected shape"),
+        ("coefficients", odd_entry(np.nan), "finite"),
+        ("coefficients", lambda a: a[..., :8], "expected shape"),
+        ("coefficients", lambda a: a[:0], "no samples"),
+        ("step_steps", lambda a: -a, "one step or more"),
+        ("step_steps", lambda a: a.astype(float), "whole numbers"),
+        ("step_quaternions", lambda a: 0.0 * a, "length 1"),
+        ("step_quaternions", lambda a: a[:, :-1], "expected shape"),
+        ("step_directions", lambda a: a[:, 1:], "directions are needed"),
+        ("step_dynamics", lambda a: a.astype(np.float32), "doubles"),
+        ("step_sampling_error", lambda a: a - 1.0, "below 0"),
+        ("perturbed", odd_entry(-np.inf), "finite"),
+        ("hidden", lambda a: a[None], "doubles"),
+    ],
+)
+def test_arrays_that_no_motion_has(saved: Path, tmp_path, name: str, change, said: str):
+    with np.load(saved) as stored:
+        array = change(stored[name])
+    where = rewritten(saved, tmp_path / "odd.npz", **{name: array})
+    with pytest.raises(ResultFileError, match=rf"odd\.npz: the motion's numbers cannot be used \(.*{said}"):
+        sp.load_motion(where)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("loops", 1e400), ("loops", 0), ("loops", 10**9), ("tolerance", float("nan")), ("shape_gap", -1), ("sha256", [])],
+)
+def test_a_header_that_no_motion_has(saved: Path, tmp_path, name: str, value):
+    with np.load(saved) as stored:
+        header = json.loads(str(stored["header"])) | {name: value}
+    where = rewritten(saved, tmp_path / "odd.npz", header=np.array(json.dumps(header)))
+    with pytest.raises(ResultFileError, match=r"odd\.npz: the motion's numbers cannot be used"):
+        sp.load_motion(where)
+
+
 # ---- The table -----------------------------------------------------------------------------------------------------
 
 

@@ -22,6 +22,7 @@ from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.stepped import Perturbed, SteppedRotation
 from ..provenance import provenance
+from ._stored_arrays import check_deformation, check_rotation, check_rows, check_start
 
 _FORMAT = "shapephase motion 3"
 _STEPS = (
@@ -125,7 +126,7 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
         return _record(header, arrays)
     except KeyError as error:
         raise ResultFileError(f"{where}: the motion lacks {error}; compute it anew") from None
-    except (AttributeError, TypeError, ValueError) as error:
+    except (ArithmeticError, AttributeError, TypeError, ValueError) as error:
         raise ResultFileError(f"{where}: the motion's numbers cannot be used ({error}); compute it anew") from None
 
 
@@ -153,13 +154,14 @@ def _of_part(number: int, name: str) -> str:
 
 def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecord:
     loops = int(header["loops"])
+    check_deformation(arrays, loops)
     interpolant = _interpolant(arrays, loops, int(header["interpolant_evaluations"]))
     deformation = sampled_deformation(
         interpolant,
         arrays["centre"],
         arrays["breaks"],
         arrays.get("closure"),
-        float(header["shape_gap"]),
+        _positive(header, "shape_gap"),
         str(header["deformation"]),
         {str(name): str(digest) for name, digest in header["sha256"].items()},
         _made_from(header),
@@ -168,11 +170,19 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         deformation,
         arrays["spatial_momentum"],
         so3.orthonormalised(arrays["initial_attitude"]),
-        float(header["tolerance"]),
+        _positive(header, "tolerance"),
         str(header["method"]),
         int(header["evaluations"]),
         _solution(header, arrays, interpolant),
     )
+
+
+def _positive(header: Mapping[str, Any], name: str) -> float:
+    """A number of the header, zero or above."""
+    value = float(header[name])
+    if not 0.0 <= value < np.inf:
+        raise ValueError(f"{name} is {value}")
+    return value
 
 
 def _made_from(header: Mapping[str, Any]) -> dict[str, Any]:
@@ -187,14 +197,18 @@ def _made_from(header: Mapping[str, Any]) -> dict[str, Any]:
 def _solution(
     header: Mapping[str, Any], arrays: Mapping[str, Any], interpolant: Interpolant
 ) -> SteppedRotation | GroupedRotations:
+    count = check_start(arrays)
     if "parts" not in header:
+        check_rotation(arrays, interpolant.loops, count)
         return _rotation(arrays, interpolant)
-    parts = []
+    parts: list[RotationPart] = []
     for number, evaluations in enumerate(header["parts"]):
         start = _of_part(number, "")
         own = {name.removeprefix(start): value for name, value in arrays.items() if name.startswith(start)}
+        check_rotation(own, interpolant.loops, len(own["rows"]))
         samples = _interpolant(own, interpolant.loops, int(evaluations))
         parts.append(RotationPart(own["rows"], _rotation(own, samples)))
+    check_rows([part.rows for part in parts], count)
     return GroupedRotations(tuple(parts), int(header["evaluations"]))
 
 

@@ -1,0 +1,100 @@
+"""The arrays of a stored motion, checked before anything is made of them: whoever wrote the file is not believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, Integers, finite_array
+
+_CHANNELS = 9
+"""Of the interpolant: six of the inverse inertia, three of the drift."""
+_UNIT = 1e-6
+"""How far a stored rotation may be from one: what `so3.orthonormalised` still mends."""
+
+
+def check_deformation(arrays: Mapping[str, Any], loops: int) -> None:
+    """Raise ValueError where samples, breaks, centre of mass or closure do not go together, KeyError if one lacks."""
+    edges, coefficients = _samples(arrays, loops)
+    breaks = _numbers(arrays, "breaks", None)
+    if len(breaks) < 2 or breaks[0] != 0.0 or np.any(np.diff(breaks) <= 0.0):
+        raise ValueError("breaks do not ascend from 0")
+    if breaks[-1] != edges[-1]:
+        raise ValueError(f"breaks end at {breaks[-1]:g} s, edges at {edges[-1]:g} s")
+    _numbers(arrays, "centre", len(coefficients), None, 3)
+    if "closure" in arrays:
+        _check_rotations(_numbers(arrays, "closure", 3, 3), "closure")
+
+
+def check_start(arrays: Mapping[str, Any]) -> int:
+    """How many motions there are. Raises ValueError where momenta and attitudes do not go together."""
+    momentum = finite_array(arrays["spatial_momentum"], "spatial_momentum", (3,))
+    attitude = _numbers(arrays, "initial_attitude", *momentum.shape, 3)
+    _check_rotations(attitude, "initial_attitude")
+    return momentum.size // 3
+
+
+def check_rotation(arrays: Mapping[str, Any], loops: int, count: int) -> None:
+    """Raise ValueError where the steps of `count` motions do not go with their samples."""
+    _, coefficients = _samples(arrays, loops)
+    steps = _integers(arrays, "step_steps", len(coefficients))
+    if np.any(steps < 1):
+        raise ValueError("step_steps: a panel has one step or more")
+    total = loops * sum(steps.tolist())
+    _numbers(arrays, "step_momentum", count, 3)
+    quaternions = _numbers(arrays, "step_quaternions", None, total + 1, 4)
+    if len(quaternions) not in (1, count):
+        raise ValueError(f"step_quaternions: {count} motions are needed, got {len(quaternions)}")
+    if np.any(np.abs((quaternions**2).sum(axis=-1) - 1.0) > _UNIT):
+        raise ValueError("step_quaternions: not all are of length 1")
+    directions = _numbers(arrays, "step_directions", count, None, 3)
+    if directions.shape[1] not in (0, total + 1):
+        raise ValueError(f"step_directions: {total + 1} directions are needed, got {directions.shape[1]}")
+    for name in ("step_turns", "step_dynamics"):
+        _numbers(arrays, name, count, None if directions.shape[1] == 0 else total)
+    for name in ("step_sampling_error", "step_stepping_error", "step_rounding_error", "step_amplification"):
+        if np.any(_numbers(arrays, name, count) < 0.0):
+            raise ValueError(f"{name} is below 0")
+    _numbers(arrays, "perturbed", *coefficients.shape)
+    _numbers(arrays, "hidden")
+
+
+def check_rows(parts: Sequence[Any], count: int) -> None:
+    """Raise ValueError unless each of `count` motions is in one part, and in one only."""
+    rows = [row for part in parts for row in _integers({"rows": part}, "rows", None).tolist()]
+    if sorted(rows) != list(range(count)):
+        raise ValueError(f"rows: each of {count} motions is needed once")
+
+
+def _samples(arrays: Mapping[str, Any], loops: int) -> tuple[Array, Array]:
+    """Edges and coefficients of an interpolant."""
+    coefficients = _numbers(arrays, "coefficients", None, None, _CHANNELS)
+    if loops < 1 or not coefficients.size:
+        raise ValueError("no samples")
+    edges = _numbers(arrays, "edges", loops * len(coefficients) + 1)
+    if edges[0] != 0.0 or np.any(np.diff(edges) <= 0.0):
+        raise ValueError("edges do not ascend from 0")
+    return edges, coefficients
+
+
+def _numbers(arrays: Mapping[str, Any], name: str, *shape: int | None) -> Array:
+    """An array of finite numbers with as many axes as lengths are given; None: any length."""
+    array = finite_array(arrays[name], name, shape)
+    if array.ndim != len(shape) or np.asarray(arrays[name]).dtype != np.float64:
+        raise ValueError(f"{name}: {len(shape)} axes of doubles are needed, got {array.shape}")
+    return array
+
+
+def _integers(arrays: Mapping[str, Any], name: str, length: int | None) -> Integers:
+    array = np.asarray(arrays[name])
+    if array.dtype != np.int64 or array.ndim != 1 or length not in (None, len(array)):
+        raise ValueError(f"{name}: {'' if length is None else length} whole numbers are needed, got {array.shape}")
+    return array
+
+
+def _check_rotations(matrices: Array, name: str) -> None:
+    excess = matrices.swapaxes(-1, -2) @ matrices - np.eye(3)
+    if np.any(np.abs(excess) > _UNIT) or np.any(np.linalg.det(matrices) < 0.0):
+        raise ValueError(f"{name}: no rotation")
