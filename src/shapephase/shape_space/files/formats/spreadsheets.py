@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import threading
+import warnings
 import zipfile
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +23,8 @@ _MOST_CELLS = 5_000_000
 """Cells of a sheet, empty ones counted: a second for each million."""
 _MOST_VALUES = 2**24
 """Values of a Parquet file: an hour of a hundred joints at forty samples a second."""
+
+_WARNINGS = threading.Lock()
 
 
 def read_excel(where: Path, data: bytes, sheet: str | None) -> Table:
@@ -42,8 +48,9 @@ def read_excel(where: Path, data: bytes, sheet: str | None) -> Table:
             size = sum(entry.file_size for entry in archive.infolist())
         if size > _MOST_UNPACKED:
             raise TrajectoryError(f"{where}: {size >> 20} MiB when unpacked, up to {_MOST_UNPACKED >> 20} MiB are read")
-        book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
-        sheets = {name: _cells(book[name], where) for name in book.sheetnames if hasattr(book[name], "iter_rows")}
+        with _silent_openpyxl():
+            book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
+            sheets = {name: _cells(book[name], where) for name in book.sheetnames if hasattr(book[name], "iter_rows")}
     except ShapePhaseError:
         raise
     except Exception as error:  # a damaged workbook fails inside openpyxl in many ways
@@ -51,6 +58,17 @@ def read_excel(where: Path, data: bytes, sheet: str | None) -> Table:
             f"{where}: no workbook that can be read ({type(error).__name__}: {error!s:.200})"
         ) from None
     return _sheet_table(_chosen_sheet(sheets, where, sheet), where)
+
+
+@contextlib.contextmanager
+def _silent_openpyxl() -> Iterator[None]:
+    """What openpyxl warns of are styles and links; dates that are none become cells with a fault.
+
+    One thread at a time: Python's filters belong to the process.
+    """
+    with _WARNINGS, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", module="openpyxl")
+        yield
 
 
 def _cells(sheet: Any, where: Path) -> list[tuple[int, list[Any]]]:
