@@ -1,7 +1,7 @@
 # The same checks as .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test notebooks full bench
+.PHONY: check lint types imports test notebooks full fuzz bench
 
 check: lint types imports test notebooks
 
@@ -24,6 +24,11 @@ notebooks:
 
 full:
 	$(BIN)/pytest -n auto
+
+# Twenty minutes of mutated files and command lines; MINUTES and SEED choose others.
+MINUTES ?= 20
+fuzz:
+	PYTHONPATH=src:tests $(BIN)/python -m fuzz --minutes $(MINUTES) $(if $(SEED),--seed $(SEED))
 
 bench:
 	$(BIN)/python -m benchmarks

@@ -1,0 +1,179 @@
+"""Grammar of command lines: every command, its options with usual and odd values, good and fuzzed files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from random import Random
+
+from .bodies import mjcf, urdf
+from .pieces import BODY, ODD_NAMES, Trial, odd_one, rarely
+from .text_motions import delimited, number_text, opensim
+
+_GOOD_MOTION = "time,hip,wrist,boom\n0,0,0,0\n0.25,0.2,0.1,0.05\n0.5,0.3,0.3,0.1\n0.75,0.1,0.2,0.02\n1,0,0,0\n"
+_ODD_VALUES = (
+    "",
+    "-",
+    "--",
+    "nan",
+    "inf",
+    "-1",
+    "0",
+    "1e400",
+    "1e-320",
+    "1e308",
+    "x",
+    "x" * 300,
+    "\u202e",
+    "a=b",
+    "[",
+    "1,2,3",
+    "@",
+    "%s",
+    "\n",
+)
+
+
+def _number(chance: Random, usual: str) -> str:
+    return odd_one(chance, usual, _ODD_VALUES, 6)
+
+
+def _three(chance: Random) -> list[str]:
+    count = odd_one(chance, 3, (1, 2, 4), 20)
+    return [odd_one(chance, number_text(chance), _ODD_VALUES, 20) for _ in range(count)]
+
+
+def _file(chance: Random, usual: str) -> list[str]:
+    return [
+        odd_one(
+            chance,
+            usual,
+            ("out.xyz", "no/such/folder/x.npz", ".", "x" * 300 + ".npz", "\x01.npz", "x.NPZ", "", "motion.csv"),
+            4,
+        )
+    ]
+
+
+_RECORDING: Mapping[str, Callable[[Random], list[str]]] = {
+    "--degrees": lambda _: [],
+    "--radians": lambda _: [],
+    "--time-unit": lambda c: [odd_one(c, "s", ("ms", "h", "", "us"), 3)],
+    "--timestep": lambda c: [_number(c, "0.1")],
+    "--topic": lambda c: [c.choice(("a", "", "Sheet1"))],
+    "--rest": lambda c: [c.choice(("boom=1mm", "hip=nan", "hip", "=1", "x=1", "hip=1e999", "hip=1deg"))],
+    "--rest-missing": lambda _: [],
+    "--ignore-extra": lambda _: [],
+    "--names": lambda c: [c.choice(("hip=wrist", "hip=", "nofile", "x=hip", "=", "motion.csv", "body.urdf"))],
+    "--trim": lambda c: [_number(c, "0"), _number(c, "1")],
+    "--resample": lambda c: [_number(c, "50")],
+    "--smooth": lambda c: [_number(c, "0.01")],
+    "--close": lambda c: [c.choice(("3deg", "0.1", "3deg,5mm", "-1", "nan", "x", "1e400deg", "1s"))],
+    "--close-by": lambda c: [c.choice(("drift", "smooth", "geodesic", "x"))],
+}
+_FLIGHT: Mapping[str, Callable[[Random], list[str]]] = {
+    "--momentum": _three,
+    "--attitude": lambda c: odd_one(
+        c, ["0", "0", "0", "1"], (["0"] * 4, ["nan"] * 4, ["1", "1"], ["1e200"] * 4, ["1e-320"] * 4), 3
+    ),
+}
+_GAUGES = ("horizontal", "base", "principal", "mean_body", "link:hand", "link:", "link:none", "x", "")
+_GAUGE: Mapping[str, Callable[[Random], list[str]]] = {"--gauge": lambda c: [c.choice(_GAUGES)]}
+_TOLERANCE: Mapping[str, Callable[[Random], list[str]]] = {
+    "--tolerance": lambda c: [odd_one(c, "1e-6", ("1e-13", "1e-15", "1", "nan", "-1", "0"), 4)]
+}
+_ERRORS: Mapping[str, Callable[[Random], list[str]]] = {
+    "--joint-noise": lambda c: [c.choice(("0.3deg", "0.1", "nan", "-1", "x", "1e300"))],
+    "--mass-error": lambda c: [_number(c, "0.05")],
+    "--centre-error": lambda c: [_number(c, "0.05")],
+    "--inertia-error": lambda c: [_number(c, "0.05")],
+    "--momentum-error": lambda c: [_number(c, "0.05")],
+    "--attitude-error": lambda c: [_number(c, "0.05")],
+}
+_COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
+    "check": _RECORDING,
+    "split": _RECORDING | _FLIGHT | _GAUGE | _TOLERANCE | _ERRORS | {"--out": lambda c: _file(c, "out.npz")},
+    "plot": _RECORDING | _FLIGHT | _GAUGE | {"--out": lambda c: _file(c, "out.png")},
+    "view": _RECORDING
+    | _FLIGHT
+    | {"--trail": lambda c: [c.choice(("hand", "none", ""))], "--speed": lambda c: [_number(c, "1")]},
+    "orbits": _RECORDING | _GAUGE | _TOLERANCE,
+    "plan": {
+        "--rotate": lambda c: [_number(c, "5")],
+        "--about": lambda c: [
+            c.choice(("x", "0,1,1", "0,0,0", "nan,1,1", "1e400,0,0", "w", "1e200,1e200,0", "1e-320,0,0"))
+        ],
+        "--momentum": _three,
+        "--duration": lambda c: [_number(c, "1")],
+        "--somersaults": lambda c: [_number(c, "0")],
+        "--half-twists": lambda c: [_number(c, "1")],
+        "--cost": lambda c: [c.choice(("kinetic", "rate", "time", "x"))],
+        "--starts": lambda c: [_number(c, "1")],
+        "--seed": lambda c: [_number(c, "1")],
+        "--out": lambda c: _file(c, "out.csv"),
+    },
+    "conjugate": {"--momenta": _three, "--order": lambda c: [_number(c, "2")], "--out": lambda c: _file(c, "out.svg")},
+    "robots": {},
+    "doctor": {},
+    "": {},
+}
+"""Command -> option -> its values."""
+
+
+def _word(chance: Random) -> str:
+    return chance.choice(
+        ("--json", "--quiet", "-q", "-v", "--", "--no-such", "-x", "extra", "--help", "", *ODD_NAMES[:8])
+    )
+
+
+def command(chance: Random, only: str | None = None) -> Trial:
+    """A command line and the files that it names."""
+    names = tuple(_COMMANDS) if only is None else (only,)
+    weights = {"check": 8, "split": 6, "plan": 3, "conjugate": 3, "plot": 2, "orbits": 2}
+    name = chance.choice([name for name in names for _ in range(weights.get(name, 1))])
+    files: dict[str, bytes] = {}
+    body = odd_one(
+        chance,
+        "body.urdf",
+        ("cat", "diver", "nobody", "", "example:none", "body.xml", "folder", "motion.csv", "x" * 5000),
+        8,
+    )
+    made = mjcf(chance) if body == "body.xml" else urdf(chance)
+    files[made.main] = BODY.encode() if made.main == "body.urdf" and not rarely(chance, 4) else made.files[made.main]
+    motion = odd_one(
+        chance, "motion.csv", ("circle", "cat_righting", "-", "none", "no.csv", "", ".csv", "body.urdf", "a.bvh"), 10
+    )
+    if name != "plan":
+        fuzzed = opensim(chance) if rarely(chance, 4) else delimited(chance)
+        use = rarely(chance, 2) and motion == "motion.csv"
+        files["motion.csv"] = _GOOD_MOTION.encode()
+        if use:
+            files, motion = files | fuzzed.files, fuzzed.main
+    words = {
+        "plan": [body],
+        "conjugate": [_number(chance, "1"), _number(chance, "2"), _number(chance, "3")],
+        "orbits": [body, motion, _number(chance, "0.02")],
+        "plot": [
+            odd_one(chance, chance.choice(("momentum", "phases", "shape", "inertia")), ("x", ""), 8),
+            body,
+            motion,
+        ],
+        "robots": [],
+        "doctor": [],
+        "": [],
+    }.get(name, [body, motion])
+    if name == "view":
+        words += ["--html", "page.html"]
+    if name == "plot" and not rarely(chance, 5):
+        words += ["--out", "out.png"]
+    if name == "plan" and not rarely(chance, 5):
+        words += ["--rotate", _number(chance, "5")]
+    offered = _COMMANDS[name]
+    for option in chance.sample(sorted(offered), min(len(offered), chance.randrange(3))):
+        words += [option, *offered[option](chance)]
+    if rarely(chance, 8):
+        words.insert(chance.randrange(len(words) + 1), _word(chance))
+    if words and rarely(chance, 12):
+        words.pop(chance.randrange(len(words)))
+    arguments = [word.replace("\x00", "") for word in ([name] if name else []) + words]
+    if not rarely(chance, 4):
+        arguments.append("--json")
+    return Trial(kind="command", source=f"shapephase {name}".strip(), files=files, arguments=arguments)

@@ -1,0 +1,342 @@
+"""A process that tries one input after the other, each in a child with limits of processor time and memory.
+
+Run as a script this is the process. It has imported what the library imports late, so that a child is a fork and costs
+milliseconds; what a child does to itself hurts no other.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import traceback
+import warnings
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fuzz.pieces import BODY, Trial
+
+SECONDS = 10
+"""Processor time of one input [s]; the limit of the kernel, in whole seconds."""
+MOST_MEMORY = 2**31
+"""Largest part of a child's memory that was ever in use [bytes]."""
+_ROOM = 2**31 + 2**29
+"""Addresses that a child may take beyond those of the process it was forked from [bytes]."""
+_WIDE = 2**34
+"""The same for an input that was refused for want of them [bytes]: now it shows how many of them it would use."""
+_PATIENCE = 300
+"""A child that has not ended after so long hangs [s of the clock]; it has used next to no processor time."""
+_CODES = (0, 2, 3, 4, 5, 6, 7)
+"""Exit codes that a command may have here: neither 1, a fault of the program, nor those of signals."""
+_LONGEST_MESSAGE = 6000
+"""Characters of an error: names of a body's joints are listed, and up to 200 columns of a file."""
+_OF_MEMORY = (
+    "MemoryError",
+    "Unable to allocate",
+    "bad_alloc",
+    "malloc of size",
+    "realloc of size",
+    "std::length_error",
+)
+_BODY = "small.urdf"
+
+
+class LimitedProcess:
+    """The process, from outside."""
+
+    def __init__(self, folder: Path, *, long: bool) -> None:
+        """Start it; `long`: for so many inputs that it is worth while to import everything beforehand."""
+        self.folder = folder
+        (folder / _BODY).write_text(BODY)
+        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+        environment = {
+            **os.environ,
+            "OPENBLAS_NUM_THREADS": "1",
+            "OMP_NUM_THREADS": "1",
+            "SHAPEPHASE_FAST": "0",
+            "PYTHONPATH": path,
+            "COLUMNS": "200",
+            "MPLBACKEND": "agg",
+        }
+        command = [sys.executable, "-m", "fuzz.limited_process", *(["long"] if long else [])]
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=folder, text=True
+        )
+        self._answer()
+
+    def tried(self, trial: Trial, *, by_command_line: bool = False) -> dict[str, Any]:
+        """What became of an input: "outcome", "message", "faults", "seconds" [s of processor], "memory" [bytes]."""
+        place = self.folder / "trial"
+        shutil.rmtree(place, ignore_errors=True)
+        (place / "folder").mkdir(parents=True)
+        for name, content in trial.files.items():
+            (place / name).write_bytes(content)
+        request = {
+            "kind": "process" if by_command_line else trial.kind,
+            "folder": str(place),
+            "main": trial.main,
+            "options": dict(trial.options),
+            "arguments": list(trial.arguments),
+        }
+        assert self._process.stdin is not None
+        print(json.dumps(request), file=self._process.stdin, flush=True)
+        return self._answer()
+
+    def stop(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+    def _answer(self) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        return json.loads(self._process.stdout.readline())
+
+
+def _limit(room: int) -> None:
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    resource.setrlimit(resource.RLIMIT_AS, (room, room))
+    signal.alarm(_PATIENCE)
+
+
+def _watched(request: dict[str, Any], room: int) -> dict[str, Any]:
+    """Try an input in a child, and measure it."""
+    read, write = os.pipe()
+    place = Path(request["folder"])
+    child = os.fork()
+    if child == 0:
+        os.close(read)
+        os.chdir(place)
+        for number, name in ((1, "stdout.txt"), (2, "stderr.txt")):
+            os.dup2(os.open(place / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        code = 70
+        with contextlib.suppress(BaseException):
+            _limit(room)
+            if request["kind"] == "process":
+                os.set_inheritable(write, False)
+                command = ["-m", "shapephase", *request["arguments"]]
+                os.execv(sys.executable, [sys.executable, *command])
+            with os.fdopen(write, "w") as answers:
+                for part in _TRIALS[request["kind"]](request):
+                    print(json.dumps(part), file=answers, flush=True)
+            code = 0
+        os._exit(code)
+    os.close(write)
+    with os.fdopen(read) as answers:
+        parts = [json.loads(line) for line in answers]
+    _, status, used = os.wait4(child, 0)
+    answer: dict[str, Any] = {"outcome": "nothing", "message": "", "faults": []}
+    for part in parts:
+        answer["faults"] += part.pop("faults", [])
+        answer |= part
+    code = os.waitstatus_to_exitcode(status)
+    if code < 0:
+        answer["faults"].append(f"signal {-code} ({signal.Signals(-code).name}); before it: {answer['outcome']}")
+    elif request["kind"] in ("command", "process"):
+        answer |= {"outcome": f"exit {answer.pop('code', code)}"}
+        answer["faults"] += list(_command_faults(request, answer["outcome"], place))
+    elif answer["outcome"] == "nothing":
+        answer["faults"].append(f"it ended with {code}: {(place / 'stderr.txt').read_text(errors='replace')[-2000:]}")
+    answer["seconds"], answer["memory"] = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
+    if answer["memory"] > MOST_MEMORY:
+        answer["faults"].append(f"{answer['memory'] >> 20} MiB of memory")
+    if room < _WIDE and any(word in answer["message"] for word in _OF_MEMORY):
+        return _watched(request, _WIDE)
+    return answer
+
+
+def _outcome(request: dict[str, Any], call: Any, names_file: bool = True) -> tuple[Any, list[str], dict[str, Any]]:
+    """What a function of the library gives, what it warned of, and how that is told."""
+    import shapephase as sp
+
+    where = str(Path(request["folder"]) / request["main"])
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            found = call(where)
+        except sp.ShapePhaseError as error:
+            told = {"outcome": type(error).__name__, "message": str(error)}
+            faults = [f"a message of {len(str(error))} characters"] if len(str(error)) > _LONGEST_MESSAGE else []
+            if names_file and where not in str(error) and not request["options"]:
+                faults.append(f"the file is not named: {error}")
+            return None, [], told | {"faults": faults}
+        except BaseException:
+            return None, [], {"outcome": "escaped", "faults": [traceback.format_exc()[-3000:]]}
+    own = [str(warning.message) for warning in caught if warning.category.__module__.startswith("shapephase")]
+    others = [w for w in caught if not w.category.__module__.startswith("shapephase")]
+    faults = [f"a warning of others: {w.category.__name__}: {w.message} ({w.filename}:{w.lineno})" for w in others]
+    return found, own, {"outcome": "accepted", "faults": faults}
+
+
+def _checked(faults: Any) -> dict[str, Any]:
+    """The faults of what was accepted, by the rules; also where these cannot be applied."""
+    try:
+        return {"faults": list(faults)}
+    except BaseException:
+        return {"faults": [f"a rule fails: {traceback.format_exc()[-3000:]}"]}
+
+
+def _body(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    import shapephase as sp
+    from fuzz.rules import body_faults
+
+    body, warned, told = _outcome(request, lambda where: sp.load_body(where, **request["options"]))
+    yield told
+    if body is not None:
+        yield _checked(body_faults(Path(request["folder"]) / request["main"], body, warned, request["options"]))
+
+
+def _motion(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    from fuzz.rules import motion_faults
+    from shapephase.shape_space.files.read import read_recorded_motion
+
+    body = _small_body()
+    recorded, _, told = _outcome(request, lambda where: read_recorded_motion(where, body, **request["options"]))
+    yield told
+    if recorded is not None:
+        yield _checked(motion_faults(Path(request["folder"]) / request["main"], body, recorded, request["options"]))
+
+
+def _names(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    from fuzz.rules import name_faults
+    from shapephase.shape_space.files.mapping_files import read_names
+
+    names, _, told = _outcome(request, read_names)
+    yield told
+    if names is not None:
+        yield _checked(name_faults(Path(request["folder"]) / request["main"], names))
+
+
+def _record(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    import shapephase as sp
+    from fuzz.rules import record_faults
+
+    motion, _, told = _outcome(request, sp.load_motion)
+    yield told
+    if motion is not None:
+        yield _checked(record_faults(motion))
+
+
+def _command(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    from shapephase.cli.main import main
+
+    code: Any = 0
+    try:
+        main(request["arguments"])
+    except SystemExit as stopped:
+        code = stopped.code or 0
+    except BaseException:
+        traceback.print_exc()
+        code = "escaped"
+    with contextlib.suppress(OSError, ValueError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    yield {"code": code}
+
+
+def _command_faults(request: dict[str, Any], outcome: str, place: Path) -> Iterator[str]:
+    """What is wrong with how a command ended: one of the documented codes, one line for an error, JSON as asked."""
+    printed = (place / "stdout.txt").read_text(encoding="utf-8", errors="backslashreplace")
+    said = (place / "stderr.txt").read_text(encoding="utf-8", errors="backslashreplace")
+    code = outcome.removeprefix("exit ")
+    if code not in map(str, _CODES) or "Traceback" in said + printed:
+        yield f"{outcome}: {said[-3000:]}"
+        return
+    lines = [line for line in said.splitlines() if not line.startswith(("shapephase: warning: ", "wrote "))]
+    loud = {"-v", "--verbose"} & {*request["arguments"]}
+    alone = len(lines) == (code != "0") and all(line.startswith("shapephase: ") for line in lines)
+    # A search that found nothing tells its best try, and why in a warning.
+    if not (loud or alone or code == "7"):
+        yield f"{outcome} with {len(lines)} lines: {said[-1000:]}"
+    if "--json" not in request["arguments"] or (code == "0" and not printed.startswith("{")):
+        return
+    try:
+        data = json.loads(printed, parse_constant=_no_constant)
+    except ValueError as fault:
+        yield f"{outcome}, and no JSON ({fault}): {printed[:1000]}"
+        return
+    if code not in ("0", "7") and data.get("error", {}).get("exit_code") != int(code):
+        yield f"{outcome}, and JSON says {data}"
+
+
+def _no_constant(word: str) -> None:
+    raise ValueError(f"{word} in JSON")
+
+
+@cache
+def _small_body() -> Any:
+    import shapephase as sp
+
+    return sp.load_body(_BODY)
+
+
+def _warm_up(long: bool) -> None:
+    """Do once what imports modules when it is first done."""
+    import shapephase as sp
+
+    body = _small_body()
+    file = Path("good.csv")
+    file.write_text("time," + ",".join(body.joint_names) + "\n0,0,0,0\n1,0.1,0.2,0.1\n2,0.2,0.1,0\n3,0,0,0\n")
+    path = sp.read_shape_path(file, body)
+    if not long:
+        return
+    import yaml  # noqa: F401
+
+    from shapephase.cli.main import main
+
+    sp.reconstruct(sp.articulated(body, path), [0.0, 0.1, 0.2], tolerance=1e-6).save("good.npz")
+    sp.load_motion("good.npz").attitude([0.0, 1.0])
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        main(["check", "cat", "cat_righting"])
+        main(["split", "cat", "cat_righting", "--momentum", "0", "0", "0.01", "--json"])
+
+
+def _crash(_: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    yield {"outcome": "alive"}
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def _escape(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    yield _outcome(request, lambda _: 1 // 0)[2]
+
+
+_TRIALS = {
+    "body": _body,
+    "motion": _motion,
+    "names": _names,
+    "record": _record,
+    "command": _command,
+    "crash": _crash,
+    "escape": _escape,
+}
+
+
+def _work() -> None:
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    import shapephase.cli.main
+    import shapephase.reconstruction.reconstruction
+    import shapephase.shape_space.files.read  # noqa: F401
+
+    _warm_up("long" in sys.argv)
+    # What is there now is shared with the children, page by page, until somebody writes to it.
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    room = pages * resource.getpagesize() + _ROOM
+    print(json.dumps({"ready": True}), file=answers, flush=True)
+    for line in sys.stdin:
+        print(json.dumps(_watched(json.loads(line), room)), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    _work()
