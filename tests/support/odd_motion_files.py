@@ -362,7 +362,7 @@ ODD_FILES = {
         E,
         ["stands twice"],
     ),
-    "half a position": ("m.csv", f"time,{BOTH},base_x_m\n0,0,0,1\n1,0,0,1\n", E, ["without base_y_m, base_z_m"]),
+    "half a position": ("m.csv", f"time,{BOTH},base_x_m\n0,0,0,1\n1,0,0,1\n", E, ["without base_y, base_z"]),
     "too large": ("m.csv", sparse(2**28 + 1), E, ["256 MiB are read"]),
     "nothing but lines": ("m.csv", b"\n" * 2_000_003, E, ["2000003 lines, up to 2000000 are read"]),
     "not there": ("m.csv", nothing, N, ["no such file"]),

@@ -1,3 +1,4 @@
+from ._flight import Flight
 from .closing import Closing
 from .mapping_files import read_names
 from .read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
@@ -5,6 +6,7 @@ from .smoothing import smoothed_path
 
 __all__ = [
     "Closing",
+    "Flight",
     "RecordedMotion",
     "read_names",
     "read_recorded_motion",

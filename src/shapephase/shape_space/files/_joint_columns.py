@@ -8,21 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import so3
-from ...arrays import FARTHEST, Array
+from ...arrays import FARTHEST, Array, Integers
 from ...body.body import Body
 from ...errors import TrajectoryError, UnknownColumnError, unknown_name
+from ._base_columns import BaseChoices, BaseColumns, BaseMotion
 from ._labels import ANGLES, LENGTHS, SI, Label, in_square_brackets, label, quantity
 from ._recording import Recording
 from ._unit_doubts import check_unit, warn_of_values
 
 LONGEST_NAME = 256
 """Characters of a column's name, as of a joint's name in a body's file."""
-_QUATERNIONS = (("qx", "qy", "qz", "qw"), ("base_qx", "base_qy", "base_qz", "base_qw"))
-_POSITION = ("base_x_m", "base_y_m", "base_z_m")
-# In the tables that `Motion.write_csv` writes; they follow from the rest.
-_FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
-_BASE = {*_QUATERNIONS[0], *_QUATERNIONS[1], *_POSITION, *_FOLLOWING}
 _STILL = 1e-9
 """Range of a coordinate [rad, m or degrees] below which it was locked."""
 _SAME = 1e-6
@@ -40,9 +35,11 @@ class JointChoices:
     rest : joint -> value [rad or m] or a text with its unit, of joints without a column
     rest_missing : whether joints without a column rest at zero, or at the limit that is nearest to it
     ignore_extra : whether columns that are no joints are left out
+    base : the same of the columns of the base
     """
 
     names: Mapping[str, str | None]
+    base: BaseChoices
     degrees: bool | None = None
     rest: Mapping[str, float | str] | None = None
     rest_missing: bool = False
@@ -55,8 +52,7 @@ class Matched(NamedTuple):
     Attributes
     ----------
     shapes : (N, n) [rad or m] in the body's order
-    base_attitude : (N, 3, 3) or None
-    base_position : (N, 3) [m] or None
+    base : the motion of the base
     columns : joint -> the label of its column
     units : joint -> the unit in which its column was read
     at_rest : joint -> where it rests [rad or m], of joints without a column
@@ -64,12 +60,15 @@ class Matched(NamedTuple):
     """
 
     shapes: Array
-    base_attitude: Array | None
-    base_position: Array | None
+    base: BaseMotion
     columns: dict[str, str]
     units: dict[str, str]
     at_rest: dict[str, float]
     left_out: dict[str, str]
+
+    def kept(self, samples: Integers) -> Matched:
+        """Some of the samples, by their places."""
+        return self._replace(shapes=self.shapes[samples], base=self.base.kept(samples))
 
 
 def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
@@ -96,18 +95,16 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     found: dict[int, str] = {}
     units: dict[str, str] = {}
     known: set[int] = set()
-    base: dict[str, Array] = {}
+    base = BaseColumns(recording, choices.base, choices.degrees)
     left_out: dict[str, str] = {}
     for text, values in table.columns.items():
         target = choices.names.get(text, text)
         if target is None:
             left_out[text] = "as told by names"
             continue
-        if target in _BASE and target not in body.joint_names:
-            table.check_column(text)
-            base[target] = values
-            continue
         resolved = _resolved(target, body)
+        if resolved is None and base.take(text, target):
+            continue
         if resolved is None:
             left_out[text] = _why_left_out(text, target, recording, body, choices)
             continue
@@ -129,9 +126,9 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
             check_unit(shapes[:, joint], joint, body, recording)
     for joint in range(body.n_shape):
         warn_of_values(shapes[:, joint], joint, body, recording)
-    attitude, position = _base(base, recording)
+    base_motion = base.motion(ignore_extra=choices.ignore_extra)
     columns = {body.joint_names[joint]: text for joint, text in found.items()}
-    return Matched(shapes, attitude, position, columns, units, at_rest, left_out)
+    return Matched(shapes, base_motion, columns, units, at_rest, left_out | base_motion.left_out)
 
 
 def _resolved(target: str, body: Body) -> Label | None:
@@ -233,38 +230,3 @@ def _check_reach(values: Array, joint: int, body: Body, recording: Recording) ->
             f"{recording.place(largest)}: joint {name} is at {values[largest]:.6g} {unit}; up to {FARTHEST:g} {unit} "
             "can be represented to full accuracy"
         )
-
-
-def _base(columns: dict[str, Array], recording: Recording) -> tuple[Array | None, Array | None]:
-    table = recording.table
-    quaternions, positions = table.base_quat_xyzw, table.base_position
-    for group in (*_QUATERNIONS, _POSITION):
-        there = [name for name in group if name in columns]
-        if not there:
-            continue
-        if len(there) < len(group):
-            lacking = ", ".join(name for name in group if name not in columns)
-            raise TrajectoryError(
-                f"{table.where}: base motion with {', '.join(there)}, without {lacking}; add it or leave them out"
-            )
-        values = np.stack([columns[name] for name in group], axis=-1)
-        if group is _POSITION:
-            positions = values
-        elif quaternions is not None:
-            raise TrajectoryError(f"{table.where}: the attitude of the base stands twice, as qx and as base_qx")
-        else:
-            quaternions = values
-    attitude = None if quaternions is None else _attitude(quaternions, recording)
-    return attitude, positions
-
-
-def _attitude(quaternions: Array, recording: Recording) -> Array:
-    with np.errstate(over="ignore"):
-        norms = np.linalg.norm(quaternions, axis=-1)
-    off = np.abs(norms - 1.0)
-    worst = int(np.argmax(off))
-    if not off[worst] <= 1e-3:
-        raise TrajectoryError(
-            f"{recording.place(worst)}: the quaternion x y z w of the base has the norm {norms[worst]:.6g}; 1 is needed"
-        )
-    return so3.matrix_from_quat(quaternions / norms[:, None])

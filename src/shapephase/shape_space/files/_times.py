@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...arguments import positive_argument
-from ...arrays import Array, Mask, finite_array
+from ...arrays import Array, Integers, Mask, finite_array
 from ...errors import ShapeError, TrajectoryError
 from ._labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
 from ._recording import Recording, Table, times_from_zero
@@ -69,6 +69,19 @@ def recording_of(
         _check_unit(shifted, table)
     ends = _clock(table)[[0, -1]].tolist()
     return Recording(table, shifted, ends[0], ends[1], unit)
+
+
+def part_of(recording: Recording, samples: Integers) -> Recording:
+    """Some of the samples of a recording, by their places, with times that begin at 0."""
+    table = recording.table.kept(samples)
+    ends = _clock(table)[[0, -1]].tolist()
+    times = recording.times[samples]
+    return Recording(table, times - times[0], ends[0], ends[1], recording.time_unit)
+
+
+def samples_within(recording: Recording, ends: tuple[float, float]) -> Integers:
+    """The places of the samples from the first to the last of two times, as the file tells them."""
+    return np.flatnonzero(_within(_clock(recording.table), ends))
 
 
 def doubtful_steps(times: Array) -> bool:
@@ -144,13 +157,13 @@ def _trimmed(table: Table, clock: Array, trim: tuple[float, float]) -> Table:
     return table.kept(samples)
 
 
-def trim_argument(trim: tuple[float, float] | None) -> tuple[float, float] | None:
+def trim_argument(trim: tuple[float, float] | None, name: str = "trim") -> tuple[float, float] | None:
     """A user's two times, the first before the last. Raises ShapeError."""
     if trim is None:
         return None
-    ends = finite_array(trim, "trim", (2,))
+    ends = finite_array(trim, name, (2,))
     if ends.ndim != 1 or not ends[0] < ends[1]:
-        raise ShapeError(f"trim: two times, the first before the last, are needed, got {trim!r}")
+        raise ShapeError(f"{name}: two times, the first before the last, are needed, got {trim!r}")
     return float(ends[0]), float(ends[1])
 
 

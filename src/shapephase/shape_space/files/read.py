@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,8 @@ from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
 from ...provenance import provenance
 from ..shape_path import ShapePath
+from ._base_columns import base_choices
+from ._flight import Flight, flight_argument, in_flight
 from ._inputs import read_input
 from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
 from ._labels import SI, mapping_argument
@@ -53,6 +55,7 @@ class RecordedMotion:
     record : what was read and what was done to it, as JSON can hold it: the file with its hash, samples and times,
         columns and units of joints, where the others rest, what was left out, smoothed, closed, resampled
     closing : how a cycle was closed, and what that changed; None: it was not
+    flight : the free flight that was kept; None: nobody asked for one
     """
 
     path: ShapePath
@@ -63,6 +66,7 @@ class RecordedMotion:
     format: str
     record: Mapping[str, Any]
     closing: Closing | None = None
+    flight: Flight | None = None
 
 
 def read_recorded_motion(
@@ -82,13 +86,16 @@ def read_recorded_motion(
     smooth: float | Mapping[str, float] | None = None,
     close: float | str | bool | None = None,
     close_by: str | None = None,
+    base_order: str | None = None,
+    base_axes: ArrayLike | str | None = None,
+    flight: str | Sequence[float] | None = None,
 ) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
     By the file's ending:
 
     - `.csv`, `.tsv`, `.txt`: a header `time,<joint names>` in any order, separated by commas, tabs or semicolons;
-      decimal points or decimal commas; the base as `qx,qy,qz,qw` and `base_x_m,base_y_m,base_z_m`.
+      decimal points or decimal commas.
     - `.xlsx`: such a table in a sheet of Excel. `.parquet`: such a table, also of pandas.
     - `.mot`, `.sto`: OpenSim; its header says whether turning coordinates are in degrees. Locked coordinates and
       coupled ones that are no joints of the body are left out.
@@ -102,6 +109,9 @@ def read_recorded_motion(
     - `.npz` with `qpos` and `time` or `timestep`, or `.npy` with the argument `timestep`: MuJoCo. With a free joint,
       the first seven columns are x y z and the quaternion w x y z; then one column for each joint, by the array
       `joint_names` or, without it, **in the order of `body.joint_names`**, which a MuJoCo model may not have.
+
+    The base in columns: `base_qx,base_qy,base_qz,base_qw` (or `qx` and so on), `base_roll,base_pitch,base_yaw` or
+    OpenSim's `pelvis_tilt,pelvis_list,pelvis_rotation`; and `base_x,base_y,base_z` or `pelvis_tx,pelvis_ty,pelvis_tz`.
 
     Units stand in the labels, as `knee [deg]`, `knee (deg)`, `knee_deg`, `boom [mm]`, `Time [ms]`, or in a row of
     units below them. Without, times are in seconds, angles in radians and lengths in metres; where they look like
@@ -130,6 +140,14 @@ def read_recorded_motion(
     close_by : "smooth", a smoother that runs on from the end to the start (where `smooth` is given, else "drift");
         "drift", the gap is taken off evenly in time; "geodesic", the shortest way back in the metric of the kinetic
         energy is put at the end
+    base_order : of roll, pitch and yaw, or tilt, list and rotation: the axes in the order in which these turn, each
+        as the turns before have left it; None: "zyx" (URDF) and "zxy" (OpenSim)
+    base_axes : the axes of the base in those whose attitude was recorded: a rotation (3, 3), base axes to those, or a
+        text such as "x,-z,y", where the x, y and z axis of the base point to; "estimate" leaves them open, for
+        `momentum_from_recording` to find; None: the same axes, but "x,-z,y" for `pelvis_tilt` and so on (OpenSim: x
+        forward, y up; URDF: x forward, z up)
+    flight : what is kept is a free flight: "auto", the longest stretch on which the centre of mass falls freely; its
+        first and last time, as the file tells the time; "all"; None: what is kept may be anything
 
     Raises
     ------
@@ -148,7 +166,8 @@ def read_recorded_motion(
         For what can be read and is probably not meant: limits left, gaps, jumps of a whole turn.
     """
     check_object(body, "Body", "body")
-    kept = trim_argument(trim)
+    kept, flying = trim_argument(trim), flight_argument(flight)
+    base = base_choices(base_order, base_axes)
     within = close_argument(close)
     rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
     given, step = read_input(file, body, topic, timestep)
@@ -156,9 +175,9 @@ def read_recorded_motion(
     mapping = _mapping(read_names(names) if isinstance(names, str | os.PathLike) else names, table)
     recording = recording_of(table, body.joint_names, mapping, time_unit, step, kept)
     choices = JointChoices(
-        names=mapping, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
+        names=mapping, base=base, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
     )
-    motion = matched(recording, body, choices)
+    recording, motion, free = in_flight(recording, matched(recording, body, choices), body, flying)
     try:
         noise = _noise_levels(smooth, body)
         path, closing = _path(recording.times, motion.shapes, noise, body, within, close_by, loop=close is None)
@@ -177,6 +196,7 @@ def read_recorded_motion(
         **_record(recording, motion),
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
         "closing": None if closing is None else _closing_record(closing, body),
+        "flight": None if free is None else free.record,
         "resampled_to_hz": None if rate is None else (len(path.breaks) - 1) / path.duration,
     }
     path = replace(path, sha256=given.sha256, record=record)
@@ -184,11 +204,12 @@ def read_recorded_motion(
         path=path,
         residual=residual,
         times=recording.times,
-        base_attitude=motion.base_attitude,
-        base_position=motion.base_position,
+        base_attitude=motion.base.attitude,
+        base_position=motion.base.position,
         format=table.format,
         record=record,
         closing=closing,
+        flight=free,
     )
 
 
@@ -209,6 +230,9 @@ def read_shape_path(
     smooth: float | Mapping[str, float] | None = None,
     close: float | str | bool | None = None,
     close_by: str | None = None,
+    base_order: str | None = None,
+    base_axes: ArrayLike | str | None = None,
+    flight: str | Sequence[float] | None = None,
 ) -> ShapePath:
     """The path of `read_recorded_motion`: a C2 spline, periodic where the last sample equals the first.
 
@@ -230,6 +254,9 @@ def read_shape_path(
         smooth=smooth,
         close=close,
         close_by=close_by,
+        base_order=base_order,
+        base_axes=base_axes,
+        flight=flight,
     ).path
 
 
@@ -332,6 +359,7 @@ def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
         "units": motion.units,
         "at_rest": motion.at_rest,
         "left_out": motion.left_out,
+        "base": motion.base.record,
     }
 
 

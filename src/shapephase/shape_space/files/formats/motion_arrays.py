@@ -55,12 +55,21 @@ def _shapes(arrays: dict[str, Any], where: Path) -> Table:
     names = _names(arrays["joint_names"], where)
     times = _array(arrays["time"], where, "time", (None,), "s")
     shapes = _array(arrays["shapes"], where, "shapes", (len(times), len(names)))
-    quaternions, positions = arrays.get("base_quat_xyzw"), arrays.get("base_position")
-    if quaternions is not None:
-        quaternions = _array(quaternions, where, "base_quat_xyzw", (len(times), 4))
+    quaternions, positions = _quaternions(arrays, where, len(times)), arrays.get("base_position")
     if positions is not None:
         positions = _array(positions, where, "base_position", (len(times), 3), "m")
     return _table(where, "NPZ", times, shapes, names, quaternions, positions)
+
+
+def _quaternions(arrays: dict[str, Any], where: Path, count: int) -> Array | None:
+    """Of the base, x y z w, by the array whose name says its order."""
+    there = [name for name in ("base_quat_xyzw", "base_quat_wxyz") if name in arrays]
+    if len(there) > 1:
+        raise TrajectoryError(f"{where}: both {there[0]!r} and {there[1]!r} are there; keep one")
+    if not there:
+        return None
+    found = _array(arrays[there[0]], where, there[0], (count, 4))
+    return found if there[0] == "base_quat_xyzw" else found[:, _SCALAR_FIRST]
 
 
 def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], timestep: float | None) -> Table:

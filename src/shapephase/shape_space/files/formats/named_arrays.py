@@ -13,6 +13,12 @@ from .column_tables import column_table
 
 _MATRICES = ("shapes", "data", "q", "values")
 _NAMES = ("joint_names", "names", "colheaders", "labels", "columns", "headers")
+# Matrices with a column for each part of the base's motion, and what these columns are called in a table.
+_OF_THE_BASE = {
+    "base_quat_xyzw": ("base_qx", "base_qy", "base_qz", "base_qw"),
+    "base_quat_wxyz": ("base_qw", "base_qx", "base_qy", "base_qz"),
+    "base_position": ("base_x", "base_y", "base_z"),
+}
 _DEEPEST = 4
 """Structures inside each other that are looked into."""
 
@@ -41,7 +47,10 @@ def arrays_table(
     for _ in range(_DEEPEST):
         columns = _matrix(where, inside) or _vectors(inside)
         if columns:
-            return column_table(where, kind, columns, units=units, row="sample")
+            base = _base_columns(inside)
+            of_base = {label: units[name] for label, name, _ in base if units and name in units}
+            columns += [(label, values) for label, _, values in base]
+            return column_table(where, kind, columns, units={**(units or {}), **of_base}, row="sample")
         groups = {name: value for name, value in inside.items() if isinstance(value, Mapping)}
         if len(groups) != 1:
             break
@@ -77,6 +86,16 @@ def _vectors(entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
     """Vectors as long as the longest; single numbers, such as a sampling rate, are none."""
     vectors = {name: vector for name, value in entries.items() if (vector := _vector(value)) is not None}
     return list(vectors.items())
+
+
+def _base_columns(entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
+    """Label, matrix and values of the columns that say where the base is and how it is turned."""
+    found: list[tuple[str, str, Any]] = []
+    for name, labels in _OF_THE_BASE.items():
+        value = entries.get(name)
+        if isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[1] == len(labels):
+            found += [(label, name, value[:, k]) for k, label in enumerate(labels)]
+    return found
 
 
 def _vector(value: Any) -> Any:

@@ -1,0 +1,325 @@
+"""Columns of a recording that say where the base is and how it is turned, and the axes in which they say it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import permutations
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ... import so3
+from ...arrays import FARTHEST, Array, Integers
+from ...errors import TrajectoryError
+from ._labels import ANGLES, LENGTHS, SI, Label, label
+from ._recording import Recording
+
+ESTIMATE = "estimate"
+"""Instead of the axes of the base: they are found by a fit."""
+# In the tables that `Motion.write_csv` writes; they follow from the rest.
+_FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
+_PREFIXES = ("base", "pelvis", "root")
+# A quaternion may be off the unit length by this much: recordings keep as few as three digits.
+_OFF_UNIT = 1e-3
+_MOST_ANGLE = 2.0 * np.pi
+"""[rad] An angle of the base beyond it, of which nobody has said the unit, is rather in degrees."""
+_FARTHEST = 50.0
+"""[m] A base farther from the origin, of which nobody has said the unit, is rather in millimetres."""
+_AXES = "xyz"
+_SAME_AXES = "x y z"
+# Of the base, seen from a pelvis of OpenSim (x forward, y up, z right): x forward, y left, z up, as URDF has it.
+_OPENSIM_AXES = "x -z y"
+
+
+class _Group(NamedTuple):
+    """Columns that belong together.
+
+    Attributes
+    ----------
+    kind : "quaternion", "angles" or "position"
+    names : of the columns
+    parts : for each column its part of the quaternion, or the axis it turns about
+    order : of angles, the usual one: each turns about its axis as those before have turned it
+    axes : of the base in those that the columns tell, the usual ones
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    parts: str = _AXES
+    order: str = ""
+    axes: str = _SAME_AXES
+
+
+def _groups() -> tuple[_Group, ...]:
+    found = [_Group("quaternion", tuple(f"q{part}" for part in "xyzw"), "xyzw")]
+    for prefix in _PREFIXES:
+        for stem in ("q", "quat_"):
+            found.append(_Group("quaternion", tuple(f"{prefix}_{stem}{part}" for part in "xyzw"), "xyzw"))
+        for parts in ("xyzw", "wxyz"):
+            names = tuple(f"{prefix}_quat_{parts}_{k}" for k in range(len(parts)))
+            found.append(_Group("quaternion", names, parts))
+        turns = tuple(f"{prefix}_{word}" for word in ("roll", "pitch", "yaw"))
+        found.append(_Group("angles", turns, _AXES, "zyx"))
+        for stem in ("", "t"):
+            found.append(_Group("position", tuple(f"{prefix}_{stem}{axis}" for axis in _AXES)))
+    opensim = tuple(f"pelvis_{word}" for word in ("tilt", "list", "rotation"))
+    return (*found, _Group("angles", opensim, "zxy", "zxy", _OPENSIM_AXES))
+
+
+_GROUPS = _groups()
+_KNOWN = frozenset(name for group in _GROUPS for name in group.names)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaseChoices:
+    """How columns become the motion of the base: what a caller has said, checked.
+
+    Attributes
+    ----------
+    order : of angles, as "zxy"; None: the usual one of such columns
+    axes : (3, 3) base axes to the axes that the columns tell, ESTIMATE, or None for the usual ones
+    said : these axes as they were given
+    """
+
+    order: str | None = None
+    axes: Array | str | None = None
+    said: str | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BaseMotion:
+    """The recorded motion of the base.
+
+    Attributes
+    ----------
+    attitude : (N, 3, 3) base axes to the recorder's, or None; with axes to be estimated, from the columns' own axes
+    position : (N, 3) [m] or None
+    record : what it was read from, as JSON can hold it, or None
+    left_out : label -> why a column was left out
+    """
+
+    attitude: Array | None
+    position: Array | None
+    record: dict[str, Any] | None
+    left_out: dict[str, str]
+
+    def kept(self, samples: Integers) -> BaseMotion:
+        """Some of the samples, by their places."""
+        return replace(
+            self,
+            attitude=None if self.attitude is None else self.attitude[samples],
+            position=None if self.position is None else self.position[samples],
+        )
+
+
+def base_choices(order: str | None, axes: Any) -> BaseChoices:
+    """A user's order of angles and axes of the base. Raises TrajectoryError, ShapeError."""
+    if order is not None and order not in {"".join(letters) for letters in permutations(_AXES)}:
+        raise TrajectoryError(f"base_order: the three axes in their order, as 'zxy', are needed, got {order!r:.40}")
+    if axes is None or (isinstance(axes, str) and axes == ESTIMATE):
+        return BaseChoices(order=order, axes=axes, said=axes)
+    if isinstance(axes, str):
+        return BaseChoices(order=order, axes=named_axes(axes), said=" ".join(axes.replace(",", " ").split()))
+    matrix = so3.rotation_argument(axes, "base_axes")
+    if matrix.shape != (3, 3):
+        raise TrajectoryError(f"base_axes: one rotation (3, 3) is needed, got {matrix.shape}")
+    return BaseChoices(order=order, axes=matrix, said=str(matrix.tolist()))
+
+
+def named_axes(text: str) -> Array:
+    """The rotation from base axes of a text such as "x -z y": where the x, y and z axis of the base point to.
+
+    Raises TrajectoryError.
+    """
+    words = text.replace(",", " ").split()
+    matrix = np.zeros((3, 3))
+    for column, word in enumerate(words[:3]):
+        axis = word.lstrip("+-")
+        if len(axis) == 1 and axis in _AXES and len(word) <= 2:
+            matrix[_AXES.index(axis), column] = -1.0 if word[0] == "-" else 1.0
+    if len(words) != 3 or np.linalg.det(matrix) != 1.0:
+        raise TrajectoryError(
+            f"base_axes: where the x, y and z axis of the base point to is needed, three right-handed words such as "
+            f"'x,-z,y', or {ESTIMATE!r}; got {text!r:.40}"
+        )
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class BaseColumns:
+    """Columns of the base as they are found in a table, one after the other."""
+
+    recording: Recording
+    choices: BaseChoices
+    degrees: bool | None
+    found: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+
+    def take(self, text: str, target: str) -> bool:
+        """Keep a column, by its label and the name that it goes by, if it is one of the base."""
+        if target in _FOLLOWING:
+            return True
+        parts = Label(target, None) if target in _KNOWN else label(target)
+        if parts.name not in _KNOWN:
+            return False
+        table = self.recording.table
+        if parts.name in self.found:
+            first = self.found[parts.name][0]
+            raise TrajectoryError(f"{table.where}: columns {first!r} and {text!r} are both {parts.name}; keep one")
+        own = table.units.get(text) or label(text).unit
+        if parts.unit and own and parts.unit != own:
+            raise TrajectoryError(f"{table.where}: column {text!r} is in {own}, and names says {parts.unit}")
+        self.found[parts.name] = (text, parts.unit or own)
+        return True
+
+    def motion(self, *, ignore_extra: bool) -> BaseMotion:
+        """What the columns say together.
+
+        ignore_extra : whether columns without their companions are left out
+
+        Raises
+        ------
+        TrajectoryError
+            If some are missing, are there twice, are no possible numbers, or have a unit that can only be guessed.
+        """
+        table, left_out = self.recording.table, {}
+        groups: dict[str, _Group] = {}
+        for group in _GROUPS:
+            there = [name for name in group.names if name in self.found]
+            lacking = ", ".join(name for name in group.names if name not in self.found)
+            if there and lacking:
+                if not ignore_extra:
+                    raise TrajectoryError(
+                        f"{table.where}: base motion with {', '.join(there)}, without {lacking}; add it, or leave them "
+                        "out: ignore_extra=True (--ignore-extra), or names={column: None} (--names COLUMN=)"
+                    )
+                left_out |= {self.found[name][0]: f"of the base, without {lacking}" for name in there}
+            elif there:
+                what = "position" if group.kind == "position" else "attitude"
+                if what in groups or self._stored(what) is not None:
+                    first = groups[what].names[0] if what in groups else "an array"
+                    raise TrajectoryError(
+                        f"{table.where}: the {what} of the base stands twice, as {first} and as {group.names[0]}; "
+                        "leave one out with names={column: None} (--names COLUMN=)"
+                    )
+                groups[what] = group
+        attitude, record = self._attitude(groups.get("attitude"))
+        position = self._position(groups.get("position"))
+        if position is not None:
+            record["position"] = list(self._texts(groups["position"])) if "position" in groups else "base_position"
+        return BaseMotion(attitude=attitude, position=position, record=record or None, left_out=left_out)
+
+    def _stored(self, what: str) -> Array | None:
+        table = self.recording.table
+        return table.base_position if what == "position" else table.base_quat_xyzw
+
+    def _attitude(self, group: _Group | None) -> tuple[Array | None, dict[str, Any]]:
+        stored, record = self._stored("attitude"), {}
+        if group is None and stored is None:
+            return None, {}
+        if group is None:
+            assert stored is not None
+            turned, usual = _by_quaternions(stored, self.recording), _SAME_AXES
+            record["attitude"] = "base_quat_xyzw"
+        else:
+            values = np.stack([self._values(name, group) for name in group.names], axis=-1)
+            usual = group.axes
+            record["attitude"] = list(self._texts(group))
+            if group.kind == "quaternion":
+                turned = _by_quaternions(values[:, [group.parts.index(part) for part in "xyzw"]], self.recording)
+            else:
+                order = self.choices.order or group.order
+                turned = _by_angles(values, group.parts, order)
+                record |= {"order": order, "order_said": self.choices.order is not None}
+        if "order" not in record and self.choices.order is not None:
+            raise TrajectoryError(
+                f"{self.recording.table.where}: base_order is for angles, and the attitude of the base is a quaternion"
+            )
+        record |= {"axes": self.choices.said or usual, "axes_said": self.choices.said is not None}
+        axes = named_axes(usual) if self.choices.axes is None else self.choices.axes
+        return (turned if isinstance(axes, str) else turned @ axes), record
+
+    def _position(self, group: _Group | None) -> Array | None:
+        if group is None:
+            return self._stored("position")
+        return np.stack([self._values(name, group) for name in group.names], axis=-1)
+
+    def _texts(self, group: _Group) -> tuple[str, ...]:
+        return tuple(self.found[name][0] for name in group.names)
+
+    def _values(self, name: str, group: _Group) -> Array:
+        """A column in rad, m or, of a quaternion, without unit."""
+        table = self.recording.table
+        text, said = self.found[name]
+        table.check_column(text)
+        values = table.columns[text]
+        if group.kind == "quaternion":
+            if said is not None:
+                raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; a quaternion has no unit")
+            return values
+        sizes: Mapping[str, float] = ANGLES if group.kind == "angles" else LENGTHS
+        if said is not None and said != SI and said not in sizes:
+            raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; {', '.join(sizes)} are possible")
+        found = self._lengths(text, values, said) if group.kind == "position" else self._angles(text, values, said)
+        farthest = int(np.argmax(np.abs(found)))
+        if abs(found[farthest]) > FARTHEST:
+            raise TrajectoryError(
+                f"{self.recording.place(farthest)}: column {text!r} is at {found[farthest]:.6g} rad or m; up to "
+                f"{FARTHEST:g} can be represented to full accuracy"
+            )
+        return found
+
+    def _lengths(self, text: str, values: Array, said: str | None) -> Array:
+        farthest = int(np.argmax(np.abs(values)))
+        if said is None and not self.recording.table.by_format and abs(values[farthest]) > _FARTHEST:
+            raise TrajectoryError(
+                f"{self.recording.place(farthest)}: column {text!r}: {values[farthest]:.6g} m from the origin, or "
+                f"millimetres? Write the unit into the header, as `{text} [mm]` or `{text} [m]`"
+            )
+        return values * (1.0 if said in (None, SI) else LENGTHS[said])
+
+    def _angles(self, text: str, values: Array, said: str | None) -> Array:
+        table = self.recording.table
+        if said is None:
+            given = self.degrees if self.degrees is not None else table.degrees
+            if given is None:
+                raise TrajectoryError(
+                    f"{table.where}: the header does not say inDegrees=yes or no; add that, or give degrees=True or "
+                    "False (--degrees, --radians)"
+                )
+            widest = int(np.argmax(np.abs(values)))
+            unsaid = self.degrees is None and not table.by_format
+            if unsaid and abs(values[widest]) > _MOST_ANGLE:
+                raise TrajectoryError(
+                    f"{self.recording.place(widest)}: column {text!r} is at {values[widest]:.6g} rad, more than a "
+                    f"turn: degrees? Name it {text}_deg or give degrees=True (--degrees); for radians, give "
+                    "degrees=False (--radians)"
+                )
+            said = "deg" if given else "rad"
+        elif self.degrees is not None and self.degrees != (said == "deg"):
+            spelled = "degrees" if said == "deg" else said
+            raise TrajectoryError(
+                f"{table.where}: column {text!r} is in {spelled} by its name, and degrees={self.degrees} was given"
+            )
+        return values * (1.0 if said == SI else ANGLES[said])
+
+
+def _by_quaternions(quaternions: Array, recording: Recording) -> Array:
+    with np.errstate(over="ignore"):
+        norms = np.linalg.norm(quaternions, axis=-1)
+    off = np.abs(norms - 1.0)
+    worst = int(np.argmax(off))
+    if not off[worst] <= _OFF_UNIT:
+        raise TrajectoryError(
+            f"{recording.place(worst)}: the quaternion x y z w of the base has the norm {norms[worst]:.6g}; 1 is needed"
+        )
+    return so3.matrix_from_quat(quaternions / norms[:, None])
+
+
+def _by_angles(angles: Array, parts: str, order: str) -> Array:
+    """Turns one after the other, each about its axis as those before have turned it: (N, 3) [rad] -> (N, 3, 3)."""
+    turned = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+    for axis in order:
+        unit = np.eye(3)[_AXES.index(axis)]
+        turned = turned @ so3.exp(angles[:, parts.index(axis), None] * unit)
+    return turned

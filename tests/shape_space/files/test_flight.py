@@ -1,0 +1,132 @@
+"""The flight of a jump is found by the fall of the centre of mass, whose acceleration is prescribed here."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase.errors import ShapeError, TrajectoryError
+from shapephase.shape_space.files._free_fall import free_fall
+from shapephase.shape_space.files.read import read_recorded_motion
+from support.motion_writers import write_delimited, write_opensim
+
+DIVER = sp.load_body("diver")
+G = 9.81
+TAKE_OFF, LANDING, END = 0.75, 1.75, 2.5
+
+
+def height(times: np.ndarray) -> np.ndarray:
+    """At rest, pushed off evenly for a quarter of a second, free for a second, and caught as evenly."""
+    speed = 0.5 * G * (LANDING - TAKE_OFF)
+    push = 0.25
+    before, after = times - (TAKE_OFF - push), times - LANDING
+    pushed = np.where(before > 0.0, 0.5 * speed / push * before**2, 0.0)
+    flown = 0.5 * speed * push + speed * (times - TAKE_OFF) - 0.5 * G * (times - TAKE_OFF) ** 2
+    caught = np.where(after < push, 0.5 * speed * push - speed * after + 0.5 * speed / push * after**2, 0.0)
+    return np.select([times < TAKE_OFF, times < LANDING], [pushed, flown], caught)
+
+
+def centres(times: np.ndarray, noise: float, seed: int, axis: int = 1, sign: float = 1.0) -> np.ndarray:
+    found = noise * np.random.default_rng(seed).normal(size=(len(times), 3))
+    found[:, axis] += sign * height(times)
+    found[:, (axis + 1) % 3] += 0.8 * np.clip(times - TAKE_OFF, 0.0, LANDING - TAKE_OFF)
+    return found
+
+
+@pytest.mark.parametrize("rate", [60.0, 200.0])
+@pytest.mark.parametrize("noise", [0.0, 0.001, 0.005])
+def test_the_flight_is_found_whichever_axis_is_up(rate: float, noise: float):
+    """Nothing of the contact is in it, and no more is lost than a contact by g may last unseen, twice, and a sample."""
+    times = np.arange(round(END * rate)) / rate
+    lost = 2.0 * np.sqrt(2.0 * 2.0 * np.hypot(noise, 0.002) / G) + 1.0 / rate
+    for seed in range(12):
+        axis, sign = seed % 3, 1.0 - 2.0 * (seed % 2)
+        found = free_fall(times, centres(times, noise, seed, axis, sign), "a file")
+        first, last = times[found.first], times[found.last]
+        assert found.up == f"{'+' if sign > 0.0 else '-'}{'xyz'[axis]}"
+        assert TAKE_OFF - 1e-9 <= first <= TAKE_OFF + lost, (seed, first)
+        assert LANDING + 1e-9 >= last >= LANDING - lost, (seed, last)
+        assert found.off == pytest.approx(noise, rel=0.15, abs=1e-9)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.001, 0.005, 0.02])
+def test_who_stands_or_walks_does_not_fall(noise: float):
+    times = np.arange(600) / 100.0
+    errors = noise * np.random.default_rng(5).normal(size=(len(times), 3))
+    walk = np.column_stack([1.3 * times, 0.03 * np.sin(4.0 * np.pi * times), 0.02 * np.sin(2.0 * np.pi * times)])
+    for motion in (errors, walk + errors):
+        with pytest.raises(TrajectoryError, match="nowhere does the centre of mass fall freely"):
+            free_fall(times, motion, "a file")
+
+
+def test_a_recording_that_is_nothing_but_flight_is_kept_whole():
+    times = np.sort(np.random.default_rng(2).uniform(0.0, 0.9, 80))
+    fall = np.column_stack([times, 4.0 * times - 0.5 * G * times**2, 0.0 * times])
+    found = free_fall(times, fall + 0.003 * np.random.default_rng(3).normal(size=fall.shape), "a file")
+    assert found.ends == (0, 79)
+
+
+def recorded(file, up: int):
+    """A jump of the diver, turning, with the axis y or z up, written by its pelvis."""
+    times = 12.0 + np.arange(250) / 100.0
+    arms = np.column_stack([1.0 + 0.5 * np.sin(times), 2.0 - np.sin(2.0 * times)])
+    upright = Rotation.from_rotvec([-0.5 * np.pi if up == 1 else 0.0, 0.0, 0.0])
+    turns = upright * Rotation.from_rotvec(np.outer(times - 12.0, [0.4, 3.0, 0.2]))
+    # The centre of mass of the three parts from the pelvis: theory.md A1, with the numbers of the file.
+    mass, arm = 58.801, 3.106
+    centre = mass * np.array([0.0, 0.0, 0.0941])
+    for side, angle in ((1.0, arms[:, 0]), (-1.0, arms[:, 1])):
+        hanging = np.column_stack([0.0 * angle, np.sin(angle), -np.cos(angle)])
+        centre = centre + arm * (np.array([-0.0205, side * 0.1875, 0.4719]) + 0.233088 * hanging)
+    centre = centre / (mass + 2.0 * arm)
+    places = centres(times - 12.0, 0.001, 1, up) - turns.apply(centre)
+    if file.suffix == ".csv":
+        labels = [*(f"base_q{part}" for part in "xyzw"), "base_x", "base_y", "base_z", *DIVER.joint_names]
+        write_delimited(file, labels, times, np.column_stack([turns.as_quat(), places, arms]))
+        return file
+    pelvis = turns * Rotation.from_matrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    angles = pelvis.as_euler("ZXY", degrees=True)
+    labels = ["pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz"]
+    write_opensim(file, [*labels, *DIVER.joint_names], times, np.column_stack([angles, places, np.degrees(arms)]), True)
+    return file
+
+
+@pytest.mark.parametrize(("name", "up"), [("take.mot", 1), ("take.csv", 2)])
+def test_a_file_keeps_its_flight_only(name: str, up: int, tmp_path):
+    file = recorded(tmp_path / name, up)
+    motion = read_recorded_motion(file, DIVER, flight="auto")
+    flight = motion.flight
+    assert flight.by == "auto"
+    assert flight.fall.up == "+" + "xyz"[up]
+    assert TAKE_OFF <= flight.first_time - 12.0 <= TAKE_OFF + 0.1
+    assert LANDING - 0.1 <= flight.last_time - 12.0 <= LANDING
+    assert motion.times[0] == 0.0
+    assert len(motion.base_attitude) == len(motion.base_position) == len(motion.times) == motion.record["samples"]
+    assert motion.path.duration == pytest.approx(flight.last_time - flight.first_time)
+    assert motion.record["flight"] == flight.record
+    given = read_recorded_motion(file, DIVER, flight=(flight.first_time, flight.last_time))
+    cut = read_recorded_motion(file, DIVER, trim=(flight.first_time, flight.last_time))
+    for other in (given, cut):
+        np.testing.assert_array_equal(other.path.shape(other.times), motion.path.shape(motion.times))
+        np.testing.assert_array_equal(other.base_attitude, motion.base_attitude)
+    assert given.flight.by == "times"
+    assert cut.flight is None
+    assert read_recorded_motion(file, DIVER, flight="all").flight.last_time == pytest.approx(14.49)
+
+
+def test_what_a_flight_needs(tmp_path):
+    file = recorded(tmp_path / "take.csv", 2)
+    with pytest.raises(TrajectoryError, match="attitude of the base, and there is none"):
+        read_recorded_motion(file, DIVER, flight="all", names={f"base_q{part}": None for part in "xyzw"})
+    with pytest.raises(TrajectoryError, match=r"position of the base is not recorded.*--flight all"):
+        read_recorded_motion(file, DIVER, flight="auto", names={f"base_{axis}": None for axis in "xyz"})
+    with pytest.raises(TrajectoryError, match="before the axes of the base are"):
+        read_recorded_motion(file, DIVER, flight="auto", base_axes="estimate")
+    with pytest.raises(TrajectoryError, match=r"2 samples are in the flight.*from 12 to 14\.49 s"):
+        read_recorded_motion(file, DIVER, flight=(12.5, 12.515))
+    with pytest.raises(ShapeError, match="flight: 'auto', 'all' or two times"):
+        read_recorded_motion(file, DIVER, flight="never")
+    with pytest.raises(ShapeError, match="first before the last"):
+        read_recorded_motion(file, DIVER, flight=(13.0, 12.0))
