@@ -36,9 +36,9 @@ from .errors import (
 from .integrator.fast.engine import compile_steps
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
+from .phases.phase_split import PhaseSplit
 from .phases.phases import (
     ArcPhases,
-    PhaseSplit,
     RunningPhases,
     arc_phases,
     dynamic_phase_from_energy,

@@ -220,7 +220,7 @@ def test_the_reference_is_far_from_the_point_opposite_the_curve():
     for name in ("cat", "example:human"):
         motion = some_motion(name)
         directions = motion.body_momentum(np.linspace(0.0, 2.0, 500)) / BODIES[name]
-        reference = running_phases(motion, [0.0, 1.0], "base").reference
+        reference = running_phases(motion, [0.0, 1.0], "base", closing="reference").reference
         tries = Rotation.random(2000, rng=np.random.default_rng(1)).as_matrix()[:, 0]
         best = np.arccos(np.max(-directions @ tries.T, axis=0)).max()
         assert np.linalg.norm(reference) == pytest.approx(1.0, abs=1e-14)

@@ -9,10 +9,10 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..phases.phases import PhaseSplit
+from ..phases.phase_split import PhaseSplit
+from ..plain_data import plain
 from ..reconstruction.reconstruction import Motion
 from .options import ErrorOptions
-from .text import plain
 
 if TYPE_CHECKING:
     from ..error_bars.covariance import Uncertainty

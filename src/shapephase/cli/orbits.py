@@ -52,10 +52,11 @@ def orbits_command(
     from ..integrator.fast.switch import expect_work
     from ..phases.phases import split
     from ..phases.return_map import fixed_points
+    from ..phases.split_text import rotation_line
     from ..reconstruction.reconstruction import reconstruct
     from .motion import joint_motion
     from .recording_text import recording_data, recording_lines
-    from .text import orbit_data, orbit_lines, rotation_line
+    from .text import orbit_data, orbit_lines
 
     magnitude = magnitude_argument(magnitude)
     goal = None if tolerance is None else tolerance_argument(tolerance)

@@ -149,7 +149,7 @@ def _check_goal(rotate: float | None, about: str | None, somersaults: float | No
 
 
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
-    from .text import rotation_line
+    from ..phases.split_text import rotation_line
 
     return "\n".join(
         [

@@ -23,6 +23,9 @@ from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import say_written
 
+_ROWS = 201
+"""Of a table of phases in time, as of attitudes."""
+
 
 def split_command(
     body: BodyArgument,
@@ -35,6 +38,7 @@ def split_command(
     recording: RecordingOptions = AS_RECORDED,
     errors: ErrorOptions = EXACT,
     out: Path | None = None,
+    phases: Path | None = None,
     html: ReportFile = None,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
@@ -44,14 +48,21 @@ def split_command(
     ----------
     out
         Write the motion to this NPZ file, or to a pipe; without it none is written. For example `--out fall.npz`.
+    phases
+        Write the phases in time, in degrees and in radians, to this CSV file; its last row is the table's. Without it
+        none is written. For example `--phases phases.csv`.
     """
-    from ..phases.phases import split
+    import numpy as np
+
+    from ..phases.phases import running_phases, split
+    from ..phases.split_text import split_lines
     from . import motion as motions
     from .error_bar_text import error_bar_data, error_bar_lines, error_bars
     from .recording_text import recording_data, recording_lines
-    from .text import recorded_base_text, split_data, split_lines
+    from .text import recorded_base_text, split_data, split_heading
 
     aside = check_writable(out, "--out", ".npz")
+    aside = check_writable(phases, "--phases", ".csv") or aside
     aside = check_writable(html, "--html", ".html") or aside
     with steps(13 if html else 2) as work:
         work.begin("loading and reconstructing")
@@ -62,6 +73,10 @@ def split_command(
         if out is not None:
             flown.motion.save(out)
             say_written(out)
+        if phases is not None:
+            times = np.linspace(0.0, flown.motion.duration, _ROWS)
+            running_phases(flown.motion, times, gauge).write_csv(phases)
+            say_written(phases)
         if html is not None:
             from ..plotting.report import write_report
 
@@ -70,7 +85,7 @@ def split_command(
             say_written(html)
     lines, data = recorded_base_text(flown.motion, flown.recorded)
     text = [
-        *split_lines(flown.body, motion, flown.motion, result),
+        *split_lines(result, split_heading(flown.body, motion, flown.motion)),
         *error_bar_lines(result, bars),
         *lines,
         *recording_lines(flown.body, flown.recorded),

@@ -3,83 +3,28 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
 
-from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from ..phases.phases import PhaseSplit
+from ..phases.phase_split import PhaseSplit
 from ..phases.return_map import FixedPoints
+from ..plain_data import plain
 from ..reconstruction.reconstruction import Motion
 from ..reconstruction.recorded_base import base_difference
 from ..shape_space.files.read import RecordedMotion
 from ..shape_space.summaries import BodySummary, PathSummary
 
-# Digits after the point of an axis.
-_AXIS_DIGITS = 6
-# [rad] A smaller turn has no axis worth showing.
-_NO_TURN = 1e-12
 
-
-def split_lines(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> list[str]:
-    """A split for people."""
+def split_heading(body: Body, motion_name: str, motion: Motion) -> str:
+    """The first line of the table of a split."""
     momentum = " ".join(f"{v:g}" for v in motion.momentum)
-    errors = result.error_estimates
-    lines = [
+    return (
         f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_shape} joints, {body.mass:.6g} kg, "
-        f"momentum ({momentum}) kg m^2/s",
-        "",
-        f"{'':24}{'angle [deg]':>16}{'± [rad]':>11}   axis (inertial)",
-        rotation_line("total rotation", result.total_rotation, errors.total_rotation),
-        rotation_line(
-            "  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy, errors.holonomy
-        ),
-        rotation_line("  dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
-        "",
-    ]
-    if result.has_phase:
-        lines += [
-            f"{f'seen in the {result.gauge} gauge':30}{'[deg]':>10}{'± [rad]':>11}{'[rad]':>20}",
-            _phase_line("Montgomery phase", result.montgomery_phase, errors.montgomery_phase),
-            _phase_line("  dynamic phase", result.dynamic_phase, errors.dynamic_phase),
-            _phase_line("  geometric phase", result.geometric_phase, errors.geometric_phase),
-            rotation_line("tilt", result.tilt, errors.tilt),
-            _phase_line("momentum gap", result.momentum_gap, errors.momentum_gap),
-            f"{'residual':24}{result.residual:16.2e} rad   (phase by formula against attitude)",
-        ]
-    else:
-        lines.append("no angular momentum: the shape alone turns the body, there is no Montgomery phase")
-    if not result.is_loop:
-        lines.append(f"{'shape gap':24}{result.shape_gap:16.6g}       (the shape does not return: no holonomy)")
-    lines += [
-        f"{'error estimate':24}{motion.error_estimate:16.2e} rad   (of the attitude, at all times)",
-        f"{'evaluations':24}{motion.evaluations:16d}",
-    ]
-    return lines
-
-
-def rotation_line(name: str, rotation: Array, error: Array | None = None) -> str:
-    """Angle and axis of a rotation, with the angle by which it may be off [rad] where that is known.
-
-    The axis has no more digits than the error leaves it: it is the less certain the smaller the angle.
-    """
-    vector = so3.log(rotation)
-    turn = float(np.linalg.norm(vector))
-    digits, column = _AXIS_DIGITS, ""
-    if error is not None:
-        column = f"{float(error):11.1e}"
-        digits = int(np.clip(-np.log10(float(error) / max(2.0 * math.sin(0.5 * turn), 1e-300) + 1e-300), 0, digits))
-    axis = ""
-    if turn >= _NO_TURN and digits:
-        axis = "   (" + " ".join(f"{v + 0.0:9.{digits}f}" for v in np.round(vector / turn, digits)) + ")"
-    return f"{name:24} {np.degrees(turn):15.6f}{column}{axis}"
-
-
-def _phase_line(name: str, phase: Array, error: Array) -> str:
-    return f"{name:24}{np.degrees(phase):16.6f}{float(error):11.1e}{phase:20.9f}"
+        f"momentum ({momentum}) kg m^2/s"
+    )
 
 
 def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> dict[str, Any]:
@@ -90,7 +35,7 @@ def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit)
         "duration_s": motion.duration,
         "momentum_kg_m2_s": motion.momentum.tolist(),
         "final_attitude_quat_xyzw": motion.quat_xyzw(motion.duration).tolist(),
-        **plain(result),
+        **result.to_dict(),
         "error_estimate_rad": float(motion.error_estimate),
         "evaluations": motion.evaluations,
         "sha256": dict(motion.deformation.inputs),
@@ -123,7 +68,7 @@ def orbit_data(
     """Closed orbits and their phases for programs."""
     rows = zip(starts.tolist(), found.index.tolist(), found.trace.tolist(), found.stability, splits, strict=True)
     names = ("momentum_direction_at_start", "index", "trace", "stability")
-    orbits = [dict(zip(names, row[:4], strict=True)) | plain(row[4]) | {"gauge": gauge} for row in rows]
+    orbits = [dict(zip(names, row[:4], strict=True)) | row[4].to_dict() | {"gauge": gauge} for row in rows]
     return {
         "body": body.name,
         "motion": motion_name,
@@ -205,14 +150,6 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
     return [text], {"recorded_base_difference_rad": angle, "recorded_base_difference_time_s": when}
 
 
-def plain(result: Any) -> dict[str, Any]:
-    """The fields of a result as JSON can hold them, and its error estimates; infinite limits become null."""
-    shown = {field.name: getattr(result, field.name) for field in fields(result) if field.repr}
-    if isinstance(result, PhaseSplit):
-        shown["error_estimates"] = result.error_estimates
-    return {key: _as_json(value) for key, value in shown.items()}
-
-
 _PATH_KEYS = {"joints_beyond_limits": "beyond", "still_joints": "resting"}
 """JSON keys that are shorter than the names of the fields."""
 
@@ -220,15 +157,6 @@ _PATH_KEYS = {"joints_beyond_limits": "beyond", "still_joints": "resting"}
 def path_data(summary: PathSummary) -> dict[str, Any]:
     """A summary of a joint motion as JSON can hold it."""
     return {_PATH_KEYS.get(key, key): value for key, value in plain(summary).items()}
-
-
-def _as_json(value: Any) -> Any:
-    value = value.tolist() if hasattr(value, "tolist") else plain(value) if is_dataclass(value) else value
-    if isinstance(value, dict):
-        return {key: _as_json(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_as_json(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _numbers(values: Array) -> str:

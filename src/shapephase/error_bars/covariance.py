@@ -16,7 +16,8 @@ from ..body.body import Body
 from ..body.family import BodyFamily
 from ..deformation.deformation import articulated
 from ..errors import ShapeError, unknown_name
-from ..phases.phases import PhaseSplit, split
+from ..phases.phase_split import PhaseSplit
+from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.files._labels import amounts
 from ..shape_space.summaries import body_summary

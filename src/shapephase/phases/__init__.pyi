@@ -1,8 +1,8 @@
 from .continuation import OrbitBranch, continued_orbits
 from .error_estimates import ArcErrors, RunningErrors, SplitErrors
+from .phase_split import PhaseSplit, SplitMotion
 from .phases import (
     ArcPhases,
-    PhaseSplit,
     RunningPhases,
     arc_phases,
     dynamic_phase_from_energy,
@@ -25,6 +25,7 @@ __all__ = [
     "RunningErrors",
     "RunningPhases",
     "SplitErrors",
+    "SplitMotion",
     "arc_phases",
     "closed_orbits",
     "continued_orbits",

@@ -256,6 +256,8 @@ def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> Split
     """Of a split with its `residual` (B,)."""
     errors, batch, edges = CurveErrors(motion, curve), motion.batch, curve.edges
     whole = errors.of(Stretches.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.corners[:, :1])
+    # What the momentum sweeps itself is joined to the reference; the closing is the rest.
+    swept = errors.of(Stretches.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.references[:, None])
 
     def of(error: Array) -> Array:
         return (error.reshape(-1) * curve.has_phase).reshape(batch)[()]
@@ -271,18 +273,24 @@ def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> Split
         solid_angle=of(whole.area),
         tilt=of(whole.tilt),
         momentum_gap=of(whole.gap),
+        closing_phase=of(np.minimum(whole.area + swept.area, 2.0 * np.pi)),
     )
 
 
 def running_errors(
-    motion: Motion, curve: MomentumCurve, times: Array, residual: Array, shape: tuple[int, ...]
+    motion: Motion,
+    curve: MomentumCurve,
+    times: Array,
+    residual: Array,
+    references: Array,
+    shape: tuple[int, ...],
 ) -> RunningErrors:
-    """Of phases up to times (N,) that are edges of the curve, which great circles join to its reference.
+    """Of phases up to times (N,) that are edges of the curve, which great circles join to references (B, 3).
 
     `residual` (B, N) is that of the phases at each time; results have the `shape`.
     """
     stretches = Stretches.of(curve.edges, np.zeros(1), times)
-    targets = np.broadcast_to(curve.references[:, None], (*residual.shape, 3))
+    targets = np.broadcast_to(references[:, None], (*residual.shape, 3))
     parts = CurveErrors(motion, curve).of(stretches, residual, targets)
 
     def of(error: Array) -> Array:

@@ -29,6 +29,8 @@ _SHARE = 0.2
 _SHARE_AT_TIMES = 5e-3
 # [rad] the same where the motion is as good as exact.
 _ROUNDING = 1e-14
+# The same of one that passes by the point opposite the start: what jumps there is an area that swings anyway.
+_HALVINGS_AT_START = 8
 # Halvings of steps whose integrals add more; each divides what they add by four thousand.
 _MOST_HALVINGS = 3
 # [rad] Longer pieces of a curve are halved: their area is taken between arc and chord.
@@ -115,6 +117,25 @@ class MomentumCurve(CurvePieces):
         moving = self.has_phase[:, None]
         return np.where(moving, dynamic[:, place], 0.0), np.where(moving, area[:, place], 0.0)
 
+    def closing(self, times: Array) -> tuple[Array, Integers]:
+        """What the great circle back to the start adds to the area at each of these edges, and its jumps so far.
+
+        (N,) -> (B, N) [sr], (B, N): the sum with what is `swept` grows continuously but for 4 pi, so many times, where
+        the great circle passes the point opposite the reference.
+        """
+        corners, references = self.corners, self.references[:, None]
+        start = corners[:, :1]
+        half = so3.middle(corners, start)
+        back = sphere.triangle_area(references, corners, half) + sphere.triangle_area(references, half, start)
+        back[:, 0] = 0.0
+        one, other = corners[:, :-1], corners[:, 1:]
+        grown = sphere.triangle_area(references, one, other) + np.diff(back, axis=1)
+        # Seen from the start the same triangle has no great circles beside it: it grows continuously.
+        spheres = np.rint((grown - sphere.triangle_area(start, one, other)) / (4.0 * np.pi)).astype(np.int64)
+        jumps = np.concatenate([np.zeros((len(corners), 1), dtype=np.int64), np.cumsum(spheres, axis=1)], axis=1)
+        place, moving = np.searchsorted(self.edges, times), self.has_phase[:, None]
+        return np.where(moving, back[:, place], 0.0), np.where(moving, jumps[:, place], 0)
+
     def directions(self, times: Array) -> Array:
         """At these edges: (N,) -> (B, N, 3)."""
         return self.corners[:, np.searchsorted(self.edges, times)]
@@ -164,12 +185,15 @@ class MomentumCurve(CurvePieces):
         return self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)
 
 
-def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> MomentumCurve:
+def momentum_curve(
+    motion: Motion, gauge: Gauge, times: Array | None = None, *, clear_of_start: bool = False
+) -> MomentumCurve:
     """The curve of a motion in a gauge, cut at the integrator's steps and at `times` too.
 
     Parameters
     ----------
     gauge : a name of `GAUGES`, "link:NAME", or a function as for `in_gauge`
+    clear_of_start : whether arcs that pass by the point opposite the start are cut finely, too
 
     Raises
     ------
@@ -189,10 +213,17 @@ def momentum_curve(motion: Motion, gauge: Gauge, times: Array | None = None) -> 
     goal = np.maximum((_SHARE if times is None else _SHARE_AT_TIMES) * motion.solution.error_estimate, _ROUNDING)
     integrals = _integrals_of(motion, lift, frames, start, goal)
     found = integrals(edges if times is None else np.union1d(edges, times))
-    ends = found.corners if times is None else found.corners[:, np.searchsorted(found.edges, edges)]
+    # Whatever the times, the region that is not counted is the same.
+    by_steps = times is not None and follows and isinstance(motion.solution, SteppedRotation)
+    if by_steps:
+        ends = found.corners[:, np.searchsorted(found.edges, edges)]
+    else:
+        ends = found.corners if times is None else integrals(edges).corners
     references = np.array(list(map(sphere.far_reference, ends)))
     if times is not None:
-        found = _clear(integrals, found, references)
+        found = _clear(integrals, found, references, _HALVINGS)
+    if clear_of_start:
+        found = _clear(integrals, found, found.corners[:, 0], _HALVINGS_AT_START)
     return MomentumCurve(motion=motion, lift=lift, frames=frames, axis=axis, references=references, **vars(found))
 
 
@@ -359,9 +390,11 @@ def _last_terms() -> tuple[Array, Array]:
     return terms[:, -4:-2], terms[:, -2:]
 
 
-def _clear(integrals: Callable[[Array], CurvePieces], found: CurvePieces, references: Array) -> CurvePieces:
+def _clear(
+    integrals: Callable[[Array], CurvePieces], found: CurvePieces, references: Array, halvings: int
+) -> CurvePieces:
     """Pieces so short that the point opposite the reference is never between an arc and its chord."""
-    for _ in range(_HALVINGS):
+    for _ in range(halvings):
         edges, corners = found.edges, found.corners
         away = np.linalg.norm(corners[:, :-1] + references[:, None], axis=-1)
         close = np.any(away < 2.0 * np.linalg.norm(np.diff(corners, axis=1), axis=-1), axis=0)

@@ -17,7 +17,7 @@ class SplitErrors:
     Attributes
     ----------
     total_rotation, holonomy, dynamical_rotation, tilt : angle from the true rotation [rad]
-    montgomery_phase, dynamic_phase, geometric_phase : modulo 4 pi [rad]
+    montgomery_phase, dynamic_phase, geometric_phase, closing_phase : modulo 4 pi [rad]
     montgomery_angle : modulo 2 pi [rad]
     solid_angle : modulo 4 pi [sr]
     momentum_gap : [rad]
@@ -33,6 +33,7 @@ class SplitErrors:
     solid_angle: Array
     tilt: Array
     momentum_gap: Array
+    closing_phase: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -12,70 +13,21 @@ from numpy.typing import ArrayLike
 
 from .. import so3, sphere
 from ..arguments import check_object, times_argument
-from ..arrays import Array, Mask, finite_array
-from ..errors import ShapeError
+from ..arrays import Array, Integers, finite_array
+from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
+from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
 from ._deferred import Deferred
 from ._momentum_curve import Gauge, momentum_curve
 from ._motion_parts import array_by_parts, by_parts
-from .error_estimates import ArcErrors, RunningErrors, SplitErrors
+from .error_estimates import ArcErrors, RunningErrors
+from .phase_split import PhaseSplit, SplitMotion
 
-
-@dataclass(frozen=True, eq=False)
-class PhaseSplit:
-    """What turned a free body: its shape, and its angular momentum.
-
-    All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
-    the momentum, seen from the gauge's frame,
-
-        exp(montgomery_phase hat(mu)) tilt = dynamical_rotation            in the horizontal gauge,
-        exp(montgomery_phase hat(mu)) tilt = total_rotation                in the base gauge of a closed joint path,
-        total_rotation = dynamical_rotation holonomy                       always.
-
-    Attributes
-    ----------
-    gauge : the frame from which the momentum curve was seen
-    total_rotation : (3, 3) Delta R, from the start to the end of the motion, the same in every gauge
-    holonomy : (3, 3) R_G, what the loop of shapes alone does; for an open path the endpoint of its lift
-    dynamical_rotation : (3, 3) R_D, what the momentum adds
-    montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
-    montgomery_angle : the same in (-pi, pi] [rad]
-    dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's magnitude [rad]
-    geometric_phase : minus the solid angle [rad]
-    solid_angle : signed, of the momentum curve in this gauge, closed by the great circle; counted from the
-        region of the sphere farthest from the curve [sr]
-    tilt : (3, 3) transport along the closing great circle; the identity when the momentum closes in this gauge
-    momentum_gap : angle between the ends of the momentum curve in this gauge [rad]
-    shape_gap : how far the end shape is from the start shape
-    residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
-    is_loop : whether the shape closes
-    has_phase : whether there is angular momentum; without it all phases are 0 and R_D is the identity
-    """
-
-    gauge: str
-    total_rotation: Array
-    holonomy: Array
-    dynamical_rotation: Array
-    montgomery_phase: Array
-    montgomery_angle: Array
-    dynamic_phase: Array
-    geometric_phase: Array
-    solid_angle: Array
-    tilt: Array
-    momentum_gap: Array
-    shape_gap: float
-    residual: Array
-    is_loop: bool
-    has_phase: Mask
-    _errors: Deferred[SplitErrors] = field(repr=False)
-
-    @property
-    def error_estimates(self) -> SplitErrors:
-        """Of each of these numbers; computed when they are first looked at, for about half of what the split took."""
-        return self._errors.value
+CLOSINGS = ("start", "reference")
+"""What closes the momentum's curve so far, for `running_phases`."""
 
 
 def split(
@@ -125,6 +77,7 @@ def split(
     tilt = np.where(moving, first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
     area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners, curve.references), 0.0)
+    closing = curve.closing(curve.edges[-1:])[0][:, 0]
     phase = dynamic - area
     read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
     residual = np.abs(so3.wrap(phase - read_off))
@@ -141,71 +94,118 @@ def split(
         solid_angle=area.reshape(batch)[()],
         tilt=tilt.reshape(matrix),
         momentum_gap=(so3.angle_between(departing, arriving) * has_phase).reshape(batch)[()],
+        closing_phase=(0.0 - closing).reshape(batch)[()],
         shape_gap=deformation.shape_gap,
         residual=residual.reshape(batch)[()],
         is_loop=deformation.closure is not None,
         has_phase=has_phase.reshape(batch)[()],
+        about=SplitMotion(
+            label=deformation.label,
+            duration=motion.duration,
+            momentum=motion.momentum,
+            error_estimate=motion.error_estimate,
+            evaluations=motion.evaluations,
+        ),
         _errors=Deferred(partial(split_errors, motion, curve, residual)),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class RunningPhases:
-    """The phases of a motion in time, continuous and starting from zero; fields are batch + t.shape.
+    """The phases of a motion in time, starting from zero; fields are batch + t.shape.
 
     Directions of the momentum are joined to `reference` by great circles: with B(u) the shortest turn from there to
     u, and R the attitude of the gauge's frame,
 
-        R(t) B(u(t)) = exp(montgomery_phase(t) hat(mu)) R(0) B(u(0)),
+        R(t) B(u(t)) = exp(montgomery_phase(t) hat(mu)) R(0) B(u(0)).
 
-    so that nothing jumps as long as the momentum keeps away from the point opposite the reference, which is chosen
-    for that. Whenever the momentum is back at its start, this is the phase of the closed curve.
+    Closed to the "start", they are the phases of the motion so far, and those of `split` at its end: the great circle
+    goes from the momentum back to where it began, and areas are counted from the region that the whole curve leaves
+    farthest. They grow continuously, but where that great circle passes over this region the area jumps by 4 pi.
+    Closed to a "reference" far from the points opposite the curve nothing jumps, and the phases are those of the
+    closed curve whenever the momentum is back at its start; the end of an open curve is not that of `split`.
 
     Attributes
     ----------
     times : (...) [s]
     gauge : the frame from which the momentum was seen
+    closing : "start" or "reference"
     dynamic_phase, geometric_phase, montgomery_phase : unwrapped [rad]
     montgomery_angle : the last in (-pi, pi] [rad]
-    solid_angle : swept about the reference, minus the geometric phase [sr]
-    reference : batch + (3,), in the gauge's frame
+    solid_angle : of the curve so far, closed; minus the geometric phase [sr]
+    momentum_gap : angle between the momentum and its start, in this gauge [rad]
+    closing_phase : what the great circle back to the start adds to the geometric phase; closed to a "reference" 0 [rad]
+    jumps : how many times 4 pi the solid angle has jumped so far; solid_angle - 4 pi jumps is continuous
+    reference : batch + (3,), in the gauge's frame; closed to the start, that direction
     residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
     error_estimates : of the phases at each time
     """
 
     times: Array
     gauge: str
+    closing: str
     dynamic_phase: Array
     geometric_phase: Array
     montgomery_phase: Array
     montgomery_angle: Array
     solid_angle: Array
+    momentum_gap: Array
+    closing_phase: Array
+    jumps: Integers
     reference: Array
     residual: Array
     error_estimates: RunningErrors
 
+    def write_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write a time series: each phase in degrees, then in radians, the solid angle, and the jumps so far.
 
-def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") -> RunningPhases:
-    """The continuous lift of every phase in time.
+        The geometric phase holds what closing the curve adds, the closing phase, which is beside the momentum's gap.
+
+        Raises ShapeError for the phases of a batch, or of a single time.
+        """
+        if self.times.ndim != 1 or self.montgomery_phase.ndim != 1:
+            raise ShapeError(f"a table holds one motion at (N,) times, these are {self.montgomery_phase.shape}")
+        names = ("dynamic_phase", "geometric_phase", "montgomery_phase", "closing_phase", "momentum_gap")
+        columns = {"time": self.times} | {f"{name}_deg": np.degrees(getattr(self, name)) for name in names}
+        columns |= {f"{name}_rad": getattr(self, name) for name in names}
+        write_table(path, columns | {"solid_angle_sr": self.solid_angle, "jumps": self.jumps.astype(np.float64)})
+
+
+def running_phases(
+    motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal", *, closing: str = "start"
+) -> RunningPhases:
+    """Every phase in time, ending in that of `split`.
 
     Parameters
     ----------
     t : times (...) [s]
     gauge : as for `split`
+    closing : what the momentum's curve so far is closed by: "start", the great circle back to its start, as `split`
+        closes the whole; "reference", great circles to one fixed direction, by which nothing jumps
 
     Notes
     -----
-    Raises as `split`. Source: Cabrera 2006, equation (12); theory.md D5, D9; numerics.md section 3 (branch).
+    Raises as `split`, and UnknownNameError for another closing. Source: Cabrera 2006, equation (12); theory.md D5, D9;
+    numerics.md section 3 (branch).
     """
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
-        return by_parts(motion, lambda part: running_phases(part, t, gauge), shared=("times",))
+        return by_parts(motion, lambda part: running_phases(part, t, gauge, closing=closing), shared=("times",))
+    if closing not in CLOSINGS:
+        raise unknown_name("closing", closing, CLOSINGS)
+    to_start = closing == "start"
     times = times_argument(t, motion.duration)
     flat = times.ravel()
-    curve = momentum_curve(motion, gauge, times=flat)
-    references = curve.references
+    curve = momentum_curve(motion, gauge, times=flat, clear_of_start=to_start)
     dynamic, area = curve.swept(flat)
-    about = so3.between(references[:, None], curve.directions(flat))
+    references, back, jumps = curve.references, 0.0 * area, np.zeros(area.shape, dtype=np.int64)
+    if to_start:
+        references = curve.corners[:, 0]
+        back, jumps = curve.closing(flat)
+        area = area + back
+    directions = curve.directions(flat)
+    gap = so3.angle_between(curve.corners[:, :1], directions) * curve.has_phase[:, None]
+    about = so3.between(references[:, None], directions)
     frames = curve.attitudes(flat) @ about
     begin = curve.attitudes(np.zeros(1)) @ so3.between(references, curve.corners[:, 0])[:, None]
     seen = so3.angle_about(frames @ so3.transpose(begin), curve.axis[:, None]) * curve.has_phase[:, None]
@@ -214,14 +214,18 @@ def running_phases(motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal") ->
     return RunningPhases(
         times=times,
         gauge=gauge if isinstance(gauge, str) else "given",
+        closing=closing,
         dynamic_phase=dynamic.reshape(shape)[()],
         geometric_phase=(0.0 - area).reshape(shape)[()],
         montgomery_phase=phase.reshape(shape)[()],
         montgomery_angle=so3.wrap(phase).reshape(shape)[()],
         solid_angle=area.reshape(shape)[()],
+        momentum_gap=gap.reshape(shape)[()],
+        closing_phase=(0.0 - back).reshape(shape)[()],
+        jumps=jumps.reshape(shape)[()],
         reference=references.reshape(*motion.batch, 3),
         residual=residual.max(axis=-1, initial=0.0).reshape(motion.batch)[()],
-        error_estimates=running_errors(motion, curve, flat, residual, shape),
+        error_estimates=running_errors(motion, curve, flat, residual, references, shape),
     )
 
 

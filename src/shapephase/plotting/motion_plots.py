@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, unknown_name
 from ..phases._momentum_curve import Gauge
-from ..phases.phases import running_phases
+from ..phases.phases import RunningPhases, running_phases
+from ..phases.split_text import CLOSED_GAP
 from ..reconstruction.reconstruction import Motion
+from ._letters import plain_text
 from .plot_style import (
     BLACK,
     GREY,
@@ -25,6 +27,7 @@ from .plot_style import (
     SKY,
     VERMILION,
     check_flat_axes,
+    degrees_first,
     even_times,
     in_time,
     motion_times,
@@ -40,18 +43,27 @@ ATTITUDES = ("rotation_vector", "quaternion")
 INERTIAS = ("principal", "entries")
 _ENTRIES = ((0, 0, "xx"), (1, 1, "yy"), (2, 2, "zz"), (0, 1, "xy"), (1, 2, "yz"), (0, 2, "xz"))
 _TOTAL: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
-_WRAPPED: dict[str, Any] = {"color": "#F3CE86", "linewidth": 4.0, "zorder": 1.4}
+_JUMPED: dict[str, Any] = {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 1.2, "zorder": 1.4}
 # Change between neighbouring points [rad, or 1 for a quaternion] that is a jump and not a curve.
 _JUMP = 1.0
 # Angle short of a half turn [rad] at which the sign of a rotation vector is free.
 _HALF_TURN = 1e-6
 
 
-def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times: ArrayLike | None = None) -> Axes:
-    """The dynamic, geometric and total (Montgomery) phase in time, continuous from zero, and the total in (-π, π].
+def plot_phases(
+    ax: Axes,
+    motion: Motion,
+    gauge: Gauge = "horizontal",
+    *,
+    times: ArrayLike | None = None,
+    closing: str = "start",
+) -> Axes:
+    """The dynamic, geometric and total (Montgomery) phase in time, in degrees and in radians.
 
-    The band about the total is the residual, the difference from the same angle read off the attitude; usually it is
-    far thinner than the line, and its width is in the legend.
+    Each ends in the number of `split`, which the legend has: at every time the momentum's curve so far is closed by
+    the great circle back to its start. Where it stays open by more than a degree, the legend says how much the circle
+    adds at the end. Where the great circle passes over the region that is not counted, the lines jump by a whole
+    sphere, 720 degrees, which dots mark.
 
     Parameters
     ----------
@@ -59,6 +71,7 @@ def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times:
     motion : of one momentum, no batch; without momentum all phases are zero
     gauge : as for `running_phases`
     times : (N,) where to draw [s]; None: several in each step of the integrator
+    closing : as for `running_phases`
 
     Notes
     -----
@@ -68,16 +81,20 @@ def plot_phases(ax: Axes, motion: Motion, gauge: Gauge = "horizontal", *, times:
     check_flat_axes(ax)
     one_motion(motion)
     t = motion_times(motion, times)
-    found = running_phases(motion, t, gauge)
-    total, room = found.montgomery_phase, float(found.residual)
-    label = f"residual {room:.1g} rad"
-    ax.fill_between(t, total - room, total + room, color=GREY, alpha=0.5, linewidth=0.0, label=label, zorder=1.5)
-    ax.plot(t, found.dynamic_phase, label="dynamic", **SERIES[0])
-    ax.plot(t, found.geometric_phase, label="geometric", **SERIES[1])
-    ax.plot(t, total, label="total", **_TOTAL)
-    _pieces(ax, t, found.montgomery_angle[:, None], [("total in (−π, π]", _WRAPPED)])
+    found = running_phases(motion, t, gauge, closing=closing)
+    jumps = np.flatnonzero(np.diff(found.jumps))
+    for values, name, look in (
+        (found.dynamic_phase, r"dynamic $\theta_\mathrm{D}$", SERIES[0]),
+        (found.geometric_phase, r"geometric $\theta_\mathrm{G}$", SERIES[1]),
+        (found.montgomery_phase, r"total $\theta_\mathrm{M}$", _TOTAL),
+    ):
+        at_jumps = jumps if look is not SERIES[0] else jumps[:0]
+        ax.plot(*_broken(t, values, at_jumps), label=f"{name} = {_degrees(values[-1])}", **look)
+        for k in at_jumps:
+            ax.plot(t[k : k + 2], values[k : k + 2], **_JUMPED)
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    in_time(ax, (t[0], t[-1]), f"phase, {found.gauge} gauge [rad]")
+    in_time(ax, (t[0], t[-1]), "", title=_phase_title(found, len(jumps)))
+    degrees_first(ax, "phase")
     return ax
 
 
@@ -233,6 +250,27 @@ def plot_energy(
     ax.plot(t, energy_along(motion, t), label="E", color=BLACK, linewidth=1.7)
     in_time(ax, (t[0], t[-1]), "energy [J]")
     return ax
+
+
+def _phase_title(found: RunningPhases, jumps: int) -> str:
+    """The gauge, and what closes the curve: how far it is open at the last time drawn, and what that adds."""
+    lines = [f"{plain_text(found.gauge)} gauge"]
+    gap, added = float(found.momentum_gap[-1]), float(found.closing_phase[-1])
+    if gap > CLOSED_GAP and found.closing == "start":
+        lines.append(f"open by {_degrees(gap)}; closing it adds {_degrees(added, sign=True)}")
+    if jumps:
+        lines.append(f"dots: {'a jump' if jumps == 1 else 'jumps'} by a whole sphere, 720°")
+    return "\n".join(lines)
+
+
+def _degrees(angle: float, *, sign: bool = False) -> str:
+    """An angle in degrees with two digits after the point, with a minus sign that is one."""
+    return f"{np.degrees(angle) + 0.0:{'+' if sign else ''}.2f}°".replace("-", "−")
+
+
+def _broken(t: Array, values: Array, at: Integers) -> tuple[Array, Array]:
+    """A line interrupted after some of its points: (N,), (N,) -> (M,), (M,)."""
+    return np.insert(t, at + 1, np.nan), np.insert(values, at + 1, np.nan)
 
 
 def _pieces(ax: Any, t: Array, values: Array, looks: list[tuple[str, dict[str, Any]]]) -> None:

@@ -168,7 +168,7 @@ def finish(ax: Any, **place: Any) -> Any:
     ax.tick_params(labelsize=SMALL)
     ax.xaxis.get_offset_text().set_fontsize(SMALL)
     ax.yaxis.get_offset_text().set_fontsize(SMALL)
-    above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)} if not place else {}
+    above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)} if not {"loc", "bbox_to_anchor"} & {*place} else {}
     look = {
         "fontsize": SMALL - 1,
         "title_fontsize": SMALL - 1,
@@ -182,9 +182,23 @@ def finish(ax: Any, **place: Any) -> Any:
 def in_time(ax: Any, duration: tuple[float, float], label: str, **place: Any) -> None:
     """Limits, labels and legend of a figure whose abscissa is time [s]; `label` with its unit is for the ordinate."""
     ax.set_xlim(*duration)
-    ax.set_xlabel("t [s]", fontsize=SMALL)
+    ax.set_xlabel("$t$ [s]", fontsize=SMALL)
     ax.set_ylabel(label, fontsize=SMALL)
     finish(ax, **place)
+
+
+def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
+    """An ordinate in degrees on the left, for what is drawn in radians; on the right these, if they are to be seen."""
+    left = ax.secondary_yaxis("left", functions=(np.degrees, np.radians))
+    left.set_ylabel(f"{label} [deg]", fontsize=SMALL)
+    left.tick_params(labelsize=SMALL)
+    if radians:
+        ax.yaxis.tick_right()
+        ax.yaxis.set_label_position("right")
+        ax.set_ylabel("[rad]", fontsize=SMALL)
+    else:
+        ax.tick_params(axis="y", left=False, labelleft=False)
+        ax.set_ylabel("")
 
 
 def _check_matplotlib() -> None:

@@ -1,0 +1,99 @@
+"""A split rotation: the numbers of `split`, what they are of, and how they are shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..arrays import Array, Mask
+from ..plain_data import plain
+from ._deferred import Deferred
+from .error_estimates import SplitErrors
+from .split_text import split_lines
+
+
+@dataclass(frozen=True, eq=False)
+class SplitMotion:
+    """What is told of a motion beside its split.
+
+    Attributes
+    ----------
+    label : what moved, for people
+    duration : [s]
+    momentum : batch + (3,), inertial axes [kg m^2/s]
+    error_estimate : of the attitude at all times: batch [rad]
+    evaluations : how often the locked inertia and internal momentum were computed
+    """
+
+    label: str
+    duration: float
+    momentum: Array
+    error_estimate: Array
+    evaluations: int
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseSplit:
+    """What turned a free body: its shape, and its angular momentum.
+
+    All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
+    the momentum, seen from the gauge's frame,
+
+        exp(montgomery_phase hat(mu)) tilt = dynamical_rotation            in the horizontal gauge,
+        exp(montgomery_phase hat(mu)) tilt = total_rotation                in the base gauge of a closed joint path,
+        total_rotation = dynamical_rotation holonomy                       always.
+
+    Attributes
+    ----------
+    gauge : the frame from which the momentum curve was seen
+    total_rotation : (3, 3) Delta R, from the start to the end of the motion, the same in every gauge
+    holonomy : (3, 3) R_G, what the loop of shapes alone does; for an open path the endpoint of its lift
+    dynamical_rotation : (3, 3) R_D, what the momentum adds
+    montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
+    montgomery_angle : the same in (-pi, pi] [rad]
+    dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's magnitude [rad]
+    geometric_phase : minus the solid angle [rad]
+    solid_angle : signed, of the momentum curve in this gauge, closed by the great circle; counted from the
+        region of the sphere farthest from the curve [sr]
+    tilt : (3, 3) transport along the closing great circle; the identity when the momentum closes in this gauge
+    momentum_gap : angle between the ends of the momentum curve in this gauge [rad]
+    closing_phase : what the closing great circle adds to the geometric phase; the rest is swept by the momentum
+        itself, about the direction opposite the region that is not counted [rad]
+    shape_gap : how far the end shape is from the start shape
+    residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
+    is_loop : whether the shape closes
+    has_phase : whether there is angular momentum; without it all phases are 0 and R_D is the identity
+    about : what was split
+    """
+
+    gauge: str
+    total_rotation: Array
+    holonomy: Array
+    dynamical_rotation: Array
+    montgomery_phase: Array
+    montgomery_angle: Array
+    dynamic_phase: Array
+    geometric_phase: Array
+    solid_angle: Array
+    tilt: Array
+    momentum_gap: Array
+    closing_phase: Array
+    shape_gap: float
+    residual: Array
+    is_loop: bool
+    has_phase: Mask
+    about: SplitMotion = field(repr=False)
+    _errors: Deferred[SplitErrors] = field(repr=False)
+
+    def __str__(self) -> str:
+        """The table that the command line prints; of a batch, how far each number spreads."""
+        return "\n".join(split_lines(self))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Every number under its name, with the error estimates, as JSON can hold it; angles in rad."""
+        return plain(self) | {"error_estimates": plain(self.error_estimates)}
+
+    @property
+    def error_estimates(self) -> SplitErrors:
+        """Of each of these numbers; computed when they are first looked at, for about half of what the split took."""
+        return self._errors.value

@@ -1,0 +1,139 @@
+"""A split in words and numbers: the table that is printed, on the command line and by `print(split)`."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+
+if TYPE_CHECKING:
+    from .phase_split import PhaseSplit
+
+CLOSED_GAP = math.radians(1.0)
+"""[rad] of the momentum, from which on a result says what closes it."""
+# Digits after the point of an axis.
+_AXIS_DIGITS = 6
+# [rad] A smaller turn has no axis worth showing.
+_NO_TURN = 1e-12
+# Letters of a line of words, as wide as the table.
+_WIDTH = 88
+# A line of the table of a batch.
+_ROW = "{:24}{:16.6f}{:16.6f}{:16.6f}"
+
+
+def split_lines(result: PhaseSplit, heading: str = "") -> list[str]:
+    """The table of a split; angles in degrees first, then in radians.
+
+    Parameters
+    ----------
+    heading : the first line; without it what moved, for how long, with which momentum
+    """
+    about = result.about
+    if about.momentum.ndim > 1:
+        return _batch_lines(result, heading)
+    momentum = " ".join(f"{v:g}" for v in about.momentum)
+    errors = result.error_estimates
+    closing = [_phase_line("    by the closing", result.closing_phase, errors.closing_phase)] if is_open(result) else []
+    lines = [
+        heading or f"{about.label}: {about.duration:g} s, momentum ({momentum}) kg m^2/s",
+        "",
+        f"{'':24}{'angle [deg]':>16}{'± [rad]':>11}   axis (inertial)",
+        rotation_line("total rotation", result.total_rotation, errors.total_rotation),
+        rotation_line(
+            "  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy, errors.holonomy
+        ),
+        rotation_line("  dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
+        "",
+    ]
+    if result.has_phase:
+        lines += [
+            f"{f'seen in the {result.gauge} gauge':30}{'[deg]':>10}{'± [rad]':>11}{'[rad]':>20}",
+            _phase_line("Montgomery phase", result.montgomery_phase, errors.montgomery_phase),
+            _phase_line("  dynamic phase", result.dynamic_phase, errors.dynamic_phase),
+            _phase_line("  geometric phase", result.geometric_phase, errors.geometric_phase),
+            *closing,
+            rotation_line("tilt", result.tilt, errors.tilt),
+            _phase_line("momentum gap", result.momentum_gap, errors.momentum_gap),
+            f"{'residual':24}{result.residual:16.2e} rad   (phase by formula against attitude)",
+        ]
+    else:
+        lines.append("no angular momentum: the shape alone turns the body, there is no Montgomery phase")
+    if not result.is_loop:
+        lines.append(f"{'shape gap':24}{result.shape_gap:16.6g}       (the shape does not return: no holonomy)")
+    lines += [
+        f"{'error estimate':24}{about.error_estimate:16.2e} rad   (of the attitude, at all times)",
+        f"{'evaluations':24}{about.evaluations:16d}",
+    ]
+    said = closing_text(result)
+    return [*lines, *(["", *textwrap.wrap(said, _WIDTH)] if said else [])]
+
+
+def is_open(result: PhaseSplit) -> bool:
+    """Whether the momentum of one motion ends so far from its start that what closes it has to be said."""
+    return bool(result.has_phase) and float(result.momentum_gap) > CLOSED_GAP
+
+
+def closing_text(result: PhaseSplit) -> str:
+    """What closes the momentum's curve and how much that adds, in one sentence; "" where it closes by itself."""
+    if not is_open(result):
+        return ""
+    gap, added = float(result.momentum_gap), float(result.closing_phase)
+    return (
+        f"The momentum does not close: a great circle of {degrees_text(gap)} from its end to its start closes it. "
+        f"That adds {degrees_text(added, sign=True)} to the geometric phase, and a tilt by the angle of the gap."
+    )
+
+
+def degrees_text(angle: float, *, sign: bool = False) -> str:
+    """An angle in degrees and in radians."""
+    return f"{math.degrees(angle):{'+' if sign else ''}.4f} deg ({angle:{'+' if sign else ''}.6f} rad)"
+
+
+def rotation_line(name: str, rotation: Array, error: Array | None = None) -> str:
+    """Angle and axis of a rotation, with the angle by which it may be off [rad] where that is known.
+
+    The axis has no more digits than the error leaves it: it is the less certain the smaller the angle.
+    """
+    vector = so3.log(rotation)
+    turn = float(np.linalg.norm(vector))
+    digits, column = _AXIS_DIGITS, ""
+    if error is not None:
+        column = f"{float(error):11.1e}"
+        digits = int(np.clip(-np.log10(float(error) / max(2.0 * math.sin(0.5 * turn), 1e-300) + 1e-300), 0, digits))
+    axis = ""
+    if turn >= _NO_TURN and digits:
+        axis = "   (" + " ".join(f"{v + 0.0:9.{digits}f}" for v in np.round(vector / turn, digits)) + ")"
+    return f"{name:24} {np.degrees(turn):15.6f}{column}{axis}"
+
+
+def _phase_line(name: str, phase: Array, error: Array) -> str:
+    return f"{name:24}{np.degrees(phase):16.6f}{float(error):11.1e}{phase:20.9f}"
+
+
+def _batch_lines(result: PhaseSplit, heading: str) -> list[str]:
+    """Of a batch, the least, the middle and the largest of each number."""
+    about = result.about
+    shape = about.momentum.shape[:-1]
+    rows = {
+        "total rotation": so3.angle(result.total_rotation),
+        "shape holonomy": so3.angle(result.holonomy),
+        "Montgomery phase": result.montgomery_phase,
+        "dynamic phase": result.dynamic_phase,
+        "geometric phase": result.geometric_phase,
+        "momentum gap": result.momentum_gap,
+    }
+    lines = [
+        heading or f"{about.label}: {about.duration:g} s, {math.prod(shape)} motions, a batch {shape}",
+        "",
+        f"{f'{result.gauge} gauge, [deg]':24}{'least':>16}{'middle':>16}{'largest':>16}",
+    ]
+    for name, values in rows.items():
+        if values.size:
+            spread = np.degrees([values.min(), np.median(values), values.max()])
+            lines.append(_ROW.format(name, *spread))
+    return lines
