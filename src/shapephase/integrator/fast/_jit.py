@@ -13,6 +13,7 @@ from typing import Any
 from numba import njit
 from numba.core import config
 
+from ._kept_code import KeptFunction
 from .cache_folder import kernel_folder
 
 # Without the interpreter's lock; a division by zero gives infinity, as in NumPy, and needs no branch.
@@ -35,7 +36,9 @@ def kernel(function: Any) -> Any:
         # Numba asks where to keep a function once, here; what else uses Numba in this process has its own place.
         before, _config.CACHE_DIR = _config.CACHE_DIR, str(folder)
         try:
-            return njit(cache=True, **_OPTIONS)(function)
+            made: Any = njit(**_OPTIONS)(function)
+            made._cache = KeptFunction(function)
+            return made
         except RuntimeError:
             return njit(**_OPTIONS)(function)
         finally:

@@ -16,7 +16,8 @@ from ...errors import CompiledCodeWarning
 
 _HERE = Path(__file__).parent
 _PRIVATE = 0o700
-_OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
+OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
+"""Bits of the mode of a file or folder that is not to be trusted."""
 
 
 def code_folder() -> Path:
@@ -57,7 +58,7 @@ def _make_private(folder: Path) -> None:
             raise NotADirectoryError(f"{folder} is no folder") from None
         if found.st_uid != os.getuid():
             raise PermissionError(f"{folder} belongs to another user") from None
-        if found.st_mode & _OTHERS_MAY_WRITE:
+        if found.st_mode & OTHERS_MAY_WRITE:
             raise PermissionError(f"others may write to {folder}") from None
         if stat.S_IMODE(found.st_mode) != _PRIVATE:
             os.chmod(folder, _PRIVATE)

@@ -64,9 +64,9 @@ def compile_steps() -> list[Path]:
         try:
             folder = kernel_folder()
             _import_kernels()
+            _warm()
         except (CompiledCodeWarning, *_NUMBA_DOES_NOT_WORK) as error:
             raise CompilerError(str(error)) from None
-    _warm()
     files = [] if folder is None else sorted(file for file in folder.rglob("*") if file.is_file())
     if not files:
         raise CompilerError("the kernels are not kept: there is no folder that only this user may write to")
@@ -104,7 +104,7 @@ def _import_kernels() -> None:
 def _are_kept() -> bool:
     """Whether every kernel was compiled before this process first asked, as far as the names of files tell."""
     folder = kernel_folder()
-    return folder is not None and all(any(folder.rglob(f"*{name}-*.nbi")) for name in _KERNELS)
+    return folder is not None and all(any(folder.rglob(f"*{name}-*.nbc")) for name in _KERNELS)
 
 
 @contextmanager

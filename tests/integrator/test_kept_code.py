@@ -1,0 +1,182 @@
+"""Kept machine code under torture: what is not whole, not this user's or not for this is made anew, never run."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from support.keeping_process import KeepingProcess
+
+pytestmark = pytest.mark.usefixtures("fast")
+FEW_OR_MANY = pytest.mark.parametrize("trials", [4, pytest.param(200, marks=pytest.mark.full)])
+
+
+@pytest.fixture(scope="module")
+def process():
+    pytest.importorskip("numba")
+    one = KeepingProcess()
+    yield one
+    one.stop()
+
+
+@pytest.fixture(scope="module")
+def compiled(process, tmp_path_factory):
+    """A folder for caches with one function in it."""
+    home = tmp_path_factory.mktemp("compiled")
+    assert ask(process, home) == (14.0, False, [])
+    return home
+
+
+@pytest.fixture
+def home(compiled, tmp_path):
+    """A copy of it."""
+    shutil.copytree(compiled, tmp_path / "home")
+    return tmp_path / "home"
+
+
+def ask(process, home, **request):
+    (answer,) = process.ask(home=home, count=1, **request)["all"]
+    assert "died" not in answer, answer
+    return answer["value"], answer["found"], answer["said"]
+
+
+def files(home) -> list[Path]:
+    """All that is kept, whatever it is."""
+    return list(home.glob("shapephase/kernels-*/*/*"))
+
+
+def kept(home) -> Path:
+    """The only one."""
+    (file,) = files(home)
+    return file
+
+
+def is_made_anew(process, home):
+    """The function is right, without the file; and the file is repaired."""
+    assert ask(process, home) == (14.0, False, [])
+    assert ask(process, home) == (14.0, True, [])
+
+
+def test_what_is_whole_is_loaded(process, home):
+    assert ask(process, home) == (14.0, True, [])
+    assert stat.S_IMODE(kept(home).parents[1].stat().st_mode) == 0o700
+
+
+@FEW_OR_MANY
+def test_a_file_that_is_cut_off_is_made_anew(process, home, trials):
+    file = kept(home)
+    whole = file.read_bytes()
+    lengths = np.random.default_rng(4).integers(0, len(whole), trials - 3)
+    for length in [0, 31, len(whole) - 1, *lengths]:
+        file.write_bytes(whole[:length])
+        is_made_anew(process, home)
+
+
+@FEW_OR_MANY
+def test_a_file_with_a_wrong_bit_is_made_anew(process, home, trials):
+    """Also one within the machine code, which would crash or compute something else."""
+    file = kept(home)
+    whole = file.read_bytes()
+    rng = np.random.default_rng(5)
+    for place in rng.integers(0, len(whole), trials):
+        changed = bytearray(whole)
+        changed[place] ^= 1 << int(rng.integers(8))
+        file.write_bytes(changed)
+        is_made_anew(process, home)
+
+
+class Trap:
+    """Something that does harm when it is unpickled."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return Path.touch, (self.mark,)
+
+
+def test_what_nobody_of_us_wrote_is_not_even_unpickled(process, home, tmp_path):
+    file, mark = kept(home), tmp_path / "mark"
+    for before in (b"", file.read_bytes()[:32]):
+        file.write_bytes(before + pickle.dumps(Trap(mark)))
+        is_made_anew(process, home)
+    assert not mark.exists()
+
+
+def test_the_code_of_another_function_is_not_taken_for_it(process, home, tmp_path):
+    shutil.rmtree(tmp_path / "other", ignore_errors=True)
+    assert ask(process, tmp_path / "other", function="thrice") == (21.0, False, [])
+    shutil.copy(kept(tmp_path / "other"), kept(home))
+    is_made_anew(process, home)
+
+
+@pytest.mark.parametrize("bits", [0o602, 0o620, 0o666])
+def test_a_file_that_others_may_write_to_is_made_anew(process, home, bits):
+    kept(home).chmod(bits)
+    is_made_anew(process, home)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
+def test_a_file_of_another_user_is_made_anew(process, home):
+    os.chown(kept(home), 12345, -1)
+    is_made_anew(process, home)
+
+
+@pytest.mark.parametrize("kind", ["folder", "link", "pipe"])
+def test_what_is_no_file_is_not_loaded(process, home, kind, tmp_path):
+    file = kept(home)
+    file.rename(tmp_path / "elsewhere")
+    if kind == "folder":
+        file.mkdir()
+        value, found, (said,) = ask(process, home)
+        assert (value, found) == (14.0, False)
+        assert said.endswith("it is a folder; name a file in it")
+    else:
+        file.symlink_to(tmp_path / "elsewhere") if kind == "link" else os.mkfifo(file)
+        is_made_anew(process, home)
+        assert not file.is_symlink()
+
+
+def test_a_full_disk_is_told_and_leaves_nothing(process, tmp_path):
+    value, found, (said,) = ask(process, tmp_path, limit=1024)
+    assert (value, found) == (14.0, False)
+    assert said.startswith(f"machine code is not kept in {tmp_path}/shapephase/kernels-")
+    assert said.endswith("File too large")
+    assert files(tmp_path) == []
+    assert ask(process, tmp_path) == (14.0, False, [])
+
+
+@pytest.mark.parametrize("rounds", [1, pytest.param(50, marks=pytest.mark.full)])
+def test_processes_that_compile_at_once_do_not_disturb_each_other(process, tmp_path, rounds):
+    for k in range(rounds):
+        home = tmp_path / str(k)
+        answers = process.ask(home=home, count=4)["all"]
+        assert [answer.get("value") for answer in answers] == [14.0] * 4
+        kept(home)
+        assert ask(process, home) == (14.0, True, [])
+
+
+@FEW_OR_MANY
+def test_a_process_that_is_killed_leaves_nothing_that_hurts(process, tmp_path, trials):
+    found = process.ask(home=tmp_path, trials=trials, seed=6)
+    assert found["wrong"] == 0
+    # Else the trial would show little.
+    assert 0 < found["kept"] < trials or trials < 200
+
+
+def test_another_processor_has_a_file_of_its_own(process, home):
+    """The same folder, as in a home that two machines share."""
+    other = KeepingProcess(NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
+    try:
+        assert ask(other, home) == (14.0, False, [])
+        assert ask(other, home) == (14.0, True, [])
+    finally:
+        other.stop()
+    assert ask(process, home) == (14.0, True, [])
+    assert len(files(home)) == 2
