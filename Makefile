@@ -1,7 +1,7 @@
 # The same checks as .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test notebooks full fuzz bench
+.PHONY: check lint types imports test notebooks docs full fuzz bench
 
 check: lint types imports test notebooks
 
@@ -21,6 +21,10 @@ test:
 
 notebooks:
 	$(BIN)/pytest --nbmake notebooks -p no:cacheprovider -W default
+
+# The notebooks are executed here, too; `notebooks` also fails on their asserts in an environment without Sphinx.
+docs:
+	$(BIN)/sphinx-build -nW --keep-going docs docs/_build/html
 
 full:
 	$(BIN)/pytest -n auto

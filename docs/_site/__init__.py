@@ -1,0 +1,1 @@
+"""Steps of the build that are this site's own."""

@@ -1,0 +1,75 @@
+"""Which functions and tests belong to each code of the theory, as tables made from docstrings and tests."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from pathlib import Path
+
+from .code_links import CODE
+
+_ENTRY = re.compile(rf"^- \*\*({CODE})\*\* (.*(?:\n  .*)*)", re.MULTILINE)
+_CITED = re.compile(rf"theory\.md((?:[ ,;:(-]|\n|and\b|to\b|errata\b|{CODE}\b)*)")
+_MOST = 4
+"""Of tests and functions a row names so many, and counts the rest."""
+
+
+def _codes(text: str) -> set[str]:
+    """What a docstring cites of the theory; `E6 to E9` are all of them."""
+    found: set[str] = set()
+    for citation in _CITED.findall(text):
+        found |= set(re.findall(CODE, citation))
+        for first, last in re.findall(r"([A-U]\d+) to ([A-U]\d+)", citation):
+            if first[0] == last[0]:
+                found |= {f"{first[0]}{number}" for number in range(int(first[1:]), int(last[1:]) + 1)}
+    return found
+
+
+def _definitions(file: Path) -> list[tuple[str, str]]:
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    kinds = (ast.FunctionDef, ast.ClassDef)
+    return [(node.name, ast.get_docstring(node) or "") for node in ast.walk(tree) if isinstance(node, kinds)]
+
+
+def coverage(root: Path) -> dict[str, tuple[str, list[str], list[str]]]:
+    """Each code with its entry, the functions that cite it, and the tests named after it or citing it."""
+    entries = dict(_ENTRY.findall((root / "docs" / "theory.md").read_text(encoding="utf-8")))
+    functions, tests = defaultdict(list), defaultdict(list)
+    for file in sorted((root / "src").rglob("*.py")):
+        for name, text in _definitions(file):
+            for code in _codes(text):
+                if not name.startswith("_"):
+                    functions[code].append(name)
+    lower = {code.lower().replace("-", "_"): code for code in entries}
+    for file in sorted((root / "tests").rglob("test_*.py")):
+        for name, text in _definitions(file):
+            if name.startswith("test_"):
+                ending = re.search(r"_((?:[cbm]_e|[a-z])\d+[a-z]?)$", name)
+                code = lower.get(ending[1]) or lower.get(ending[1].rstrip("abc")) if ending else None
+                for one in _codes(text) | ({code} if code else set()):
+                    tests[one].append(f"{file.relative_to(root / 'tests')}: {name}")
+    return {code: (text, functions[code], tests[code]) for code, text in entries.items()}
+
+
+def _some(names: list[str]) -> str:
+    unique = list(dict.fromkeys(names))
+    shown = "<br>".join(f"`{name}`" for name in unique[:_MOST])
+    return shown + (f"<br>and {len(unique) - _MOST} more" if len(unique) > _MOST else "")
+
+
+def write_tables(root: Path) -> None:
+    """Misprints with their tests, and the catalogue with functions and tests."""
+    rows = coverage(root)
+    folder = root / "docs" / "theory" / "tables"
+    folder.mkdir(exist_ok=True)
+    for name, misprint in (("misprints", True), ("coverage", False)):
+        lines = ["| code | what holds | tests |" if misprint else "| code | functions | tests |", "|---|---|---|"]
+        for code, (text, functions, tests) in rows.items():
+            if ("-E" in code) == misprint:
+                middle = re.sub(r"\s*\n\s*", " ", text).replace("|", "\\|") if misprint else _some(functions)
+                lines.append(f"| [{code}](../theory.md#code-{code.lower()}) | {middle} | {_some(tests)} |")
+        file = folder / f"{name}.inc"
+        text = "\n".join(lines) + "\n"
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")

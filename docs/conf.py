@@ -1,0 +1,133 @@
+"""The documentation site: `make docs` writes it to docs/_build/html, and it needs no network there."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from _site.code_links import with_links, with_targets
+from _site.coverage import write_tables
+from _site.docstrings import bars_are_norms, entries_are_descriptions, name_aliases
+from _site.reader_cells import hide_asserts
+from _site.reference_pages import write_reference
+
+import shapephase
+
+project = "shapephase"
+author = "The shapephase authors"
+project_copyright = "The shapephase authors"
+version = release = shapephase.__version__
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinxcontrib.bibtex",
+]
+exclude_patterns = ["_build", "_site", "jupyter_execute", "theory/tables"]
+templates_path: list[str] = []
+numfig = True
+math_numfig = True
+# A name, a link or an equation that leads nowhere is an error (-W), also in a docstring.
+nitpicky = True
+_INSIDE = r"shapephase\.\w+\.(\w+\.)*"
+nitpick_ignore_regex = [
+    # Other libraries' pages are not on this site, and a build without network cannot look them up.
+    ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray|viser)\..*"),
+    ("py:.*", r"(pathlib|collections|typing|types|os)\..*"),
+    ("py:.*", r"(Array|ArrayLike|Axes|TypeAliasForwardRef)"),
+    # Names that stand for a union of types, which the docstring spells out.
+    ("py:class", r"(\w+\.)*(Gauge|Given|Moments|Samplers)"),
+    # What a result holds for its own use, and nobody makes.
+    ("py:class", rf"{_INSIDE}(_\w+\.\w+|_\w+|Curve|\w+Variants|FunctionScan|GroupedRotations|KnotPath)"),
+    ("py:class", rf"{_INSIDE}(Lift|LinkRows|MovingNode|PiecewiseChebyshev|ResolvedPath|RunProgress)"),
+    ("py:class", rf"{_INSIDE}(ScannedFunction|Smoothness|VariantRotations)"),
+    ("py:class", r"MovingNode"),
+]
+
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+nb_execution_mode = "cache"
+nb_execution_raise_on_error = True
+# The longest notebook plans a dozen motions; a busy machine takes minutes for it.
+nb_execution_timeout = 1800
+nb_merge_streams = True
+
+autosummary_generate = False
+autodoc_default_options = {"members": True, "undoc-members": False}
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+autodoc_typehints_format = "short"
+autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike")}
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 100
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+bibtex_bibfiles = ["references.bib"]
+bibtex_default_style = "unsrt"
+bibtex_reference_style = "author_year"
+
+html_theme = "pydata_sphinx_theme"
+html_title = "shapephase"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_theme_options = {
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "header_links_before_dropdown": 6,
+}
+# One file of npm's mathjax 3.2.2 (tex-svg: fonts are in it), with its licence beside it, so that pages open offline.
+mathjax_path = "mathjax/tex-svg.js"
+mathjax3_config = {"options": {"enableMenu": False}, "svg": {"fontCache": "global"}}
+
+
+def _write_pages(*_: object) -> None:
+    """Pages that are made: the reference, tables of the theory; and notebooks, which have to lie below this folder."""
+    write_reference(HERE / "reference")
+    write_tables(HERE.parent)
+    target = HERE / "tutorials" / "notebooks"
+    target.mkdir(exist_ok=True)
+    wanted = sorted((HERE.parent / "notebooks").glob("*.ipynb"))
+    for old in set(target.glob("*.ipynb")) - {target / file.name for file in wanted}:
+        old.unlink()
+    for file in wanted:
+        copy = target / file.name
+        if not copy.exists() or copy.read_bytes() != file.read_bytes():
+            shutil.copyfile(file, copy)
+
+
+def _add_targets(_: Sphinx, page: str, source: list[str]) -> None:
+    if page in ("theory", "numerics"):
+        source[0] = with_targets(page, source[0])
+
+
+def _plain_docstring(*event: Any) -> None:
+    lines = event[-1]
+    lines[:] = with_links(entries_are_descriptions(bars_are_norms("\n".join(lines)))).split("\n")
+
+
+def setup(app: Sphinx) -> None:
+    """Steps of the build that are this site's own."""
+    name_aliases()
+    app.connect("config-inited", _write_pages)
+    app.connect("source-read", _add_targets)
+    # Before numpydoc, which makes sections of the text.
+    app.connect("autodoc-process-docstring", _plain_docstring, priority=400)
+    app.connect("doctree-read", hide_asserts)
