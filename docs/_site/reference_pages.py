@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
+import sys
 import tomllib
 import types
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -46,10 +49,14 @@ def _found(name: str) -> Any:
 
 def _line(found: Any) -> tuple[str, int]:
     """Where something is defined, so that a page has its names in the order of the source."""
-    try:
-        return inspect.getsourcefile(found) or "", inspect.getsourcelines(found)[1]
-    except TypeError:
-        return "", 0
+    file = getattr(sys.modules.get(getattr(found, "__module__", "")), "__file__", None)
+    return (file, _definitions(file).get(found.__name__, 0)) if file and hasattr(found, "__name__") else ("", 0)
+
+
+@cache
+def _definitions(file: str) -> dict[str, int]:
+    tree = ast.parse(Path(file).read_text(encoding="utf-8"))
+    return {node.name: node.lineno for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
 
 
 def _directive(found: Any) -> str:

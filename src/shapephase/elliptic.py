@@ -36,19 +36,37 @@ _FAR = 1e-3
 
 
 def complete_k(m1: ArrayLike) -> Array:
-    """K = F(pi/2), the quarter period: (...) -> (...); infinite at m1 = 0. Parameter m = k² = 1 − m1."""
+    """K = F(pi/2), the quarter period: (...) -> (...); infinite at m1 = 0. Parameter m = k² = 1 − m1.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.complete_k(0.5):.9f}")  # m = 1/2, the lemniscate: Gamma(1/4)^2/(4 sqrt(pi))
+    1.854074677
+    """
     (m1,) = _arguments(m1=m1)
     return _quarter_period(m1)[()]
 
 
 def complete_e(m1: ArrayLike) -> Array:
-    """E = E(pi/2): (...) -> (...), from 1 at m1 = 0 to pi/2 at m1 = 1. Parameter m = k² = 1 − m1."""
+    """E = E(pi/2): (...) -> (...), from 1 at m1 = 0 to pi/2 at m1 = 1. Parameter m = k² = 1 − m1.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.complete_e(1.0):.9f} = pi/2")
+    1.570796327 = pi/2
+    """
     (m1,) = _arguments(m1=m1)
     return _second_kind(np.ones(()), np.zeros(()), m1)[()]
 
 
 def complete_pi(n: ArrayLike, m1: ArrayLike) -> Array:
-    """Pi(n) = Pi(n; pi/2), n < 1: (...), (...) -> (...); infinite at m1 = 0. Parameter m = k² = 1 − m1."""
+    """Pi(n) = Pi(n; pi/2), n < 1: (...), (...) -> (...); infinite at m1 = 0. Parameter m = k² = 1 − m1.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.complete_pi(-3.0, 1.0):.9f} = pi/4")  # at m = 0: pi/(2 sqrt(1 - n))
+    0.785398163 = pi/4
+    """
     n, m1 = _arguments(n=n, m1=m1)
     return _complete_third_kind(n, m1)[()]
 
@@ -69,6 +87,12 @@ def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
     -----
     For |u| of a hundred sn and cn are right to 1e-13 and dn to 1e-13 of itself, however small; so is cn except next to
     its zeros. The errors grow as 1e-15 |u|, or less; that of am also as its size.
+
+    Examples
+    --------
+    >>> sn, cn, dn, am = sp.elliptic.jacobi(1.0, 1.0)
+    >>> print(f"{sn:.9f} = sin 1, {cn:.9f} = cos 1")  # at m = 0
+    0.841470985 = sin 1, 0.540302306 = cos 1
     """
     u, m1 = _arguments(u=u, m1=m1)
     sine, cosine, _, turns = _reduced_jacobi(u, m1)
@@ -82,6 +106,12 @@ def jacobi_and_pi_excess(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> tuple[Arr
     not as the difference of two rounded arguments.
 
     Source: Abramowitz and Stegun 17.7.15, where the integrals of the first kind add up to u/(1 − n).
+
+    Examples
+    --------
+    >>> *_, excess = sp.elliptic.jacobi_and_pi_excess(0.0, 0.7, 0.5)
+    >>> float(excess)  # Pi(0; am u) = u
+    0.0
     """
     n, u, m1 = _arguments(n=n, u=u, m1=m1)
     _refuse(n > 0.0, n, "n", "along u the characteristic must be 0 or less; incomplete_pi takes those up to 1")
@@ -91,7 +121,13 @@ def jacobi_and_pi_excess(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> tuple[Arr
 
 
 def complete_pi_excess(n: ArrayLike, m1: ArrayLike) -> Array:
-    """Pi(n) − K/(1 − n), for n <= 0: (...), (...) -> (...); finite at m1 = 0 too. Parameter m = k² = 1 − m1."""
+    """Pi(n) − K/(1 − n), for n <= 0: (...), (...) -> (...); finite at m1 = 0 too. Parameter m = k² = 1 − m1.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.complete_pi_excess(-3.0, 1.0):.9f} = pi/4 - pi/8")
+    0.392699082 = pi/4 - pi/8
+    """
     n, m1 = _arguments(n=n, m1=m1)
     _refuse(n > 0.0, n, "n", "the characteristic must be 0 or less; complete_pi takes those up to 1")
     return _excess(n, np.ones(()), np.zeros(()), m1)[()]
@@ -102,6 +138,11 @@ def argument_of(sn: ArrayLike, cn: ArrayLike, m1: ArrayLike) -> Array:
 
     Preferable to `incomplete_f` of the amplitude: for small m1 next to ±K an amplitude lacks the digits of cn.
     Infinite at m1 = 0 and cn = 0. Parameter m = k² = 1 − m1.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.argument_of(np.sin(0.7), np.cos(0.7), 1.0):.9f}")  # at m = 0 the angle itself
+    0.700000000
     """
     sine, cosine, m1 = _arguments(sn=sn, cn=cn, m1=m1)
     length = np.hypot(sine, cosine)
@@ -116,6 +157,11 @@ def jacobi_pi(n: ArrayLike, u: ArrayLike, m1: ArrayLike) -> Array:
 
     Preferable to `incomplete_pi` of an amplitude: for small m1 the amplitude stays near odd multiples of pi/2
     for so long that its digits do not determine u. Parameter m = k² = 1 − m1; u as in `jacobi`, also at m1 = 0.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.jacobi_pi(0.0, 0.7, 0.5):.9f}")  # without n the argument itself
+    0.700000000
     """
     n, u, m1 = _arguments(n=n, u=u, m1=m1)
     _refuse(n > 0.0, n, "n", "along u the characteristic must be 0 or less; incomplete_pi takes those up to 1")
@@ -127,6 +173,11 @@ def incomplete_f(phi: ArrayLike, m1: ArrayLike) -> Array:
     """F(phi), the integral of 1/sqrt(1 − m sin²) from 0 to phi: (...), (...) -> (...). Parameter m = k² = 1 − m1.
 
     Any real phi [rad]. Where F is infinite, at m1 = 0 and |phi| >= pi/2 (as rounded), a `ShapeError` is raised.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.incomplete_f(0.7, 1.0):.9f}")  # at m = 0 the angle itself
+    0.700000000
     """
     phi, m1 = _arguments(phi=phi, m1=m1)
     _refuse_infinite(phi, m1)
@@ -138,6 +189,11 @@ def incomplete_e(phi: ArrayLike, m1: ArrayLike) -> Array:
     """E(phi), the integral of sqrt(1 − m sin²) from 0 to phi: (...), (...) -> (...). Parameter m = k² = 1 − m1.
 
     Any real phi [rad]; at m1 = 0 the integral of |cos|.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.incomplete_e(0.7, 0.0):.9f} = sin 0.7")  # at m = 1
+    0.644217687 = sin 0.7
     """
     phi, m1 = _arguments(phi=phi, m1=m1)
     sine, cosine, turns = _folded(phi)
@@ -162,6 +218,11 @@ def incomplete_pi(n: ArrayLike, phi: ArrayLike, m1: ArrayLike) -> Array:
     Notes
     -----
     Source: for n < 0 Abramowitz and Stegun 17.7.15, the only form whose terms all have the same sign.
+
+    Examples
+    --------
+    >>> print(f"{sp.elliptic.incomplete_pi(-3.0, np.pi / 2, 1.0):.9f} = pi/4")
+    0.785398163 = pi/4
     """
     n, phi, m1 = _arguments(n=n, phi=phi, m1=m1)
     _refuse_infinite(phi, m1)

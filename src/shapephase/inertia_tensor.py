@@ -33,6 +33,11 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
     SingularInertiaError
         If a tensor is not finite or its least eigenvalue is not above 1e-12 of its largest. `times` (...),
         where given, are the instants that the message quotes.
+
+    Examples
+    --------
+    >>> sp.inertia_tensor.inverse_inertia(np.diag([1.0, 2.0, 4.0])).diagonal().tolist()
+    [1.0, 0.5, 0.25]
     """
     with np.errstate(invalid="ignore", over="ignore"):
         adjugate, determinant = _adjugate(inertia)
@@ -82,13 +87,24 @@ def second_moment(inertia: Array) -> Array:
 
     Any real distribution of mass has J positive semidefinite, which is the triangle inequality of the
     principal moments. Source: theory.md A4.
+
+    Examples
+    --------
+    >>> sp.inertia_tensor.second_moment(np.diag([3.0, 4.0, 5.0])).diagonal().tolist()
+    [3.0, 2.0, 1.0]
     """
     half_trace = 0.5 * np.trace(inertia, axis1=-2, axis2=-1)
     return half_trace[..., None, None] * np.eye(3) - inertia
 
 
 def triangle_defect(inertia: Array) -> Array:
-    """By how much the triangle inequality fails, relative to the largest moment; negative where it holds: (...)."""
+    """By how much the triangle inequality fails, relative to the largest moment; negative where it holds: (...).
+
+    Examples
+    --------
+    >>> float(sp.inertia_tensor.triangle_defect(np.diag([1.0, 1.0, 4.0])))  # 4 > 1 + 1: no body
+    0.5
+    """
     moments = np.linalg.eigvalsh(inertia)
     return (moments[..., 2] - moments[..., 1] - moments[..., 0]) / moments[..., 2]
 
@@ -104,6 +120,12 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     Notes
     -----
     Source: theory.md A11 (Marsden and Ratiu, section 15.3).
+
+    Examples
+    --------
+    >>> moments, axes = sp.inertia_tensor.principal_axes(np.diag([3.0, 1.0, 2.0]))
+    >>> moments.tolist(), round(float(np.linalg.det(axes)), 12)
+    ([1.0, 2.0, 3.0], 1.0)
     """
     moments, axes = np.linalg.eigh(inertia)
     axes[..., :, 2] *= np.where(np.linalg.det(axes) < 0.0, -1.0, 1.0)[..., None]
@@ -125,6 +147,12 @@ def ascending_moments(moments: Array) -> tuple[Array, NDArray[np.intp], Array]:
     Notes
     -----
     Source: theory.md section 1 (table of conventions).
+
+    Examples
+    --------
+    >>> moments, order, parity = sp.inertia_tensor.ascending_moments(np.array([3.0, 1.0, 2.0]))
+    >>> moments.tolist(), order.tolist()
+    ([1.0, 2.0, 3.0], [1, 2, 0])
     """
     order = np.argsort(moments, axis=-1, kind="stable")
     parity = np.where((order[..., 1] - order[..., 0]) % 3 == 1, 1.0, -1.0)

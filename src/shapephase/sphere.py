@@ -30,7 +30,14 @@ _HALVINGS = 12
 
 
 def area_rate(reference: Array, direction: Array, direction_rate: Array) -> Array:
-    """dA/dt = n.(u x u')/(1 + n.u): (3,), (..., 3), (..., 3) -> (...) [sr/s]."""
+    """dA/dt = n.(u x u')/(1 + n.u): (3,), (..., 3), (..., 3) -> (...) [sr/s].
+
+    Examples
+    --------
+    >>> north, u, rate = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    >>> float(sp.sphere.area_rate(north, u, rate))  # along the equator: 2 pi sr in a turn of 2 pi
+    1.0
+    """
     along = np.sum(so3.cross(direction, direction_rate) * reference, axis=-1)
     return along / (1.0 + np.sum(reference * direction, axis=-1))
 
@@ -40,6 +47,12 @@ def triangle_area(reference: Array, start: Array, end: Array) -> Array:
 
     The integral of the area form along the great circle from `start` to `end`.
     Source: van Oosterom and Strackee 1983.
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)
+    >>> print(f"{sp.sphere.triangle_area(x, y, z):.9f} = pi/2, an eighth of the sphere")
+    1.570796327 = pi/2, an eighth of the sphere
     """
     volume = np.sum(reference * so3.cross(start, end), axis=-1)
     denominator = 1.0 + np.sum(start * end + reference * start + reference * end, axis=-1)
@@ -51,6 +64,12 @@ def polygon_area(corners: Array, references: Array | None = None) -> Array:
 
     Counted from the region that holds the direction farthest from the corners, opposite `references` (..., 3) where
     these are known. Opposite ends are joined through `so3.middle`.
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)
+    >>> print(f"{sp.sphere.polygon_area(np.array([x, y, z])):.9f} = pi/2")
+    1.570796327 = pi/2
     """
     if references is None:
         found = [far_reference(polygon) for polygon in corners.reshape(-1, *corners.shape[-2:])]
@@ -78,6 +97,15 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
     ------
     AccuracyNotReached
         If the area has not converged after the steps were halved twelve times.
+
+    Examples
+    --------
+    >>> def circle(t):
+    ...     u = np.stack([0.6 * np.cos(t), 0.6 * np.sin(t), np.full_like(t, 0.8)], axis=-1)
+    ...     return u, np.stack([-0.6 * np.sin(t), 0.6 * np.cos(t), 0.0 * t], axis=-1)
+    >>> area = sp.sphere.curve_area(circle, np.linspace(0.0, 2.0 * np.pi, 9))
+    >>> print(f"{float(area):.9f} = 2 pi (1 - 0.8)")
+    1.256637061 = 2 pi (1 - 0.8)
     """
 
     def area(edges: Array) -> Array:
@@ -118,6 +146,15 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     Notes
     -----
     Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
+
+    Examples
+    --------
+    >>> def circle(t):
+    ...     u = np.stack([0.6 * np.cos(t), 0.6 * np.sin(t), np.full_like(t, 0.8)], axis=-1)
+    ...     return u, np.stack([-0.6 * np.sin(t), 0.6 * np.cos(t), 0.0 * t], axis=-1)
+    >>> turn = sp.sphere.transport(circle, np.linspace(0.0, 2.0 * np.pi, 9))
+    >>> print(f"{float(sp.so3.angle(turn)):.9f} = 2 pi (1 - 0.8), the area inside")
+    1.256637061 = 2 pi (1 - 0.8), the area inside
     """
 
     def rotation(edges: Array) -> Array:
@@ -146,12 +183,25 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
 
 
 def wrapped(area: Array) -> Array:
-    """A signed area modulo 4 pi in (-2 pi, 2 pi] [sr]."""
+    """A signed area modulo 4 pi in (-2 pi, 2 pi] [sr].
+
+    Examples
+    --------
+    >>> print(f"{sp.sphere.wrapped(7.0):.6f} = 7 - 4 pi")
+    -5.566371 = 7 - 4 pi
+    """
     return 2.0 * so3.wrap(0.5 * area)
 
 
 def gauss_nodes(left: Array, right: Array) -> tuple[Array, Array]:
-    """Eight Gauss-Legendre nodes in each step and their weights: (K,), (K,) -> (K, 8), (K, 8)."""
+    """Eight Gauss-Legendre nodes in each step and their weights: (K,), (K,) -> (K, 8), (K, 8).
+
+    Examples
+    --------
+    >>> nodes, weights = sp.sphere.gauss_nodes(np.array([0.0]), np.array([1.0]))
+    >>> round(float(np.sum(weights * nodes**3)), 12)  # the integral of t^3
+    0.25
+    """
     half = 0.5 * (right - left)[:, None]
     return left[:, None] + half * (_GAUSS[0] + 1.0), half * _GAUSS[1]
 
@@ -161,12 +211,25 @@ def far_reference(directions: Array) -> Array:
 
     The region of the sphere that holds -n is the one whose area is not counted, which fixes the branch
     of the area of a winding curve.
+
+    Examples
+    --------
+    >>> reference = sp.sphere.far_reference(np.array([[0.0, 0.0, 1.0]]))
+    >>> float(reference[2]) > 0.9  # its antipode is far from the one direction, north
+    True
     """
     return _FIBONACCI[np.argmax(np.min(directions @ _FIBONACCI.T, axis=0))]
 
 
 def fibonacci_directions(count: int) -> Array:
-    """Directions spread evenly over the sphere: (count, 3)."""
+    """Directions spread evenly over the sphere: (count, 3).
+
+    Examples
+    --------
+    >>> spread = sp.sphere.fibonacci_directions(100)
+    >>> np.linalg.norm(spread, axis=1).round(9).sum().item(), float(np.linalg.norm(spread.mean(axis=0))) < 0.01
+    (100.0, True)
+    """
     index = np.arange(count) + 0.5
     height = 1.0 - 2.0 * index / count
     azimuth = np.pi * (1.0 + np.sqrt(5.0)) * index

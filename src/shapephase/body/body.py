@@ -51,6 +51,12 @@ class Body:
     joint_units : "rad" or "m" for each joint
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     chain : its links and joints as plain numbers
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> cat.joint_names, round(cat.mass, 6)
+    (('waist_pitch', 'waist_yaw', 'waist_roll'), 2.0)
     """
 
     def __init__(self, model: pin.Model, name: str, mimics: Mapping[str, Mimic] | None = None) -> None:

@@ -66,6 +66,12 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
         Once for each kind of doubt about inertias, with the names of the links.
     IgnoredElementWarning
         For what the file says and a free body of joints does not take up.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat")
+    >>> cat.name, round(cat.mass, 6), cat.n_shape
+    ('cat', 4.0, 23)
     """
     if on_unphysical not in ("error", "warn"):
         raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
@@ -99,7 +105,13 @@ def robots_folder() -> Path:
 
 
 def robot_names() -> tuple[str, ...]:
-    """The names of the bodies that come with the library."""
+    """The names of the bodies that come with the library.
+
+    Examples
+    --------
+    >>> len(sp.robot_names()), sp.robot_names()[0]
+    (5, 'astronaut')
+    """
     return tuple(sorted(p.stem for p in robots_folder().glob("*.urdf")))
 
 

@@ -33,6 +33,14 @@ class BodyFamily(Sequence[Body]):
     masses : (N, k + 1) of what moves with each frame of `body.chain` [kg]
     centres : (N, k + 1, 3) centres of mass, axes of each frame [m]
     tensors : (N, k + 1, 3, 3) inertias about them [kg m^2]
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> masses = np.outer([1.0, 2.0, 3.0], [part.mass for part in cat.moving_parts])
+    >>> family = cat.with_inertias(masses=masses)
+    >>> len(family), round(family[2].mass, 6)
+    (3, 6.0)
     """
 
     body: Body

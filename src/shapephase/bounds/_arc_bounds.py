@@ -80,6 +80,13 @@ def arc_length_bounds(bounds: EnergyBounds) -> ArcLengthBounds:
     """Bounds of the length of Pi's curve, from those of the energy.
 
     Source: Cabrera 2006, section 4.1; theory.md E6, E7.
+
+    Examples
+    --------
+    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> found = sp.bounds.arc_length_bounds(found)
+    >>> found.by_energy <= found.by_drift <= found.general
+    True
     """
     known, magnitude = bounds.enclosure, bounds.magnitude
     low, high = bounds.quotients
@@ -117,6 +124,11 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
     Notes
     -----
     Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
+
+    Examples
+    --------
+    >>> print(f"{sp.bounds.azimuth_rate([1.0, 2.0, 4.0], [0.1, 0.0, 1.0], 2):.6f} rad/s")
+    0.750000 rad/s
     """
     values, pi = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
     if isinstance(axis, bool) or axis not in (0, 1, 2):
@@ -146,6 +158,12 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     Notes
     -----
     Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
+
+    Examples
+    --------
+    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> sp.bounds.azimuth_bounds(certificate).monotone
+    True
     """
     if not certificate.certain:
         raise ShapeError(f"certificate: a certain axis is needed, but {certificate.why}")
@@ -171,6 +189,14 @@ def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
     the largest moment they are the same, with the least moment in them.
 
     Source: Cabrera 2006, remark 4.1, as corrected in theory.md C-E10; E12.
+
+    Examples
+    --------
+    >>> body = sp.rigid(np.diag([1.0, 2.0, 4.0]), 30.0)
+    >>> found = sp.bounds.return_time_bounds(sp.bounds.regime_certificate(body, [0.1, 0.2, 2.0]))
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 4.0], [0.1, 0.2, 2.0])
+    >>> print(f"{found.by_latitude:.4f}, {found.by_inertia:.4f}, {found.by_azimuth:.4f} <= {top.period:.4f} s")
+    0.3469, 4.1629, 4.1749 <= 7.2522 s
     """
     known = certificate.bounds.enclosure
     azimuth = azimuth_bounds(certificate) if certificate.certain else None

@@ -45,6 +45,12 @@ class EnergyBounds:
     initial : (2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]
     lower, upper : (K,) of E on each cell [J]
     rate_lower, rate_upper : (K,) of dE/dt [W]
+
+    Examples
+    --------
+    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> print(f"{found.magnitude:.6f} kg m^2/s, {found.lower.min():.6f} J")
+    2.000000 kg m^2/s, 0.500000 J
     """
 
     enclosure: Enclosure
@@ -105,6 +111,12 @@ def energy_bounds(
     Notes
     -----
     Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
+
+    Examples
+    --------
+    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> print(f"{found.lower.min():.6f} to {found.upper.max():.6f} J")
+    0.500000 to 0.500000 J
     """
     body = body_momentum_argument(momentum, attitude)
     magnitude = float(np.linalg.norm(body))

@@ -21,7 +21,14 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class PhaseBounds:
-    """A phase lies in [lower, upper] [rad]."""
+    """A phase lies in [lower, upper] [rad].
+
+    Examples
+    --------
+    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> round(sp.bounds.dynamic_phase_bounds(found).upper, 6)
+    1.5
+    """
 
     lower: float
     upper: float
@@ -48,6 +55,13 @@ def dynamic_phase_bounds(bounds: EnergyBounds) -> PhaseBounds:
     """Bounds of theta_D from those of the energy at each time, the sharper ones; zero without momentum.
 
     Source: theory.md E13.
+
+    Examples
+    --------
+    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> phase = sp.bounds.dynamic_phase_bounds(found)
+    >>> print(f"{phase.lower:.6f} to {phase.upper:.6f} rad")  # 2 E t/l = 1.5
+    1.500000 to 1.500000 rad
     """
     if not bounds.magnitude:
         return PhaseBounds(lower=0.0, upper=0.0)
@@ -63,6 +77,13 @@ def dynamic_phase_bounds_by_extremes(bounds: EnergyBounds) -> PhaseBounds:
     Without L_o their width is 2 (E_max - E_min) dt/l. Both are zero without momentum.
 
     Source: Cabrera 2006, equation (15), remark 4.2; theory.md E14.
+
+    Examples
+    --------
+    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> phase = sp.bounds.dynamic_phase_bounds_by_extremes(found)
+    >>> print(f"{phase.lower:.6f} to {phase.upper:.6f} rad")
+    1.500000 to 1.500000 rad
     """
     if not bounds.magnitude:
         return PhaseBounds(lower=0.0, upper=0.0)
@@ -86,6 +107,14 @@ def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     Notes
     -----
     Source: theory.md E8, E13.
+
+    Examples
+    --------
+    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> area = sp.bounds.solid_angle_bounds(certificate)
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 4.0], [0.1, 0.2, 2.0])
+    >>> area.lower <= top.solid_angle <= area.upper
+    True
     """
     azimuth = azimuth_bounds(certificate)
     if not azimuth.monotone:
@@ -99,6 +128,14 @@ def loop_phase_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     """Bounds of theta_M before the motion is computed, if Pi closes once round the axis just at the interval's end.
 
     Raises as `solid_angle_bounds`. Source: theory.md E13, E8.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 4.0], [0.1, 0.2, 2.0])
+    >>> body = sp.rigid(np.diag([1.0, 2.0, 4.0]), top.period)
+    >>> phase = sp.bounds.loop_phase_bounds(sp.bounds.regime_certificate(body, [0.1, 0.2, 2.0]))
+    >>> phase.lower <= top.montgomery_phase <= phase.upper
+    True
     """
     dynamic, area = dynamic_phase_bounds(certificate.bounds), solid_angle_bounds(certificate)
     return PhaseBounds(lower=dynamic.lower - area.upper, upper=dynamic.upper - area.lower)

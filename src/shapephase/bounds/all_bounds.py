@@ -37,6 +37,13 @@ class Bound:
     is_upper : whether the value is at most the bound; else it is at least the bound
     limit : the bound
     value : of the motion
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> bound = sp.bounds.bounds(motion)[0]
+    >>> bound.slack >= 0.0
+    True
     """
 
     name: str
@@ -79,6 +86,12 @@ def bounds(
     Notes
     -----
     Source: theory.md E3, E6 to E14.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> all(bound.slack > -1e-9 for bound in sp.bounds.bounds(motion)), len(sp.bounds.bounds(motion)) > 5
+    (True, True)
     """
     check_object(motion, "Motion", "motion")
     if motion.batch:

@@ -33,6 +33,13 @@ class EnergyRate:
     ----------
     by_inertia : Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum
     by_internal_momentum : (Pi x I^-1 Pi).I^-1 L_o
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.3, 0.4, 2.0])
+    >>> rate = sp.bounds.energy_rate(motion, 1.0)
+    >>> float(rate.by_inertia), float(rate.by_internal_momentum)
+    (0.0, 0.0)
     """
 
     by_inertia: Array
@@ -56,6 +63,12 @@ class FrozenPolhode:
     homoclinic_energy : E_t of the separatrix [J]
     period : of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium
     regime : as `EulerTop.regime`
+
+    Examples
+    --------
+    >>> curve = sp.bounds.frozen_polhode(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), 0.0, [0.1, 0.2, 2.0])
+    >>> curve.regime, curve.energy < curve.homoclinic_energy
+    ('circling', True)
     """
 
     points: Array
@@ -69,13 +82,25 @@ def momentum_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """E = Pi.I^-1 Pi/2: (..., 3, 3) [kg m^2], (..., 3) body axes [kg m^2/s] -> (...) [J]; leading axes broadcast.
 
     Raises ShapeError, SingularInertiaError. Source: theory.md E1.
+
+    Examples
+    --------
+    >>> sp.bounds.momentum_energy(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0]).item()
+    0.5
     """
     tensor, pi = finite_array(inertia, "inertia", (3, 3)), finite_array(momentum, "momentum", (3,))
     return 0.5 * np.sum(pi * so3.apply(inverse_inertia(tensor), pi), axis=-1)
 
 
 def energy_along(motion: Motion, t: ArrayLike) -> Array:
-    """E_t of a motion: times (...) -> batch + (...) [J]. Source: theory.md E1."""
+    """E_t of a motion: times (...) -> batch + (...) [J]. Source: theory.md E1.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> sp.bounds.energy_along(motion, [0.0, 3.0]).tolist()
+    [0.5, 0.5]
+    """
     check_object(motion, "Motion", "motion")
     times, inverse, _, pi = _along(motion, t)
     energy = 0.5 * np.sum(pi * so3.apply(inverse, pi), axis=-1)
@@ -86,6 +111,13 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
     """dE_t/dt of a motion, in its two parts: times (...) -> batch + (...) [W].
 
     Source: Cabrera 2006, section 4.1, with L_o where L(d_0) is printed (theory.md C-E9); E3.
+
+    Examples
+    --------
+    >>> growing = sp.prescribed(lambda t: np.eye(3) * (1.0 + t)[:, None, None], None, 1.0)
+    >>> motion = sp.reconstruct(growing, [0.0, 0.0, 2.0])
+    >>> print(f"{sp.bounds.energy_rate(motion, 0.0).by_inertia:.6f} W")  # d/dt of 2/(1 + t)
+    -2.000000 W
     """
     check_object(motion, "Motion", "motion")
     times, inverse, drift, pi = _along(motion, t)
@@ -104,6 +136,12 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
 
     Raises GaugeError if the deformation is known by its inertia only.
     Source: Cabrera 2006, equation (4), with the missing half (theory.md C-E1); A6.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
+    >>> sp.bounds.kinetic_energy_along(motion, 1.0).item()
+    0.5
     """
     check_object(motion, "Motion", "motion")
     times = times_argument(t, motion.duration)
@@ -125,6 +163,11 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
     Notes
     -----
     Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
+
+    Examples
+    --------
+    >>> sp.bounds.homoclinic_energy(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), 0.0, 2.0).item()
+    1.0
     """
     check_object(deformation, "Deformation", "deformation")
     norm = float(finite_array(magnitude, "magnitude"))
@@ -144,6 +187,13 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     Notes
     -----
     Source: Cabrera 2006, section 4.1; theory.md E4.
+
+    Examples
+    --------
+    >>> curve = sp.bounds.frozen_polhode(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), 0.0, [0.1, 0.2, 2.0])
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 4.0], [0.1, 0.2, 2.0])
+    >>> print(f"{curve.period:.6f} s, {top.period:.6f} s")
+    7.252223 s, 7.252223 s
     """
     check_object(deformation, "Deformation", "deformation")
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:

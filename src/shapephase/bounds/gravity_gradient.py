@@ -60,6 +60,12 @@ class KeplerOrbit:
     axes : (3, 3) inertial axes; columns to the pericentre, across it along the motion, and the orbit's normal
     mean_anomaly : at t = 0 [rad]; of a hyperbola e sinh(H) - H
     centre : (3,) where the other body is [m]
+
+    Examples
+    --------
+    >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
+    >>> print(f"{orbit.eccentricity:.5f}, {2.0 * np.pi / orbit.mean_motion:.0f} s")
+    0.00000, 5829 s
     """
 
     gm: float
@@ -241,6 +247,12 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     Notes
     -----
     Newton's method from above the root, where the function is convex, so that it always converges.
+
+    Examples
+    --------
+    >>> anomaly = sp.bounds.eccentric_anomaly(1.0, 0.5)
+    >>> print(f"{anomaly - 0.5 * np.sin(anomaly):.12f}")  # Kepler's equation
+    1.000000000000
     """
     mean = finite_array(mean_anomaly, "mean_anomaly", unit="rad")
     e = float(finite_array(eccentricity, "eccentricity"))
@@ -279,6 +291,12 @@ def gravity_gradient_torque(inertia: ArrayLike, position: ArrayLike, gm: float) 
     Returns
     -------
     (..., 3) [N m], in those axes
+
+    Examples
+    --------
+    >>> place, inertia = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0), np.diag([1.0, 2.0, 3.0])
+    >>> print(sp.bounds.gravity_gradient_torque(inertia, place, 1.0).round(9))  # 3/2 (I_2 - I_1)
+    [0.  0.  1.5]
     """
     tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
     arm = finite_array(position, "position", (3,), unit="m")
@@ -295,6 +313,11 @@ def gravity_force(mass: float, position: ArrayLike, gm: float) -> Array:
     attitude.
 
     Source: Cabrera 2006, remark 4.7, with the cube of the distance in the denominators; theory.md A16, C-E14.
+
+    Examples
+    --------
+    >>> sp.bounds.gravity_force(2.0, [2.0, 0.0, 0.0], 8.0)[0].item()  # -8 * 2/4
+    -4.0
     """
     arm = finite_array(position, "position", (3,), unit="m")
     distance = _distance(arm)

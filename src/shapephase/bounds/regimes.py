@@ -36,7 +36,13 @@ _COSINE_ROUNDING = 1e-15
 
 
 class Regime(StrEnum):
-    """Which principal axis the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest."""
+    """Which principal axis the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest.
+
+    Examples
+    --------
+    >>> [regime.name for regime in sp.bounds.Regime]
+    ['ABOUT_SMALLEST', 'ABOUT_LARGEST', 'MAY_CROSS']
+    """
 
     ABOUT_SMALLEST = "about axis 1"
     ABOUT_LARGEST = "about axis 3"
@@ -60,6 +66,12 @@ class RegimeCertificate:
     bounds : of the energy, cell by cell
     plane : (K,) on each cell the energy that Pi would need to cross the plane [J]
     why : the reason, as a sentence
+
+    Examples
+    --------
+    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> print(f"{certificate.energy[1]:.6f} < {certificate.threshold[0]:.6f} J")
+    0.515000 < 1.012500 J
     """
 
     regime: Regime
@@ -107,6 +119,12 @@ class CrownRegion:
     Attributes
     ----------
     certificate : where the bounds come from
+
+    Examples
+    --------
+    >>> crown = sp.bounds.crown_region(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> crown.certificate.axis.tolist()
+    [0.0, 0.0, 1.0]
     """
 
     certificate: RegimeCertificate
@@ -159,6 +177,12 @@ def regime_certificate(
     Raises as `energy_bounds`.
 
     Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
+
+    Examples
+    --------
+    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> certificate.regime.name, certificate.certain, certificate.axis.tolist()
+    ('ABOUT_LARGEST', True, [0.0, 0.0, 1.0])
     """
     check_object(deformation, "Deformation", "deformation")
     body = body_momentum_argument(momentum, attitude)
@@ -195,6 +219,12 @@ def crown_region(
     """The part of the momentum sphere that Pi can reach over an interval; arguments and errors of `regime_certificate`.
 
     Source: Cabrera 2006, section 4.1.1; theory.md E8.
+
+    Examples
+    --------
+    >>> crown = sp.bounds.crown_region(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
+    >>> crown.contains([[0.1, 0.2, 2.0], [2.0, 0.2, 0.1]]).tolist()
+    [True, False]
     """
     check_object(deformation, "Deformation", "deformation")
     return CrownRegion(regime_certificate(deformation, momentum, attitude, interval))

@@ -255,6 +255,13 @@ def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | Defor
     ------
     UnknownNameError, TrajectoryError
         If the path has other joints than the body.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> deformation = sp.articulated(cat, sp.examples.kane_scher(0.0, 0.5))
+    >>> deformation.duration, deformation.inertia(0.0).trace().round(6).item()
+    (1.0, 0.045)
     """
     if isinstance(body, BodyFamily):
         check_object(path, "ShapePath", "path")
@@ -286,6 +293,11 @@ def rigid(inertia: ArrayLike, duration: float) -> Deformation:
     """A rigid body: constant inertia (3, 3) [kg m^2], no internal momentum, for `duration` [s].
 
     Source: Cabrera 2006, example 2.6; theory.md A10.
+
+    Examples
+    --------
+    >>> sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0).inertia(1.0).tolist()
+    [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.5]]
     """
     tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3))[None])[0]
     length = positive_argument(duration)
@@ -325,6 +337,15 @@ def prescribed(
     -----
     UnphysicalInertiaWarning
         With "warn", for tensors that break the triangle inequality; the message has the worst time.
+
+    Examples
+    --------
+    >>> def inertia(t):
+    ...     return np.eye(3) * (1.0 + t)[:, None, None]
+    >>> growing = sp.prescribed(inertia, None, 1.0)
+    >>> motion = sp.reconstruct(growing, [0.0, 0.0, 1.0])
+    >>> print(f"{sp.so3.angle(motion.final_attitude):.9f} = log 2")
+    0.693147181 = log 2
     """
     length = positive_argument(duration)
     edges = breaks_argument(breaks, length)
@@ -370,6 +391,14 @@ def particles(
     Notes
     -----
     Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, A7, A8.
+
+    Examples
+    --------
+    >>> times = np.linspace(0.0, 2.0, 9)
+    >>> apart = np.array([[[1 + t, 0, 0], [-1 - t, 0, 0], [0, 1, 0]] for t in times])
+    >>> deformation = sp.particles([1.0, 1.0, 1.0], (times, apart))
+    >>> deformation.inertia([0.0, 2.0])[:, 2, 2].round(6).tolist()  # 2 x^2 + 2/3
+    [2.666667, 18.666667]
     """
     weights = finite_array(masses, "masses", (None,), unit="kg").copy()
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):

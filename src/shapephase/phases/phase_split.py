@@ -64,6 +64,13 @@ class PhaseSplit:
     is_loop : whether the shape closes
     has_phase : whether there is angular momentum; without it all phases are 0 and R_D is the identity
     about : what was split
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, np.radians(59.426458741516))
+    >>> parts = sp.split(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.0]))
+    >>> print(f"{np.degrees(sp.so3.angle(parts.holonomy)):.6f} degrees by shape alone")
+    180.000000 degrees by shape alone
     """
 
     gauge: str

@@ -55,6 +55,13 @@ def split(
     Notes
     -----
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), top.period), [0.6, 0.9, 0.5])
+    >>> print(f"{sp.split(motion, 'base').montgomery_angle:.9f}, {sp.so3.wrap(top.montgomery_phase):.9f}")
+    2.523520948, 2.523520948
     """
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
@@ -139,6 +146,13 @@ class RunningPhases:
     reference : batch + (3,), in the gauge's frame; closed to the start, that direction
     residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
     error_estimates : of the phases at each time
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 10.0), [0.0, 0.0, 5.0])
+    >>> phases = sp.running_phases(motion, [0.0, 5.0, 10.0], "base")
+    >>> phases.montgomery_phase.round(9).tolist(), phases.solid_angle.round(9).tolist()
+    ([0.0, 10.0, 20.0], [0.0, 0.0, 0.0])
     """
 
     times: Array
@@ -187,6 +201,12 @@ def running_phases(
     -----
     Raises as `split`, and UnknownNameError for another closing. Source: Cabrera 2006, equation (12); theory.md D5, D9;
     numerics.md section 3 (branch).
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 10.0), [0.0, 0.0, 5.0])
+    >>> sp.running_phases(motion, [0.0, 5.0, 10.0], "base").dynamic_phase.round(9).tolist()  # 2 rad/s
+    [0.0, 10.0, 20.0]
     """
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
@@ -252,6 +272,13 @@ class ArcPhases:
     total_phase : of all arcs as one [rad]
     total_tilt : (3, 3)
     error_estimates : of each of these numbers
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.0, 0.0, 5.0])
+    >>> arcs = sp.arc_phases(motion, [0.0, 1.0, 3.0], "base")
+    >>> arcs.montgomery_phase.round(9).tolist(), arcs.momentum_gap.round(9).tolist()
+    ([2.0, 4.0], [0.0, 0.0])
     """
 
     times: Array
@@ -287,6 +314,12 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     Notes
     -----
     Raises also as `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 10.0), [0.0, 0.0, 5.0])
+    >>> sp.arc_phases(motion, [0.0, 4.0, 10.0], "base").dynamic_phase.round(9).tolist()
+    [8.0, 12.0]
     """
     check_object(motion, "Motion", "motion")
     cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
@@ -365,6 +398,14 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
     Notes
     -----
     Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.0, 0.0, 5.0])
+    >>> print(sp.parallel_transport(motion, 3.0).round(9) + 0.0)  # the momentum stands still in the body
+    [[1. 0. 0.]
+     [0. 1. 0.]
+     [0. 0. 1.]]
     """
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
@@ -391,6 +432,12 @@ def dynamic_phase_from_energy(motion: Motion) -> Array:
     Notes
     -----
     Source: Cabrera 2006, remark 3.7; theory.md D11.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.0, 0.0, 5.0])
+    >>> print(f"{float(sp.dynamic_phase_from_energy(motion)):.9f}")  # 2 rad/s for 3 s
+    6.000000000
     """
     check_object(motion, "Motion", "motion")
     edges = motion.solution.times

@@ -51,6 +51,13 @@ class Returns:
     ----------
     times : (n,) ascending, above 0 [s]
     gaps : (n,) angle to the start then [rad]
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.5 * top.period), [0.6, 0.9, 0.5])
+    >>> sp.momentum_returns(motion).gaps.round(6).tolist()
+    [0.0]
     """
 
     times: Array
@@ -68,6 +75,12 @@ class Crossings:
     angles : (n,) from the first passage's heading to the second's, between 0 and pi [rad]
     gaps : (n,) angle between the two passages: of the order of rounding [rad]
     retraced : (m, 2) from when to when the curve goes along an earlier part of itself, either way [s]
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 3.0), [0.6, 0.9, 0.5])
+    >>> sp.momentum_crossings(motion).angles.shape
+    (0,)
     """
 
     first: Array
@@ -98,6 +111,13 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
     Notes
     -----
     Source: theory.md section 6 and D12.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 2.5 * top.period), [0.6, 0.9, 0.5])
+    >>> (sp.momentum_returns(motion).times / top.period).round(6).tolist()
+    [1.0, 2.0]
     """
     check_object(motion, "Motion", "motion")
     largest = finite_array(gap, "gap", unit="rad")
@@ -150,6 +170,12 @@ def momentum_crossings(motion: Motion) -> Crossings:
     Notes
     -----
     Source: theory.md D8.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 3.0), [0.6, 0.9, 0.5])
+    >>> len(sp.momentum_crossings(motion).first)  # a rigid body's curve does not cross itself
+    0
     """
     check_object(motion, "Motion", "motion")
     curve = _Curve.of(motion)

@@ -31,6 +31,14 @@ class MotionFamily(Sequence[Motion]):
     initial_attitude : (N, 3, 3) base axes to inertial axes
     tolerance : the one requested [rad]
     solution : S(t) of each, the attitude relative to the start
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
+    >>> motions = sp.reconstruct(sp.articulated(family, loop), [0.0, 0.0, 0.0])
+    >>> [round(float(sp.so3.angle(motion.final_attitude)), 6) for motion in motions]
+    [1.139791, 1.139791]
     """
 
     deformations: DeformationFamily

@@ -52,6 +52,12 @@ class Sensitivity:
     ----------
     by_momentum : batch + (3, 3) [rad per kg m^2/s], from inertial axes to base axes
     by_attitude : batch + (3, 3), base axes at the start to base axes at the end
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> print(f"{motion.sensitivity.by_momentum[2, 2]:.6f}")  # 2 s over 2.5 kg m^2
+    0.800000
     """
 
     by_momentum: Array
@@ -75,6 +81,14 @@ class Motion:
     method : the one used
     evaluations : how often the locked inertia and internal momentum were computed
     solution : S(t), the attitude relative to the start: attitude(t) = initial_attitude S(t)
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> print(motion.angular_velocity(1.0).round(9))  # momentum over moment
+    [0. 0. 2.]
+    >>> print(motion.quat_xyzw(0.5).round(6))  # half a radian as half an angle
+    [0.       0.       0.479426 0.877583]
     """
 
     deformation: Deformation
@@ -386,6 +400,12 @@ def reconstruct(
     Notes
     -----
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> print(f"{sp.so3.log(motion.final_attitude)[2]:.6f} = 4 - 2 pi")  # 2 rad/s for 2 s
+    -2.283185 = 4 - 2 pi
     """
     goal, workers = tolerance_argument(tolerance), threads_argument(threads)
     if isinstance(deformation, DeformationFamily):
@@ -444,6 +464,11 @@ def momentum_from_rate(
     Notes
     -----
     Source: Cabrera 2006, equation (7).
+
+    Examples
+    --------
+    >>> sp.momentum_from_rate(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 2.0]).tolist()
+    [0.0, 0.0, 5.0]
     """
     if not isinstance(deformation, DeformationFamily):
         check_object(deformation, "Deformation", "deformation")

@@ -34,7 +34,13 @@ _REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}
 
 @dataclass(frozen=True, eq=False)
 class AndoyerPendulum:
-    """The reduced Euler-Poinsot motion in the (y, p_y) plane, see `andoyer_pendulum`."""
+    """The reduced Euler-Poinsot motion in the (y, p_y) plane, see `andoyer_pendulum`.
+
+    Examples
+    --------
+    >>> sp.rigid_body.andoyer_pendulum([3.0, 2.0, 1.0]).moments.tolist()
+    [3.0, 2.0, 1.0]
+    """
 
     moments: Array
     """(3,) principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
@@ -162,6 +168,12 @@ def andoyer_pendulum(moments: ArrayLike) -> AndoyerPendulum:
     ------
     ShapeError
         If the moments are not positive, or two of them are equal.
+
+    Examples
+    --------
+    >>> pendulum = sp.rigid_body.andoyer_pendulum([1.0, 2.0, 3.0])
+    >>> pendulum.moments.tolist()
+    [1.0, 2.0, 3.0]
     """
     values = moments_argument(moments)
     if not np.all(np.diff(np.sort(values)) > 0.0):

@@ -36,6 +36,12 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
     ------
     AccuracyNotReached
         If the solution leaves every bound before the last time, the step becomes too small, or the steps too many.
+
+    Examples
+    --------
+    >>> decay = sp.rigid_body.flow(lambda y: -y, np.array([1.0]), np.array([0.0, 1.0]))
+    >>> print(f"{decay[-1, 0]:.9f} = exp(-1)")
+    0.367879441 = exp(-1)
     """
     from scipy.integrate import DOP853
 
@@ -71,7 +77,13 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
 
 
 def ascending_times(times: ArrayLike) -> Array:
-    """A user's times, checked: (N,), strictly ascending, at least one. Raises ShapeError."""
+    """A user's times, checked: (N,), strictly ascending, at least one. Raises ShapeError.
+
+    Examples
+    --------
+    >>> sp.rigid_body.ascending_times([0.0, 0.5, 2.0]).tolist()
+    [0.0, 0.5, 2.0]
+    """
     array = finite_array(times, "times", (None,))
     if array.ndim != 1 or not array.size or np.any(np.diff(array) <= 0.0):
         raise ShapeError("times: expected strictly ascending times (N,), the first one that of the start")

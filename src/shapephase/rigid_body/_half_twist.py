@@ -34,6 +34,12 @@ class HalfTwist:
     rate : (...) argument of the elliptic functions per second; 0 where Pi stands still [rad/s]
     growth_rate : (...) the positive eigenvalue at the intermediate axis,
         |Pi| sqrt((I2 - I1)(I3 - I2)/(I1 I3))/I2 [1/s]
+
+    Examples
+    --------
+    >>> flip = sp.rigid_body.half_twist([1.0, 2.0, 3.0], [0.001, 2.0, 0.0])
+    >>> print(f"{flip.time:.6f} s, by the logarithm alone {flip.asymptote:.6f} s")
+    28.731424 s, by the logarithm alone 28.731429 s
     """
 
     time: Array
@@ -65,6 +71,13 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     -----
     Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1, whose I1 >= I2 >= I3 are our I3, I2, I1;
     theory.md L4.
+
+    Examples
+    --------
+    >>> flip = sp.rigid_body.half_twist([1.0, 2.0, 3.0], [0.001, 2.0, 0.0])
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.001, 2.0, 0.0])
+    >>> print(f"{flip.time:.6f} s, half of the period {top.period:.6f} s")
+    28.731424 s, half of the period 57.462849 s
     """
     inertia, vector = _broadcast(_moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s"))
     # Whether the ordered axes are right-handed makes no difference to times.
@@ -90,6 +103,12 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
     ------
     ShapeError, SingularInertiaError
         As `half_twist`.
+
+    Examples
+    --------
+    >>> flip = sp.rigid_body.half_twist_from_tilt([1.0, 2.0, 3.0], 2.0, 1e-3, 0.0)
+    >>> print(f"{flip.time:.4f} s")
+    26.3303 s
     """
     inertia, _, _ = ascending_moments(_moments(moments))
     norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
@@ -127,6 +146,11 @@ def twist_defect(moments: ArrayLike) -> Array:
     Notes
     -----
     Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
+
+    Examples
+    --------
+    >>> print(f"{np.degrees(sp.rigid_body.twist_defect([1.0, 2.0, 2.1])):.3f} degrees")
+    51.506 degrees
     """
     inertia, _, _ = ascending_moments(_moments(moments))
     low, middle, high = np.moveaxis(inertia, -1, 0)

@@ -52,6 +52,12 @@ class MomentumOrbit:
     precession : (L/I_a − L/I_k)/rate
     sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
     condition : how much a small change of inertia or momentum is magnified, see `EulerTop.condition`
+
+    Examples
+    --------
+    >>> orbit = sp.rigid_body.momentum_orbit(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 1.5]))
+    >>> orbit.circled, round(orbit.magnitude, 6)
+    (2, 1.516575)
     """
 
     moments: Array
@@ -103,6 +109,12 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
     """The orbit of a momentum (3,), in the axes of these ascending moments (3,).
 
     Components below 1e-140 of the momentum are taken as zero.
+
+    Examples
+    --------
+    >>> orbit = sp.rigid_body.momentum_orbit(np.array([1.0, 2.0, 3.0]), np.array([0.6, 0.9, 0.5]))
+    >>> orbit.regime, orbit.circled
+    ('circling', 0)
     """
     magnitude = float(np.linalg.norm(start))
     # Powers of two, so that squares neither overflow nor round.
@@ -169,6 +181,12 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     Notes
     -----
     Source: theory.md section 7.
+
+    Examples
+    --------
+    >>> areas = [sp.rigid_body.separatrix_solid_angle([1.0, 2.0, 3.0], axis) for axis in (0, 2)]
+    >>> print(f"{2.0 * sum(areas) / np.pi:.9f} pi")  # both sides of both axes are the sphere
+    4.000000000 pi
     """
     values = finite_array(moments, "moments", (3,), unit="kg m^2")
     if values.ndim != 1 or values.min() <= 0.0 or values.min() == values.max():

@@ -30,6 +30,13 @@ class Nutation:
     rate : argument of the elliptic functions per second [rad/s]
     complement : m1 = 1 - k^2
     period : 2K/rate; infinite where the axis only approaches the vertical [s]
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
+    >>> found = sp.rigid_body.nutation(top, [0.0, 0.3, 3.0], [0.0, 0.6, 0.8])
+    >>> print(f"{found.highest:.6f}")
+    0.800000
     """
 
     lowest: float
@@ -63,6 +70,13 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     ------
     ShapeError
         If Mgl is not above 0, or an argument is of a wrong shape or value.
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
+    >>> found = sp.rigid_body.nutation(top, [0.0, 0.3, 3.0], [0.0, 0.6, 0.8])
+    >>> print(f"{found.lowest:.6f} to {found.highest:.6f} in {found.period:.6f} s")
+    0.647308 to 0.800000 in 3.313171 s
     """
     if top.mgl <= 0.0:
         raise ShapeError(f"mgl: the nutation needs Mgl > 0, got {top.mgl:.6g} J; turn e3 towards the centre of mass")

@@ -34,7 +34,14 @@ _AT_POLE = 1e-15
 
 @dataclass(frozen=True)
 class EulerChart:
-    """Euler angles (phi, theta, psi) with R = R_z(phi) R_node(theta) R_z(psi); use `ZXZ` or `ZYZ`."""
+    """Euler angles (phi, theta, psi) with R = R_z(phi) R_node(theta) R_z(psi); use `ZXZ` or `ZYZ`.
+
+    Examples
+    --------
+    >>> turn = sp.rigid_body.ZXZ.attitude([0.1, 0.2, 0.3])
+    >>> print(sp.rigid_body.ZXZ.angles(turn).round(9))
+    [0.1 0.2 0.3]
+    """
 
     name: str
     node: tuple[float, float]
@@ -369,6 +376,11 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     Notes
     -----
     Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
+
+    Examples
+    --------
+    >>> print(sp.rigid_body.precession_rate([3.0, 0.0, 4.0], [1.5, 0.0, 4.0]))  # of moments 2, 2, 1: 5/2
+    2.5
     """
     momentum, velocity = _pair(body_momentum, angular_velocity, "angular_velocity", "rad/s", first="body_momentum")
     magnitude = np.linalg.norm(momentum, axis=-1)
@@ -395,6 +407,11 @@ def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
     Notes
     -----
     Source: Marsden and Ratiu (15.7.7).
+
+    Examples
+    --------
+    >>> sp.rigid_body.canonical_bracket([1.0, 0.0], [0.0, 1.0]).item()  # {q, p}
+    1.0
     """
     first = finite_array(gradient_f, "gradient_f", (None,))
     second = finite_array(gradient_g, "gradient_g", (None,))

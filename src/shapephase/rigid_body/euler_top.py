@@ -60,6 +60,12 @@ class EulerTop:
         For arrays of the wrong shape or entries that are not finite numbers.
     UnphysicalInertiaError, SingularInertiaError
         If the inertia is not symmetric, or not positive definite.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [0.6, 0.3, 1.5])
+    >>> print(f"{top.energy:.6f} J, period {top.period:.6f} s, Montgomery phase {top.montgomery_phase:.6f} rad")
+    1.207500 J, period 7.336538 s, Montgomery phase 11.386379 rad
     """
 
     inertia: Array

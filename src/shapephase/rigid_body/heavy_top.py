@@ -65,6 +65,12 @@ class HeavyTop:
     Notes
     -----
     Source: Marsden and Ratiu (15.10.1-3).
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.HeavyTop(np.diag([1.0, 1.0, 0.5]), 2.0)
+    >>> top.energy([0.0, 0.0, 1.0], [0.0, 0.0, 1.0]).item()  # 1/(2 * 0.5) + 2
+    3.0
     """
 
     inertia: Array
@@ -323,6 +329,13 @@ def semidirect_bracket(
     Notes
     -----
     Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)
+    >>> zero = np.zeros(3)
+    >>> sp.rigid_body.semidirect_bracket((x, zero), (y, zero), [0.0, 0.0, 5.0], z).item()  # -Pi . (x x y)
+    -5.0
     """
     (fp, fg), (gp, gg) = (tuple(finite_array(part, "gradient", (3,)) for part in pair) for pair in (df, dg))
     pi, up = _point(momentum, gamma)
@@ -334,6 +347,11 @@ def casimirs(momentum: ArrayLike, gamma: ArrayLike) -> tuple[Array, Array]:
     """(Pi.Gamma, |Gamma|^2), constant along every motion: (..., 3), (..., 3) -> two of (...).
 
     Source: Marsden and Ratiu, before (15.10.4).
+
+    Examples
+    --------
+    >>> [float(value) for value in sp.rigid_body.casimirs([0.0, 0.0, 3.0], [0.0, 0.0, 1.0])]
+    [3.0, 1.0]
     """
     pi, up = _point(momentum, gamma)
     return np.sum(pi * up, axis=-1), np.sum(up * up, axis=-1)

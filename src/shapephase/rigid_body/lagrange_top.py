@@ -37,6 +37,12 @@ class LagrangeTop:
         If an entry is not a finite number.
     SingularInertiaError
         If a moment is not positive.
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
+    >>> sp.rigid_body.sleeping_top(top, 3.0).spectrally_stable  # 9 > 4 Mgl I1 = 8
+    True
     """
 
     transverse: float
@@ -79,6 +85,12 @@ class SleepingTop:
     energy_casimir : whether the second variation is definite (stable in the sense of Liapunov)
     spectrally_stable : whether no eigenvalue has a positive real part
     verdict : "stable", "unstable", or "marginal" where p^2 = 4 Mgl I1, which neither method decides
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.sleeping_top(sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0), 3.0)
+    >>> top.momentum, top.energy_casimir, top.verdict
+    (3.0, True, 'stable')
     """
 
     momentum: float
@@ -128,6 +140,12 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     Notes
     -----
     Source: Marsden and Ratiu, theorem 15.10.1.
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
+    >>> [sp.rigid_body.sleeping_top(top, spin).spectrally_stable for spin in (2.8, 2.9)]  # sqrt(8) = 2.83
+    [False, True]
     """
     p = _number(momentum, "momentum")
     i1, i3, mgl = top.transverse, top.axial, top.mgl
@@ -166,6 +184,12 @@ def second_variation(
     a66 = 2 Phi' + b + p^2 c + 2 p d differ from the printed ones.
 
     Source: Marsden and Ratiu (15.10.5-7) with theory.md M-E9.
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
+    >>> sp.rigid_body.second_variation(top, 3.0, 0.0).shape
+    (6, 6)
     """
     p, phi_dot, a, b, c, d = (_number(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
     vertical = -(top.mgl + phi_dot * p)
@@ -181,6 +205,11 @@ def e_quadratic(top: LagrangeTop, momentum: float) -> Array:
 
     It is positive for some e, and the spin stable, if its discriminant p^2 (p^2 - 4 Mgl I1)/I1^2 is.
     Source: Marsden and Ratiu (15.10.11).
+
+    Examples
+    --------
+    >>> sp.rigid_body.e_quadratic(sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0), 3.0).tolist()
+    [-9.0, 9.0, -2.0]
     """
     p, i1 = _number(momentum, "momentum"), top.transverse
     return np.array([-p * p, p * p / i1, -top.mgl / i1])
@@ -204,6 +233,11 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
     Notes
     -----
     Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
+
+    Examples
+    --------
+    >>> sp.rigid_body.sleeping_matrix([1.0, 1.0, 0.5], 2.0, 3.0).tolist()
+    [[0.0, 3.0, 0.0, 2.0], [-3.0, 0.0, -2.0, 0.0], [0.0, -1.0, 0.0, 6.0], [1.0, 0.0, -6.0, 0.0]]
     """
     i1, i2, i3, weight, p = _upright(moments, mgl, momentum)
     matrix = np.zeros((*p.shape, 4, 4))
@@ -221,6 +255,12 @@ def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: Arra
     p: the two pairs of roots coincide, and the sign of B decides.
 
     Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments and errors as `sleeping_matrix`.
+
+    Examples
+    --------
+    >>> b, c, discriminant = sp.rigid_body.characteristic_polynomial([1.0, 1.0, 0.5], 2.0, 8.0**0.5)
+    >>> abs(float(discriminant)) < 1e-9  # it vanishes at Pi_3^2 = 4 Mgl I1
+    True
     """
     i1, i2, i3, weight, p = _upright(moments, mgl, momentum)
     spin = p / i3
@@ -235,6 +275,11 @@ def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -
     """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments and errors as there.
 
     Found through their squares (-B +- sqrt(B^2 - 4C))/2, so they come in pairs of opposite sign.
+
+    Examples
+    --------
+    >>> print(sp.rigid_body.sleeping_spectrum([1.0, 1.0, 0.5], 2.0, 3.0).real.round(9) + 0.0)
+    [0. 0. 0. 0.]
     """
     b, c, discriminant = characteristic_polynomial(moments, mgl, momentum)
     root = np.sqrt(np.asarray(discriminant, dtype=complex))
@@ -249,6 +294,11 @@ def spectrally_stable(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -
     """Whether no eigenvalue of an upright spin has a positive real part: (...). Arguments as `sleeping_matrix`.
 
     The squares of the eigenvalues must be real and not positive: B, C and B^2 - 4C not negative.
+
+    Examples
+    --------
+    >>> sp.rigid_body.spectrally_stable([1.0, 1.0, 0.5], 2.0, [2.8, 2.9]).tolist()
+    [False, True]
     """
     b, c, discriminant = characteristic_polynomial(moments, mgl, momentum)
     return (b >= 0.0) & (c >= 0.0) & (discriminant >= 0.0)

@@ -53,7 +53,15 @@ class PendulumEquilibrium:
 
 @dataclass(frozen=True, eq=False)
 class RigidBodyPendulum:
-    """The coordinates (r, theta, p) of body momenta on elliptic cylinders, see `rigid_body_pendulum`."""
+    """The coordinates (r, theta, p) of body momenta on elliptic cylinders, see `rigid_body_pendulum`.
+
+    Examples
+    --------
+    >>> pendulum = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0])
+    >>> radius, angle, p = pendulum.coordinates([0.6, 0.9, 0.5])
+    >>> print(f"{radius:.6f} {angle:.6f} {p:.6f}")
+    0.612372 0.643501 0.500000
+    """
 
     moments: Array
     """(3,) principal moments as given [kg m^2]."""
@@ -279,6 +287,12 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     Notes
     -----
     Source: Marsden and Ratiu (15.11.7) to (15.11.13).
+
+    Examples
+    --------
+    >>> pendulum = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0])
+    >>> pendulum.axes, round(pendulum.stiffness, 6)
+    ((0, 1, 2), 0.5)
     """
     values = moments_argument(moments)
     if values.min() == values.max():

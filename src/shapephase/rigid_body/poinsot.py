@@ -56,6 +56,12 @@ class Cones:
     space_inside_body : the space cone lies inside the body cone (oblate), or the two touch from outside (prolate)
     precession_rate : of the axis of symmetry about the momentum, |mu| / I1 [rad/s]
     spin_rate : lambda, of the momentum about the axis of symmetry seen in the body [rad/s]; > 0 oblate, < 0 prolate
+
+    Examples
+    --------
+    >>> cones = sp.rigid_body.cones(sp.EulerTop.principal([1.0, 1.0, 2.0], [3.0, 0.0, 4.0]))
+    >>> print(f"{np.degrees(cones.body_half_angle):.3f} degrees, {cones.precession_rate:.3f} rad/s")
+    56.310 degrees, 5.000 rad/s
     """
 
     body_half_angle: float
@@ -77,6 +83,13 @@ class Poinsot:
     ------
     ShapeError
         For a top without momentum, which has no invariable plane.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> poinsot = sp.rigid_body.Poinsot(top)
+    >>> np.abs(poinsot.slip(np.linspace(0.0, 5.0, 7))).max().round(9).item()  # it rolls without slipping
+    0.0
     """
 
     top: EulerTop
@@ -349,6 +362,12 @@ def cones(top: EulerTop) -> Cones:
     -----
     Source: Marsden and Ratiu, 15.8 case 2, whose I1 = I2 are the equal moments and I3 the one about the axis of
     symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
+
+    Examples
+    --------
+    >>> cones = sp.rigid_body.cones(sp.EulerTop.principal([2.0, 2.0, 1.0], [3.0, 0.0, 4.0]))
+    >>> cones.precession_rate, cones.space_inside_body
+    (2.5, False)
     """
     moments, magnitude = top.moments, top.magnitude
     close = np.diff(moments) <= _EQUAL * moments[1:]

@@ -28,6 +28,12 @@ class Equilibrium:
     direction : (3,) unit vector
     kind : "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)
     rate : angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
+
+    Examples
+    --------
+    >>> points = sp.rigid_body.equilibria([1.0, 2.0, 3.0])
+    >>> len(points), [point.kind for point in points]
+    (6, ['centre', 'centre', 'saddle', 'saddle', 'centre', 'centre'])
     """
 
     direction: Array
@@ -39,6 +45,12 @@ def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
     """The six steady rotations of a body, axis by axis in the order of its moments, + before −.
 
     Source: Marsden and Ratiu, 15.3 (figure 15.3.1) and 15.9; theory.md L2.
+
+    Examples
+    --------
+    >>> saddle = sp.rigid_body.equilibria([1.0, 2.0, 3.0])[2]
+    >>> saddle.kind, saddle.direction.tolist()
+    ('saddle', [0.0, 1.0, 0.0])
     """
     inertia = moments_argument(moments)
     found = []
@@ -64,6 +76,13 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     Notes
     -----
     Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
+
+    Examples
+    --------
+    >>> curve = sp.rigid_body.heteroclinics([1.0, 2.0, 3.0], 5)[0]
+    >>> print(curve[[0, -1]].round(6) + 0.0)  # from saddle to saddle
+    [[ 0. -1.  0.]
+     [ 0.  1.  0.]]
     """
     inertia = moments_argument(moments)
     ascending, order, parity = ascending_moments(inertia)
@@ -95,6 +114,13 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     ------
     ShapeError
         If an energy is out of range, or the three moments are equal: then no point of the sphere moves.
+
+    Examples
+    --------
+    >>> curves = sp.rigid_body.polhodes([1.0, 2.0, 3.0], [0.2], 5)
+    >>> energy = 0.5 * np.sum(curves**2 / [1.0, 2.0, 3.0], axis=-1)
+    >>> curves.shape, np.ptp(energy).round(12).item()
+    ((1, 2, 5, 3), 0.0)
     """
     inertia = moments_argument(moments)
     levels = np.atleast_1d(finite_array(energies, "energies", unit="1/(kg m^2)"))
@@ -122,5 +148,11 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
 
 
 def inverse_difference(moments: Array, first: int, second: int) -> float:
-    """1/I_first - 1/I_second, accurate in all digits also for moments that nearly agree [1/(kg m^2)]."""
+    """1/I_first - 1/I_second, accurate in all digits also for moments that nearly agree [1/(kg m^2)].
+
+    Examples
+    --------
+    >>> sp.rigid_body.inverse_difference(np.array([1.0, 2.0, 4.0]), 1, 2)
+    0.25
+    """
     return float((moments[second] - moments[first]) / (moments[first] * moments[second]))

@@ -53,6 +53,12 @@ class SteadyRotation:
     Notes
     -----
     A spherical body is "stable" everywhere: every momentum stands still.
+
+    Examples
+    --------
+    >>> spin = sp.rigid_body.steady_rotation(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0])
+    >>> spin.moment, spin.verdict
+    (3.0, 'stable')
     """
 
     momentum: Array
@@ -102,6 +108,12 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     -----
     Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
     order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
+
+    Examples
+    --------
+    >>> spin = sp.rigid_body.steady_rotation(np.diag([1.0, 2.0, 3.0]), [0.0, 1.0, 0.0])
+    >>> print(f"{spin.eigenvalues.real.max():.6f} = sqrt((1 - 1/2)(1/2 - 1/3))")
+    0.288675 = sqrt((1 - 1/2)(1/2 - 1/3))
     """
     tensor = _tensor(inertia)
     vector = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -150,6 +162,11 @@ def steady_rotations(
     Notes
     -----
     Source: Marsden and Ratiu, theorem 15.9.1.
+
+    Examples
+    --------
+    >>> [spin.verdict for spin in sp.rigid_body.steady_rotations(np.diag([1.0, 2.0, 3.0]))]
+    ['stable', 'unstable', 'stable']
     """
     tensor = _tensor(inertia)
     norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")

@@ -48,6 +48,12 @@ def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
     Notes
     -----
     Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> sp.mechanical_connection(cat, np.zeros(3)).round(6).tolist()
+    [[0.0, 0.0, 0.5], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
     check_object(body, "Body", "body")
     return inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
@@ -69,6 +75,12 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
     Notes
     -----
     Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> sp.curvature(cat, np.zeros(3))[1, 2].round(6).tolist()  # of waist_pitch and waist_yaw
+    [0.0, 0.0625, 0.0]
     """
     check_object(body, "Body", "body")
     columns, slopes = connection_slopes(body, shape)
@@ -107,6 +119,13 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     Notes
     -----
     Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
+
+    Examples
+    --------
+    >>> cat, bend = sp.load_body("cat_two_halves"), np.radians(59.426458741516)
+    >>> turn = sp.holonomy(cat, sp.examples.kane_scher(0.0, bend))
+    >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees: it turns over")
+    180.000000 degrees: it turns over
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
@@ -124,6 +143,13 @@ class HorizontalLift:
     body : who moves
     path : how the joints move, in the body's order
     solution : the integrated rotation
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, np.radians(30.0))
+    >>> lift = sp.horizontal_lift(cat, loop)
+    >>> print(f"{np.degrees(sp.so3.angle(lift.attitude([0.0, loop.duration]))).round(3)} degrees")
+    [ 0.    70.454] degrees
     """
 
     body: Body
@@ -175,6 +201,13 @@ def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Hor
     Notes
     -----
     Source: Cabrera 2006, section 2.3.1 (a) and remark 2.11; theory.md B2, B8.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, np.radians(59.426458741516))
+    >>> lift = sp.horizontal_lift(cat, loop)
+    >>> print(f"{np.degrees(sp.so3.angle(lift.attitude(loop.duration))):.6f} degrees: it turns over")
+    180.000000 degrees: it turns over
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")

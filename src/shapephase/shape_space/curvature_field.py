@@ -58,6 +58,11 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
     Notes
     -----
     Source: theory.md B6.
+
+    Examples
+    --------
+    >>> sp.is_flat(sp.load_body("cat_two_halves"))
+    False
     """
     check_object(body, "Body", "body")
     goal = finite_array(tolerance, "tolerance")

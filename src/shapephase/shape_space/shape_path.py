@@ -58,6 +58,12 @@ class ShapePath:
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
     scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
+
+    Examples
+    --------
+    >>> circle = sp.ShapePath.fourier([0.0, 0.0], [[0.5], [0.0]], [[0.0], [0.5]], 2.0)
+    >>> circle.shape(0.5).round(12).tolist(), circle.duration
+    ([0.0, 0.5], 2.0)
     """
 
     curve: Curve

@@ -61,6 +61,12 @@ class BodySummary:
     joints : the independent ones, in the order of the shape vector
     links : all of them, by name
     parts : what moves as one, the base first
+
+    Examples
+    --------
+    >>> summary = sp.body_summary(sp.load_body("satellite"))
+    >>> summary.mass, len(summary.joints), len(summary.links)
+    (139.5, 10, 16)
     """
 
     name: str
@@ -103,7 +109,14 @@ class PathSummary:
 
 
 def body_summary(body: Body) -> BodySummary:
-    """What there is to know of a body at its neutral shape."""
+    """What there is to know of a body at its neutral shape.
+
+    Examples
+    --------
+    >>> summary = sp.body_summary(sp.load_body("cat"))
+    >>> round(summary.mass, 6), len(summary.joints), summary.principal_moments.round(4).tolist()
+    (4.0, 23, [0.0119, 0.0799, 0.085])
+    """
     check_object(body, "Body", "body")
     neutral = body.shape()
     inertia = body.locked_inertia(neutral)

@@ -48,7 +48,15 @@ _GROUPS = {
 
 @dataclass(frozen=True, eq=False)
 class NambuPair:
-    """K = Pi.casimir Pi / 2 and N = Pi.hamiltonian Pi / 2 with Pi' = orientation (grad K x grad N)."""
+    """K = Pi.casimir Pi / 2 and N = Pi.hamiltonian Pi / 2 with Pi' = orientation (grad K x grad N).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> pair = lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
+    >>> pair.orientation
+    -1.0
+    """
 
     casimir: Array
     """(3, 3) symmetric, the matrix of K."""
@@ -115,6 +123,13 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     Notes
     -----
     Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> pair = lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
+    >>> pair.casimir.diagonal().tolist(), pair.hamiltonian.diagonal().tolist()
+    ([1.0, 0.5, 0.25], [1.0, 1.0, 1.0])
     """
     tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
     if tensor.ndim != 2:
@@ -155,6 +170,13 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
     Notes
     -----
     Source: Marsden and Ratiu (15.11.7).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> matrix = lie.cylinder_matrix([1.0, 2.0, 4.0])
+    >>> lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), matrix).casimir.diagonal().round(9).tolist()
+    [0.75, 0.25, 0.0]
     """
     first, _, third = moments_argument(moments)
     if first == third:
@@ -177,6 +199,12 @@ def structure_constants(form: ArrayLike) -> Array:
     Notes
     -----
     Source: Marsden and Ratiu, theorem 15.11.3 and exercise 14.9-1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.structure_constants(np.eye(3))[0, 1].tolist()  # those of so(3)
+    [0.0, 0.0, 1.0]
     """
     return np.einsum("ijl,lk->ijk", so3.hat(np.eye(3)).transpose(1, 2, 0) * -1.0, _form(form))
 
@@ -196,6 +224,12 @@ def lie_group(form: ArrayLike) -> str:
     Notes
     -----
     Source: Marsden and Ratiu, theorem 15.11.3, which leaves out (+-0) and (000).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> [lie.lie_group(np.diag([1.0, 1.0, last])) for last in (1.0, -1.0, 0.0)]
+    ['SO(3)', 'SO(2,1)', 'SE(2)']
     """
     values = np.linalg.eigvalsh(_form(form))
     threshold = _ZERO * np.max(np.abs(values))
@@ -209,13 +243,26 @@ def maxwell_bloch_invariants(state: ArrayLike) -> tuple[Array, Array]:
     A circular and a parabolic cylinder. On the first x_1 is the rate of a pendulum's angle, on the second x_1 obeys
     the ideal Duffing equation x_1'' = C x_1 - x_1^3/2, C the second invariant.
     Source: Marsden and Ratiu, remark after theorem 15.11.3 (David and Holm 1992); theory.md N11.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> tuple(float(value) for value in lie.maxwell_bloch_invariants([1.0, 2.0, 3.0]))
+    (6.5, 3.5)
     """
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)
     return 0.5 * (y * y + z * z), z + 0.5 * x * x
 
 
 def maxwell_bloch_rate(state: ArrayLike) -> Array:
-    """(x_2, x_1 x_3, -x_1 x_2), the cross product of the gradients of the two invariants: (..., 3) -> (..., 3)."""
+    """(x_2, x_1 x_3, -x_1 x_2), the cross product of the gradients of the two invariants: (..., 3) -> (..., 3).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.maxwell_bloch_rate([1.0, 2.0, 3.0]).tolist()
+    [2.0, 3.0, -2.0]
+    """
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)
     return np.stack([y, x * z, -x * y], axis=-1)
 

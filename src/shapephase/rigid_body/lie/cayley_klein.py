@@ -38,6 +38,12 @@ def cayley_klein_momentum(z: ArrayLike) -> Array:
     """Pi_k = -z^H sigma_k z / 4, minus the momentum map of SU(2) on C^2: (..., 2) -> (..., 3) [kg m^2/s].
 
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> print(lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
+    [ 0.  0. -1.]
     """
     spinor = _spinor(z, "z")
     return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
@@ -47,6 +53,13 @@ def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
     """A z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
 
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> z = lie.cayley_klein_spinor([0.3, 0.4, 1.2])
+    >>> print(lie.cayley_klein_momentum(z).round(9))
+    [0.3 0.4 1.2]
     """
     pi, angle = finite_array(momentum, "momentum", (3,)), finite_array(phase, "phase")
     length = np.linalg.norm(pi, axis=-1)
@@ -69,6 +82,12 @@ def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
     Notes
     -----
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> float(np.real(lie.cayley_klein_bracket([1.0, 0.0], [1.0j, 0.0])))  # {q_1, p_1}
+    1.0
     """
     f, g = _spinor(first, "first"), _spinor(second, "second")
     return np.sum(f.real * g.imag - f.imag * g.real, axis=-1)
@@ -78,6 +97,12 @@ def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
     """The gradient dF/dq + i dF/dp of a collective F(Pi(z)) with dF/dPi = omega: (..., 3), (..., 2) -> (..., 2).
 
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.cayley_klein_gradient([0.0, 0.0, 2.0], [2.0, 0.0]).shape
+    (2,)
     """
     return -0.5 * _turned(finite_array(omega, "omega", (3,)), _spinor(z, "z"))
 
@@ -89,6 +114,13 @@ def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
     ------
     ShapeError, SingularInertiaError
         If the inertia is not symmetric positive definite, or the shapes are not right.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> z = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> print(f"{lie.cayley_klein_hamiltonian(np.diag([1.0, 2.0, 4.0]), z):.9f} J")
+    0.500000000 J
     """
     return kinetic_energy(inertia, cayley_klein_momentum(z))
 
@@ -97,6 +129,14 @@ def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
     """Hamilton's equations of the kinetic energy on C^2, z' = (i/2) (Omega . sigma) z: (..., 2) -> (..., 2).
 
     Raises as `cayley_klein_hamiltonian`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> z = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> rate = lie.cayley_klein_equations(np.diag([1.0, 2.0, 4.0]), z)
+    >>> print(f"{np.linalg.norm(rate) / np.linalg.norm(z):.9f}")  # half of Omega_3 = 1/2
+    0.250000000
     """
     spinor = _spinor(z, "z")
     return 0.5j * _turned(angular_velocity(inertia, cayley_klein_momentum(spinor)), spinor)
@@ -106,6 +146,14 @@ def cayley_klein_motion(inertia: ArrayLike, z: ArrayLike, times: ArrayLike) -> S
     """The rigid body's flow on C^2 from z at the first time: (..., 2), (N,) -> (..., N, 2).
 
     Raises as `cayley_klein_hamiltonian`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> start = lie.cayley_klein_spinor([0.3, 0.4, 1.2])
+    >>> z = lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])
+    >>> print(np.linalg.norm(lie.cayley_klein_momentum(z), axis=-1).round(9))
+    [1.3 1.3]
     """
     inverse = inverse_inertia_argument(inertia)
     return _collective_flow(lambda pi: (inverse @ pi[..., None])[..., 0], _spinor(z, "z"), ascending_times(times))
@@ -120,6 +168,14 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
     ------
     ShapeError
         If the two lengths differ by more than 1e-6 of themselves, or are zero.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> start = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> z = lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])[-1]
+    >>> print(f"{sp.so3.angle(lie.cayley_klein_attitude(start, z)):.9f}")  # 1/2 rad/s for 1 s
+    0.500000000
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")
     length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)

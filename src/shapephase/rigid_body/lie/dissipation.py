@@ -30,6 +30,13 @@ def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, al
     Notes
     -----
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> x, y, z = np.eye(3)
+    >>> lie.symmetric_bracket(x, x, [0.0, 0.0, 2.0], 0.5).item()  # -alpha |Pi x e_x|^2
+    -2.0
     """
     pi, strength = _momentum(momentum), finite_array(alpha, "alpha")
     across = np.cross(pi, gradient_at(first, "first", pi))
@@ -43,13 +50,26 @@ def double_bracket_equations(inertia: ArrayLike, momentum: ArrayLike, alpha: Arr
     ------
     ShapeError, SingularInertiaError
         If the inertia is not symmetric positive definite, or the shapes are not right.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.double_bracket_equations(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0], 0.1).tolist()
+    [0.0, 0.0, 0.0]
     """
     pi = _momentum(momentum)
     return _rate(pi, angular_velocity(inertia, pi), finite_array(alpha, "alpha")[..., None])
 
 
 def dissipated_power(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
-    """-dK/dt = alpha |Pi x Omega|^2, zero at equilibria only: (...) [W]. Raises as `double_bracket_equations`."""
+    """-dK/dt = alpha |Pi x Omega|^2, zero at equilibria only: (...) [W]. Raises as `double_bracket_equations`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.dissipated_power(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0], 2.0).item()  # alpha |Pi x Omega|^2
+    1.125
+    """
     pi = _momentum(momentum)
     torque = np.cross(pi, angular_velocity(inertia, pi))
     return finite_array(alpha, "alpha") * np.sum(torque * torque, axis=-1)
@@ -67,6 +87,13 @@ def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float,
     Notes
     -----
     Raises as `double_bracket_equations`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> pi = lie.double_bracket_motion(np.diag([1.0, 2.0, 4.0]), [0.6, 0.1, 0.5], 1.0, [0.0, 60.0])
+    >>> print(pi[-1].round(4) + 0.0, np.linalg.norm(pi, axis=-1).round(6))
+    [0.     0.     0.7874] [0.787401 0.787401]
     """
     pi, instants, strength = _momentum(momentum), ascending_times(times), finite_array(alpha, "alpha")[..., None]
     inverse = inverse_inertia_argument(inertia)

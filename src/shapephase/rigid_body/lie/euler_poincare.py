@@ -29,6 +29,13 @@ class EulerPoincareMotion:
     velocity : (..., N, d) body velocity xi = I^-1 mu
     adjoint : (..., N, d, d) Ad_g, from body to space components; needs no matrices of the group
     attitude : (..., N, n, n) the group element g, g' = g xi; None where the algebra has no basis of matrices
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> motion = lie.euler_poincare_motion(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 1.0])
+    >>> print((motion.attitude[-1] @ motion.momentum[-1]).round(9))  # the spatial momentum is constant
+    [0.3 0.4 1.2]
     """
 
     algebra: LieAlgebra
@@ -71,6 +78,12 @@ def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: Array
     Notes
     -----
     Source: Marsden and Ratiu, section 15.3 and chapter 13; theory.md G7.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.euler_poincare_rate(lie.so3(), np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()
+    [0.0, 0.75, 0.0]
     """
     operator = inertia_operator(algebra, inertia)
     mu = finite_array(momentum, "momentum", (algebra.dimension,))
@@ -98,6 +111,13 @@ def euler_poincare_motion(
     Notes
     -----
     Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> motion = lie.euler_poincare_motion(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 1.0])
+    >>> print(np.linalg.norm(motion.momentum, axis=-1).round(9))
+    [1.3 1.3]
     """
     operator, d = inertia_operator(algebra, inertia), algebra.dimension
     mu, instants = finite_array(momentum, "momentum", (d,)), ascending_times(times)

@@ -28,6 +28,13 @@ class InvariableHyperplane:
     ----------
     normal : (..., d) covector, the space momentum mu_s
     level : (...) twice the energy
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> plane = lie.invariable_hyperplane(lie.so3(), np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 0.0])
+    >>> plane.level.item()  # twice the energy
+    1.0
     """
 
     normal: Array
@@ -53,6 +60,13 @@ class RollingContact:
     contact_velocity : (..., N, d) velocity of the point of the moved quadric that touches; zero, part (c)
     body_rate : (..., N, d) xi', the rate of the contact along the quadric, body components
     space_rate : (..., N, d) Ad_g xi', its rate along the hyperplane; equal rates are equal lengths of the two curves
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> motion = lie.euler_poincare_motion(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 1.0])
+    >>> lie.rolling_contact(motion).point[0].round(9).tolist()  # the angular velocity at the start
+    [0.3, 0.2, 0.3]
     """
 
     hyperplane: InvariableHyperplane
@@ -72,6 +86,13 @@ def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: Arr
     ------
     ShapeError, LieAlgebraError
         If the shapes or the operator are not right, or the momentum is zero: then there is no plane.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> plane = lie.invariable_hyperplane(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0])
+    >>> plane.normal.tolist(), plane.level.item()
+    ([0.0, 0.0, 2.0], 1.0)
     """
     operator = inertia_operator(algebra, inertia)
     mu = finite_array(momentum, "momentum", (algebra.dimension,))
@@ -94,6 +115,12 @@ def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -
     Notes
     -----
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.contact_conormal(np.diag([1.0, 2.0, 4.0]), np.eye(3), [1.0, 1.0, 1.0]).tolist()
+    [1.0, 2.0, 4.0]
     """
     points = finite_array(point, "point", (None,))
     d = points.shape[-1]
@@ -114,6 +141,13 @@ def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLik
     Notes
     -----
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> x, y, z = np.eye(3)
+    >>> lie.contact_velocity(lie.so3(), np.eye(3), z, x).tolist()  # z x x
+    [0.0, 1.0, 0.0]
     """
     ad = finite_array(adjoint, "adjoint", (algebra.dimension, algebra.dimension))
     return np.einsum("...ij,...j->...i", ad, algebra.bracket(velocity, body_point))
@@ -123,6 +157,14 @@ def rolling_contact(motion: EulerPoincareMotion) -> RollingContact:
     """The contact of energy quadric and invariable hyperplane along a motion, with what the theorem says is zero.
 
     Raises LieAlgebraError for a body at rest.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> motion = lie.euler_poincare_motion(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 1.0])
+    >>> contact = lie.rolling_contact(motion)
+    >>> np.abs(contact.contact_velocity).max().round(9).item()  # it rolls
+    0.0
     """
     algebra, inertia = motion.algebra, motion.inertia
     hyperplane = invariable_hyperplane(algebra, inertia, motion.momentum[..., 0, :])

@@ -17,7 +17,17 @@ from .lie_algebra import LieAlgebra, Matrices, complex_or_real
 
 
 def group_exponential(algebra: LieAlgebra, a: ArrayLike) -> Matrices:
-    """The group element exp(a): (..., d) -> (..., n, n). Raises ShapeError, LieAlgebraError."""
+    """The group element exp(a): (..., d) -> (..., n, n). Raises ShapeError, LieAlgebraError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> quarter = lie.group_exponential(lie.so3(), [0.0, 0.0, np.pi / 2.0])
+    >>> print(quarter.real.round(9) + 0.0)
+    [[ 0. -1.  0.]
+     [ 1.  0.  0.]
+     [ 0.  0.  1.]]
+    """
     from scipy.linalg import expm
 
     return expm(algebra.matrix(a))
@@ -30,6 +40,15 @@ def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     ------
     LieAlgebraError
         If g has no inverse, or does not map the algebra to itself: then it is not an element of the group.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> half = np.diag([1.0, -1.0, -1.0])
+    >>> print(lie.adjoint_action(lie.so3(), half).round(9) + 0.0)
+    [[ 1.  0.  0.]
+     [ 0. -1.  0.]
+     [ 0.  0. -1.]]
     """
     element, inverse = _element(algebra, g)
     turned = element[..., None, :, :] @ algebra.matrix_basis @ inverse[..., None, :, :]
@@ -41,6 +60,13 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 
     <Ad*_{g^-1} mu, a> = <mu, Ad_{g^-1} a>. Raises LieAlgebraError as `adjoint_action` does.
     Source: Marsden and Ratiu, equation (15.4.5).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> half = np.diag([1.0, -1.0, -1.0])
+    >>> print(lie.coadjoint_action(lie.so3(), half).diagonal().round(9))
+    [ 1. -1. -1.]
     """
     _, inverse = _element(algebra, g)
     return np.swapaxes(adjoint_action(algebra, inverse), -1, -2)
@@ -57,6 +83,12 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
     Notes
     -----
     Source: Marsden and Ratiu, equation (15.4.4).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.body_velocity(lie.so3(), np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).round(9).tolist()
+    [1.0, 2.0, 3.0]
     """
     _, inverse = _element(algebra, g)
     return algebra.coordinates(inverse @ _like(algebra, velocity, "velocity"))
@@ -66,6 +98,13 @@ def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Ar
     """V^S = V g^-1 of a tangent vector at g: (..., n, n), (..., n, n) -> (..., d).
 
     Raises LieAlgebraError as `body_velocity` does. Source: Marsden and Ratiu, equation (15.4.3).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> turn = sp.so3.exp(np.array([0.0, 0.0, np.pi / 2.0]))
+    >>> lie.space_velocity(lie.so3(), turn, turn @ sp.so3.hat(np.array([1.0, 0.0, 0.0]))).round(9).tolist()
+    [0.0, 1.0, 0.0]
     """
     _, inverse = _element(algebra, g)
     return algebra.coordinates(_like(algebra, velocity, "velocity") @ inverse)
@@ -75,6 +114,12 @@ def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Arr
     """alpha^B, the pull-back of a covector at g by left translation, <alpha^B, a> = <alpha, g a>: -> (..., d).
 
     Raises LieAlgebraError, ShapeError. Source: Marsden and Ratiu, equation (15.4.2).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.body_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
+    [0.0, 0.0, 2.0]
     """
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), element[..., None, :, :] @ algebra.matrix_basis)
@@ -84,6 +129,12 @@ def space_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Ar
     """alpha^S, the pull-back of a covector at g by right translation, <alpha^S, a> = <alpha, a g>: -> (..., d).
 
     Raises LieAlgebraError, ShapeError. Source: Marsden and Ratiu, equation (15.4.1).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.space_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
+    [0.0, 0.0, 2.0]
     """
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), algebra.matrix_basis @ element[..., None, :, :])

@@ -31,6 +31,12 @@ class ReducedBody:
     centre : (3,) centre of mass from the material origin [m]
     positions : (P, 3) from the centre of mass [m]
     inertia : (3, 3) about the centre of mass [kg m^2]
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]).mass
+    4.0
     """
 
     mass: float
@@ -48,7 +54,14 @@ class ReducedBody:
 
 
 def material_velocity(attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
-    """V(X) = R' X: (..., 3, 3), (P, 3) -> (..., P, 3) [m/s]. Raises ShapeError; equation (15.2.1)."""
+    """V(X) = R' X: (..., 3, 3), (P, 3) -> (..., P, 3) [m/s]. Raises ShapeError; equation (15.2.1).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.material_velocity(sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
+    [[0.0, 2.0, 0.0]]
+    """
     rate, points = finite_array(attitude_rate, "attitude_rate", (3, 3)), finite_array(positions, "positions", (None, 3))
     return points @ so3.transpose(rate)
 
@@ -57,6 +70,12 @@ def spatial_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, points: Arra
     """v(x) = R' R^-1 x at points of space: (..., 3, 3), (..., 3, 3), (..., P, 3) -> (..., P, 3) [m/s].
 
     Raises ShapeError. Source: equation (15.2.2).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.spatial_velocity(np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
+    [[0.0, 2.0, 0.0]]
     """
     omega = spatial_angular_velocity(attitude, attitude_rate)
     return np.cross(omega[..., None, :], finite_array(points, "points", (None, 3)))
@@ -66,6 +85,12 @@ def convective_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, positions
     """R^-1 R' X, the velocity in body axes: (..., 3, 3), (..., 3, 3), (P, 3) -> (..., P, 3) [m/s].
 
     Raises ShapeError. Source: equation (15.2.3).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.convective_velocity(np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
+    [[0.0, 2.0, 0.0]]
     """
     omega = body_angular_velocity(attitude, attitude_rate)
     return np.cross(omega[..., None, :], finite_array(positions, "positions", (None, 3)))
@@ -82,6 +107,12 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     Notes
     -----
     Source: equation (15.2.8).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.body_angular_velocity(np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).tolist()
+    [1.0, 2.0, 3.0]
     """
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
     spin = so3.transpose(rotation) @ rate
@@ -98,6 +129,12 @@ def spatial_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> A
     """omega = R Omega, hat(omega) = R' R^-1: (..., 3, 3), (..., 3, 3) -> (..., 3) [rad/s, inertial axes].
 
     Raises ShapeError as `body_angular_velocity`. Source: equation (15.2.7).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.spatial_angular_velocity(np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).tolist()
+    [1.0, 2.0, 3.0]
     """
     return so3.apply(so3.rotation_argument(attitude, "attitude"), body_angular_velocity(attitude, attitude_rate))
 
@@ -107,13 +144,27 @@ def material_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude_rate: 
 
     Left invariant: the same for (B R, B R') with any rotation B. Raises ShapeError.
     Source: equations (15.2.4), (15.2.9).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.material_lagrangian([3.0], [[1.0, 0.0, 0.0]], sp.so3.hat(np.array([0.0, 0.0, 2.0]))).item()
+    6.0
     """
     m, _ = _particles(masses, positions)
     return _energy(m, material_velocity(attitude_rate, positions))
 
 
 def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
-    """L = sum m |v(x)|^2 / 2 of the spatial velocity field at x = R X: -> (...) [J]. Raises ShapeError; (15.2.5)."""
+    """L = sum m |v(x)|^2 / 2 of the spatial velocity field at x = R X: -> (...) [J]. Raises ShapeError; (15.2.5).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> rate = sp.so3.hat(np.array([0.0, 0.0, 2.0]))
+    >>> lie.spatial_lagrangian([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).item()  # 3 * 2^2/2
+    6.0
+    """
     m, points = _particles(masses, positions)
     placed = points @ so3.transpose(so3.rotation_argument(attitude, "attitude"))
     return _energy(m, spatial_velocity(attitude, attitude_rate, placed))
@@ -122,7 +173,15 @@ def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayL
 def convective_lagrangian(
     masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike
 ) -> Array:
-    """L = sum m |Omega x X|^2 / 2: -> (...) [J]. Raises ShapeError; equations (15.2.6), (15.3.1)."""
+    """L = sum m |Omega x X|^2 / 2: -> (...) [J]. Raises ShapeError; equations (15.2.6), (15.3.1).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> rate = sp.so3.hat(np.array([0.0, 0.0, 2.0]))
+    >>> lie.convective_lagrangian([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).item()  # 3 * 2^2/2
+    6.0
+    """
     m, points = _particles(masses, positions)
     return _energy(m, convective_velocity(attitude, attitude_rate, points))
 
@@ -131,6 +190,13 @@ def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b:
     """<<a, b>> = sum m (a x X) . (b x X): (P,), (P, 3), (..., 3), (..., 3) -> (...) [kg m^2 times those of a and b].
 
     L = <<Omega, Omega>> / 2. Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.2).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> x = [1.0, 0.0, 0.0]
+    >>> lie.mass_inner_product([2.0], [[0.0, 3.0, 0.0]], x, x).item()  # m r^2
+    18.0
     """
     m, points = _particles(masses, positions)
     first, second = (np.cross(finite_array(v, n, (3,))[..., None, :], points) for v, n in ((a, "a"), (b, "b")))
@@ -141,6 +207,12 @@ def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia tensor about the material origin, I a . b = <<a, b>>: (P,), (P, 3) -> (3, 3) [kg m^2].
 
     Raises ShapeError. Source: Marsden and Ratiu, section 15.3.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.mass_inertia([1.0, 1.0], [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).tolist()
+    [[4.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 5.0]]
     """
     m, points = _particles(masses, positions)
     return _inertia(m, points)
@@ -150,6 +222,12 @@ def legendre_transform(masses: ArrayLike, positions: ArrayLike, angular_velocity
     """Pi = sum m X x (Omega x X) = I Omega, the body momentum: (P,), (P, 3), (..., 3) -> (..., 3) [kg m^2/s].
 
     Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.4).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.legendre_transform([2.0], [[0.0, 3.0, 0.0]], [1.0, 0.0, 0.0]).tolist()
+    [18.0, 0.0, 0.0]
     """
     m, points = _particles(masses, positions)
     speeds = np.cross(finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")[..., None, :], points)
@@ -160,6 +238,13 @@ def spatial_momentum(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLik
     """pi = sum m x x v = R Pi, constant in a free motion: -> (..., 3) [kg m^2/s, inertial axes].
 
     Raises ShapeError. Source: Marsden and Ratiu, equations (15.3.5), (15.3.7), (15.3.13).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> rate = sp.so3.hat(np.array([0.0, 0.0, 2.0]))
+    >>> lie.spatial_momentum([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).tolist()
+    [0.0, 0.0, 6.0]
     """
     m, points = _particles(masses, positions)
     placed = points @ so3.transpose(so3.rotation_argument(attitude, "attitude"))
@@ -170,6 +255,12 @@ def se3_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia operator on se(3), twist (Omega, V) of the material origin -> (Pi, P): (P,), (P, 3) -> (6, 6).
 
     That of the kinetic energy with translations; for `euler_poincare_motion(se3(), ...)`. Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.se3_inertia([2.0], [[0.0, 3.0, 0.0]]).diagonal().tolist()
+    [18.0, 0.0, 18.0, 2.0, 2.0, 2.0]
     """
     m, points = _particles(masses, positions)
     coupling = so3.hat(m @ points)
@@ -180,6 +271,13 @@ def reduce_translations(masses: ArrayLike, positions: ArrayLike) -> ReducedBody:
     """The body about its centre of mass: SE(3) reduced by its translations to SO(3).
 
     Raises ShapeError. Source: Marsden and Ratiu, exercise 15.1-1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> body = lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    >>> body.centre.tolist(), body.inertia.diagonal().tolist()
+    ([3.0, 0.0, 0.0], [0.0, 12.0, 12.0])
     """
     m, points = _particles(masses, positions)
     centre = m @ points / m.sum()

@@ -48,6 +48,13 @@ class LieAlgebra:
         those of the basis.
     ShapeError
         If an entry is not finite or the shapes do not fit.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> algebra = lie.so3()
+    >>> algebra.name, algebra.structure.shape
+    ('so(3)', (3, 3, 3))
     """
 
     structure: Array
@@ -164,6 +171,13 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
     ------
     LieAlgebraError
         If the matrices are linearly dependent, or a bracket leaves their span.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> plane = lie.lie_algebra_from_matrices([[[0.0, -1.0], [1.0, 0.0]]], "so(2)")
+    >>> plane.structure.tolist()
+    [[[0.0]]]
     """
     matrices = _matrices(basis, "basis")
     if matrices.ndim != 3 or not len(matrices):
@@ -183,6 +197,12 @@ def so3() -> LieAlgebra:
     """so(3): basis hat(e_1), hat(e_2), hat(e_3); the bracket is the cross product, [e_1, e_2] = +e_3.
 
     Source: theory.md B-E2 (Bonnard et al. print the opposite sign).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.so3().structure[0, 1].tolist()  # [e_1, e_2] = e_3
+    [0.0, 0.0, 1.0]
     """
     return so(3)
 
@@ -196,6 +216,12 @@ def so(n: int) -> LieAlgebra:
     ------
     LieAlgebraError
         For n below 2.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.so(4).structure.shape
+    (6, 6, 6)
     """
     _whole(n, 2, "n")
     pairs = [(1, 2), (2, 0), (0, 1)] if n == 3 else list(combinations(range(n), 2))
@@ -203,12 +229,26 @@ def so(n: int) -> LieAlgebra:
 
 
 def sl2r() -> LieAlgebra:
-    """sl(2, R): H = diag(1, -1), X, Y with [H, X] = 2X, [H, Y] = -2Y, [X, Y] = H."""
+    """sl(2, R): H = diag(1, -1), X, Y with [H, X] = 2X, [H, Y] = -2Y, [X, Y] = H.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.sl2r().structure[0, 1].tolist()  # [H, X] = 2 X
+    [0.0, 2.0, 0.0]
+    """
     return lie_algebra_from_matrices(np.stack([np.diag([1.0, -1.0]), _unit(2, 0, 1), _unit(2, 1, 0)]), "sl(2, R)")
 
 
 def se2() -> LieAlgebra:
-    """se(2): the turn, then the two translations, as 3 x 3 homogeneous matrices."""
+    """se(2): the turn, then the two translations, as 3 x 3 homogeneous matrices.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.se2().structure.shape, lie.linear_casimirs(lie.se2()).shape
+    ((3, 3, 3), (0, 3))
+    """
     return lie_algebra_from_matrices(
         np.stack([_unit(3, 1, 0) - _unit(3, 0, 1), _unit(3, 0, 2), _unit(3, 1, 2)]), "se(2)"
     )
@@ -219,6 +259,12 @@ def se3() -> LieAlgebra:
 
     [(a, u), (b, v)] = (a x b, a x v - b x u). A covector is (Pi, P), angular and linear momentum; with (Pi, Gamma)
     in its place the minus Lie-Poisson bracket is the heavy top's (theory.md M2).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.se3().structure.shape
+    (6, 6, 6)
     """
     turns = np.zeros((3, 4, 4))
     turns[:, :3, :3] = so3().matrix_basis
@@ -226,13 +272,27 @@ def se3() -> LieAlgebra:
 
 
 def su2() -> LieAlgebra:
-    """su(2): basis -i sigma_k / 2 of Pauli's matrices, with the structure constants of so(3)."""
+    """su(2): basis -i sigma_k / 2 of Pauli's matrices, with the structure constants of so(3).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.su2().structure[0, 1].round(12).tolist()
+    [0.0, 0.0, 1.0]
+    """
     sigma = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
     return lie_algebra_from_matrices(-0.5j * sigma, "su(2)")
 
 
 def heisenberg() -> LieAlgebra:
-    """The Heisenberg algebra: [p, q] = z, z central, as strictly upper triangular 3 x 3 matrices."""
+    """The Heisenberg algebra: [p, q] = z, z central, as strictly upper triangular 3 x 3 matrices.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.linear_casimirs(lie.heisenberg()).round(9).tolist()  # the centre, z
+    [[0.0, 0.0, 1.0]]
+    """
     return lie_algebra_from_matrices(np.stack([_unit(3, 0, 1), _unit(3, 1, 2), _unit(3, 0, 2)]), "Heisenberg")
 
 
@@ -247,6 +307,12 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
         If the shape is wrong or an entry is not finite.
     LieAlgebraError
         If it is not symmetric to 1e-9 of its largest entry, or singular.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.inertia_operator(lie.so3(), np.diag([1.0, 2.0, 4.0])).shape
+    (3, 3)
     """
     d = algebra.dimension
     operator = finite_array(inertia, "inertia", (d, d))
@@ -261,7 +327,14 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
 
 
 def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...]) -> NDArray[Any]:
-    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`. Raises ShapeError."""
+    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`. Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.complex_or_real([1.0, 2.0j], "z", (2,)).tolist()
+    [(1+0j), 2j]
+    """
     try:
         # asanyarray keeps the mask of a masked array, which `finite_array` refuses.
         entries = np.asanyarray(value)
@@ -273,7 +346,14 @@ def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...
 
 
 def linear_solution(operator: Array, right: Array) -> Array:
-    """x with operator x = right: (..., d, d), (..., d) -> (..., d)."""
+    """x with operator x = right: (..., d, d), (..., d) -> (..., d).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.linear_solution(np.diag([2.0, 4.0]), np.array([2.0, 8.0])).tolist()
+    [1.0, 2.0]
+    """
     return np.linalg.solve(operator, right[..., None])[..., 0].astype(np.float64, copy=False)
 
 

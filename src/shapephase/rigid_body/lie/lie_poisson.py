@@ -37,6 +37,14 @@ def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """B_ij = {mu_i, mu_j} = -c_ij^k mu_k: (..., d) -> (..., d, d). {F, G} = dF . B dG, and mu' = B dH.
 
     For so(3) it is hat(Pi). Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> print(lie.poisson_tensor([1.0, 2.0, 3.0]) + 0.0)
+    [[ 0. -3.  2.]
+     [ 3.  0. -1.]
+     [-2.  1.  0.]]
     """
     return -np.einsum("ijk,...k->...ij", algebra.structure, _momentum(momentum, algebra))
 
@@ -52,6 +60,13 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
     Notes
     -----
     Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> x, y, z = np.eye(3)
+    >>> lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
+    -5.0
     """
     mu = _momentum(momentum, algebra)
     bracket = algebra.bracket(gradient_at(first, "first", mu), gradient_at(second, "second", mu))
@@ -74,6 +89,13 @@ def bracket_gradient(
     Notes
     -----
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> flat = np.zeros((3, 3))
+    >>> lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
+    [0.0, 0.0, -1.0]
     """
     d, mu = algebra.dimension, _momentum(momentum, algebra)
     df, dg = finite_array(first[0], "first gradient", (d,)), finite_array(second[0], "second gradient", (d,))
@@ -87,6 +109,12 @@ def hamiltonian_vector_field(hamiltonian: Gradient, momentum: ArrayLike, algebra
     """X_H(mu) = ad*_{dH} mu, with {F, H} = dF . X_H: (..., d) -> (..., d). For so(3) it is Pi x grad H.
 
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
+    [0.0, -1.0, 0.0]
     """
     mu = _momentum(momentum, algebra)
     return algebra.coad(gradient_at(hamiltonian, "hamiltonian", mu), mu)
@@ -108,6 +136,14 @@ def lie_poisson_motion(
         If the gradient, the momentum or the times are not right.
     AccuracyNotReached
         If the motion goes to infinity before the last time.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> inverse = np.array([1.0, 0.5, 0.25])
+    >>> pi = lie.lie_poisson_motion(lambda pi: inverse * pi, [0.3, 0.4, 1.2], [0.0, 1.0, 2.0])
+    >>> print(np.linalg.norm(pi, axis=-1).round(9))
+    [1.3 1.3 1.3]
     """
     start, instants = _momentum(momentum, algebra), ascending_times(times)
     gradient_at(hamiltonian, "hamiltonian", start)
@@ -125,12 +161,25 @@ def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra 
     Zero everywhere if and only if C is a Casimir.
 
     Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.12).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
+    0.0
     """
     return np.linalg.norm(hamiltonian_vector_field(function, momentum, algebra), axis=-1)
 
 
 def linear_casimirs(algebra: LieAlgebra) -> Array:
-    """An orthonormal basis v of the linear Casimirs mu -> v . mu, that is of the centre of the algebra: (count, d)."""
+    """An orthonormal basis v of the linear Casimirs mu -> v . mu, that is of the centre of the algebra: (count, d).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.linear_casimirs(lie.so3()).shape  # none
+    (0, 3)
+    """
     return _null_space(algebra.structure.reshape(algebra.dimension, -1).T)
 
 
@@ -139,6 +188,14 @@ def quadratic_casimirs(algebra: LieAlgebra) -> Array:
 
     Products of linear Casimirs are among them. From the null space of {mu . Q mu, mu_j} = 0, d^2 (d + 1)/2 linear
     equations for d (d + 1)/2 unknowns.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> print((lie.quadratic_casimirs(lie.so3())[0] * np.sqrt(3.0)).round(9) + 0.0)
+    [[1. 0. 0.]
+     [0. 1. 0.]
+     [0. 0. 1.]]
     """
     d = algebra.dimension
     rows, columns = np.triu_indices(d)
@@ -165,6 +222,13 @@ def coadjoint_orbit_form(first: ArrayLike, second: ArrayLike, momentum: ArrayLik
     ------
     ShapeError
         If a vector is not tangent to the orbit, that is not an ad*_a mu, to 1e-9 of its length.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> x, y, z = np.eye(3)
+    >>> lie.coadjoint_orbit_form(x, y, [0.0, 0.0, 5.0]).item()
+    -0.2
     """
     mu = _momentum(momentum, algebra)
     tensor = poisson_tensor(mu, algebra)
@@ -183,6 +247,12 @@ def sphere_area_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLike) -
     """dA(u, v) = Pi . (u x v)/|Pi|, the area form of the sphere through Pi, positive from outside: (..., 3) -> (...).
 
     Raises ShapeError for a zero momentum.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.sphere_area_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()
+    1.0
     """
     pi, u, v = (finite_array(x, n, (3,)) for x, n in ((momentum, "momentum"), (first, "first"), (second, "second")))
     return np.sum(pi * np.cross(u, v), axis=-1) / _radius(pi)
@@ -192,6 +262,12 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
     """omega(u, v) = -Pi . (u x v)/|Pi|^2 = -dA/|Pi|, the form of the leaf for the minus bracket: (..., 3) -> (...).
 
     omega(X_H, v) = dH . v for tangent v. Raises ShapeError for a zero momentum. Source: theory.md K2, D3.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.sphere_symplectic_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()  # -dA/|Pi|
+    -0.5
     """
     area = sphere_area_form(momentum, first, second)
     return -area / _radius(np.asarray(momentum, dtype=float))
@@ -208,13 +284,26 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     Notes
     -----
     Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.euler_equations(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()  # Pi x I^-1 Pi
+    [0.0, 0.75, 0.0]
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     return np.cross(pi, angular_velocity(inertia, pi))
 
 
 def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
-    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Raises as `euler_equations`; equation (15.3.3)."""
+    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Raises as `euler_equations`; equation (15.3.3).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.kinetic_energy(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0]).item()
+    0.5
+    """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     return 0.5 * np.sum(pi * angular_velocity(inertia, pi), axis=-1)
 
@@ -223,13 +312,26 @@ def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """Omega = I^-1 Pi, the gradient of the kinetic energy: (..., 3, 3), (..., 3) -> (..., 3) [rad/s, body axes].
 
     Raises as `euler_equations`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.angular_velocity(np.diag([1.0, 2.0, 4.0]), [1.0, 1.0, 1.0]).tolist()
+    [1.0, 0.5, 0.25]
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     return (inverse_inertia_argument(inertia) @ pi[..., None])[..., 0]
 
 
 def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
-    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError."""
+    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.gradient_at(lambda mu: 2.0 * mu, "gradient", np.array([1.0, 2.0, 3.0])).tolist()
+    [2.0, 4.0, 6.0]
+    """
     value = gradient(mu) if callable(gradient) else gradient
     return finite_array(value, f"{name} gradient", mu.shape[-1:])
 

@@ -28,6 +28,13 @@ class MagneticEquilibrium:
     energy : (...) M . B
     spectrum : (..., 3) eigenvalues of the linearisation delta M' = delta M x B: 0 along the line of equilibria, and
         +-i |B| on the sphere's tangent plane
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> along, opposite = lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])
+    >>> float(along.energy), float(opposite.energy)
+    (6.0, -6.0)
     """
 
     moment: Array
@@ -36,12 +43,26 @@ class MagneticEquilibrium:
 
 
 def magnetic_hamiltonian(moment: ArrayLike, field: ArrayLike) -> Array:
-    """H = M . B, whose gradient is B: (..., 3), (..., 3) -> (...). Raises ShapeError."""
+    """H = M . B, whose gradient is B: (..., 3), (..., 3) -> (...). Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.magnetic_hamiltonian([1.0, 2.0, 3.0], [0.0, 0.0, 2.0]).item()
+    6.0
+    """
     return np.sum(finite_array(moment, "moment", (3,)) * finite_array(field, "field", (3,)), axis=-1)
 
 
 def magnetic_precession_rate(moment: ArrayLike, field: ArrayLike) -> Array:
-    """M' = M x B: (..., 3), (..., 3) -> (..., 3). Raises ShapeError."""
+    """M' = M x B: (..., 3), (..., 3) -> (..., 3). Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.magnetic_precession_rate([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]).tolist()
+    [0.0, -2.0, 0.0]
+    """
     return np.cross(finite_array(moment, "moment", (3,)), finite_array(field, "field", (3,)))
 
 
@@ -49,6 +70,13 @@ def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Ar
     """M(t) = exp(-t hat(B)) M(0), the turn about B at the rate -|B|: (..., 3), (..., 3), (N,) -> (..., N, 3).
 
     Raises ShapeError.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> turned = lie.magnetic_precession([1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [np.pi / 4.0])
+    >>> print(turned.round(9) + 0.0)  # a quarter turn, against the right-hand rule
+    [[ 0. -1.  0.]]
     """
     times = finite_array(t, "t")
     axis, start = finite_array(field, "field", (3,)), finite_array(moment, "moment", (3,))
@@ -68,6 +96,12 @@ def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEqu
     ------
     ShapeError
         If the field is zero, where every moment is an equilibrium, or the magnitude is not positive.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> [float(point.moment[2]) for point in lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])]
+    [3.0, -3.0]
     """
     axis, radius = finite_array(field, "field", (3,)), finite_array(magnitude, "magnitude")
     strength = np.linalg.norm(axis, axis=-1)

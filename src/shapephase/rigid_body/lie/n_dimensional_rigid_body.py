@@ -33,6 +33,12 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
     ------
     ShapeError, SingularInertiaError
         If J is not symmetric, or two of its eigenvalues have no positive sum: their plane has no inertia.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.n_dimensional_inertia(np.diag([1.0, 2.0, 3.0])).diagonal().tolist()  # J_i + J_j
+    [5.0, 4.0, 3.0]
     """
     j = _second_moment(second_moment)
     basis = so(len(j)).matrix_basis
@@ -40,7 +46,15 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
 
 
 def n_dimensional_momentum(second_moment: ArrayLike, angular_velocity: ArrayLike) -> Array:
-    """M = Omega J + J Omega: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`."""
+    """M = Omega J + J Omega: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> omega = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    >>> lie.n_dimensional_momentum(np.diag([1.0, 2.0, 3.0]), omega)[1, 0].item()
+    3.0
+    """
     j = _second_moment(second_moment)
     omega = _antisymmetric(angular_velocity, "angular_velocity", len(j))
     return omega @ j + j @ omega
@@ -50,6 +64,13 @@ def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike
     """The Omega with Omega J + J Omega = M: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
     Raises as `n_dimensional_inertia`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    >>> lie.n_dimensional_angular_velocity(np.diag([1.0, 2.0, 3.0]), momentum)[1, 0].item()
+    1.0
     """
     j = _second_moment(second_moment)
     m = _antisymmetric(momentum, "momentum", len(j))
@@ -58,7 +79,15 @@ def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike
 
 
 def n_dimensional_rate(second_moment: ArrayLike, momentum: ArrayLike) -> Array:
-    """M' = [M, Omega]: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`."""
+    """M' = [M, Omega]: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    >>> float(np.abs(lie.n_dimensional_rate(np.diag([1.0, 2.0, 3.0]), momentum)).max())  # a steady turn
+    0.0
+    """
     omega = n_dimensional_angular_velocity(second_moment, momentum)
     m = finite_array(momentum, "momentum", (None, None))
     return m @ omega - omega @ m
@@ -68,6 +97,13 @@ def momentum_traces(momentum: ArrayLike) -> Array:
     """The Casimirs tr M^2, tr M^4, ..., one for each rotation plane: (..., n, n) -> (..., n // 2).
 
     Raises ShapeError for matrices that are not antisymmetric.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    >>> lie.momentum_traces(momentum).tolist()
+    [-18.0]
     """
     m = _antisymmetric(momentum, "momentum")
     powers, traces = m @ m, []
@@ -85,6 +121,13 @@ def pfaffian(momentum: ArrayLike) -> Array:
     ------
     ShapeError
         If n is odd or above 10, or the matrix is not antisymmetric.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> momentum = np.array([[0, 2, 0, 0], [-2, 0, 0, 0], [0, 0, 0, 3], [0, 0, -3, 0]])
+    >>> print(f"{lie.pfaffian(momentum):.6f}, {np.linalg.det(momentum):.6f}")
+    6.000000, 36.000000
     """
     m = _antisymmetric(momentum, "momentum")
     n = m.shape[-1]
@@ -110,6 +153,13 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     Notes
     -----
     Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    >>> lie.manakov_integrals(np.diag([1.0, 2.0, 3.0]), momentum, 2).tolist()
+    [-18.0, 0.0, 98.0]
     """
     if isinstance(power, bool) or not isinstance(power, int | np.integer) or power < 1:
         raise ShapeError(f"power: a whole number from 1 up is needed, got {power!r}")

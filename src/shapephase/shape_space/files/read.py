@@ -237,6 +237,15 @@ def read_shape_path(
     """The path of `read_recorded_motion`: a C2 spline, periodic where the last sample equals the first.
 
     Kinds of file, parameters and errors as there.
+
+    Examples
+    --------
+    >>> rows = [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.3, 0.0], [2.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0]]
+    >>> header = "time,waist_roll,waist_pitch,waist_yaw"
+    >>> np.savetxt("bend.csv", rows, delimiter=",", header=header, comments="")
+    >>> path = sp.read_shape_path("bend.csv", sp.load_body("cat_two_halves"))
+    >>> path.duration, path.joint_names, path.shape(1.0).round(9).tolist()
+    (3.0, ('waist_pitch', 'waist_yaw', 'waist_roll'), [0.3, 0.0, 0.0])
     """
     return read_recorded_motion(
         file,
