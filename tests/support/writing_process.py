@@ -1,0 +1,308 @@
+"""A process that writes files of every kind, each time in a process forked from it, which may be killed.
+
+Run as a script this is the process: it reads requests as lines of JSON and answers each with a line of JSON. What a
+writer needs is imported once, before the first one is forked.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+import traceback
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+AS_NOBODY = 65534
+CAT = ("cat", "cat_righting", "--momentum", "0", "0")
+# What commands write: words before the name of the file; the last one differs between the two versions of it.
+COMMANDS = {
+    "split.npz": ("split", *CAT, ("0.02", "0.03"), "--out"),
+    "split.html": ("split", *CAT, ("0.02", "0.03"), "--html"),
+    "phases.csv": ("split", *CAT, ("0.02", "0.03"), "--phases"),
+    "view.html": ("view", *CAT, ("0.02", "0.03"), "--html"),
+    "plot.svg": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
+    "plot.pdf": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
+    "plot.png": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
+    "plan.csv": ("plan", "cat_two_halves", "--rotate", ("10", "12"), "--out"),
+    "plan.html": ("plan", "cat_two_halves", "--rotate", ("10", "12"), "--html"),
+    "conjugate.svg": ("conjugate", "1", "2", ("3", "4"), "--out"),
+    "conjugate.pdf": ("conjugate", "1", "2", ("3", "4"), "--out"),
+    "conjugate.png": ("conjugate", "1", "2", ("3", "4"), "--out"),
+}
+FUNCTIONS = ("motion.npz", "motion.csv", "path.npz", "path.csv", "page.html", "figure.svg")
+WRITERS = (*COMMANDS, *FUNCTIONS)
+
+
+# [s] A few times what writing takes: then all moments of it are as probable.
+_WRITING = 0.02
+
+
+class WritingProcess:
+    """The process, seen from the tests."""
+
+    def __init__(self, *writers: str) -> None:
+        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
+        # Two writes of the same are the same bytes.
+        fixed = {"SOURCE_DATE_EPOCH": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0", "SHAPEPHASE_FAST": "0"}
+        self.process = subprocess.Popen(
+            [sys.executable, __file__, *writers],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **fixed, "PYTHONPATH": path},
+        )
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        """The answer to a request: the arguments of `_wrote` or `_killed`."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(json.dumps(request, default=str) + "\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            if stream is not None:
+                stream.close()
+
+
+def is_whole(content: bytes, writer: str) -> bool:
+    """Whether these are all bytes of a file of this kind, by another reader of the format."""
+    kind = writer.split(".")[1]
+    if kind == "npz":
+        import numpy as np
+
+        arrays = np.load(io.BytesIO(content))
+        return all(arrays[name] is not None for name in arrays.files)
+    if kind == "csv":
+        import numpy as np
+
+        rows = np.genfromtxt(io.BytesIO(content), delimiter=",", skip_header=1)
+        return content.endswith(b"\n") and len(rows) > 100 and bool(np.isfinite(rows).all())
+    if kind == "svg":
+        return ElementTree.fromstring(content).tag.endswith("svg")
+    ends = {"html": b"</html>", "pdf": b"%%EOF", "png": b"IEND\xaeB`\x82"}
+    return content.rstrip().endswith(ends[kind])
+
+
+def _words(writer: str, version: int, target: str) -> list[str]:
+    return [word if isinstance(word, str) else word[version] for word in COMMANDS[writer]] + [target]
+
+
+def _write(writer: str, version: int, target: str) -> int:
+    """Write a file as a user does; the exit code."""
+    if writer in COMMANDS:
+        from shapephase.cli.main import main
+
+        try:
+            main(_words(writer, version, target))
+        except SystemExit as stopped:
+            return int(stopped.code or 0)
+        return 0
+    from shapephase.cli.exit_codes import exit_code_of
+    from shapephase.errors import ShapePhaseError
+
+    try:
+        _call(writer, version, target)
+    except ShapePhaseError as error:
+        print(f"shapephase: {error}", file=sys.stderr)
+        return exit_code_of(error)
+    return 0
+
+
+def _call(writer: str, version: int, target: str) -> None:
+    """As a program does."""
+    import numpy as np
+
+    import shapephase as sp
+
+    if writer in ("path.npz", "path.csv"):
+        path = sp.ShapePath.fourier([0.1], [[1.0 + version]], [[0.2]], 1.0, joint_names=("hinge",))
+        sp.write_shape_path(path, target, np.linspace(0.0, 1.0, 3000))
+        return
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), [0.1, 0.2, 1.0 + version])
+    if writer == "motion.npz":
+        motion.save(target)
+    elif writer == "motion.csv":
+        motion.write_csv(target, np.linspace(0.0, 1.0, 2000))
+    elif writer == "figure.svg":
+        from shapephase.plotting.named_figures import write_figure
+
+        write_figure("attitude", motion, target)
+    else:
+        body, path = sp.load_body("cat"), sp.examples.scenarios.cat_righting()
+        sp.motion_page(sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.02 + 0.01 * version]), target)
+
+
+def _in_child(
+    do: Callable[[], int], streams: tuple[str, str], limit: int | None = None, before: Callable[[], Any] | None = None
+) -> int:
+    """Fork a process that does something with standard output and error in files; its number.
+
+    With `before` this is done first, and the rest as a user who may do next to nothing.
+    """
+    child = os.fork()
+    if child:
+        return child
+    code = 70
+    try:
+        if before is not None:
+            before()
+        for number, file in enumerate(streams, 1):
+            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND), number)
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+        if before is not None:
+            os.setgroups([])
+            os.setgid(AS_NOBODY)
+            os.setuid(AS_NOBODY)
+        code = do()
+        sys.stdout.flush()
+    except BaseException:
+        traceback.print_exc()
+    sys.stderr.flush()
+    os._exit(code)
+
+
+def _wrote(
+    writer: str, target: str, folder: str, version: int = 0, limit: int | None = None, nobody: bool = False
+) -> dict[str, Any]:
+    """Write once; how it ended and what was said. `folder` is for standard output and error."""
+    streams = (f"{folder}/stdout", f"{folder}/stderr")
+    # What is imported late may be where only root may read.
+    spare = f"{folder}/imported.{writer.split('.')[1]}"
+    child = _in_child(
+        lambda: _write(writer, version, target), streams, limit, (lambda: _write(writer, 1, spare)) if nobody else None
+    )
+    _, status = os.waitpid(child, 0)
+    said = Path(streams[1]).read_text(encoding="utf-8", errors="replace")
+    printed = Path(streams[0]).read_bytes().decode("latin-1")
+    return {"code": os.waitstatus_to_exitcode(status), "printed": printed, "said": said}
+
+
+def _killed(writer: str, target: str, folder: str, trials: int, seed: int, whole_commands: int = 4) -> dict[str, Any]:
+    """Kill a writer of two versions in turn at random times.
+
+    `trials` times while nothing is done but to write what was computed once, over and over; and some whole commands.
+    """
+    place = Path(target)
+    writes, wholes, durations = [], [], []
+    for version in (1, 0):
+        start = time.monotonic()
+        writes += _recorded(writer, version, target)
+        durations.append(time.monotonic() - start)
+        wholes.append(place.read_bytes())
+    streams, chance = (f"{folder}/stdout", f"{folder}/stderr"), random.Random(seed)
+    found = {"torn": 0, "littered": 0}
+    for trial in range(trials + whole_commands):
+        begun, told = os.pipe()
+        is_command = trial >= trials
+        again = (
+            (lambda told=told: _again(writer, target, told))
+            if is_command
+            else (lambda told=told: _again_only(writes, told))
+        )
+        child = _in_child(again, streams)
+        os.close(told)
+        os.read(begun, 1)
+        time.sleep(chance.uniform(0.0, max(durations) if is_command else _WRITING))
+        os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        os.close(begun)
+        assert os.WIFSIGNALED(status), Path(streams[1]).read_text()
+        left = place.read_bytes()
+        # Two pages of the same motion have other identifiers.
+        found["torn"] += left not in wholes and not (is_command and is_whole(left, writer))
+        found["littered"] += len(list(place.parent.iterdir())) > 1
+    last = _wrote(writer, target, folder, 1)
+    left = sorted(entry.name for entry in place.parent.iterdir())
+    whole = place.read_bytes() == wholes[0] or is_whole(place.read_bytes(), writer)
+    return {**found, "differ": wholes[0] != wholes[1], "left": left, "code": last["code"], "whole": whole}
+
+
+def _recorded(writer: str, version: int, target: str) -> list[Callable[[], None]]:
+    """Write a file here, and how to write just that again."""
+    from shapephase import files
+
+    really, found = files.write_whole, []
+
+    def recording(path: Any, write: Any) -> None:
+        found.append(lambda: really(path, write))
+        really(path, write)
+
+    loaded = [module for name, module in sys.modules.items() if name.startswith("shapephase")]
+    having = [module for module in loaded if getattr(module, "write_whole", None) is really]
+    for module in having:
+        module.write_whole = recording
+    try:
+        with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere), contextlib.redirect_stderr(nowhere):
+            assert _write(writer, version, target) == 0
+    finally:
+        for module in having:
+            module.write_whole = really
+    assert len(found) == 1
+    return found
+
+
+def _again(writer: str, target: str, told: int) -> int:
+    """Write both versions in turn, from the beginning."""
+    os.write(told, b" ")
+    while True:
+        for version in (0, 1):
+            assert _write(writer, version, target) == 0
+
+
+def _again_only(writes: list[Callable[[], None]], told: int) -> int:
+    """Write both versions in turn, and nothing but that."""
+    os.write(told, b" ")
+    while True:
+        for write in writes:
+            write()
+
+
+def _import_for(writer: str) -> None:
+    """Import here what a process that is forked from here imports to write."""
+    import importlib
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        listed, target = Path(folder) / "stdout", f"{folder}/target.{writer.split('.')[1]}"
+
+        def listing() -> int:
+            assert _write(writer, 0, target) == 0
+            listed.write_text("\n".join(sys.modules))
+            return 0
+
+        _, status = os.waitpid(_in_child(listing, (os.devnull, f"{folder}/stderr")), 0)
+        assert status == 0, Path(f"{folder}/stderr").read_text()
+        for name in listed.read_text().split("\n"):
+            # Some are made by other modules, and cannot be imported by their names.
+            with contextlib.suppress(ImportError):
+                importlib.import_module(name)
+
+
+def work(writers: list[str]) -> None:
+    for writer in writers:
+        _import_for(writer)
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        request = json.loads(line)
+        answer = _killed(**request) if "trials" in request else _wrote(**request)
+        print(json.dumps(answer), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    work(sys.argv[1:])
