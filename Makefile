@@ -1,7 +1,7 @@
 # The same checks as .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test notebooks docs full fuzz bench
+.PHONY: check lint types imports test times notebooks docs full fuzz bench
 
 check: lint types imports test notebooks
 
@@ -18,6 +18,10 @@ imports:
 
 test:
 	$(BIN)/pytest -n auto -m "not full"
+
+# What each quick test takes of the processor, and the budget.
+times:
+	$(BIN)/pytest -n auto -m "not full" -p support.processor_time
 
 notebooks:
 	$(BIN)/pytest --nbmake notebooks -p no:cacheprovider -W default

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gc
 import os
+from functools import lru_cache
 
 # The workers share the cores: threads of their own would get in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Machine code is tested where the fixture `fast` switches it on.
 os.environ["SHAPEPHASE_FAST"] = "0"
 
+import hypothesis
 import numpy as np
 import pytest
 
@@ -18,19 +20,42 @@ from support.bodies import BODIES
 from support.browser import chromium  # noqa: F401 (a fixture)
 
 
+def pytest_configure(config):
+    """As many examples as Hypothesis tries where a test does not say how many."""
+    hypothesis.settings.register_profile("quick", max_examples=15)
+    hypothesis.settings.register_profile("full", max_examples=50)
+    hypothesis.settings.load_profile("quick" if config.option.markexpr == "not full" else "full")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Collect the tests without looking for garbage: millions of new objects, nearly all of which stay."""
+    """Collect the tests without looking for garbage: millions of new objects, nearly all of which stay.
+
+    Nor are they looked through again while the tests run.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
+        gc.freeze()
         gc.enable()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    from support.distribution import WholeFiles
+
+    return WholeFiles(config, log) if config.getvalue("dist") == "load" else None
+
+
+@lru_cache(maxsize=len(BODIES))
+def loaded(name):
+    return sp.load_body(name)
 
 
 @pytest.fixture(scope="session", params=BODIES)
 def body(request):
-    return sp.load_body(request.param)
+    return loaded(request.param)
 
 
 @pytest.fixture

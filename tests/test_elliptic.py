@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import mpmath
 import numpy as np
 import pytest
 
 from shapephase import elliptic
 from shapephase.errors import ShapeError
+from support.long_runs import full_but
 
 EPS = float(np.finfo(float).eps)
 M1 = [1.0, 0.9, 0.5, 1e-3, 1e-8, 1e-15, 1e-30]
 BELOW = np.nextafter(0.5 * np.pi, 0.0)
 ABOVE = np.nextafter(0.5 * np.pi, 2.0)
 AMPLITUDES = [1e-200, 1e-8, 0.1, 0.7, 1.2, 1.57, BELOW, 0.5 * np.pi, ABOVE, 2.0, 3.0, np.pi, 10.0, 1e3, -1.0, -4.0]
+PAIRS = list(product([*M1, 0.0], AMPLITUDES))
 CHARACTERISTICS = [-1e8, -100.0, -1.0, -0.3, -1e-10, 0.0, 0.3, 0.99, 1.0 - 1e-8, 1.0 - 2.0**-53]
 ARGUMENTS = [0.01, 0.3, 0.5, 0.9, 0.999, 0.999999, 1.0, 1.000001, 1.001, 1.5, 2.0, 2.5, 3.7, 10.2, 50.0]
 
@@ -144,8 +148,7 @@ def test_circular_functions_at_the_other_end(rng):
     assert np.abs(am - u).max() < 3e-14
 
 
-@pytest.mark.parametrize("m1", [*M1, 0.0])
-@pytest.mark.parametrize("phi", AMPLITUDES)
+@pytest.mark.parametrize(("m1", "phi"), full_but(PAIRS, *PAIRS[::3]))
 def test_incomplete_integrals(m1, phi):
     m = 1 - mp(m1)
     assert off(elliptic.incomplete_e(phi, m1), mpmath.ellipe(mp(phi), m)) < 1e-14
@@ -158,11 +161,14 @@ def test_incomplete_integrals(m1, phi):
         assert off(elliptic.incomplete_pi(n, phi, m1), truth) < 2e-14
 
 
-def test_third_kind_of_random_arguments(rng):
+@pytest.mark.parametrize("count", full_but([90, 300], 90))
+def test_third_kind_of_random_arguments(rng, count):
     """Among them n close to 1 with m1 and cos(phi) far below 1 − n, on both sides of the switch there."""
-    m1 = 10.0 ** rng.uniform(-30.0, 0.0, 300)
-    phi = np.concatenate([rng.uniform(-9.0, 9.0, 100), 0.5 * np.pi - 10.0 ** rng.uniform(-16.0, 0.0, 200)])
-    n = np.where(rng.random(300) < 0.7, 1.0 - 10.0 ** rng.uniform(-15.5, 0.0, 300), -(10.0 ** rng.uniform(-9, 20, 300)))
+    far, m1 = count // 3, 10.0 ** rng.uniform(-30.0, 0.0, count)
+    near = 0.5 * np.pi - 10.0 ** rng.uniform(-16.0, 0.0, count - far)
+    phi = np.concatenate([rng.uniform(-9.0, 9.0, far), near])
+    close, negative = 1.0 - 10.0 ** rng.uniform(-15.5, 0.0, count), -(10.0 ** rng.uniform(-9, 20, count))
+    n = np.where(rng.random(count) < 0.7, close, negative)
     values = elliptic.incomplete_pi(n, phi, m1)
     for value, *given in zip(values, n, phi, m1):
         with mpmath.workdps(100):

@@ -14,9 +14,12 @@ import shapephase as sp
 from shapephase.errors import TrajectoryError
 from support.hostile_files import cases
 from support.loading_process import MOST_MEMORY, Worker
+from support.long_runs import full_but
 from support.odd_motion_files import ODD_FILES, odd_file
 
 CASES_OF_BODIES = cases()
+# Of the odd motions, all of which test_read.py reads in this process, and of the bodies, as test_hostile_files.py does.
+QUICK_MOTIONS, QUICK_BODIES = list(ODD_FILES)[::5], CASES_OF_BODIES[::40]
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +54,7 @@ def asked(worker: Worker, folder, *arguments: str) -> dict:
     return {"code": code, **data}
 
 
-@pytest.mark.parametrize("case", ODD_FILES)
+@pytest.mark.parametrize("case", full_but(ODD_FILES, *QUICK_MOTIONS))
 def test_an_odd_motion(case, worker: Worker, tmp_path):
     _, _, outcome, words = ODD_FILES[case]
     file = odd_file(case, tmp_path)
@@ -77,7 +80,7 @@ def body_through_the_command_line(case, worker: Worker, tmp_path):
         assert answer["error"]["type"] == case.error
 
 
-@pytest.mark.parametrize("case", CASES_OF_BODIES[::20], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", QUICK_BODIES, ids=lambda case: case.name)
 def test_a_hostile_body(case, worker: Worker, tmp_path):
     body_through_the_command_line(case, worker, tmp_path)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ import shapephase as sp
 from shapephase.deformation._principal_frame import principal_frames
 from shapephase.errors import GaugeError, TrajectoryError
 from support.bodies import joint, link, random_loop, urdf
+from support.long_runs import full_but
 
 EYE, X, Y, Z = np.eye(3), *np.eye(3)
 FIRST, SECOND = np.array([0.6, 0.3, -0.5]), np.array([0.1, -0.7, 0.4])
@@ -135,7 +136,7 @@ MEETINGS = {
 }
 
 
-@pytest.mark.parametrize("when", [0.0, 0.25, 0.5, 0.7, 1.0, 1.999999, 2.0])
+@pytest.mark.parametrize("when", full_but([0.0, 0.25, 0.5, 0.7, 1.0, 1.999999, 2.0], 0.0, 0.7, 1.999999))
 @pytest.mark.parametrize("motion", [still, turning])
 @pytest.mark.parametrize("meeting", MEETINGS)
 def test_where_moments_meet_the_axes_go_straight_on(meeting, motion, when):
@@ -280,8 +281,9 @@ def test_an_avoided_crossing_turns_the_axes(e, near_rate, when):
     assert want.max() > 0.1 / e
 
 
-@pytest.mark.parametrize("when", [0.7, 1.0])
-@pytest.mark.parametrize("e", [1e-9, 1e-10, 3e-11, 1e-11, 3e-12])
+@pytest.mark.parametrize(
+    ("e", "when"), full_but(product([1e-9, 1e-10, 3e-11, 1e-11, 3e-12], [0.7, 1.0]), (1e-9, 0.7), (3e-12, 1.0))
+)
 def test_axes_that_turn_in_an_instant(e, when):
     """Either they are followed, or the error tells the time; off the diagonal nothing is hidden."""
     deformation = prescribed(avoided(e, when))

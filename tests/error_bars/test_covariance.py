@@ -8,6 +8,7 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, UnknownNameError
+from support.long_runs import full_but
 
 _DRAWS = 100
 
@@ -30,7 +31,10 @@ SOURCES = {
 }
 
 
-@pytest.mark.parametrize(("source", "periodic"), [*((name, True) for name in SOURCES), ("joints", False)])
+@pytest.mark.parametrize(
+    ("source", "periodic"),
+    full_but([*((name, True) for name in SOURCES), ("joints", False)], ("joints", False), ("all", True)),
+)
 def test_first_order_is_what_draws_show(source: str, periodic: bool):
     """A standard deviation of 100 draws is known to 6 %: four times that is allowed, and 2 % for the second order."""
     whole = motion(periodic=periodic)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
 import shapephase as sp
 from shapephase import so3
+from support.long_runs import full_but
 
 _NOISE = np.radians(0.3)
 _RATE = 60.0
@@ -27,8 +30,7 @@ def swing(name: str) -> sp.ShapePath:
     return sp.ShapePath.spline(times, samples, periodic=True)
 
 
-@pytest.mark.parametrize("draws", [60, pytest.param(400, marks=pytest.mark.full)])
-@pytest.mark.parametrize("name", ["cat", "astronaut"])
+@pytest.mark.parametrize(("name", "draws"), full_but(product(["cat", "astronaut"], [60, 400]), ("cat", 60)))
 def test_a_recorded_cycle_with_noise(name: str, draws: int):
     """Each component of the holonomy's error within two bars, and its chi-square, in 95 % of the recordings."""
     body, path = sp.load_body(name), swing(name)

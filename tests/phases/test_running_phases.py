@@ -33,6 +33,7 @@ from support.independent import (
     turn,
     wrapped,
 )
+from support.long_runs import full_but
 
 FULL = pytest.mark.full
 UP = np.array([0.0, 0.0, 1.0])
@@ -721,7 +722,7 @@ def test_a_function_as_gauge(name):
     assert without_rates.residual < 1e-9
 
 
-@pytest.mark.parametrize(("speed", "near"), [(40.0, 1e-10), (-40.0, 1e-10), pytest.param(300.0, 2e-9, marks=FULL)])
+@pytest.mark.parametrize(("speed", "near"), full_but([(40.0, 1e-10), (-40.0, 1e-10), (300.0, 2e-9)], (-40.0, 1e-10)))
 def test_fast_gauges_are_resolved(speed, near):
     """The gauge's frame turns twelve times or more while the integrator takes a step or two."""
     fast = partial(turning, speed=speed, swing=0.3)

@@ -12,7 +12,7 @@ import shapephase as sp
 from support.independent import BODIES, MujocoBody, apart, body_of, random_loop, random_rotation, random_vector
 
 TIMES = np.linspace(0.0, 2.0, 33)
-LAW = settings(derandomize=True, deadline=None, max_examples=50)
+LAW = settings(derandomize=True, deadline=None)
 EXACT = 1e-12
 
 

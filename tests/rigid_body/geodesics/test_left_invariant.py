@@ -16,6 +16,7 @@ from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaErr
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.geodesics import _conjugate_search as conjugate_search
 from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
+from support.long_runs import full_but
 
 METRICS = {
     "triaxial": [3.0, 2.0, 1.0],
@@ -297,7 +298,9 @@ def test_small_turns_keep_their_digits_q6():
         np.testing.assert_allclose(metric.differential(direction, t), expected, rtol=0, atol=1e-13 * t)
 
 
-@pytest.mark.parametrize("name", [name for name in METRICS if name != "round"])
+@pytest.mark.parametrize(
+    "name", full_but([name for name in METRICS if name != "round"], "unsorted", "flat", "sub-Riemannian about 2")
+)
 def test_conjugate_times_are_zeros_of_the_variational_determinant_q6(name):
     rng = np.random.default_rng(8)
     metric = left_invariant_metric(METRICS[name])
