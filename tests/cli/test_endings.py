@@ -432,7 +432,7 @@ def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path, monkey
     from shapephase.optimal_control.plan_options import Search
 
     monkeypatch.setattr(
-        "shapephase.optimal_control.plan_options.Search", lambda **options: Search(iterations=12, **options)
+        "shapephase.optimal_control.plan_options.Search", lambda **options: Search(iterations=12, pieces=20, **options)
     )
     assert planning.Search is Search
     out = tmp_path / "plan.csv"
@@ -454,13 +454,28 @@ def options_of(text):
     return {re.match(r"\S+", row)[0]: row for row in rows if re.match(r"--[a-z]|[A-Z]", row)}
 
 
+@pytest.fixture(scope="module")
+def wide_pages():
+    """The pages of help, in a process of their own: the width of a page is decided once in each."""
+    source = f"""
+import contextlib, io, json
+from shapephase.cli.main import main
+pages = {{}}
+for name in {ALL_COMMANDS!r}:
+    with contextlib.redirect_stdout(io.StringIO()) as page:
+        main([name, "--help"])
+    pages[name] = page.getvalue()
+print(json.dumps(pages))
+"""
+    wide = {**os.environ, "COLUMNS": "400"}
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, env=wide, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
 @pytest.mark.parametrize("name", ALL_COMMANDS)
-def test_every_option_has_a_sentence_and_an_example(name):
-    # A process of its own: the width of a page of help is decided once in each.
-    command, wide = [sys.executable, "-m", "shapephase", name, "--help"], {**os.environ, "COLUMNS": "400"}
-    done = subprocess.run(command, capture_output=True, text=True, env=wide, timeout=300)
-    assert done.returncode == 0
-    found = options_of(done.stdout)
+def test_every_option_has_a_sentence_and_an_example(name, wide_pages):
+    found = options_of(wide_pages[name])
     assert {"--json", "--quiet", "--verbose"} <= set(found)
     for option, line in found.items():
         words = " ".join(line.split())

@@ -27,6 +27,7 @@ from shapephase.optimal_control import (
     wong_residual,
 )
 from support.bodies import joint, link, random_loop, urdf
+from support.long_runs import full_but
 
 X = np.array([1.0, 0.0, 0.0])
 START, RATE, CHARGE = np.array([0.3, 0.2, -0.1]), np.array([1.0, -0.7, 0.5]), np.array([0.03, -0.02, 0.01])
@@ -270,7 +271,7 @@ def test_planar_conjugate_times_are_those_of_the_heisenberg_group(planar):
 # ---- Small rotations: the isoperimetric circle ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("degrees", [1.0, 0.1, 0.01])
+@pytest.mark.parametrize("degrees", full_but([1.0, 0.1, 0.01], 0.1))
 def test_small_rotations_cost_what_the_isoperimetric_circle_costs(cat, degrees):
     """E T sigma_max / (2 pi theta) -> 1, linearly in theta; the circle is closed at T, and its symmetry opens there."""
     angle = np.radians(degrees)
@@ -366,7 +367,7 @@ def test_a_path_at_rest_is_an_extremal(planar):
     assert wong_residual(planar, still).residual == 0.0
 
 
-@pytest.mark.parametrize("kind", METRICS)
+@pytest.mark.parametrize("kind", full_but(METRICS, "rate"))
 def test_shooting_from_a_path_that_is_nearly_optimal(sliding, kind):
     """A spline through disturbed samples of an extremal; the answer has its ends and its rotation exactly."""
     motion = extremal(sliding, START, RATE, 3.0 * CHARGES[kind], 2.0, metric=kind)

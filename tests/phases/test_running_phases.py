@@ -547,7 +547,7 @@ def test_without_momentum_there_is_no_phase(gauge):
     assert dynamic_phase_from_energy(motion) == 0.0
 
 
-@pytest.mark.parametrize("gauge", ["base", "horizontal", "given"])
+@pytest.mark.parametrize("gauge", full_but(["base", "horizontal", "given"], "given"))
 def test_batches_are_their_members(gauge):
     momenta = np.stack([np.zeros(3), random_vector(1, 12.0), random_vector(2, 3.0)])
     attitudes = np.stack([random_rotation(k) for k in range(2)])

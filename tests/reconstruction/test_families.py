@@ -18,6 +18,7 @@ from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaErr
 from shapephase.integrator.fast import engine
 from shapephase.integrator.variants import rotations
 from support.bodies import joint, link, urdf
+from support.long_runs import full_but
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="the extended precision is compiled C")
 CAT = 2
@@ -72,7 +73,10 @@ def picked(deformations: sp.DeformationFamily, rows: Array) -> sp.DeformationFam
 
 
 @pytest.mark.usefixtures("fast")
-@pytest.mark.parametrize(("number", "box"), [(CAT, False), (CAT, True), (DIVER, False), (SPLINE, True)])
+@pytest.mark.parametrize(
+    ("number", "box"),
+    full_but([(CAT, False), (CAT, True), (DIVER, False), (SPLINE, True)], (DIVER, False), (SPLINE, True)),
+)
 def test_companions_order_and_threads_change_nothing(number: int, box: bool):
     """To the last bit: the attitude, its estimate and what they were computed from."""
     deformations = family(number, box=box)

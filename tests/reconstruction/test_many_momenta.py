@@ -14,6 +14,7 @@ import shapephase as sp
 from shapephase.arrays import Array
 from shapephase.errors import AccuracyNotReached, ShapeError
 from shapephase.integrator.fast import engine
+from support.long_runs import full_but
 
 DECADES = (-1.5, 1.5)
 """Of the rates of turning [rad/s]."""
@@ -50,7 +51,9 @@ def code(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.mark.usefixtures("code")
-@pytest.mark.parametrize(("number", "box"), [(2, False), (2, True), (9, False), (14, True)])
+@pytest.mark.parametrize(
+    ("number", "box"), full_but([(2, False), (2, True), (9, False), (14, True)], (2, True), (9, False))
+)
 def test_each_is_as_it_is_alone(number: int, box: bool):
     """To the last bit in machine code, whose lanes do the same operations; else to the rounding of sines."""
     given = momenta(number, 60)

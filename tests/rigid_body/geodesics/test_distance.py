@@ -25,7 +25,7 @@ def axial_form(moments):
     return axisymmetric_metric(moments[odd - 1], moments[odd]), [(odd + 1) % 3, (odd + 2) % 3, odd]
 
 
-@pytest.mark.parametrize("moments", AXISYMMETRIC, ids=str)
+@pytest.mark.parametrize("moments", full_but(AXISYMMETRIC, *AXISYMMETRIC[1:4]), ids=str)
 def test_a_geodesic_before_its_cut_is_found_again_and_certified_q6(moments):
     metric = left_invariant_metric(moments)
     closed, columns = axial_form(moments)

@@ -24,6 +24,7 @@ from shapephase.rigid_body.geodesics._ellipsoid import ellipsoid
 from shapephase.rigid_body.geodesics._extremal import extremal, variational_jacobi_field
 from shapephase.rigid_body.geodesics.metric_profile import assumptions, surface_of_metric
 from shapephase.rigid_body.geodesics.surface_of_revolution import surface_of_stretch
+from support.long_runs import full_but
 
 ANDOYER = (1.0 / 3.0, 1.0 / 2.0, 1.0)
 """Inverse moments A < B < C of I = (3, 2, 1)."""
@@ -222,6 +223,7 @@ def test_metrics_that_break_an_assumption_are_refused_o4():
         surface_of_metric(lambda x: (1 - x**2 + np.abs(x) ** 3 / 9, -2 * x + x * np.abs(x) / 3), 0.8)
 
 
+@pytest.mark.parametrize("case", full_but(CASES, "andoyer", "boundary"), indirect=True)
 def test_jacobi_fields_by_two_routes_and_the_raw_equations_o5(case):
     surface = case.surface()
     for p in case.momenta:
@@ -442,6 +444,7 @@ def test_conjugate_points_by_three_routes_o12(name, p, order):
     assert found == pytest.approx(float(point.latitude), abs=1e-7)
 
 
+@pytest.mark.parametrize("case", full_but(CASES, "andoyer", "boundary"), indirect=True)
 def test_general_points_and_orders_against_the_raw_equations_o12(case):
     surface = case.surface()
     start = 0.35 * case.reach
