@@ -46,9 +46,10 @@ nitpick_ignore_regex = [
     # Other libraries' pages are not on this site, and a build without network cannot look them up.
     ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray|viser)\..*"),
     ("py:.*", r"(pathlib|collections|typing|types|os)\..*"),
-    ("py:.*", r"(Array|ArrayLike|Axes|TypeAliasForwardRef)"),
-    # Names that stand for a union of types, which the docstring spells out.
-    ("py:class", r"(\w+\.)*(Gauge|Given|Moments|Samplers)"),
+    ("py:.*", r"(Array|ArrayLike|Integers|Mask|Matrices|Spinor|Axes|TypeAliasForwardRef)"),
+    # Names that stand for a union of types or a kind of function, which the docstring spells out.
+    ("py:class", r"(\w+\.)*(Gauge|Given|Gradient|Moments|Samplers|Curve|Evaluate|Meridian|Profile|Stretch)"),
+    ("py:class", r"(\w+\.)*(Colour|Directly)"),
     # What a result holds for its own use, and nobody makes.
     ("py:class", rf"{_INSIDE}(_\w+\.\w+|_\w+|Curve|\w+Variants|FunctionScan|GroupedRotations|KnotPath)"),
     ("py:class", rf"{_INSIDE}(Lift|LinkRows|MovingNode|PiecewiseChebyshev|ResolvedPath|RunProgress)"),
@@ -70,7 +71,8 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
-autodoc_type_aliases = {name: name for name in ("Array", "ArrayLike")}
+_ALIASES = "Array ArrayLike Integers Mask Gauge Given Gradient Matrices Spinor Curve Evaluate Meridian Profile Stretch"
+autodoc_type_aliases = {name: name for name in (*_ALIASES.split(), "Colour", "Directly")}
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 100
 numpydoc_show_class_members = False

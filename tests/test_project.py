@@ -30,6 +30,12 @@ def test_a_wheel_holds_the_bodies(tmp_path):
     count, where = said.split(maxsplit=1)
     assert int(count) == len(sp.robot_names()) >= 5
     assert str(tmp_path) in where
+    # The README's Python, in a folder that has nothing of the checkout.
+    block, output = _readme_s_python()
+    (empty := tmp_path / "empty").mkdir()
+    code = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r})\n{block}"
+    ran = subprocess.run([sys.executable, "-c", code], cwd=empty, check=True, capture_output=True, text=True)
+    assert ran.stdout == output
 
 
 def test_a_checkout_holds_the_bodies(tmp_path):
@@ -50,12 +56,16 @@ def test_importing_brings_nothing_heavy():
     assert said.strip() == "[]"
 
 
+def _readme_s_python() -> tuple[str, str]:
+    """Its code, and what it prints."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    ((block, output),) = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, re.DOTALL)
+    return block, output
+
+
 def test_the_readme_s_python_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "robots").symlink_to(ROOT / "robots")
-    ((block, output),) = re.findall(
-        r"```python\n(.*?)```\n\n```text\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL
-    )
+    block, output = _readme_s_python()
     exec(compile(block, "README.md", "exec"), {})
     assert capsys.readouterr().out == output
     assert (tmp_path / "fall.npz").exists()

@@ -12,7 +12,16 @@ from pickle import PicklingError
 
 
 class ShapePhaseError(Exception):
-    """Root of every error raised on purpose by this library."""
+    """Root of every error raised on purpose by this library.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.load_body("catt")
+    ... except sp.ShapePhaseError as error:  # of any kind
+    ...     print(type(error).__name__)
+    UnknownNameError
+    """
 
 
 class ShapeError(ShapePhaseError, ValueError):
@@ -20,6 +29,14 @@ class ShapeError(ShapePhaseError, ValueError):
 
     Remedy: the message names the argument, what came and what was expected; arrays of text, objects, complex numbers
     or with masked entries are refused, never converted.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.reconstruct(sp.rigid(np.eye(3), 1.0), [1.0, 2.0])
+    ... except sp.errors.ShapeError as error:
+    ...     print(str(error)[:72])
+    momentum: expected shape (..., 3) [kg m^2/s], got (2,)
     """
 
 
@@ -27,6 +44,14 @@ class WrongObjectError(ShapeError, TypeError):
     """A function got another kind of object than it needs.
 
     Remedy: the message says what is needed, what came, and how the one is made of the other.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.split(3.0)
+    ... except sp.errors.WrongObjectError as error:
+    ...     print(str(error)[:72])
+    motion: a Motion is needed, got a float; make it with reconstruct(deform
     """
 
 
@@ -34,6 +59,14 @@ class UnknownNameError(ShapePhaseError, ValueError):
     """A joint, body, motion, gauge or method that does not exist.
 
     Remedy: the message lists the names there are, and the nearest.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.load_body("catt")
+    ... except sp.errors.UnknownNameError as error:
+    ...     print(str(error)[:72])
+    unknown body (no such file either) 'catt'. Did you mean 'cat'? Valid: as
     """
 
 
@@ -43,6 +76,16 @@ class ModelFileError(ShapePhaseError, ValueError):
     Causes: missing or broken XML, text where a number belongs, links without a parent or with two, joints with several
     axes, unexpanded macros, or a parsed model that differs from the file. Remedy: the message begins with file, line
     and element, and says how to correct it.
+
+    Examples
+    --------
+    >>> with open("empty.urdf", "w") as file:
+    ...     _ = file.write("<robot/>")
+    >>> try:
+    ...     sp.load_body("empty.urdf")
+    ... except sp.errors.ModelFileError as error:
+    ...     print(str(error)[:72])
+    empty.urdf:1: robot 'robot': has no links; a body needs at least one <li
     """
 
 
@@ -50,11 +93,28 @@ class UnphysicalInertiaError(ModelFileError):
     """A link has a mass or an inertia that no body can have.
 
     Remedy: correct the file; if only principal moments are negative, `load_body(..., on_unphysical="warn")` takes it.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.deformation.rigid_part(1.0, np.diag([1.0, 1.0, 4.0]))
+    ... except sp.errors.UnphysicalInertiaError as error:
+    ...     print(str(error)[:72])
+    the principal moments [1. 1. 4.] kg m^2 break the triangle inequality by
     """
 
 
 class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
-    """A file named by the user is not there or cannot be opened. Remedy: look at the path and its permissions."""
+    """A file named by the user is not there or cannot be opened. Remedy: look at the path and its permissions.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.load_body("nowhere.urdf")
+    ... except sp.errors.InputFileNotFoundError as error:
+    ...     print(str(error)[:72])
+    nowhere.urdf: there is no such file
+    """
 
 
 class OutputFileError(ShapePhaseError, OSError):
@@ -62,6 +122,16 @@ class OutputFileError(ShapePhaseError, OSError):
 
     Causes: a folder of that name, no permission, a full disk, a name that is too long. Remedy: the message names the
     file and the cause; another place. The old file, where there was one, is as it was.
+
+    Examples
+    --------
+    >>> import os
+    >>> os.mkdir("folder.npz")
+    >>> try:
+    ...     sp.reconstruct(sp.rigid(np.eye(3), 1.0), [0.0, 0.0, 1.0]).save("folder.npz")
+    ... except sp.errors.OutputFileError as error:
+    ...     print(str(error)[:72])
+    cannot write folder.npz: it is a folder; name a file in it
     """
 
 
@@ -71,6 +141,14 @@ class TrajectoryError(ShapePhaseError, ValueError):
     Remedy: the message names file, row and joint; times must ascend, every joint of the body must be there or rest
     somewhere, angles are in radians unless the file or the caller says degrees. A unit that can only be guessed is an
     error that names the argument to give.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.ShapePath.waypoints([0.0, 0.0], [[0.0], [1.0]])
+    ... except sp.errors.TrajectoryError as error:
+    ...     print(str(error)[:72])
+    times must ascend: sample 1 at 0 s follows 0 s
     """
 
 
@@ -87,6 +165,14 @@ class OpenPathError(TrajectoryError):
 
     Remedy: close the path (the message names the joint and its gap), or use what open paths have: `horizontal_lift`,
     `split`, `arc_phases`.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.holonomy(sp.load_body("satellite"), sp.examples.antenna_deployment())
+    ... except sp.errors.OpenPathError as error:
+    ...     print(str(error)[:72])
+    the holonomy of an open path is undefined: joint boom_extension ends 1.8
     """
 
 
@@ -102,6 +188,14 @@ class SingularInertiaError(ShapePhaseError, ArithmeticError):
     """The locked inertia is not positive definite: some axis has no inertia, so the rotation is undefined.
 
     Cause: masses all on one line, or links without mass. Remedy: the message names the time; give mass to the links.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.reconstruct(sp.rigid(np.zeros((3, 3)), 1.0), [1.0, 0.0, 0.0])
+    ... except sp.errors.SingularInertiaError as error:
+    ...     print(str(error)[:72])
+    locked inertia is not positive definite: principal moments [0. 0. 0.] kg
     """
 
 
@@ -117,6 +211,14 @@ class GaugeError(ShapePhaseError, ArithmeticError):
     """The requested frame is not continuous along the motion, or does not exist for this kind of deformation.
 
     Remedy: the message names the time; the horizontal and the base gauge always exist.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.link_gauge(sp.rigid(np.eye(3), 1.0), "head")
+    ... except sp.errors.GaugeError as error:
+    ...     print(str(error)[:72])
+    there is no link 'head': only the deformation of an articulated body has
     """
 
 
@@ -124,6 +226,14 @@ class ChartPoleError(ShapePhaseError, ArithmeticError):
     """Euler angles whose middle angle is at or next to 0 or pi, where they are not coordinates of rotations.
 
     Remedy: turn the inertial or the body axes by a constant rotation, or work with attitudes and body momenta.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.rigid_body.ZXZ.rates([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
+    ... except sp.errors.ChartPoleError as error:
+    ...     print(str(error)[:64])
+    angles: entry [] has theta = 0, a pole of the ZXZ chart to 1e-08
     """
 
 
@@ -132,6 +242,14 @@ class LieAlgebraError(ShapePhaseError, ValueError):
 
     Remedy: the message names the law that fails and by how much; structure constants are c[i, j, k] with
     [e_i, e_j] = c[i, j, k] e_k.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.rigid_body.lie.LieAlgebra(np.ones((2, 2, 2)))
+    ... except sp.errors.LieAlgebraError as error:
+    ...     print(str(error)[:72])
+    structure: not antisymmetric, c[0, 0, 0] = 1 and c[0, 0, 0] = 1; [e_i, e
     """
 
 
@@ -143,11 +261,31 @@ class RunStopped(ShapePhaseError):
     """A run was stopped by the `progress` callback that watched it, as it asked; nothing is left of it.
 
     A look at a path that was complete is kept.
+
+    Examples
+    --------
+    >>> def stop(run):
+    ...     raise sp.errors.RunStopped("enough")
+    >>> try:
+    ...     sp.reconstruct(sp.rigid(np.eye(3), 1.0), [0.0, 0.0, 1.0], progress=stop)
+    ... except sp.errors.RunStopped as error:
+    ...     print(error)
+    enough
     """
 
 
 class ResultFileError(ShapePhaseError, ValueError):
-    """A result file that this version cannot read: another format, or damaged. Remedy: compute it anew."""
+    """A result file that this version cannot read: another format, or damaged. Remedy: compute it anew.
+
+    Examples
+    --------
+    >>> np.savez("bad.npz", numbers=[1.0, 2.0])
+    >>> try:
+    ...     sp.load_motion("bad.npz")
+    ... except sp.errors.ResultFileError as error:
+    ...     print(str(error)[:72])
+    bad.npz: no motion that can be read ('header')
+    """
 
 
 class CompilerError(ShapePhaseError, RuntimeError):
@@ -182,7 +320,17 @@ class PlanNotFound(ShapePhaseError, ArithmeticError):
 
 
 class UnphysicalInertiaWarning(UserWarning):
-    """Links whose inertia is doubtful, accepted because the caller allows it or because it does no harm."""
+    """Links whose inertia is doubtful, accepted because the caller allows it or because it does no harm.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> with warnings.catch_warnings(record=True) as said:
+    ...     warnings.simplefilter("always")
+    ...     _ = sp.deformation.rigid_part(1.0, np.diag([1.0, 1.0, 4.0]), on_unphysical="warn")
+    >>> len(said), said[0].category.__name__
+    (1, 'UnphysicalInertiaWarning')
+    """
 
 
 class ImplausibleBodyWarning(UserWarning):
@@ -212,7 +360,13 @@ class UndeclaredBreakWarning(TrajectoryWarning):
 def unknown_name(
     kind: str, name: str, valid: Iterable[str], error: type[UnknownNameError] = UnknownNameError
 ) -> UnknownNameError:
-    """The error for a name that does not exist, with the nearest and all valid names."""
+    """The error for a name that does not exist, with the nearest and all valid names.
+
+    Examples
+    --------
+    >>> print(sp.errors.unknown_name("gauge", "bass", ["base", "principal"]))
+    unknown gauge 'bass'. Did you mean 'base'? Valid: base, principal
+    """
     choices = [str(v) for v in valid]
     near = difflib.get_close_matches(str(name), choices, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""

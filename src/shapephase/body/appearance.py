@@ -63,6 +63,13 @@ class Visual:
     colour : red, green, blue, opacity, each from 0 to 1
     mesh : the file of a mesh, else None
     vertices, faces : (V, 3) [m] and (F, 3) of a mesh, its scale applied; empty otherwise
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> shape = sp.body.visuals(cat)[0]
+    >>> shape.kind, shape.pose.shape
+    ('cylinder', (4, 4))
     """
 
     link: str
@@ -103,6 +110,12 @@ def visuals(body: Body) -> tuple[Visual, ...]:
     VisualWarning
         If the file is gone or no longer the one that was loaded (all is drawn as boxes then), or something in it cannot
         be shown: a mesh that is not found or cannot be read, a faulty element.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> len(sp.body.visuals(cat)), sp.body.visuals(cat)[0].kind
+    (3, 'cylinder')
     """
     found, doubts = drawn_shapes(body)
     shown = {shape.link for shape in found}
@@ -142,6 +155,12 @@ def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     Notes
     -----
     A box has the second moment m a^2 / 12 along an edge a.
+
+    Examples
+    --------
+    >>> size, axes = sp.body.inertia_box(12.0, np.diag([5.0, 4.0, 3.0]))
+    >>> print(size.round(6))  # 12 (4 + 1)/12 and so on
+    [1.       1.414214 1.732051]
     """
     moments, axes = principal_axes(second_moment(inertia))
     return np.sqrt(12.0 * np.maximum(moments, 0.0) / mass), axes

@@ -99,7 +99,13 @@ def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
 
 
 def robots_folder() -> Path:
-    """The folder of the bodies and motions that come with the library, in a wheel as in a checkout."""
+    """The folder of the bodies and motions that come with the library, in a wheel as in a checkout.
+
+    Examples
+    --------
+    >>> (sp.body.robots_folder() / "cat.urdf").exists()
+    True
+    """
     inside = Path(__file__).parents[1] / "robots"
     return inside if inside.is_dir() else Path(__file__).parents[3] / "robots"
 

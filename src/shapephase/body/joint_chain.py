@@ -36,6 +36,12 @@ class JointChain:
         inertia about the centre of mass [kg], [m], [kg m^2]
     matrix, offset : (k, n), (k,) coordinates of all joints from the shape, matrix @ shape + offset
     link_frames : number of the frame that each link moves with, and its pose there, (4, 4)
+
+    Examples
+    --------
+    >>> chain = sp.optimal_control.symbolic_body(sp.load_body("cat_two_halves")).chain
+    >>> chain.names, float(np.sum(chain.masses))
+    (('waist_pitch', 'waist_yaw', 'waist_roll'), 2.0)
     """
 
     names: tuple[str, ...]

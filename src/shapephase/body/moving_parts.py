@@ -23,6 +23,12 @@ class MovingPart:
     mass : [kg]
     centre : (3,) centre of mass [m]
     inertia : (3, 3) about the centre of mass [kg m^2]
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> [part.mass for part in cat.moving_parts]
+    [1.0, 0.0, 0.0, 1.0]
     """
 
     links: tuple[str, ...]

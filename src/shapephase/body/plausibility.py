@@ -36,6 +36,12 @@ def implausible(body: Body) -> tuple[str, ...]:
     Links that are denser than any matter or lighter than air, by the box of their inertia or by what is drawn of them;
     masses of neighbours that differ ten thousandfold; joints that are not limited although their kind is, or beyond a
     whole turn; lengths that look like millimetres. Nothing of this makes a body unusable.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> sp.body.implausible(cat)
+    ()
     """
     check_object(body, "Body", "body")
     chain = body.chain

@@ -348,6 +348,14 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
     Notes
     -----
     Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
+
+    Examples
+    --------
+    >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 10.0), [0.0, 0.5, 5.0])
+    >>> found = sp.bounds.gravity_torque_estimate(motion, orbit)
+    >>> print(f"{found.largest_torque:.1e} N m")
+    1.8e-06 N m
     """
     check_object(motion, "Motion", "motion")
     if motion.batch:

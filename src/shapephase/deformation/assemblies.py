@@ -176,6 +176,11 @@ def rigid_part(
     Notes
     -----
     Since masses add up to masses, an assembly of parts that are physical is physical at all times.
+
+    Examples
+    --------
+    >>> sp.deformation.rigid_part(400.0, np.diag([300.0, 350.0, 500.0])).mass
+    400.0
     """
     weight = positive_argument(mass, "mass", "a mass in kg")
     tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
@@ -207,6 +212,12 @@ def moving_mass(mass: float, path: ShapePath) -> MovingMass:
     Notes
     -----
     Source: Cabrera 2006, example 2.2.
+
+    Examples
+    --------
+    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    >>> sp.deformation.moving_mass(80.0, path).mass
+    80.0
     """
     check_object(path, "ShapePath", "path")
     return MovingMass(positive_argument(mass, "mass", "a mass in kg"), _columns(path, 3, "a moving mass"))
@@ -229,6 +240,12 @@ def boom(mass: float, full_length: float, root: ArrayLike, direction: ArrayLike,
     ------
     ShapeError, TrajectoryError
         If an argument has the wrong shape or sign, or the length leaves its range; the message names the time.
+
+    Examples
+    --------
+    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[0.0], [3.0]])
+    >>> sp.deformation.boom(6.0, 3.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), path).full_length
+    3.0
     """
     check_object(path, "ShapePath", "path")
     weight = positive_argument(mass, "mass", "a mass in kg")
@@ -270,6 +287,14 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     Notes
     -----
     Source: Cabrera 2006, examples 2.2 and 4.5; theory.md F6.
+
+    Examples
+    --------
+    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    >>> hub = sp.deformation.rigid_part(300.0, np.diag([300.0, 350.0, 500.0]))
+    >>> whole = sp.deformation.assembly(hub, [sp.deformation.moving_mass(100.0, path)])
+    >>> print(whole.inertia([0.0, 2.0])[:, 2, 2])  # reduced mass of 75 kg at 2 m: 300 more
+    [500. 800.]
     """
     everything = (spacecraft, *parts)
     paths = [part.path for part in everything if part.path is not None]

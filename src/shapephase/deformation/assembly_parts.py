@@ -34,7 +34,14 @@ class Moments:
 
 
 class Part(Protocol):
-    """A part of an assembly, its motion known in the frame of the whole."""
+    """A part of an assembly, its motion known in the frame of the whole.
+
+    Examples
+    --------
+    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    >>> sp.deformation.moving_mass(80.0, path).mass  # one of the parts there are
+    80.0
+    """
 
     @property
     def mass(self) -> float:
@@ -68,6 +75,12 @@ class RigidPart:
     mass : [kg]
     centre : (3,) its centre of mass in the frame [m]
     moment : (3, 3) integral of r r^T dm about its centre, tr(I)/2 - I [kg m^2]
+
+    Examples
+    --------
+    >>> hub = sp.deformation.rigid_part(400.0, np.diag([300.0, 350.0, 500.0]), (0.1, 0.0, 0.0))
+    >>> hub.mass, hub.centre.tolist()
+    (400.0, [0.1, 0.0, 0.0])
     """
 
     mass: float
@@ -101,6 +114,12 @@ class MovingMass:
     ----------
     mass : [kg]
     path : x, y, z in the frame [m]
+
+    Examples
+    --------
+    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    >>> sp.deformation.moving_mass(80.0, path).path.shape(2.0).tolist()
+    [2.0, 0.0, 0.0]
     """
 
     mass: float
@@ -137,6 +156,13 @@ class Boom:
     full_length : of the whole boom [m]
     root, direction : (3,) where it comes out [m], and the unit vector of where to, in the frame
     path : the length that is out, one column [m]
+
+    Examples
+    --------
+    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[0.0], [3.0]])
+    >>> boom = sp.deformation.boom(6.0, 3.0, (0.0, 0.0, 0.0), (0.0, 0.0, 2.0), path)
+    >>> boom.mass, boom.direction.tolist()
+    (6.0, [0.0, 0.0, 1.0])
     """
 
     mass: float

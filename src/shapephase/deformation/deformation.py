@@ -59,6 +59,12 @@ class Deformation:
     loops : the deformation is its first `duration / loops` seconds, this many times
     inputs : SHA-256 of the files it was made from, "body" and "path", if it was made from files
     made_from : the body, its joints, the recording and what was done to it, as JSON can hold it: for `provenance`
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> print(np.linalg.eigvalsh(sp.articulated(cat, loop).inertia(0.3)).round(6))
+    [0.005918 0.019082 0.02    ]
     """
 
     description: Description
@@ -195,6 +201,13 @@ class DeformationFamily(Sequence[Deformation]):
     ----------
     bodies : the family
     path : with columns in the order of the bodies' joints
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
+    >>> print([float(one.inertia(0.0).trace().round(6)) for one in sp.articulated(family, loop)])
+    [0.045, 0.045]
     """
 
     bodies: BodyFamily

@@ -29,7 +29,15 @@ from ._scanned_functions import inertia_and_momentum, positions_and_velocities
 
 
 class Description(Protocol):
-    """What a deformation is made of; all functions take times (N,) in [0, duration]."""
+    """What a deformation is made of; all functions take times (N,) in [0, duration].
+
+    Examples
+    --------
+    >>> body = sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0)
+    >>> inertia, momentum = body.description.sample(np.array([0.0, 1.0]))
+    >>> inertia.shape, momentum.tolist()
+    ((2, 3, 3), [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    """
 
     def sample(self, times: Array, /) -> tuple[Array, Array]:
         """Locked inertia (N, 3, 3) [kg m^2] and internal momentum (N, 3) [kg m^2/s]."""

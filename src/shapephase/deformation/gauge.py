@@ -87,6 +87,15 @@ def in_gauge(
     Notes
     -----
     Source: theory.md B4.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> def frames(t):
+    ...     return sp.so3.exp(np.multiply.outer(t, [0.0, 0.0, 1.0]))
+    >>> spinning = sp.in_gauge(sp.articulated(cat, loop), frames)
+    >>> print(np.linalg.eigvalsh(spinning.inertia(0.3)).round(6))  # of the same body
+    [0.005918 0.019082 0.02    ]
     """
     check_object(deformation, "Deformation", "deformation")
     if (u is None) == (rates is None) or (u is not None and start is not None):
@@ -109,6 +118,13 @@ def link_gauge(deformation: Deformation, link: str) -> Deformation:
     Notes
     -----
     Source: theory.md B4 with U = R_base_link^T.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.link_gauge(sp.articulated(cat, loop), cat.moving_parts[0].links[0])
+    >>> print(np.linalg.eigvalsh(seen.inertia(0.3)).round(6))  # of the same body
+    [0.005918 0.019082 0.02    ]
     """
     check_object(deformation, "Deformation", "deformation")
     return _seen_from(deformation, link_frames(deformation, link), f"link {link}")
@@ -130,13 +146,28 @@ def mean_body_gauge(deformation: Deformation, reference: float = 0.0) -> Deforma
     Notes
     -----
     Source: Eckart 1935; Canavan and Likins 1977 (mean axes); Travers, Hatton and Choset 2013 (minimum perturbation).
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.mean_body_gauge(sp.articulated(cat, loop))
+    >>> print(np.linalg.eigvalsh(seen.inertia(0.3)).round(6))  # of the same body
+    [0.005918 0.019082 0.02    ]
     """
     check_object(deformation, "Deformation", "deformation")
     return _seen_from(deformation, mean_body_frames(deformation, reference), "mean body")
 
 
 def named_gauge(deformation: Deformation, name: str) -> Deformation:
-    """The deformation in one of `GAUGES` or "link:NAME". Raises UnknownNameError, and as the gauge itself."""
+    """The deformation in one of `GAUGES` or "link:NAME". Raises UnknownNameError, and as the gauge itself.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.deformation.named_gauge(sp.articulated(cat, loop), "principal").inertia(0.3)
+    >>> print(f"{np.abs(seen - np.diag(seen.diagonal())).max():.9f}")
+    0.000000000
+    """
     check_object(deformation, "Deformation", "deformation")
     if name == "base":
         return deformation
@@ -150,6 +181,13 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
 
     U(0) is the identity and U' = -U hat(I^-1 L_o). For a loop the closure is the holonomy (base axes at t = 0).
     Source: Cabrera 2006, section 2.3.1 (a); theory.md B2.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.horizontal_gauge(sp.articulated(cat, loop))
+    >>> print(f"{np.abs(seen.internal_momentum([0.2, 0.7])).max():.9f}")  # it vanishes there
+    0.000000000
     """
     check_object(deformation, "Deformation", "deformation")
     lift = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
@@ -182,6 +220,13 @@ def principal_gauge(deformation: Deformation) -> Deformation:
     Notes
     -----
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.principal_gauge(sp.articulated(cat, loop)).inertia(0.3)
+    >>> print(f"{np.abs(seen - np.diag(seen.diagonal())).max():.9f}")  # diagonal
+    0.000000000
     """
     check_object(deformation, "Deformation", "deformation")
     return _seen_from(deformation, principal_frames(deformation), "principal")

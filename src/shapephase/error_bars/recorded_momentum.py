@@ -44,6 +44,14 @@ class RecordedMomentum:
     noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
     residuals : (N, 3) from reconstructed to recorded attitudes, rotation vectors in base axes [rad]
     motion : the one that was fitted
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), np.linspace(0.0, 1.0, 9)
+    >>> found = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times), noise=1e-3)
+    >>> print(found.momentum_covariance.shape, f"{found.noise:.3f}")
+    (3, 3) 0.001
     """
 
     momentum: Array
@@ -91,6 +99,14 @@ def momentum_from_recording(
     Notes
     -----
     Source: theory.md section 8 (the response of the attitude to start and momentum).
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), np.linspace(0.0, 1.0, 9)
+    >>> found = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times))
+    >>> print(found.momentum.round(6) + 0.0)
+    [0.    0.    0.005]
     """
     check_object(deformation, "Deformation", "deformation")
     at = times_argument(finite_array(times, "times", (None,), unit="s"), deformation.duration)

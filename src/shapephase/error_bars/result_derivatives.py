@@ -30,6 +30,13 @@ class ResultDerivative:
     ----------
     final_attitude, total_rotation, holonomy, dynamical_rotation : (3, m) [rad per unit]
     dynamic_phase, solid_angle, montgomery_phase : (m,) in the horizontal gauge [rad per unit]; without momentum zero
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> sp.derivatives(motion).by_momentum.dynamic_phase.shape
+    (3,)
     """
 
     final_attitude: Array
@@ -66,6 +73,14 @@ class Derivatives:
     Notes
     -----
     Source: theory.md section 8.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> found = sp.derivatives(motion).by_momentum
+    >>> print(f"{found.dynamic_phase[2]:.3f} rad per kg m^2/s")
+    58.372 rad per kg m^2/s
     """
 
     def __init__(self, motion: Motion) -> None:
@@ -202,6 +217,14 @@ def derivatives(motion: Motion) -> Derivatives:
         If it is no motion of an articulated body.
     ShapeError
         If the motion is a batch.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> found = sp.derivatives(motion).by_momentum
+    >>> found.final_attitude.shape
+    (3, 3)
     """
     return Derivatives(motion)
 

@@ -33,7 +33,14 @@ _CHECK_START = 1e-9
 
 
 class KnownMotion(Protocol):
-    """A motion in closed form; times (...)."""
+    """A motion in closed form; times (...).
+
+    Examples
+    --------
+    >>> example = sp.examples.homothety()
+    >>> print(np.linalg.norm(example.known.body_momentum([0.0, 1.0]), axis=-1).round(9))
+    [3.1 3.1]
+    """
 
     def attitude(self, t: ArrayLike, /) -> Array:
         """R(t): -> (..., 3, 3)."""
@@ -56,6 +63,13 @@ class Example:
     phase : theta_M of the whole duration in the base gauge, modulo 2 pi, if Pi is back at its start by then [rad]
     turn : the angle of the total rotation, if that is what is known of the example [rad]
     rigid : the rigid body with the inertia of the start, if the example is compared with it
+
+    Examples
+    --------
+    >>> example = sp.examples.rigid_body()
+    >>> motion = sp.reconstruct(example.deformation, example.momentum)
+    >>> print(f"{sp.split(motion, 'base').montgomery_angle:.9f}, known {sp.so3.wrap(example.phase):.9f}")
+    -2.110538109, known -2.110538109
     """
 
     deformation: Deformation
@@ -74,6 +88,13 @@ class TimeReparametrisedRigid:
     ----------
     top : the rigid body
     clock : tau, times (...) -> (...) [s]
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 1.5, 2.0], [0.6, 0.5, 3.0])
+    >>> slow = sp.examples.TimeReparametrisedRigid(top, lambda t: 0.5 * t)
+    >>> print(np.abs(slow.body_momentum(2.0) - top.body_momentum(1.0)).max().round(12))
+    0.0
     """
 
     top: EulerTop
@@ -98,6 +119,12 @@ class AxialMotion:
     ----------
     momentum : (3,) [kg m^2/s]
     axial, transverse : a and b, times (...) -> (...) [1/(kg m^2/s)]
+
+    Examples
+    --------
+    >>> example = sp.examples.axial_stretch()
+    >>> print(np.linalg.norm(example.known.body_momentum([0.0, 2.0]), axis=-1).round(6))
+    [3.162278 3.162278]
     """
 
     momentum: Array
@@ -129,6 +156,12 @@ class Scale:
     ----------
     factor : times (...) -> (...), above 0
     clock : times (...) -> (...) [s]; None: by quadrature
+
+    Examples
+    --------
+    >>> scale = sp.examples.expansion(0.02)
+    >>> float(scale.factor(np.array(10.0)))
+    1.2
     """
 
     factor: Callable[[Array], ArrayLike]
@@ -143,7 +176,13 @@ class Scale:
 
 
 def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
-    """a^-2 = 1 + amount sin(2 pi t/period), 0 < |amount| < 1: tau = t + amount period (1 − cos)/(2 pi)."""
+    """a^-2 = 1 + amount sin(2 pi t/period), 0 < |amount| < 1: tau = t + amount period (1 − cos)/(2 pi).
+
+    Examples
+    --------
+    >>> print(f"{sp.examples.pulsation(0.5, 3.0).clock(np.array(3.0)):.9f}")  # after a period the time itself
+    3.000000000
+    """
     frequency = 2.0 * np.pi / positive(period, "period", "s")
     if not 0.0 < abs(amount) < 1.0:
         raise ShapeError(f"amount: a number between −1 and 1, not 0, is needed, got {amount!r}")
@@ -154,7 +193,13 @@ def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
 
 
 def expansion(rate: float = 0.02) -> Scale:
-    """a = 1 + rate t, rate in 1/s: tau = t/(1 + rate t) stays below 1/rate, and the rotation is finite."""
+    """a = 1 + rate t, rate in 1/s: tau = t/(1 + rate t) stays below 1/rate, and the rotation is finite.
+
+    Examples
+    --------
+    >>> float(sp.examples.expansion(0.02).factor(np.array(10.0)))  # 1 + 0.02 * 10
+    1.2
+    """
     speed = positive(rate, "rate", "1/s")
     return Scale(factor=lambda t: 1.0 + speed * t, clock=lambda t: t / (1.0 + speed * t))
 
@@ -167,6 +212,12 @@ class SteadyTurn:
     ----------
     momentum : (3,) [kg m^2/s]
     angular_velocity : (3,), along the momentum [rad/s]
+
+    Examples
+    --------
+    >>> turn = sp.examples.SteadyTurn(np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 0.5]))
+    >>> print(f"{sp.so3.angle(turn.attitude(1.0)):.9f}")
+    0.500000000
     """
 
     momentum: Array

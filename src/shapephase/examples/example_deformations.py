@@ -76,6 +76,13 @@ def homothety(
     Notes
     -----
     Source: Cabrera 2006, example 4.3; theory.md F1.
+
+    Examples
+    --------
+    >>> example = sp.examples.homothety()
+    >>> motion = sp.reconstruct(example.deformation, example.momentum)
+    >>> print(f"{np.abs(motion.body_momentum(1.0) - example.known.body_momentum(1.0)).max():.6f}")
+    0.000000
     """
     growing = pulsation() if scale is None else scale
     top = EulerTop(inertia, momentum)
@@ -126,6 +133,12 @@ def axial_as_printed(
     Notes
     -----
     Source: Cabrera 2006, example 4.4; theory.md F2, C-E13.
+
+    Examples
+    --------
+    >>> example = sp.examples.axial_as_printed()
+    >>> print(example.deformation.inertia([0.0, 5.0])[:, 0, 0])  # 2 (1 + 0.02 t)
+    [2.  2.2]
     """
     start, across = positive(axial, "axial", "kg m^2"), positive(transverse, "transverse", "kg m^2")
     rate = positive(expansion_rate, "expansion_rate", "1/s")
@@ -161,6 +174,12 @@ def axial_stretch(
     Notes
     -----
     Source: Cabrera 2006, example 4.4, by what its text describes; theory.md F2b, C-E13.
+
+    Examples
+    --------
+    >>> example = sp.examples.axial_stretch()
+    >>> print(example.deformation.inertia(0.0).diagonal().round(6))  # m r^2/2 and m (3 r^2 + h^2)/12
+    [1.5  1.75 1.75]
     """
     weight, wide = positive(mass, "mass", "kg"), positive(radius, "radius", "m")
     first, rate = positive(length, "length", "m"), positive(speed, "speed", "m/s")
@@ -209,6 +228,12 @@ def printed_antenna(
     Notes
     -----
     Source: Cabrera 2006, example 4.5; theory.md F3, F4, C-E13.
+
+    Examples
+    --------
+    >>> certificate = sp.bounds.regime_certificate(sp.examples.printed_antenna(3).deformation, [0.3, 0.4, 0.9])
+    >>> certificate.regime.name
+    'ABOUT_LARGEST'
     """
     if axis not in (1, 3):
         raise ShapeError(f"axis: 1 or 3 is needed, got {axis!r}")
@@ -235,6 +260,12 @@ def regime_crossing(coast: float = 20.0) -> Example:
     inequality, a flat body: I_3 can grow as fast as one likes, but no further.
 
     Source: Cabrera 2006, section 4.1.1, case 3; theory.md E11 and section 6.
+
+    Examples
+    --------
+    >>> example = sp.examples.regime_crossing(coast=1.0)
+    >>> print(example.deformation.inertia([0.0, 1.0])[:, 2, 2].round(6))
+    [1.06 2.05]
     """
     return printed_antenna(3, (1.0, 1.05, 1.06), grown=2.05, momentum=(0.6, 0.0, 0.8), extension_time=0.2, coast=coast)
 
@@ -266,6 +297,12 @@ def dipole_antenna(
     Notes
     -----
     Source: theory.md F4b, C-E13.
+
+    Examples
+    --------
+    >>> example = sp.examples.dipole_antenna()
+    >>> print(example.deformation.inertia([0.0, 5.0])[:, 0, 0].round(6))  # 1 + 2 * 0.5 * 1.5^2 in the end
+    [1.   3.25]
     """
     if axis not in (1, 2, 3):
         raise ShapeError(f"axis: 1, 2 or 3 is needed, got {axis!r}")
@@ -302,6 +339,13 @@ def furniture(
     Notes
     -----
     Source: Cabrera 2006, example 2.2; theory.md F6.
+
+    Examples
+    --------
+    >>> example = sp.examples.furniture()
+    >>> motion = sp.reconstruct(example.deformation, example.momentum)
+    >>> print(f"{motion.body_momentum(20.0)[2]:.6f}")  # walking about the axis of the momentum
+    30.000000
     """
     moments, inner, outer = moments_argument(hub), positive(hub_mass, "hub_mass", "kg"), positive(mass, "mass", "kg")
     wide, walk_rate = positive(radius, "radius", "m"), 2.0 * np.pi / positive(duration, "duration", "s")
@@ -320,6 +364,13 @@ def cat(halves: bool = False) -> Example:
     """F7: the cat rights itself at zero momentum, by 180 degrees: a realistic one, or Kane and Scher's (`halves`).
 
     Source: Kane and Scher 1969; `scenarios.kane_scher`, `scenarios.cat_righting`; theory.md F7 and section 7.
+
+    Examples
+    --------
+    >>> example = sp.examples.cat(halves=True)
+    >>> motion = sp.reconstruct(example.deformation, example.momentum)
+    >>> print(f"{np.degrees(sp.so3.angle(motion.final_attitude)):.4f}")
+    180.0000
     """
     if halves:
         deformation = articulated(load_body("cat_two_halves"), kane_scher(0.0, _HALF_TURN_CONE * _DEGREE))
@@ -332,6 +383,13 @@ def astronaut(legs: bool = False) -> Example:
     """F8: the astronaut pitches at zero momentum, 11.825049 degrees by circling the arms, 12.352775 by the legs.
 
     Source: `scenarios.astronaut_arm_circles`, `scenarios.astronaut_leg_swing`; theory.md F8.
+
+    Examples
+    --------
+    >>> example = sp.examples.astronaut()
+    >>> motion = sp.reconstruct(example.deformation, example.momentum)
+    >>> print(f"{np.degrees(sp.so3.angle(motion.final_attitude)):.6f} degrees")
+    11.825049 degrees
     """
     path, degrees = (astronaut_leg_swing(), 12.352775) if legs else (astronaut_arm_circles(), 11.825049)
     deformation = articulated(load_body("astronaut"), path)
@@ -342,6 +400,14 @@ def rigid_body(moments: ArrayLike = (1.0, 1.5, 2.0), momentum: ArrayLike = (0.6,
     """F9: a rigid body over one period of Pi, known in closed form; its phase is Montgomery's.
 
     Source: Cabrera 2006, examples 2.6 and 3.8; theory.md F9, D12, D17.
+
+    Examples
+    --------
+    >>> example = sp.examples.rigid_body()
+    >>> motion = sp.reconstruct(example.deformation, example.momentum)
+    >>> print(motion.body_momentum([0.0, motion.duration]).round(6))  # it closes
+    [[0.6 0.5 1.2]
+     [0.6 0.5 1.2]]
     """
     top = EulerTop.principal(moments, momentum)
     if not np.isfinite(top.period):
@@ -368,7 +434,14 @@ EXAMPLES: Mapping[str, Callable[[], Example]] = {
 
 
 def named_example(name: str) -> Example:
-    """One of `EXAMPLES`, with its default parameters. Raises UnknownNameError."""
+    """One of `EXAMPLES`, with its default parameters. Raises UnknownNameError.
+
+    Examples
+    --------
+    >>> example = sp.examples.named_example("rigid_body")
+    >>> print(f"{example.phase:.6f} rad")
+    16.739018 rad
+    """
     if name not in EXAMPLES:
         raise unknown_name("example", name, EXAMPLES)
     return EXAMPLES[name]()

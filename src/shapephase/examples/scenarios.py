@@ -25,7 +25,14 @@ _TOLERANCE = 1e-11
 
 @dataclass(frozen=True)
 class NamedMotion:
-    """A motion that comes with the library: its body, the function that makes its path, and a description."""
+    """A motion that comes with the library: its body, the function that makes its path, and a description.
+
+    Examples
+    --------
+    >>> motion = sp.examples.MOTIONS["kane_scher"]
+    >>> motion.body, motion.path().duration
+    ('cat_two_halves', 1.0)
+    """
 
     body: str
     path: Callable[[], ShapePath]
@@ -51,6 +58,12 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
     (60, 77.132402) degrees, and at (20, 40) by 259.512497 degrees, counted through the motion.
 
     Source: Kane and Scher 1969, equation (5).
+
+    Examples
+    --------
+    >>> cat, path = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, np.radians(59.426458741516))
+    >>> print(f"{np.degrees(sp.so3.angle(sp.holonomy(cat, path))):.6f} degrees")
+    180.000000 degrees
     """
     if not 0.0 <= alpha < beta < 0.5 * np.pi:
         raise TrajectoryError(f"0 <= alpha < beta < pi/2 [rad] is needed, got alpha = {alpha!r}, beta = {beta!r}")
@@ -64,6 +77,12 @@ def cat_righting(duration: float = 0.5) -> ShapePath:
     legs tucked and neck and tail bending along. Two numbers were solved for, the largest bend and the tail's share;
     two are enough, because a loop that is its own mirror image run backwards turns about an axis in the plane of
     symmetry.
+
+    Examples
+    --------
+    >>> turn = sp.holonomy(sp.load_body("cat"), sp.examples.cat_righting())
+    >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
+    180.000000 degrees
     """
     names = load_body("cat").joint_names
     return _loop(_CatRighting(float(duration), names), duration, names)
@@ -74,6 +93,12 @@ def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
 
     The arms go up in front of the body, close together, and come down spread at the sides.
     In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
+
+    Examples
+    --------
+    >>> turn = sp.holonomy(sp.load_body("astronaut"), sp.examples.astronaut_arm_circles())
+    >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
+    11.825049 degrees
     """
     abduction = (0.75, 0.0, -0.75)
     return _one_harmonic(
@@ -93,6 +118,12 @@ def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
 
     The legs swing forward stretched and come back bent, the trunk bends along.
     In the manner of Kulwicki 1962 and Kane, Headrick and Yatteau 1972; the numbers are our own.
+
+    Examples
+    --------
+    >>> turn = sp.holonomy(sp.load_body("astronaut"), sp.examples.astronaut_leg_swing())
+    >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
+    12.352775 degrees
     """
     return _one_harmonic(
         "astronaut",
@@ -108,7 +139,14 @@ def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
 
 
 def antenna_deployment(duration: float = 60.0) -> ShapePath:
-    """The boom of the `satellite` extends from its lower to its upper limit, from rest to rest: an open path."""
+    """The boom of the `satellite` extends from its lower to its upper limit, from rest to rest: an open path.
+
+    Examples
+    --------
+    >>> path = sp.examples.antenna_deployment()
+    >>> print(path.shape([0.0, 60.0])[:, path.joint_names.index("boom_extension")].round(6))
+    [0.  1.8]
+    """
     body = load_body("satellite")
     lower, upper = body.joint_limits[body.joint_index("boom_extension")]
     ends = [body.shape({"boom_extension": float(length)}) for length in (lower, upper)]
@@ -119,6 +157,12 @@ def satellite_sweep(duration: float = 60.0) -> ShapePath:
     """One sweep of the `satellite`: the boom goes out and in while its arm swings to and fro, a quarter period behind.
 
     At zero momentum it turns by 5.405499 degrees, most of it about the z axis. The numbers are our own.
+
+    Examples
+    --------
+    >>> path = sp.examples.satellite_sweep()
+    >>> print(np.abs(path.shape(0.0) - path.shape(path.duration)).max().round(9))  # a loop
+    0.0
     """
     return _one_harmonic(
         "satellite",
@@ -159,7 +203,13 @@ CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
 
 
 def named_motion(name: str) -> ShapePath:
-    """The path of one of `MOTIONS`. Raises UnknownNameError."""
+    """The path of one of `MOTIONS`. Raises UnknownNameError.
+
+    Examples
+    --------
+    >>> sp.examples.named_motion("cat_righting").duration
+    0.5
+    """
     if name not in MOTIONS:
         raise unknown_name("motion", name, MOTIONS)
     return MOTIONS[name].path()

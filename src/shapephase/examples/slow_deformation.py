@@ -76,6 +76,12 @@ def slow_antenna(
     Notes
     -----
     Source: Cabrera 2006, remark 4.6, with the scale corrected (C-E12); orders derived here; theory.md F5.
+
+    Examples
+    --------
+    >>> example = sp.examples.slow_antenna(1e-3)
+    >>> print(f"{example.rigid.montgomery_phase:.6f} rad")  # of the body as it was at the start
+    11.187497 rad
     """
     if law not in _LAWS:
         raise unknown_name("law", law, _LAWS)
@@ -110,6 +116,11 @@ def slow_phase_slope(moments: ArrayLike, momentum: ArrayLike) -> float:
     Notes
     -----
     Source: first-order perturbation in Andoyer's variables, derived here.
+
+    Examples
+    --------
+    >>> print(f"{sp.examples.slow_phase_slope([1.0, 1.5, 2.0], [0.4, 0.3, 3.2]):.6f} rad s")
+    -109.583017 rad s
     """
     start = moments_argument(moments)
     top = orbit_about_third(start, momentum)
@@ -155,6 +166,12 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
     Notes
     -----
     Source: Ehrenfest's adiabatic invariance, with the area as the action; theory.md F5.
+
+    Examples
+    --------
+    >>> top = sp.examples.orbit_of_area([1.0, 1.5, 2.0], 1.0, 0.5)
+    >>> print(f"{abs(top.solid_angle):.9f} sr")
+    0.500000000 sr
     """
     end, norm = moments_argument(moments), positive(magnitude, "magnitude", "kg m^2/s")
     limit = separatrix_solid_angle(end, 2)
@@ -195,6 +212,14 @@ def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: f
     Notes
     -----
     Source: Hannay 1985; derived here, theory.md F5.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 1.5, 2.0], [0.4, 0.3, 3.2])
+    >>> body = sp.rigid(np.diag([1.0, 1.5, 2.0]), 2.0 * top.period)
+    >>> angle = sp.examples.adiabatic_precession(body, [0.4, 0.3, 3.2], top.period)
+    >>> print(f"{sp.so3.wrap(angle - top.montgomery_phase):.6f}")
+    0.000000
     """
     check_object(deformation, "Deformation", "deformation")
     end = positive(until, "until", "s")
@@ -249,6 +274,13 @@ def first_loop(motion: Motion, axis: int = 3) -> float:
         If the motion is a batch, or the axis is none of these.
     TrajectoryError
         If Pi does not go once round the axis during the motion.
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 1.5, 2.0], [0.4, 0.3, 3.2])
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 1.5, 2.0]), 2.0 * top.period), [0.4, 0.3, 3.2])
+    >>> print(f"{sp.examples.first_loop(motion) / top.period:.6f} periods")
+    1.000000 periods
     """
     if motion.batch or axis not in (1, 2, 3):
         raise ShapeError(f"one motion and axis 1, 2 or 3 are needed, got a batch {motion.batch} and axis {axis!r}")

@@ -67,6 +67,15 @@ def stepped_rotation(
     ------
     AccuracyNotReached
         If the estimate stays above the tolerance.
+
+    Examples
+    --------
+    >>> def evaluate(t):
+    ...     return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(t), 3, 3)), np.zeros((len(t), 3))
+    >>> steady = sp.integrator.sampler(evaluate, np.array([0.0, 1.0]))
+    >>> solution = sp.integrator.stepped_rotation(steady, np.array([[0.0, 0.0, 5.0]]), 1e-9)
+    >>> print(f"{sp.so3.angle(solution.rotation(np.array([1.0]))[0, 0]):.9f}")
+    2.000000000
     """
     ceiling = float(norms(momentum).max(initial=0.0))
     return Integration(sampler, momentum, tolerance, ceiling=ceiling, subdivide=subdivide).solution()

@@ -24,6 +24,12 @@ class Interpolant:
         the P panels of the first loop serve every loop
     loops : how often the panels are repeated
     evaluations : how many times the deformation was evaluated
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 5.0])
+    >>> motion.interpolant.edges.tolist(), motion.interpolant.coefficients.shape[-1]
+    ([0.0, 1.0], 9)
     """
 
     edges: Array

@@ -28,7 +28,14 @@ _PANELS_OF_A_ROUGH_LOOP = 32
 
 
 class Sampler(Protocol):
-    """A deformation being sampled."""
+    """A deformation being sampled.
+
+    Examples
+    --------
+    >>> sampler = sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0).sampler
+    >>> sampler is not None
+    True
+    """
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """Sample until the attitude error for momenta up to this magnitude is at most `tolerance` [rad].
@@ -85,6 +92,15 @@ def sampler(
         result: `evaluate` is asked
     checked : it depends on more, and is checked between nodes nevertheless
     knots : the first loop of a recorded path, whose knots are the breaks: panels may span several of them
+
+    Examples
+    --------
+    >>> def evaluate(t):
+    ...     return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(t), 3, 3)), np.zeros((len(t), 3))
+    >>> steady = sp.integrator.sampler(evaluate, np.array([0.0, 1.0]))
+    >>> solution = sp.integrator.stepped_rotation(steady, np.array([[0.0, 0.0, 5.0]]), 1e-9)
+    >>> print(solution.error_estimate < 1e-9)
+    [ True]
     """
     if knots is not None:
         return KnotSampler(knots, loops)

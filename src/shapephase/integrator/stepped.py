@@ -40,6 +40,12 @@ class SteppedRotation:
     rounding_error : (B,) error due to rounding alone [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
     perturbed : the interpolant's series with errors like those that they probably have
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 5.0])
+    >>> print(motion.stepped.momentum, motion.stepped.error_estimate < 1e-9)
+    [[0. 0. 5.]] [ True]
     """
 
     interpolant: Interpolant

@@ -155,6 +155,13 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     Notes
     -----
     Source: Agrachev and Sachkov, Control Theory from the Geometric Viewpoint, section 21.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> path = sp.optimal_control.extremal(cat, np.zeros(3), [1.0, 0.0, 0.0], np.zeros(3), 0.2)
+    >>> sp.optimal_control.conjugate_times(path)
+    []
     """
     if motion.energy == 0.0:
         raise ShapeError("an extremal at rest has no conjugate times; give it a rate")

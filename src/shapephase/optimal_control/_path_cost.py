@@ -35,6 +35,12 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
         For another cost, or a path of other joints.
     AccuracyNotReached
         If the cost does not converge: the path has jumps that are not declared as breaks.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> print(f"{sp.optimal_control.path_cost(cat, loop, 'rate'):.6f} rad^2/s")
+    5.169923 rad^2/s
     """
     if cost not in ("kinetic", "rate"):
         raise unknown_name("cost of a path", cost, ("kinetic", "rate"))

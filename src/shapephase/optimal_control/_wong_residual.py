@@ -42,6 +42,12 @@ class WongFit:
     rate : (n,) at the start of that extremal [rad/s or m/s]
     residual : root mean square, in the metric of the cost, of what is missing in p = p(0) + integral of dL/dr,
         relative to that of the rate
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> sp.optimal_control.wong_residual(cat, loop).charge.shape
+    (3,)
     """
 
     charge: Array
@@ -72,6 +78,12 @@ def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> Wo
     Notes
     -----
     Source: as `extremal`.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> print(f"{sp.optimal_control.wong_residual(cat, loop).residual:.3f}")  # an extremal
+    0.000
     """
     route = path.matched(body.joint_names, body.name)
     equations = hamiltonian(body, metric)

@@ -35,6 +35,13 @@ class Extremal:
     energy : 1/2 r' g r', kept by the motion [J, or rad^2/s^2]
     energy_drift : the largest relative change of the computed one at the steps
     solution : times -> states (2 n + 4, N): shapes, their canonical momenta, quaternion xyzw
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> path = sp.optimal_control.extremal(cat, np.zeros(3), [1.0, 0.0, 0.0], np.zeros(3), 1.0)
+    >>> print(f"{path.energy_drift < 1e-8} {path.shape(0.0)}")
+    True [0. 0. 0.]
     """
 
     body: Body
@@ -126,6 +133,13 @@ def extremal(
     -----
     Source: Montgomery, Isoholonomic problems and some applications, Comm. Math. Phys. 128 (1990) 565-592, theorem 1 and
     its Hamiltonian form; signs as in theory.md section 1.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> path = sp.optimal_control.extremal(cat, np.zeros(3), [1.0, 0.0, 0.0], [0.0, 0.0, 0.001], 1.0)
+    >>> print(f"{path.cost:.6f} J s")
+    0.002500 J s
     """
     check_object(body, "Body", "body")
     start, speed = (vector_argument(value, name, body.n_shape) for value, name in ((shape, "shape"), (rate, "rate")))

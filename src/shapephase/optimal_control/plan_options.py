@@ -37,6 +37,12 @@ class Goal:
     ShapeError
         If nothing, or more than one thing, is given; for a wrong shape, entries that are not finite, a matrix that is
         no rotation, a vector of no length.
+
+    Examples
+    --------
+    >>> goal = sp.optimal_control.Goal(somersaults=1, half_twists=2)
+    >>> goal.somersaults, goal.half_twists
+    (1, 2)
     """
 
     rotation: ArrayLike | None = None
@@ -90,6 +96,11 @@ class Limits:
     ------
     ShapeError
         For rates that are not finite, not above 0, or neither a number nor a vector.
+
+    Examples
+    --------
+    >>> sp.optimal_control.Limits(rate_limits=3.0).rate_limits.item()
+    3.0
     """
 
     joint_limits: bool = True
@@ -132,6 +143,11 @@ class Search:
         For another method.
     ShapeError
         For counts that are not whole numbers, or too small.
+
+    Examples
+    --------
+    >>> sp.optimal_control.Search(starts=4).starts
+    4
     """
 
     method: str = "collocation"

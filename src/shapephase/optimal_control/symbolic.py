@@ -44,6 +44,15 @@ class SymbolicBody:
     Notes
     -----
     Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> functions = sp.optimal_control.symbolic_body(cat)
+    >>> print(np.array(functions.connection(np.zeros(3))).round(6))
+    [[0.  0.  0.5]
+     [0.5 0.  0. ]
+     [0.  0.5 0. ]]
     """
 
     name: str
@@ -113,6 +122,13 @@ def symbolic_body(body: Body) -> SymbolicBody:
 
     Source: the composite rigid body algorithm (Featherstone, Rigid Body Dynamics Algorithms, section 6.2), reduced by
     the momentum of the base.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> functions = sp.optimal_control.symbolic_body(cat)
+    >>> print(np.array(functions.inertia(np.zeros(3))).diagonal().round(6))
+    [0.005 0.02  0.02 ]
     """
     with _building:
         if body not in _built:

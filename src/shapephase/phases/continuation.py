@@ -35,6 +35,15 @@ class OrbitBranch:
     stopped : why the branch ends before the last magnitude asked for; None when it does not
     fold : the magnitude at which it meets another orbit and both vanish, to about 1e-8 of the range followed
         [kg m^2/s]; None when it does not
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.horizontal_gauge(sp.articulated(cat, loop))
+    >>> start = sp.fixed_points(seen, 0.005).directions[0]
+    >>> branch = sp.continued_orbits(seen, [0.005, 0.006], start=start)
+    >>> print(np.linalg.norm(branch.directions, axis=-1).round(9))
+    [1. 1.]
     """
 
     magnitudes: Array
@@ -77,6 +86,15 @@ def continued_orbits(
     Notes
     -----
     Source: theory.md section 2.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> seen = sp.horizontal_gauge(sp.articulated(cat, loop))
+    >>> start = sp.fixed_points(seen, 0.005).directions[0]
+    >>> branch = sp.continued_orbits(seen, [0.005, 0.006], start=start)
+    >>> branch.magnitudes.tolist()
+    [0.005, 0.006]
     """
     check_object(deformation, "Deformation", "deformation")
     magnitudes = magnitudes_argument(magnitudes)

@@ -21,6 +21,13 @@ class SplitErrors:
     montgomery_angle : modulo 2 pi [rad]
     solid_angle : modulo 4 pi [sr]
     momentum_gap : [rad]
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> print(sp.split(motion).error_estimates.montgomery_phase < 1e-6)
+    True
     """
 
     total_rotation: Array
@@ -38,7 +45,15 @@ class SplitErrors:
 
 @dataclass(frozen=True, eq=False)
 class RunningErrors:
-    """Estimates of the errors of `RunningPhases`, modulo 4 pi; fields are batch + t.shape [rad]."""
+    """Estimates of the errors of `RunningPhases`, modulo 4 pi; fields are batch + t.shape [rad].
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> print(sp.running_phases(motion, [0.5, 1.0]).error_estimates.dynamic_phase < 1e-6)
+    [ True  True]
+    """
 
     dynamic_phase: Array
     geometric_phase: Array
@@ -48,7 +63,15 @@ class RunningErrors:
 
 @dataclass(frozen=True, eq=False)
 class ArcErrors:
-    """Estimates of the errors of `ArcPhases`, named and shaped as there, modulo 4 pi; for tilts angles [rad]."""
+    """Estimates of the errors of `ArcPhases`, named and shaped as there, modulo 4 pi; for tilts angles [rad].
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> print(sp.arc_phases(motion, [0.0, 0.5, 1.0]).error_estimates.dynamic_phase < 1e-6)
+    [ True  True]
+    """
 
     dynamic_phase: Array
     geometric_phase: Array

@@ -47,6 +47,13 @@ class ReturnMap:
     magnitude : of the momentum [kg m^2/s]
     start, end : (..., 3) u(0) and u(T), unit vectors
     solution : the motions themselves, with the leading axes made one
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> found = sp.stroboscopic_map(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), 1.0, [0.0, 0.0, 1.0])
+    >>> print(found.end.round(9) + 0.0)  # a steady rotation stays
+    [0. 0. 1.]
     """
 
     magnitude: float
@@ -94,6 +101,13 @@ class FixedPoints:
     index_sum : of the indices; 2 for every loop and magnitude when none is missing
     complete : whether the indices sum to 2, none is 0, and the search left no part of the sphere out
     tolerance : of the attitudes by which they were found [rad]
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> points = sp.fixed_points(sp.articulated(cat, loop), 0.005)
+    >>> len(points.directions) >= 2, int(points.index.sum())
+    (True, 2)
     """
 
     magnitude: float
@@ -128,6 +142,13 @@ def stroboscopic_map(
     Notes
     -----
     Source: theory.md section 2.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> found = sp.stroboscopic_map(sp.articulated(cat, loop), 0.005, np.eye(3))
+    >>> print(np.linalg.norm(found.end, axis=-1).round(9))  # still on the sphere
+    [1. 1. 1.]
     """
     check_object(deformation, "Deformation", "deformation")
     magnitude = magnitude_argument(magnitude, allow_zero=True)
@@ -171,6 +192,13 @@ def fixed_points(
     Notes
     -----
     Source: theory.md section 2, B9, D16.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> points = sp.fixed_points(sp.articulated(cat, loop), 0.005)
+    >>> points.index_sum  # Lefschetz's number of the sphere
+    2
     """
     check_object(deformation, "Deformation", "deformation")
     magnitude = magnitude_argument(magnitude)
@@ -215,6 +243,13 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     ------
     OpenPathError
         If the shape does not close.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> orbits = sp.closed_orbits(sp.horizontal_gauge(sp.articulated(cat, loop)), 0.005)
+    >>> len(orbits) >= 2, round(float(sp.split(orbits[0]).momentum_gap), 6)
+    (True, 0.0)
     """
     check_object(deformation, "Deformation", "deformation")
     found = fixed_points(deformation, magnitude, tolerance=tolerance)

@@ -61,6 +61,12 @@ class MovingScene:
     momentum : (3,) the angular momentum [kg m^2/s]
     trail : (F, 3) positions of the origin of a link; None: no trail
     articulated : whether the nodes are the links of a body, else particles or the locked inertia
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.moving_scene(motion, 5).times.tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0]
     """
 
     title: str
@@ -132,6 +138,13 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     -----
     VisualWarning
         As `visuals`.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> scene = sp.plotting.moving_scene(motion, 5)
+    >>> scene.times.tolist(), scene.articulated
+    ([0.0, 1.0, 2.0, 3.0, 4.0], False)
     """
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")

@@ -57,6 +57,13 @@ def plot_conjugate_locus(
     Notes
     -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 4.4; theory.md R12.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> len(sp.plotting.plot_conjugate_locus(ax, [3.0, 2.0, 1.0], geodesics=4).lines) > 4
+    True
     """
     check_flat_axes(ax)
     metric = serret_andoyer_metric(moments)
@@ -119,6 +126,13 @@ def plot_ellipsoid_locus(
     Notes
     -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 2, the ellipsoid; theory.md P3, P5.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> len(sp.plotting.plot_ellipsoid_locus(ax, 0.8, geodesics=4).lines) >= 2
+    True
     """
     check_flat_axes(ax)
     surface = ellipsoid(aspect)

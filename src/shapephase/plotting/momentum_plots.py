@@ -90,6 +90,14 @@ def plot_momentum_curve(
     Notes
     -----
     Source: Cabrera 2006, equation (12) and section 4.1; Marsden and Ratiu, figure 15.3.1.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> len(sp.plotting.plot_momentum_curve(ax, motion, "base").lines) > 3
+    True
     """
     check_object(motion, "Motion", "motion")
     check_axes(ax)
@@ -146,6 +154,15 @@ def plot_fixed_points(
     Notes
     -----
     Raises MissingExtraError, ShapeError. Source: theory.md section 2.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> points = sp.fixed_points(sp.articulated(cat, loop), 0.005)
+    >>> len(sp.plotting.plot_fixed_points(ax, points).lines) >= 2
+    True
     """
     check_axes(ax)
     drawn = SphereAxes(ax, _DEFAULT_VIEW if view is None else view)

@@ -76,6 +76,14 @@ def plot_phases(
     Notes
     -----
     Raises MissingExtraError, ShapeError, and as `running_phases`. Source: Cabrera 2006, equation (12).
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.plot_phases(ax, motion, "base").get_xlabel()
+    '$t$ [s]'
     """
     check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
@@ -114,6 +122,14 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     Notes
     -----
     Raises MissingExtraError, ShapeError, UnknownNameError.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> len(sp.plotting.plot_attitude(ax, motion, "quaternion").lines) >= 4
+    True
     """
     check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
@@ -151,6 +167,14 @@ def plot_inertia(
     Notes
     -----
     Raises MissingExtraError, ShapeError, UnknownNameError.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> len(sp.plotting.plot_inertia(ax, motion.deformation).lines)  # one for each principal moment
+    3
     """
     check_object(deformation, "Deformation", "deformation")
     check_flat_axes(ax)
@@ -182,6 +206,14 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
     Notes
     -----
     Raises MissingExtraError, ShapeError.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.plot_internal_momentum(ax, motion.deformation).get_xlabel()
+    '$t$ [s]'
     """
     check_object(deformation, "Deformation", "deformation")
     check_flat_axes(ax)
@@ -223,6 +255,14 @@ def plot_energy(
     Notes
     -----
     Source: Cabrera 2006, section 4.1.1; theory.md E1, E5.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.plot_energy(ax, motion).get_xlabel()
+    '$t$ [s]'
     """
     check_object(motion, "Motion", "motion")
     check_flat_axes(ax)

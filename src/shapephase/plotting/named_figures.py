@@ -40,6 +40,11 @@ class Figure:
     height : [in]
     draw : draws into axes, from a motion, the path of the joints and a gauge
     with_momentum, with_path : whether it needs a momentum, a path of the joints
+
+    Examples
+    --------
+    >>> sp.plotting.FIGURES["phases"].height > 0.0
+    True
     """
 
     caption: str
@@ -116,6 +121,12 @@ def figure_image(
         For a kind that needs a momentum or a path, if there is none; or if the motion is a batch.
     MissingExtraError
         Without Matplotlib.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.figure_image("energy", motion)[:5]
+    b'<?xml'
     """
     check_object(motion, "Motion", "motion")
     if kind not in FIGURES:
@@ -137,7 +148,16 @@ def write_figure(
     path: ShapePath | None = None,
     gauge: Gauge = "horizontal",
 ) -> None:
-    """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all. Raises as `figure_image`."""
+    """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all. Raises as `figure_image`.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.write_figure("energy", motion, "energy.svg")
+    >>> from pathlib import Path
+    >>> Path("energy.svg").read_text()[:5]
+    '<?xml'
+    """
     check_object(motion, "Motion", "motion")
     image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
     write_whole(out, lambda stream: stream.write(image))

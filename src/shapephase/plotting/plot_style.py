@@ -70,6 +70,12 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     The figure is `axes.figure`; no window shows it; `axes.figure.savefig(path, dpi=300)` writes it.
 
     Raises MissingExtraError.
+
+    Examples
+    --------
+    >>> axes = sp.plotting.column_axes()
+    >>> axes.figure.get_size_inches().round(2).tolist()
+    [3.4, 2.6]
     """
     _check_matplotlib()
     from matplotlib.figure import Figure

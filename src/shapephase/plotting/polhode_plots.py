@@ -61,6 +61,13 @@ def plot_polhodes(
     Notes
     -----
     Source: Marsden and Ratiu, figure 15.3.1.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> len(sp.plotting.plot_polhodes(ax, [1.0, 2.0, 3.0]).lines) > 6
+    True
     """
     check_axes(ax)
     top = body if isinstance(body, EulerTop) else None
@@ -118,6 +125,14 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     Notes
     -----
     Source: Marsden and Ratiu, section 15.5; theory.md I5.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> len(sp.plotting.plot_herpolhode(ax, top, 2).lines) >= 1
+    True
     """
     check_axes(ax)
     count = float(finite_array(periods, "periods"))
@@ -163,6 +178,13 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     Notes
     -----
     Source: Marsden and Ratiu, theorem 15.10.1; theory.md M-E10.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> sp.plotting.plot_heavy_top_stability(ax).get_xlabel()
+    'Π₃ / √(MglI₁) [1]'
     """
     check_axes(ax)
     marked = finite_array(tops, "tops") if np.size(tops) == 0 else finite_array(tops, "tops", (2,))

@@ -50,6 +50,15 @@ def plot_crown(
     Notes
     -----
     Source: Cabrera 2006, section 4.1; theory.md E8.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> crown = sp.bounds.crown_region(motion.deformation, [0.1, 0.2, 2.0])
+    >>> len(sp.plotting.plot_crown(ax, crown).lines) > 1
+    True
     """
     check_flat_axes(ax)
     from matplotlib.patches import Patch
@@ -86,6 +95,14 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
     Raises
     ------
     MissingExtraError, ShapeError
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> len(sp.plotting.plot_bounds(ax, sp.bounds.bounds(motion)).patches) > 3
+    True
     """
     check_flat_axes(ax)
     if not bounds:

@@ -58,6 +58,13 @@ def plot_shape_path(
     Notes
     -----
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> len(sp.plotting.plot_shape_path(ax, sp.examples.kane_scher(0.0, 0.5)).lines)  # one for each joint
+    3
     """
     check_object(path, "ShapePath", "path")
     check_flat_axes(ax)
@@ -108,6 +115,14 @@ def plot_shape_plane(
     Notes
     -----
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> path = sp.examples.kane_scher(0.0, 0.5)
+    >>> len(sp.plotting.plot_shape_plane(ax, path, (0, 1)).lines) >= 1
+    True
     """
     check_object(path, "ShapePath", "path")
     check_flat_axes(ax)
@@ -150,6 +165,14 @@ def plot_curvature(
     Notes
     -----
     Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError. Source: theory.md B6.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().subplots()
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> sp.plotting.plot_curvature(ax, cat, ("waist_pitch", "waist_yaw"), axis="x").get_xlabel()
+    'waist_pitch [rad]'
     """
     check_object(body, "Body", "body")
     check_flat_axes(ax)

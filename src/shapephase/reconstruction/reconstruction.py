@@ -442,6 +442,14 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
         If there is no such file.
     ResultFileError
         If the file is no motion, is damaged, or was written by a version with another format.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> motion.save("motion.npz")
+    >>> print(np.abs(sp.load_motion("motion.npz").final_attitude - motion.final_attitude).max().round(9))
+    0.0
     """
     return Motion(**vars(read_motion_record(path)))
 

@@ -117,6 +117,12 @@ class StabilityChart:
     momenta : (P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2
     energy_casimir, spectrum, simulation : (R, P) True where the method finds the spin stable
     largest_tilt : (R, P) of the simulated motions [rad]
+
+    Examples
+    --------
+    >>> chart = sp.rigid_body.stability_chart([0.5], [1.0, 3.0], duration=8.0)
+    >>> chart.energy_casimir.tolist()
+    [[False, True]]
     """
 
     axial_ratios: Array
@@ -330,6 +336,12 @@ def stability_chart(
     Notes
     -----
     Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
+
+    Examples
+    --------
+    >>> chart = sp.rigid_body.stability_chart([0.5], [1.0, 3.0], duration=8.0)
+    >>> chart.spectrum.tolist(), chart.simulation.tolist()
+    ([[False, True]], [[False, True]])
     """
     ratios, spins = finite_array(axial_ratios, "axial_ratios"), finite_array(momenta, "momenta")
     lean, time = _number(tilt, "tilt"), _number(duration, "duration")

@@ -38,6 +38,13 @@ class Closure:
     turns : about mu
     lobes : waves between the two circles that the herpolhode touches
     gap : angle between its start and its end [rad]
+
+    Examples
+    --------
+    >>> top = sp.EulerTop.principal([1.0, 1.0, 2.0], [0.6, 0.0, 0.8])
+    >>> closure = sp.rigid_body.Poinsot(top).closure()
+    >>> closure.turns, closure.lobes
+    (5, 4)
     """
 
     turns: int

@@ -89,7 +89,15 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
 
 
 def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
-    """Columns A_j of the connection and their exact derivatives d_i A_j: (..., n) -> (..., n, 3), (..., n, n, 3)."""
+    """Columns A_j of the connection and their exact derivatives d_i A_j: (..., n) -> (..., n, 3), (..., n, n, 3).
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> columns, slopes = sp.shape_space.connection_slopes(cat, np.zeros(3))
+    >>> print(columns.round(6).tolist(), slopes.shape)
+    [[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]] (3, 3, 3)
+    """
     inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     connection = mechanical_connection(body, shape)
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
@@ -258,6 +266,15 @@ def holonomy_derivative(
     Notes
     -----
     Source: theory.md B6; numerics.md section 4 (curvature of the connection).
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> def growing(t):
+    ...     return loop.shape(t)[:, None, :]
+    >>> turn, slope = sp.holonomy_derivative(cat, loop, growing)
+    >>> slope.shape
+    (1, 3)
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")

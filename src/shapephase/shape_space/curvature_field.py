@@ -109,6 +109,13 @@ def curvature_on_plane(
     Notes
     -----
     Source: theory.md B6; numerics.md section 4.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> found = sp.curvature_on_plane(cat, ("waist_pitch", "waist_yaw"), [0.0, 0.1], [0.0])
+    >>> print(found[0, 0].round(6))
+    [1.75 0.   0.  ]
     """
     check_object(body, "Body", "body")
     i, j = _two_joints(body, joints)
@@ -160,6 +167,12 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
     Notes
     -----
     Source: theory.md B6, B7.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> print(np.abs(sp.stokes_holonomy(cat, loop) - sp.holonomy(cat, loop)).max().round(8))
+    0.0
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")

@@ -27,6 +27,13 @@ class FinalAttitudes:
     attitude : (P, 3, 3) R(T), base axes to inertial axes
     error_estimate : (P,) of the largest attitude error over each motion [rad]
     evaluations : (P,) how often the locked inertia and internal momentum were computed
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> found = sp.final_attitudes(cat, [loop], np.zeros(3))
+    >>> print(np.degrees(sp.so3.angle(found.attitude)).round(3), found.error_estimate.max() < 1e-8)
+    [65.305] True
     """
 
     attitude: Array
@@ -60,6 +67,13 @@ def final_attitudes(
         If there are more or fewer paths than momenta or attitudes.
     ShapePhaseError
         What `reconstruct` raises, with the number of the path in front.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> paths = [sp.examples.kane_scher(0.0, bend) for bend in (0.3, 0.5)]
+    >>> print(np.degrees(sp.so3.angle(sp.final_attitudes(cat, paths, np.zeros(3)).attitude)).round(3))
+    [26.393 65.305]
     """
     check_object(body, "Body", "body")
     goal = tolerance_argument(tolerance)

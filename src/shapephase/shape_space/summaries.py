@@ -19,7 +19,15 @@ _SAMPLES = 401
 
 @dataclass(frozen=True, eq=False)
 class JointSummary:
-    """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit."""
+    """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> joint = sp.body_summary(cat).joints[0]
+    >>> joint.name, joint.kind, joint.unit
+    ('waist_pitch', 'revolute', 'rad')
+    """
 
     name: str
     kind: str
@@ -38,6 +46,12 @@ class PartSummary:
     mass : [kg]
     centre_of_mass : (3,) axes of the first link [m]
     principal_moments : (3,) ascending, about the centre of mass [kg m^2]
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> [part.mass for part in sp.body_summary(cat).parts]
+    [1.0, 0.0, 0.0, 1.0]
     """
 
     links: tuple[str, ...]
@@ -95,6 +109,12 @@ class PathSummary:
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
     is_loop : whether it closes
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> print(np.degrees(sp.path_summary(cat, loop).highest).round(3))
+    [28.648 28.648  3.738]
     """
 
     duration: float
@@ -152,7 +172,15 @@ def body_summary(body: Body) -> BodySummary:
 
 
 def path_summary(body: Body, path: ShapePath) -> PathSummary:
-    """What there is to know of a joint motion for a body. Raises TrajectoryError, UnknownNameError for other joints."""
+    """What there is to know of a joint motion for a body. Raises TrajectoryError, UnknownNameError for other joints.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> summary = sp.path_summary(cat, loop)
+    >>> summary.duration, summary.is_loop
+    (1.0, True)
+    """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)

@@ -24,6 +24,11 @@ def code_folder() -> Path:
     """Where compiled functions are kept: $XDG_CACHE_HOME/shapephase, or ~/.cache/shapephase.
 
     Raises RuntimeError if the home directory cannot be determined.
+
+    Examples
+    --------
+    >>> sp.integrator.code_folder().name
+    'shapephase'
     """
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     # A relative path is to be ignored: XDG Base Directory Specification.

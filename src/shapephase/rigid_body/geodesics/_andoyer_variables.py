@@ -45,7 +45,15 @@ _REFINEMENT_RATIO = 0.7
 
 
 class TurningBody(Protocol):
-    """Anything with an attitude and a body momentum at given times: an `EulerTop`, the `Motion` of `reconstruct`."""
+    """Anything with an attitude and a body momentum at given times: an `EulerTop`, the `Motion` of `reconstruct`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
+    >>> top.attitude(0.0).shape, top.body_momentum(0.0).round(9).tolist()  # what is needed of it
+    ((3, 3), [1.5, 0.3, 0.4])
+    """
 
     def attitude(self, t: Array, /) -> Array:
         """R(t), body to inertial axes: (N,) -> (..., N, 3, 3)."""
@@ -64,6 +72,13 @@ class AndoyerVariables:
     ------
     ShapeError
         If their shapes do not go together, an entry is not finite, G is not above 0, or |L| or |K| is above G.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> state = geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
+    >>> print(f"{state.hamiltonian(np.diag([1.0, 2.0, 4.0])):.9f}, {0.3**2 / 2 + 0.4**2 / 4 + 1.2**2 / 8:.9f}")
+    0.265000000, 0.265000000
     """
 
     g: Array
@@ -223,6 +238,13 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
     ------
     ShapeError
         If an argument is not a rotation or not a finite vector, or a momentum is zero.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> state = geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
+    >>> print(f"{state.total:.9f} {state.axial:.9f}")
+    1.300000000 1.200000000
     """
     rotation = so3.rotation_argument(attitude, "attitude")
     momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
@@ -267,6 +289,13 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
     Notes
     -----
     Source: as `AndoyerVariables.euler_angles`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> state = geodesics.andoyer_from_euler([0.1, 1.0, 0.2], [1.2, 0.1, 0.3])
+    >>> print(f"{state.vertical:.9f} {state.axial:.9f}")
+    1.200000000 0.300000000
     """
     return andoyer_variables(chart.attitude(angles), chart.body_momentum(angles, momenta))
 
@@ -294,6 +323,14 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     Notes
     -----
     Source: Cabrera 2006 (13) for the phase; theory.md R1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
+    >>> state = geodesics.andoyer_motion(top, [0.0, top.period])
+    >>> print(state.total.round(9), f"{state.g[1] - state.g[0]:.6f}")
+    [1.58113883 1.58113883] 7.508599
     """
     times = finite_array(t, "t", (None,), unit="s")
     if times.ndim != 1 or not (np.all(np.diff(times) > 0.0) or np.all(np.diff(times) < 0.0)):

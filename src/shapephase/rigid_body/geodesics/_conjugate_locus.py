@@ -30,7 +30,15 @@ _BAND_MARGIN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ConjugatePoints:
-    """Conjugate points along extremals in directions (...), see `conjugate_points`."""
+    """Conjugate points along extremals in directions (...), see `conjugate_points`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> points = geodesics.conjugate_points(geodesics.ellipsoid(0.8), 0.5)
+    >>> print(f"{points.time:.6f} {points.latitude:.6f} {points.longitude:.6f}")
+    2.745913 -0.073137 2.732659
+    """
 
     direction: Array
     """Angle at the start from east to north [rad]."""
@@ -50,7 +58,15 @@ class ConjugatePoints:
 
 @dataclass(frozen=True, eq=False)
 class ConjugateLocus:
-    """The conjugate locus of one order, sampled, see `conjugate_locus`."""
+    """The conjugate locus of one order, sampled, see `conjugate_locus`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> locus = geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60)
+    >>> locus.order, len(locus.cusp_directions)
+    (1, 4)
+    """
 
     order: int
     points: ConjugatePoints
@@ -79,6 +95,13 @@ def conjugate_points(
     Notes
     -----
     Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> points = geodesics.conjugate_points(geodesics.ellipsoid(1.0), [0.3, 0.9])
+    >>> print(points.time.round(9))  # pi on a sphere
+    [3.14159265 3.14159265]
     """
     _check_order(order)
     angle = finite_array(direction, "direction", unit="rad")
@@ -89,6 +112,13 @@ def conjugate_points_of_momentum(surface: SurfaceOfRevolution, momentum: ArrayLi
     """`conjugate_points` of a point on the equator along extremals with Clairaut constants p (...), northward.
 
     phi_1c and theta_1c of Bonnard et al., section 2.2, for order 1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> points = geodesics.conjugate_points_of_momentum(geodesics.ellipsoid(0.6), [0.95, 0.6])
+    >>> print(np.abs(points.latitude).round(5))
+    [0.04656 0.43376]
     """
     _check_order(order)
     p, q, room = surface.parameters(momentum)
@@ -115,6 +145,12 @@ def conjugate_locus(
     ------
     ShapeError
         As `conjugate_points`; or for fewer than 8 directions.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60).cusps
+    4
     """
     _check_order(order)
     if isinstance(directions, int | np.integer):
@@ -156,6 +192,12 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     Notes
     -----
     Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> float(geodesics.conjugate_height_rate(geodesics.ellipsoid(0.8), 0.5)) > 0.0  # one cusp on each axis
+    True
     """
     _check_order(order)
     p, q, room = surface.parameters(momentum)

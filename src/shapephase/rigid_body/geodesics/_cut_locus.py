@@ -30,7 +30,15 @@ _POLE_MARGIN = 1e-12
 
 @dataclass(frozen=True)
 class CutLocus:
-    """The cut locus of the point at a latitude and longitude 0: an arc between two ends, see `cut_locus`."""
+    """The cut locus of the point at a latitude and longitude 0: an arc between two ends, see `cut_locus`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> cut = geodesics.cut_locus(geodesics.ellipsoid(1.5))
+    >>> print(cut.kind, np.round(cut.longitudes, 6))
+    meridian [3.141593 3.141593]
+    """
 
     kind: str
     """ "parallel", "meridian" or "point"."""
@@ -48,6 +56,13 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     ShapeError
         If the surface is no smooth sphere whose curvature changes one way from the equator to the poles, or the point
         is a pole.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> cut = geodesics.cut_locus(geodesics.ellipsoid(0.8))
+    >>> print(cut.kind, np.round(np.array(cut.longitudes) / np.pi, 9))
+    parallel [0.8 1.2]
     """
     kind = _kind(surface, latitude)
     phi = float(latitude)
@@ -69,6 +84,12 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     ------
     ShapeError
         See `cut_locus`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> print(f"{geodesics.cut_time(geodesics.ellipsoid(1.0), 0.5):.9f} = pi")
+    3.141592654 = pi
     """
     kind = _kind(surface, latitude)
     angle = finite_array(direction, "direction", unit="rad")

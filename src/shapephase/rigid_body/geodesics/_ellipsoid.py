@@ -29,7 +29,14 @@ _LARGEST_ASPECT = 1e3
 
 @dataclass(frozen=True)
 class EllipsoidStretch:
-    """D(Y) = a sqrt(epsilon^2 + (1 - epsilon^2) Y) and its derivatives."""
+    """D(Y) = a sqrt(epsilon^2 + (1 - epsilon^2) Y) and its derivatives.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> geodesics.ellipsoid(0.5).stretch
+    EllipsoidStretch(aspect=0.5, radius=1.0)
+    """
 
     aspect: float
     radius: float
@@ -67,6 +74,13 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
     Notes
     -----
     Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> oblate = geodesics.ellipsoid(0.5)
+    >>> oblate.equator, oblate.end
+    (1.0, 'pole')
     """
     epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
     if not _LEAST_ASPECT <= epsilon <= _LARGEST_ASPECT:
@@ -81,6 +95,12 @@ def metric_coefficients(aspect: float, colatitude: ArrayLike) -> tuple[Array, Ar
     """F_1 = cos^2 + epsilon^2 sin^2 and F_2 = sin^2 of the parametric colatitude, unit equator: (...) -> (...), (...).
 
     Source: Bonnard et al., section 2.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> tuple(float(value) for value in geodesics.metric_coefficients(0.5, np.pi / 2.0))
+    (0.25, 1.0)
     """
     phi = finite_array(colatitude, "colatitude", unit="rad")
     sine2 = np.sin(phi) ** 2
@@ -92,6 +112,12 @@ def meridian_length(aspect: float, colatitude: ArrayLike) -> Array:
 
     E(phi, k) with k^2 = 1 - epsilon^2; for a prolate ellipsoid, k^2 < 0, by the complementary amplitude.
     Source: Bonnard et al., section 2; theory.md P1, P4.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> print(f"{geodesics.meridian_length(1.0, np.pi / 2.0):.9f} = pi/2")  # of a sphere
+    1.570796327 = pi/2
     """
     epsilon = _number(aspect, "aspect")
     phi = finite_array(colatitude, "colatitude", unit="rad")
@@ -108,6 +134,12 @@ def ellipsoid_period(aspect: float, momentum: ArrayLike) -> Array:
     prolate ellipsoid, where m^2 < 0, it is T = 4 epsilon E with the complementary parameter alpha^2/epsilon^2.
 
     Source: Bonnard et al., section 2; theory.md P2.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> print(f"{geodesics.ellipsoid_period(1.0, 0.5):.9f} = 2 pi")  # of a sphere
+    6.283185307 = 2 pi
     """
     epsilon = _number(aspect, "aspect")
     p = finite_array(momentum, "momentum")
@@ -126,6 +158,13 @@ def astroid(aspect: float, direction: ArrayLike) -> tuple[Array, Array]:
     with its centre opposite to the start on the equator. It is the limit of `conjugate_locus` as f -> 0.
 
     Source: the formulae of `surface_of_revolution` to first order in f; theory.md P3.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> latitude, longitude = geodesics.astroid(0.999, 0.0)
+    >>> print(f"{abs(latitude):.6f} {np.pi - longitude:.6f}")
+    0.000000 0.003142
     """
     angle = finite_array(direction, "direction", unit="rad")
     radius = np.pi * (1.0 - _number(aspect, "aspect"))

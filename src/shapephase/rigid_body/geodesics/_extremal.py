@@ -25,6 +25,12 @@ class Start:
     """Where extremals start, in the form the integrals need: all (...) of one shape.
 
     Extremals that start southward are mirrored in the equator, so that the start phase is in [-pi/2, pi/2].
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> geodesics.start_of(geodesics.ellipsoid(1.0), [0.0, np.pi / 2.0]).momentum.round(9).tolist()
+    [1.0, 0.0]
     """
 
     momentum: Array
@@ -44,6 +50,13 @@ class Extremal:
     """Extremals of unit speed from one latitude, longitude 0, in directions (...); made by `extremal`.
 
     Arguments t (...) [length] are any numbers; results have the directions' axes first, then those of t.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> geodesic = geodesics.extremal(geodesics.ellipsoid(1.0), 0.5)
+    >>> print(f"{geodesic.jacobi_field(np.pi / 2.0):.9f}")  # sin t on a sphere
+    1.000000000
     """
 
     surface: SurfaceOfRevolution
@@ -141,12 +154,28 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     ------
     ShapeError
         If a direction leads out of the band of extremals that oscillate about the equator within the chart.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> meridian = geodesics.extremal(geodesics.ellipsoid(1.0), np.pi / 2.0)
+    >>> latitude, longitude, direction = meridian.state(0.3)
+    >>> print(f"{latitude:.9f}")  # on a sphere as far north as it went
+    0.300000000
     """
     return Extremal(surface=surface, start=start_of(surface, direction, latitude))
 
 
 def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Start:
-    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`."""
+    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> start = geodesics.start_of(geodesics.ellipsoid(1.0), 0.5)
+    >>> print(f"{start.momentum:.9f} = cos 0.5")
+    0.877582562 = cos 0.5
+    """
     angle = finite_array(direction, "direction", unit="rad")
     if np.ndim(latitude) != 0:
         raise ShapeError(f"latitude: expected one number, got shape {np.shape(latitude)}")
@@ -163,7 +192,16 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 
 def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array) -> tuple[Array, Array, Array]:
-    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3."""
+    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> surface = geodesics.ellipsoid(1.0)
+    >>> start = geodesics.start_of(surface, 0.5)
+    >>> float(geodesics.stretch_at(surface, start.q, start.room, start.phase)[0])
+    1.0
+    """
     q, room, phase = np.broadcast_arrays(q, room, phase)
     sine2, cosine2 = np.sin(phase) ** 2, np.cos(phase) ** 2
     found = surface.stretch((q * sine2).ravel(), (room + q * cosine2).ravel())
@@ -186,6 +224,13 @@ def variational_jacobi_field(
     Notes
     -----
     Source: Bonnard et al., definition 2.2.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> field = geodesics.variational_jacobi_field(geodesics.ellipsoid(1.0), 0.5, [0.0, np.pi / 2.0])
+    >>> print(field.round(9))  # sin t on a sphere
+    [0. 1.]
     """
     t = finite_array(times, "times", (None,))
     if t.ndim != 1 or not t.size or t[0] < 0.0 or np.any(np.diff(t) < 0.0):

@@ -31,7 +31,15 @@ from .serret_andoyer import serret_andoyer_metric
 
 @dataclass(frozen=True, eq=False)
 class SadovVariables:
-    """Actions, angles and frequencies, (...) each; see `sadov_variables`."""
+    """Actions, angles and frequencies, (...) each; see `sadov_variables`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> print(f"{geodesics.sadov_variables([3.0, 2.0, 1.0], state).precession_rate:.6f} rad/s")
+    0.567543 rad/s
+    """
 
     own: Array
     """Conjugate to `action` [rad]."""
@@ -65,6 +73,14 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
         If two moments are equal, or a state is on the separatrix or along the axis of the middle moment, where the
         period is infinite and there are no angles. Next to it they lose digits in proportion to 1/m1, m1 the
         complement of the elliptic modulus.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> found = geodesics.sadov_variables([3.0, 2.0, 1.0], state)
+    >>> print(f"{found.total:.9f} {found.own_rate:.6f}")
+    1.581138830 0.474919
     """
     metric = serret_andoyer_metric(moments)
     axes = metric.andoyer_axes
@@ -112,6 +128,14 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     Notes
     -----
     Source: theory.md R15.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
+    >>> own, precession = geodesics.sadov_frequencies([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
+    >>> print(f"{own * top.period:.9f} = 2 pi")
+    6.283185307 = 2 pi
     """
     metric = serret_andoyer_metric(moments)
     momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")

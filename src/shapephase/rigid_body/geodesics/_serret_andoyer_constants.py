@@ -21,7 +21,14 @@ from ._checks import check_entries
 
 
 class GeodesicClass(IntEnum):
-    """The classes of geodesics, in order of growing |p_theta|."""
+    """The classes of geodesics, in order of growing |p_theta|.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> [kind.name for kind in geodesics.GeodesicClass]
+    ['EXTENDED', 'ROTATING', 'SEPARATRIX', 'OSCILLATING', 'EQUATOR']
+    """
 
     EXTENDED = 0
     """p^2 < I_1: a geodesic, but of no rigid body."""
@@ -44,7 +51,15 @@ _DEKKER_FACTOR = 2.0**27 + 1.0
 
 @dataclass(frozen=True, eq=False)
 class GeodesicConstants:
-    """Constants of geodesics from the equator with given p_theta, (...) each but the moments."""
+    """Constants of geodesics from the equator with given p_theta, (...) each but the moments.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> constants = geodesics.constants_of(np.array([3.0, 2.0, 1.0]), [1.7, 1.5])
+    >>> constants.p_theta.tolist()
+    [1.7, 1.5]
+    """
 
     moments: Array
     """(3,) ascending [kg m^2]."""
@@ -80,7 +95,15 @@ class GeodesicConstants:
 
 
 def constants_of(moments: Array, p_theta: ArrayLike) -> GeodesicConstants:
-    """The geodesics from the equator of three different moments (3,), see `SerretAndoyerMetric.geodesics`."""
+    """The geodesics from the equator of three different moments (3,), see `SerretAndoyerMetric.geodesics`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> constants = geodesics.constants_of(np.array([3.0, 2.0, 1.0]), 1.7)
+    >>> float(constants.p_theta)
+    1.7
+    """
     ascending, _, _ = ascending_moments(moments)
     p = finite_array(p_theta, "p_theta", unit="sqrt(kg) m")
     magnitude = np.maximum(np.abs(p), _LEAST_MOMENTUM * np.sqrt(ascending[0]))
@@ -96,6 +119,13 @@ def constants_of_momentum(moments: Array, body_momentum: Array) -> GeodesicConst
     """The geodesics, from the equator, of which free motions with these momenta are a part: (3,), (..., 3).
 
     The moments are those about the body axes 1, 2, 3, the momenta not zero; p_theta = |Pi|/sqrt(2 E).
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> constants = geodesics.constants_of_momentum(np.array([3.0, 2.0, 1.0]), np.array([3.0, 0.0, 0.0]))
+    >>> print(f"{constants.p_theta**2:.9f}")  # l^2/(2 E) is the moment of a steady rotation
+    3.000000000
     """
     ascending, order, _ = ascending_moments(moments)
     lower, upper, whole = moment_gaps(moments)
@@ -110,7 +140,14 @@ def constants_of_momentum(moments: Array, body_momentum: Array) -> GeodesicConst
 
 
 def separatrix_constants(moments: Array) -> GeodesicConstants:
-    """The separatrix, p_theta = sqrt(I_2) without rounding."""
+    """The separatrix, p_theta = sqrt(I_2) without rounding.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> print(f"{geodesics.separatrix_constants(np.array([3.0, 2.0, 1.0])).p_theta**2:.9f}")  # I_2
+    2.000000000
+    """
     ascending, _, _ = ascending_moments(moments)
     i1, i2, i3 = ascending
     magnitude = np.sqrt(np.asarray(i2))

@@ -32,6 +32,13 @@ class AxisymmetricMetric:
     """The metric of moments (I_1, I_1, I_3) in these axes, see `axisymmetric_metric`.
 
     Momenta are in body axes, axis 3 the axis of symmetry; they need not have unit speed, and times are theirs.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> metric = geodesics.axisymmetric_metric(1.0, 1.0)
+    >>> print(f"{metric.cut_time([0.6, 0.0, 0.8]):.9f} = pi")  # of a round body
+    3.141592654 = pi
     """
 
     equatorial: float
@@ -234,6 +241,12 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     ------
     ShapeError
         If a moment is not a number above 0, or I_1 is not finite.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> print(f"{geodesics.axisymmetric_metric(2.0, 1.0).diameter:.9f} = pi sqrt(2)")
+    4.442882938 = pi sqrt(2)
     """
     try:
         first, third = float(equatorial), float(axial)

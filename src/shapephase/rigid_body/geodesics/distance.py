@@ -59,6 +59,14 @@ class ShortestGeodesic:
     certified : whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut
     lower_bound, upper_bound : distances of axisymmetric metrics below and above this one [sqrt(kg) m]
     residual : angle by which the end misses the attitude [rad]
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
+    >>> found = geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
+    >>> print(found.momentum.round(6))
+    [0.3 0.  0.4]
     """
 
     momentum: Array
@@ -85,6 +93,14 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     Notes
     -----
     Source: theory.md Q6.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
+    >>> found = geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
+    >>> print(f"{found.length:.9f}")
+    0.500000000
     """
     matrix = so3.rotation_argument(attitude, "attitude")
     if matrix.shape != (3, 3):

@@ -59,7 +59,16 @@ _NEAREST = 1e-60
 
 @dataclass(frozen=True)
 class Assumptions:
-    """Which assumptions a metric meets, see `assumptions`."""
+    """Which assumptions a metric meets, see `assumptions`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> def catenoid(x):
+    ...     return np.cosh(x) ** 2, np.sinh(2.0 * x)
+    >>> geodesics.assumptions(catenoid, 1.0).falls_to_reach
+    False
+    """
 
     equator_is_parallel: bool
     """(A1) F_2'(0) = 0."""
@@ -116,6 +125,15 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
     Notes
     -----
     Source: Bonnard et al., section 2.1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> def sphere(x):
+    ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
+    >>> found = geodesics.assumptions(sphere, np.pi / 2.0)
+    >>> found.is_symmetric, found.falls_to_reach, found.end
+    (True, True, 'pole')
     """
     if not (np.isfinite(reach) and reach > 0.0):
         raise ShapeError(f"reach: the largest x must be positive and finite, got {reach!r}")
@@ -164,6 +182,15 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
     Notes
     -----
     Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> def sphere(x):
+    ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
+    >>> surface = geodesics.surface_of_metric(sphere, np.pi / 2.0)
+    >>> print(f"{geodesics.cut_time(surface, 0.5):.6f} = pi")
+    3.141593 = pi
     """
     found = assumptions(profile, reach, meridian)
     if not found.equator_is_parallel:

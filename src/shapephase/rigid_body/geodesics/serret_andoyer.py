@@ -37,7 +37,15 @@ from .serret_andoyer_geodesics import GeodesicFamily
 
 @dataclass(frozen=True, eq=False)
 class SerretAndoyerMetric:
-    """The metric of three principal moments, see `serret_andoyer_metric`."""
+    """The metric of three principal moments, see `serret_andoyer_metric`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> metric = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
+    >>> print(np.round(metric.curvature_range, 9))  # 1/3 on the equator
+    [-0.16666667  0.33333333]
+    """
 
     moments: Array
     """(3,) three different principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
@@ -273,6 +281,13 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
     ------
     ShapeError
         If the moments are not positive, or two of them are equal.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> metric = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
+    >>> print(f"{metric.geodesics(1.7).first_return:.9f}")
+    3.281674528
     """
     values = moments_argument(moments)
     if not np.all(np.diff(np.sort(values)) > 0.0):

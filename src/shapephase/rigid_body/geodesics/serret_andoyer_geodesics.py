@@ -52,6 +52,13 @@ class GeodesicFamily:
     """Geodesics of unit speed from the equator towards phi >= 0, with given p_theta (...).
 
     Made by `SerretAndoyerMetric.geodesics`. Times broadcast against the axes of p_theta.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> family = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics([1.7, 1.5])
+    >>> print(family.period.round(6), family.first_return.round(6))
+    [11.363461 17.085156] [3.281675 5.095474]
     """
 
     constants: GeodesicConstants
@@ -322,7 +329,16 @@ class GeodesicFamily:
 
 @dataclass(frozen=True, eq=False)
 class EquatorialConjugatePoints:
-    """Points conjugate to a start on the equator, see `GeodesicFamily.conjugate_points`."""
+    """Points conjugate to a start on the equator, see `GeodesicFamily.conjugate_points`.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> family = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics(1.7)
+    >>> points = family.conjugate_points()
+    >>> print(f"{points.phi:.6f} {points.theta:.6f}")
+    -0.094594 3.565678
+    """
 
     time: Array
     """(...) arc length from the start [sqrt(kg) m]."""

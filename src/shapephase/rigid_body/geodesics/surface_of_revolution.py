@@ -67,6 +67,13 @@ class SurfaceOfRevolution:
     constant p is between `least_momentum` and `greatest_momentum`; these are covered, and the meridians p = 0 over
     smooth poles.
     Results are right to a few units of rounding, magnified by 1/(p/`least_momentum` - 1) before a parallel.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> sphere = geodesics.ellipsoid(1.0)
+    >>> sphere.equator, sphere.depth, sphere.end
+    (1.0, 1.0, 'pole')
     """
 
     equator: float
@@ -328,6 +335,13 @@ def surface_of_stretch(
         If m(0) or the depth is out of range, or D is not positive and finite.
     AccuracyNotReached
         If D is too rough for the quadrature to settle.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> sphere = geodesics.surface_of_stretch(geodesics.EllipsoidStretch(1.0, 1.0), 1.0, 1.0)
+    >>> print(f"{geodesics.cut_time(sphere, 0.5):.9f} = pi")
+    3.141592654 = pi
     """
     if end not in _ENDS:
         raise ShapeError(f"end: expected one of {', '.join(_ENDS)}, got {end!r}")

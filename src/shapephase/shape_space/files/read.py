@@ -56,6 +56,13 @@ class RecordedMotion:
         columns and units of joints, where the others rest, what was left out, smoothed, closed, resampled
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: nobody asked for one
+
+    Examples
+    --------
+    >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
+    >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat"))
+    >>> print(recorded.format, recorded.times[-1])
+    CSV 0.5
     """
 
     path: ShapePath
@@ -164,6 +171,13 @@ def read_recorded_motion(
     -----
     TrajectoryWarning
         For what can be read and is probably not meant: limits left, gaps, jumps of a whole turn.
+
+    Examples
+    --------
+    >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
+    >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat"))
+    >>> print(recorded.path.duration, recorded.residual.max())
+    0.5 0.0
     """
     check_object(body, "Body", "body")
     kept, flying = trim_argument(trim), flight_argument(flight)
@@ -285,6 +299,12 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
         If the path has no joint names.
     UnknownNameError
         For an unknown ending of the file.
+
+    Examples
+    --------
+    >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
+    >>> print(sp.read_shape_path("cat.csv", sp.load_body("cat")).duration)
+    0.5
     """
     check_object(path, "ShapePath", "path")
     where = Path(file)
