@@ -92,3 +92,23 @@ def test_a_noise_that_is_no_amount(capfd, take, noise):
         main(["split", "diver", str(take), f"--joint-noise={noise}"])
     assert stopped.value.code == 4
     assert "joints" in capfd.readouterr().err
+
+
+def test_a_smoothed_recording_has_the_bars_of_its_noise_and_says_what_smoothing_did(capfd, take):
+    options = ("--smooth", "0.2deg", "--close", "1deg")
+    data = json.loads(said(capfd, "split", "diver", take, *MOMENTUM, *options, "--json"))
+    body = sp.load_body("diver")
+    recorded = sp.read_recorded_motion(take, body, smooth="0.2deg", close="1deg")
+    motion = sp.reconstruct(sp.articulated(body, recorded.path), [2.0, 3.0, 20.0])
+    expected = sp.uncertainty(motion, joints="0.2deg")
+    np.testing.assert_allclose(data["uncertainty"]["holonomy"], expected.holonomy, rtol=1e-9)
+    assert data["uncertainty"]["smoothing_bias"] == pytest.approx(expected.smoothing_bias, rel=1e-9)
+    told = data["recording"]["smoothing"]
+    assert told["penalty_s3"] == pytest.approx(recorded.smoothing.penalty, rel=1e-12)
+    assert told["degrees_of_freedom"] == pytest.approx(recorded.smoothing.degrees_of_freedom, rel=1e-9)
+    assert told["bias_in_bars"] <= 0.2 * (1.0 + 1e-12)
+    text = said(capfd, "split", "diver", take, *MOMENTUM, *options, "--joint-noise", "0.1deg")
+    for part in ("degrees of freedom are left to a joint", "of its error bar at most", "bias of smoothing"):
+        assert part in text
+    given = json.loads(said(capfd, "split", "diver", take, *options, "--smooth-penalty", "1e-5", "--json"))
+    assert given["recording"]["smoothing"]["penalty_s3"] == 1e-5

@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.error_bars._path_samples import path_samples
 from shapephase.errors import ShapeError, WrongObjectError
+from shapephase.shape_space.path_samples import path_samples
 
 # Of central differences with motions at 1e-12: their error is some 1e-12 over the step, and the step squared.
 _NEAR = 1e-6

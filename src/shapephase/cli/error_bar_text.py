@@ -12,6 +12,7 @@ from ..arrays import Array
 from ..phases.phase_split import PhaseSplit
 from ..plain_data import plain
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.files.read import RecordedMotion
 from .options import ErrorOptions
 
 if TYPE_CHECKING:
@@ -21,17 +22,19 @@ if TYPE_CHECKING:
 _DIGITS = 2
 
 
-def error_bars(motion: Motion, options: ErrorOptions) -> Uncertainty | None:
-    """The error bars that were asked for, if any were."""
+def error_bars(motion: Motion, options: ErrorOptions, recorded: RecordedMotion | None) -> Uncertainty | None:
+    """The error bars that were asked for, if any were: also by the noise that a recording was smoothed for."""
     relative = (options.mass_error, options.centre_error, options.inertia_error)
-    if all(given is None for given in (options.joint_noise, *relative, options.momentum_error, options.attitude_error)):
+    smoothing = None if recorded is None else recorded.smoothing
+    joints = options.joint_noise if options.joint_noise is not None or smoothing is None else smoothing.noise
+    if all(given is None for given in (joints, *relative, options.momentum_error, options.attitude_error)):
         return None
     from ..error_bars.covariance import InertiaErrors, uncertainty
 
     masses, centres, inertias = (given or 0.0 for given in relative)
     return uncertainty(
         motion,
-        joints=options.joint_noise,
+        joints=joints,
         inertias=InertiaErrors(masses=masses, centres=centres, inertias=inertias) if any(relative) else None,
         momentum=options.momentum_error,
         attitude=options.attitude_error,
@@ -53,6 +56,8 @@ def error_bar_lines(result: PhaseSplit, found: Uncertainty | None) -> list[str]:
             ("  geometric phase", result.geometric_phase, found.solid_angle),
         ):
             lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
+    if found.smoothing_bias:
+        lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most, which the bars do not hold")
     return lines
 
 

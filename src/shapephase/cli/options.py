@@ -186,10 +186,17 @@ class RecordingOptions:
         ),
     ] = None
     smooth: Annotated[
+        str | None,
+        _motion_option(
+            "Noise of the recorded samples, rms, in rad or m or with units; without it the path goes through all of "
+            "them. For example `--smooth 0.3deg` or `--smooth 0.3deg,1mm`."
+        ),
+    ] = None
+    smooth_penalty: Annotated[
         float | None,
         _motion_option(
-            "Noise of the recorded samples, rms, in rad or m; without it the path goes through all of them. For "
-            "example `--smooth 0.01`."
+            "The penalty of that smoothing, in s^3; without it one whose bias is under a fifth of the error bars. For "
+            "example `--smooth-penalty 1e-6`."
         ),
     ] = None
     close: Annotated[
@@ -217,8 +224,8 @@ class ErrorOptions:
     joint_noise: Annotated[
         str | None,
         _motion_option(
-            "Print error bars: one standard deviation of the noise of each sample, in rad or m or with units; for "
-            "example `--joint-noise 0.3deg` or `--joint-noise 0.3deg,1mm`."
+            "Print error bars: one standard deviation of the noise of each sample, in rad or m or with units; without "
+            "it the one of --smooth. For example `--joint-noise 0.3deg` or `--joint-noise 0.3deg,1mm`."
         ),
     ] = None
     mass_error: Annotated[

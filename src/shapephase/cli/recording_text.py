@@ -9,6 +9,7 @@ import numpy as np
 from ..body.body import Body
 from ..shape_space.files.closing import Closing
 from ..shape_space.files.read import RecordedMotion
+from ..shape_space.files.smoothing import Smoothing
 
 _MOST_NAMES = 8
 """Names that one line lists."""
@@ -76,6 +77,8 @@ def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
         levels = sorted(set(record["smooth"].values()) - {0.0})
         said = f"{levels[0]:.6g}" if len(levels) == 1 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
         lines.append(f"{'smoothed':24}noise {said} rad or m, rms")
+    if recorded.smoothing is not None:
+        lines += _smoothing_lines(recorded.smoothing)
     if recorded.closing is not None:
         lines += _closing_lines(recorded.closing)
     if record["resampled_to_hz"] is not None:
@@ -85,6 +88,15 @@ def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
         names = recorded.path.joint_names or ()
         lines.append(f"{'off the samples':24}{recorded.residual[joint]:.3g} rms at most, {names[joint]}")
     return lines
+
+
+def _smoothing_lines(smoothing: Smoothing) -> list[str]:
+    """How much was smoothed, and what that did to the motion itself."""
+    return [
+        f"{'  penalty':24}{smoothing.penalty:.3g} s^3; {smoothing.degrees_of_freedom:.3g} of {len(smoothing.bias)} "
+        "degrees of freedom are left to a joint",
+        f"{'  bias':24}of whatever follows from the path, {smoothing.bias_in_bars:.2g} of its error bar at most",
+    ]
 
 
 def _closing_lines(closing: Closing) -> list[str]:

@@ -69,7 +69,7 @@ def split_command(
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
-        bars = error_bars(flown.motion, errors)
+        bars = error_bars(flown.motion, errors, flown.recorded)
         if out is not None:
             flown.motion.save(out)
             say_written(out)

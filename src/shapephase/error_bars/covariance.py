@@ -20,8 +20,9 @@ from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.files._labels import amounts
+from ..shape_space.path_samples import path_samples
+from ..shape_space.shape_path import ShapePath
 from ..shape_space.summaries import body_summary
-from ._path_samples import path_samples
 from .result_derivatives import Derivatives, ResultDerivative, derivatives, described_by
 
 # An angle has a bar of its own where it is this many of them from 0 and from 180 degrees.
@@ -75,6 +76,8 @@ class Uncertainty:
     dynamic_phase, solid_angle, montgomery_phase : standard deviations [rad]
     total_angle, holonomy_angle : standard deviations of the angles of these rotations [rad]; NaN where an angle is
         less than five of them from 0 or from 180 degrees: there it cannot be said by one number
+    smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
+        standard deviations of its own, which do not hold it; 0 where nothing was smoothed or `joints` are exact
     draws : how many motions this was estimated from; 0: found by derivatives
 
     Examples
@@ -95,6 +98,7 @@ class Uncertainty:
     montgomery_phase: float
     total_angle: float
     holonomy_angle: float
+    smoothing_bias: float = 0.0
     draws: int = 0
 
     __post_init__ = lock_arrays
@@ -116,9 +120,10 @@ def uncertainty(
     Parameters
     ----------
     motion : of an articulated body
-    joints : of the samples that the path goes through: the standard deviation of white noise, one or one for each
+    joints : of the samples that the path is made of: the standard deviation of white noise, one or one for each
         joint (n,) [rad or m], or a text such as "0.3deg" or "0.3deg,1mm"; or the covariance (N n, N n) of all samples,
-        row by row; of a periodic path without the last, which is the first
+        row by row; of a periodic path without the last, which is the first. Of a recording that was closed, smoothed
+        or resampled all samples as recorded; one number is not for joints that rest without a column
     inertias : of the body's links
     momentum : the covariance (3, 3) [(kg m^2/s)^2], inertial axes, or one standard deviation of all components
     attitude : of the start, turned to R(0) exp(hat(delta)): the covariance (3, 3) of delta [rad^2], or one standard
@@ -155,7 +160,9 @@ def uncertainty(
         for total, name in zip(covariances, _ROTATIONS, strict=True):
             total += _carried(getattr(derivative, name), covariance)
         variances += [_carried(getattr(derivative, name)[None], covariance)[0, 0] for name in _PHASES]
-    return _uncertainty(split(motion), covariances, np.sqrt(variances), draws=0)
+    deviations = np.sqrt(variances)
+    bias = 0.0 if inputs.samples is None else _smoothing_bias(found, covariances, deviations)
+    return _uncertainty(split(motion), covariances, deviations, smoothing_bias=bias, draws=0)
 
 
 def sampled_uncertainty(
@@ -250,11 +257,20 @@ def _inputs(
         numbers = through.count * path.n_shape
         given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
         if given.shape in ((), (path.n_shape,)):
-            samples = np.tile(np.broadcast_to(_deviations(given, "joints"), path.n_shape) ** 2, through.count)
+            each = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
+            if given.ndim == 0 or isinstance(joints, str):
+                each[_without_samples(path)] = 0.0
+            samples = np.tile(each**2, through.count)
         else:
             samples = _covariance(given, "joints", numbers)
     links = None if inertias is None else _link_variances(body, inertias)
     return _Inputs(samples, links, _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude"))
+
+
+def _without_samples(path: ShapePath) -> list[int]:
+    """The joints that rest where a reader was told, without a column in the file."""
+    resting = {} if path.record is None else path.record.get("at_rest", {})
+    return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
 
 
 def _by_joint(body: Body, text: str) -> Array:
@@ -364,11 +380,30 @@ def _carried(derivative: Array, covariance: Array) -> Array:
     return (derivative * covariance if covariance.ndim == 1 else derivative @ covariance) @ derivative.T
 
 
+def _smoothing_bias(found: Derivatives, covariances: list[Array], deviations: Array) -> float:
+    """The largest shift of a result by smoothing, in standard deviations: of a rotation about its worst axis."""
+    taken = path_samples(found.path).bias
+    if not taken.any():
+        return 0.0
+    shifts = []
+    for name, covariance in zip(_ROTATIONS, covariances, strict=True):
+        values, vectors = np.linalg.eigh(covariance)
+        known = values > _NEGATIVE * max(float(values[-1]), 0.0)
+        turn = vectors.T @ (getattr(found.by_knots, name) @ taken)
+        shifts.append(float(np.sqrt((turn[known] ** 2 / values[known]).sum())))
+    for name, deviation in zip(_PHASES, deviations, strict=True):
+        if deviation:
+            shifts.append(abs(float(getattr(found.by_knots, name) @ taken)) / float(deviation))
+    return max(shifts)
+
+
 def _rotation(motion: Motion, parts: PhaseSplit, name: str) -> Array:
     return motion.final_attitude if name == "final_attitude" else getattr(parts, name)
 
 
-def _uncertainty(parts: PhaseSplit, covariances: list[Array], deviations: Array, *, draws: int) -> Uncertainty:
+def _uncertainty(
+    parts: PhaseSplit, covariances: list[Array], deviations: Array, *, draws: int, smoothing_bias: float = 0.0
+) -> Uncertainty:
     final, total, holonomy, dynamical = covariances
     return Uncertainty(
         final_attitude=final,
@@ -380,6 +415,7 @@ def _uncertainty(parts: PhaseSplit, covariances: list[Array], deviations: Array,
         montgomery_phase=float(deviations[2]),
         total_angle=_bar(parts.total_rotation, total),
         holonomy_angle=_bar(parts.holonomy, holonomy),
+        smoothing_bias=smoothing_bias,
         draws=draws,
     )
 

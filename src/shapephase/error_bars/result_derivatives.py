@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -15,9 +15,9 @@ from ..body.inertial_regressor import by_link_parameters, link_motions
 from ..deformation.descriptions import ArticulatedDescription
 from ..errors import ShapeError, WrongObjectError
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
 from ._along_motion import along_motion
-from ._path_samples import path_samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +109,25 @@ class Derivatives:
     def by_samples(self) -> ResultDerivative:
         """By the samples that the path was put through: m = N n, row by row of the (N, n) samples [per rad or m].
 
+        Of a recording that was closed, smoothed or resampled, by all of its samples as they were recorded, at the
+        penalty of the smoothing as it is.
+
         Raises
         ------
         WrongObjectError
-            If the path is not `ShapePath.spline` or `ShapePath.waypoints` through samples.
+            If the path is not `ShapePath.spline` or `ShapePath.waypoints` through samples, nor a recording.
         """
+        samples, by_knots = self._samples, self.by_knots
+        return ResultDerivative(
+            *(
+                samples.by_samples(part.reshape(-1, part.shape[-1])).reshape(*part.shape[:-1], -1)
+                for part in (getattr(by_knots, field.name) for field in fields(by_knots))
+            )
+        )
+
+    @cached_property
+    def by_knots(self) -> ResultDerivative:
+        """The same by the values of the path at its knots, of a periodic path without the last."""
         along, body = self._along, self.body
         of_shape = np.swapaxes(body.angular_momentum_gradient(along.shapes, along.rates, along.spins), 1, 2)
         lifted = np.swapaxes(body.angular_momentum_gradient(along.shapes, along.rates, along.lifted_spins), 1, 2)
@@ -121,7 +135,7 @@ class Derivatives:
         relative = along.spins - along.lifted_spins
         by_shape = self._density(of_shape, lifted, np.einsum("na,nak->nk", relative, of_shape - lifted))
         by_rate = self._density(matrix, matrix, np.zeros((len(matrix), body.n_shape)))
-        found = path_samples(self.path).derivative(along.times, by_shape, by_rate)
+        found = self._samples.by_knots(along.times, by_shape, by_rate)
         return self._results(_Changes(found[:3], found[3:6], found[6]))
 
     @cached_property
@@ -142,6 +156,10 @@ class Derivatives:
         (squares,) = by_link_parameters(links, weighted[:, None], relative, moving=False)
         action = 2.0 * self.motion.momentum @ of_motion[:3] + of_motion[3] - squares
         return self._results(_Changes(of_motion[:3], of_lift, action))
+
+    @property
+    def _samples(self) -> PathSamples:
+        return path_samples(self.path)
 
     def _carried(self) -> tuple[Array, Array]:
         """What a unit of angular momentum at each node turns both ends by: (N, 3, 3) each."""

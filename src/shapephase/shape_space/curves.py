@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from ..arguments import check_picklable
 from ..arrays import Array, Integers, check_reach, lock_arrays, real_array
 from ..errors import ShapeError, TrajectoryError
+
+if TYPE_CHECKING:
+    from .shape_path import ShapePath
 
 CLOSED = 1e-9
 """[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
@@ -63,16 +66,40 @@ class Fourier:
 Interpolation = Literal["not-a-knot", "periodic", "rest to rest"]
 
 
+class SampleOrigin(Protocol):
+    """How values at the knots of a path follow from recorded samples that were closed, smoothed or resampled."""
+
+    @property
+    def samples(self) -> Array:
+        """As recorded: (N, n) [rad or m]."""
+        ...
+
+    @property
+    def bias(self) -> Array:
+        """What smoothing took off the motion, as far as it is known: (knots, n) [rad or m]."""
+        ...
+
+    def path(self, samples: Array, /) -> ShapePath:
+        """What the same steps make of other samples (N, n)."""
+        ...
+
+    def by_samples(self, by_values: Array, /) -> Array:
+        """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:
     """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n).
 
     `through`: by which rule the polynomials follow from their values at the knots; None: by none.
+    `origin`: how these values follow from samples; None: they are the samples.
     """
 
     knots: Array
     coefficients: Array
     through: Interpolation | None = None
+    origin: SampleOrigin | None = None
 
     __post_init__ = lock_arrays
 

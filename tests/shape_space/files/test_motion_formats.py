@@ -313,9 +313,17 @@ def test_smoothing_by_the_reader_reports_what_is_left(tmp_path):
     clean = np.stack([np.sin(t), 0.4 * np.cos(2.0 * t)], axis=1)
     write_delimited(tmp_path / "m.csv", DIVER.joint_names, t, clean + 0.01 * rng.normal(size=clean.shape))
     motion = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth={RIGHT: 0.01})
-    np.testing.assert_allclose(motion.residual, [0.0, 0.01], atol=2e-5, rtol=0)
-    both = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth=0.01)
-    np.testing.assert_allclose(both.residual, 0.01, rtol=5.1e-4)  # FITPACK meets its sum of squares to a thousandth
+    assert motion.residual[0] < 1e-14
+    assert 0.009 < motion.residual[1] < 0.01
+    both = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth="0.01rad")
+    np.testing.assert_allclose(both.residual, both.smoothing.residual, rtol=1e-12)
+    # What is left of the noise has a share of the degrees of freedom in its squares, and the bias next to none.
+    expected = 0.01 * np.sqrt(1.0 - both.smoothing.degrees_of_freedom / 401.0)
+    np.testing.assert_allclose(both.residual, expected, rtol=0.05)
+    assert motion.smoothing.noise.tolist() == [0.0, 0.01]
+    assert both.record["smoothing"]["penalty_s3"] == both.smoothing.penalty
+    given = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth=0.01, smooth_penalty=1e-4)
+    assert given.smoothing.penalty == 1e-4
     assert np.sqrt(np.mean((both.path.shape(t) - clean) ** 2)) < 0.004
     with pytest.raises(UnknownNameError, match="unknown joint of diver"):
         read_recorded_motion(tmp_path / "m.csv", DIVER, smooth={"elbow": 0.01})

@@ -20,7 +20,7 @@ from ..curves import CLOSED, PiecewisePolynomial
 from ..shape_geodesic import shape_geodesic, shape_speed
 from ..shape_path import ShapePath
 from ._labels import amounts
-from .smoothing import smoothed_path
+from .smoothing import Recorded, Smoothing, prepared_path
 
 WAYS = ("smooth", "drift", "geodesic")
 """A smoother that runs on from the end to the start; the gap taken off evenly in time; a geodesic put at the end."""
@@ -64,16 +64,15 @@ class Closing:
 
 
 def closed_path(
-    times: Array, shapes: Array, noise: Array, body: Body, *, within: float | str, by: str | None
-) -> tuple[ShapePath, Closing]:
+    recorded: Recorded, body: Body, *, within: float | str, by: str | None, penalty: float | None = None
+) -> tuple[ShapePath, Smoothing, Closing]:
     """The loop of a recorded cycle.
 
     Parameters
     ----------
-    times, shapes : (N,) from 0 [s], (N, n) [rad or m]
-    noise : (n,) rms of the samples [rad or m]
     within : the largest gap that is closed, a number in rad or m, or a text as "3deg" or "3deg,5mm"
     by : one of `WAYS`; None: a periodic smoother where a noise is given, else by the drift
+    penalty : of the smoothing, as for `smoothed_path`
 
     Raises
     ------
@@ -83,25 +82,21 @@ def closed_path(
         If the ends differ by more, or a joint that does not close has no noise to smooth.
     """
     check_object(body, "Body", "body")
-    way = ("smooth" if noise.any() else "drift") if by is None else by
+    way = ("smooth" if recorded.noise.any() else "drift") if by is None else by
     if way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)
-    whole = shapes[-1] - shapes[0]
+    whole = recorded.shapes[-1] - recorded.shapes[0]
     turns = np.where(body.continuous, _WHOLE_TURN * np.round(whole / _WHOLE_TURN), 0.0)
     gap = whole - turns
     _check_gap(gap, amounts(within, "close"), body)
-    opened, _ = smoothed_path(times, shapes, noise, False, body.joint_names)
+    opened, smoothing = prepared_path(recorded, periodic=False, penalty=penalty)
     if way == "geodesic":
-        return _with_geodesic(opened, turns, gap, body)
+        closed, closing = _with_geodesic(opened, turns, gap, body)
+        return closed, smoothing, closing
     if way == "smooth":
-        _check_noise(gap, noise, body)
-    share = times[:, None] / times[-1]
-    even = shapes - share * turns - (share * gap if way == "drift" else 0.0)
-    if way == "drift":
-        even[-1] = even[0]
-    loop, _ = smoothed_path(times, even, noise, True, body.joint_names)
-    closed = _with_turns(loop, turns)
-    return closed, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)
+        _check_noise(gap, recorded.noise, body)
+    closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
+    return closed, smoothing, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)
 
 
 def close_argument(close: Any) -> float | str | None:
@@ -135,19 +130,6 @@ def _check_noise(gap: Array, noise: Array, body: Body) -> None:
             f"joint {name} does not close, and no noise is given that a smoother could use; give smooth (--smooth), or "
             "close it by drift or geodesic (close_by, --close-by)"
         )
-
-
-def _with_turns(loop: ShapePath, turns: Array) -> ShapePath:
-    """A loop whose endless joints turn on evenly, by so much in all."""
-    if not turns.any():
-        return loop
-    curve = loop.curve
-    assert isinstance(curve, PiecewisePolynomial)
-    rate = turns / loop.duration
-    coefficients = curve.coefficients.copy()
-    coefficients[0] += curve.knots[:-1, None] * rate
-    coefficients[1] += rate
-    return _cubics(curve.knots, coefficients, loop.joint_names)
 
 
 def _with_geodesic(opened: ShapePath, turns: Array, gap: Array, body: Body) -> tuple[ShapePath, Closing]:

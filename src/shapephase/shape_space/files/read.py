@@ -25,13 +25,14 @@ from ._base_columns import base_choices
 from ._flight import Flight, flight_argument, in_flight
 from ._inputs import read_input
 from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
-from ._labels import SI, mapping_argument
+from ._labels import SI, amounts, mapping_argument
 from ._recording import Recording, Table
+from ._sample_origins import resampled
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
 from .closing import Closing, close_argument, closed_path
 from .mapping_files import read_names
-from .smoothing import smoothed_path
+from .smoothing import Recorded, Smoothing, prepared_path
 
 _WRITTEN = (".csv", ".npz", ".tsv")
 _MOST_SHOWN = 200
@@ -54,6 +55,7 @@ class RecordedMotion:
     format : the kind of file
     record : what was read and what was done to it, as JSON can hold it: the file with its hash, samples and times,
         columns and units of joints, where the others rest, what was left out, smoothed, closed, resampled
+    smoothing : what smoothing did, with its penalty, degrees of freedom and bias; None: it was not smoothed
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: nobody asked for one
 
@@ -72,6 +74,7 @@ class RecordedMotion:
     base_position: Array | None
     format: str
     record: Mapping[str, Any]
+    smoothing: Smoothing | None = None
     closing: Closing | None = None
     flight: Flight | None = None
 
@@ -90,7 +93,8 @@ def read_recorded_motion(
     ignore_extra: bool = False,
     trim: tuple[float, float] | None = None,
     resample: float | None = None,
-    smooth: float | Mapping[str, float] | None = None,
+    smooth: float | str | Mapping[str, float | str] | None = None,
+    smooth_penalty: float | None = None,
     close: float | str | bool | None = None,
     close_by: str | None = None,
     base_order: str | None = None,
@@ -139,8 +143,10 @@ def read_recorded_motion(
     ignore_extra : whether columns that are no joints are left out
     trim : the first and the last time to be kept, as the file tells the time (its unit, its start)
     resample : the path goes through this many of its own values a second instead, evenly spaced [1/s]
-    smooth : noise level of the samples, rms [rad or m], one for all joints or by joint (the others are interpolated);
-        None: the path goes through all samples. See `smoothing.smoothed_path`.
+    smooth : noise level of the samples, rms, a number [rad or m] or a text as "0.3deg" or "0.3deg,1mm", one for all
+        joints or by joint (the others are interpolated); None: the path goes through all samples. See
+        `smoothing.smoothed_path`.
+    smooth_penalty : instead of the penalty that follows from the noise [s^3]
     close : the largest gap between the ends of a cycle that is closed, a number [rad or m] or a text as "3deg" or
         "3deg,5mm"; None: what meets to 1e-9 runs smoothly from its end to its start, else the ends stay apart; False:
         they are not joined even then
@@ -194,7 +200,8 @@ def read_recorded_motion(
     recording, motion, free = in_flight(recording, matched(recording, body, choices), body, flying)
     try:
         noise = _noise_levels(smooth, body)
-        path, closing = _path(recording.times, motion.shapes, noise, body, within, close_by, loop=close is None)
+        samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)
+        path, smoothing, closing = _path(samples, body, within, close_by, loop=close is None, penalty=smooth_penalty)
     except (TrajectoryError, ShapeError) as error:
         raise TrajectoryError(f"{table.where}: {error}") from None
     if rate is not None:
@@ -209,6 +216,7 @@ def read_recorded_motion(
         "trim": kept,
         **_record(recording, motion),
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
+        "smoothing": _smoothing_record(smoothing, body) if noise.any() else None,
         "closing": None if closing is None else _closing_record(closing, body),
         "flight": None if free is None else free.record,
         "resampled_to_hz": None if rate is None else (len(path.breaks) - 1) / path.duration,
@@ -222,6 +230,7 @@ def read_recorded_motion(
         base_position=motion.base.position,
         format=table.format,
         record=record,
+        smoothing=smoothing if noise.any() else None,
         closing=closing,
         flight=free,
     )
@@ -241,7 +250,8 @@ def read_shape_path(
     ignore_extra: bool = False,
     trim: tuple[float, float] | None = None,
     resample: float | None = None,
-    smooth: float | Mapping[str, float] | None = None,
+    smooth: float | str | Mapping[str, float | str] | None = None,
+    smooth_penalty: float | None = None,
     close: float | str | bool | None = None,
     close_by: str | None = None,
     base_order: str | None = None,
@@ -275,6 +285,7 @@ def read_shape_path(
         trim=trim,
         resample=resample,
         smooth=smooth,
+        smooth_penalty=smooth_penalty,
         close=close,
         close_by=close_by,
         base_order=base_order,
@@ -347,24 +358,34 @@ def _mapping(names: Mapping[str, str | None] | None, table: Table) -> dict[str, 
 
 
 def _path(
-    times: Array,
-    shapes: Array,
-    noise: Array,
+    samples: Recorded,
     body: Body,
     within: float | str | None,
     close_by: str | None,
     *,
     loop: bool,
-) -> tuple[ShapePath, Closing | None]:
+    penalty: float | None,
+) -> tuple[ShapePath, Smoothing, Closing | None]:
     """The path through samples or near them, and how it was closed; `loop`: what meets anyway runs on smoothly."""
     if within is not None:
-        return closed_path(times, shapes, noise, body, within=within, by=close_by)
+        return closed_path(samples, body, within=within, by=close_by, penalty=penalty)
     if close_by is not None:
         raise TrajectoryError(
             f"close_by={close_by!r:.40}: how large a gap is to be closed? Give close, as 0.05 or '3deg'"
         )
-    path, _ = smoothed_path(times, shapes, noise, None if loop else False, body.joint_names)
-    return path, None
+    path, smoothing = prepared_path(samples, periodic=loop and samples.meets, penalty=penalty)
+    return path, smoothing, None
+
+
+def _smoothing_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
+    """What smoothing did, as JSON can hold it."""
+    rms = np.sqrt(np.mean(smoothing.bias**2, axis=0))
+    return {
+        "penalty_s3": smoothing.penalty,
+        "degrees_of_freedom": smoothing.degrees_of_freedom,
+        "bias_rms": dict(zip(body.joint_names, rms.tolist(), strict=True)),
+        "bias_in_bars": smoothing.bias_in_bars,
+    }
 
 
 def _closing_record(closing: Closing, body: Body) -> dict[str, Any]:
@@ -397,21 +418,17 @@ def _resampled(path: ShapePath, rate: float, where: str) -> ShapePath:
     count = max(round(path.duration * rate), 2)
     if count > _MOST_SAMPLES:
         raise TrajectoryError(f"{where}: resample: {count} samples; up to {_MOST_SAMPLES} are made")
-    times = np.linspace(0.0, path.duration, count + 1)
-    return ShapePath.spline(times, path.shape(times), joint_names=path.joint_names)
+    return resampled(path, np.linspace(0.0, path.duration, count + 1), path.joint_names)
 
 
-def _noise_levels(smooth: float | Mapping[str, float] | None, body: Body) -> Array:
+def _noise_levels(smooth: float | str | Mapping[str, float | str] | None, body: Body) -> Array:
     """The noise of each joint: (n,) [rad or m]."""
-    given = dict.fromkeys(body.joint_names, 0.0)
+    given: dict[str, float | str] = dict.fromkeys(body.joint_names, 0.0)
     if isinstance(smooth, Mapping):
         for name in smooth:
             body.joint_index(name)
         given.update(smooth)
     elif smooth is not None:
         given = dict.fromkeys(body.joint_names, smooth)
-    levels = [finite_array(level, f"smooth, joint {name}") for name, level in given.items()]
-    for level, name in zip(levels, given, strict=True):
-        if level.ndim or level < 0.0:
-            raise TrajectoryError(f"smooth, joint {name}: a noise level is a number, zero or above, got {level}")
-    return np.array(levels).reshape(body.n_shape)
+    units = zip(given.items(), body.joint_units, strict=True)
+    return np.array([amounts(level, f"smooth, joint {name}")[unit] for (name, level), unit in units])

@@ -1,60 +1,95 @@
-"""Smooth paths through noisy samples: the least wiggly spline that stays as far from them as the noise is large."""
+"""Smooth paths through noisy samples: a smoothing spline of one penalty, linear in the samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ...arrays import Array
-from ...errors import TrajectoryError
-from ..curves import PiecewisePolynomial
+from ...arguments import positive_argument
+from ...arrays import Array, finite_array, lock_arrays
+from ...errors import ShapeError, TrajectoryError
+from ..curves import CLOSED
 from ..shape_path import ShapePath
+from ._linear_smoother import LinearSmoother, pilot
 from ._recording import warn
+from ._sample_origins import Prepared
 
 _FEWEST = 5
-"""Samples; four determine a cubic, so that nothing could be smoothed."""
+"""Samples; of fewer, what is motion and what is noise cannot be told apart."""
 _WIDEST_GAP = 5.0 * np.sqrt(2.0)
 """Largest gap of a loop in noise levels: five standard deviations of the difference of two samples."""
-_OFF = 0.01
-"""Share by which the residual may exceed the noise level: what FITPACK's search for the smoothness leaves."""
+_BIAS = 0.2
+"""Of what smoothing does to the motion, in standard deviations of what noise does: it widens no bar by more than
+a fiftieth."""
 _EXACT = 1e-9
 """Noise below this share of the samples' spread counts as none: the samples are interpolated."""
-_ANY = 1e3
-"""Noise above this many times the spread is cut to it: a single cubic is within either, and its square is finite."""
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothing:
+    """What smoothing did to recorded samples.
+
+    Attributes
+    ----------
+    noise : (n,) as stated, rms [rad or m]; zero where the path goes through the samples
+    penalty : of the integral of squared second derivatives, beside the sum of squares of samples minus path [s^3]
+    degrees_of_freedom : effective, of each joint that is smoothed, of as many as it has samples
+    bias : (knots, n) what was taken off the motion itself at the knots, as far as it is known [rad or m]
+    bias_in_bars : bias of a number that follows linearly from the path, at most, whichever it is: in standard
+        deviations of what the noise does to it
+    residual : (n,) rms of samples minus path [rad or m]
+    """
+
+    noise: Array
+    penalty: float
+    degrees_of_freedom: float
+    bias: Array
+    bias_in_bars: float
+    residual: Array
+
+    __post_init__ = lock_arrays
 
 
 def smoothed_path(
-    times: Array, shapes: Array, noise: Array, periodic: bool | None, joint_names: Sequence[str]
-) -> tuple[ShapePath, Array]:
-    """A C2 cubic spline near samples whose noise is known, and how far it is from them.
+    times: ArrayLike,
+    shapes: ArrayLike,
+    noise: ArrayLike,
+    periodic: bool | None = None,
+    joint_names: Sequence[str] | None = None,
+    *,
+    penalty: float | None = None,
+) -> tuple[ShapePath, Smoothing]:
+    """A C2 cubic spline near samples whose noise is known, and what smoothing did to them.
 
-    Of each joint, the smoothest cubic spline whose samples are off by the noise level, rms (the discrepancy
-    principle; SciPy's `splrep`, FITPACK, keeps to it within a thousandth, as a rule, and a hundredth at most), or by
-    less where a single cubic is that near already. The knots of all joints together are the breaks. A noise of zero
-    is interpolation.
+    Its values at the samples' times are those of a smoothing spline, with one penalty for all joints. They are linear
+    in the samples, so that error bars go through. A noise of zero is interpolation.
+
+    The penalty follows from the noise level: first the one of least expected error (Mallows' C_p), whose bias may be
+    as large as the bars; then less, by as much as it takes for a bias under a fifth of the bar of any number that
+    follows linearly from the path. How large it is follows from the samples smoothed twice by the first penalty.
 
     A periodic spline runs smoothly from its end to its start, and its ends are equal. The first and the last sample
     are then two measurements of one shape: their mean is used, with the weight of both.
 
     Parameters
     ----------
-    times : (N,) ascending from 0 [s]
+    times : (N,) ascending; the path starts at 0 [s]
     shapes : (N, n) [rad or m]
-    noise : (n,) rms [rad or m]
+    noise : rms of each sample's noise, one or one for each joint (n,) [rad or m]
     periodic : None: periodic when the last sample equals the first to 1e-9
     joint_names : n names
-
-    Returns
-    -------
-    path, residual : the residual (n,) is the rms of samples minus path [rad or m]
+    penalty : instead of the one that follows from the noise [s^3]; what it does to the motion is told in any case
 
     Raises
     ------
     TrajectoryError
         If there are fewer than five samples, a periodic path does not close within the noise, or no joint moves more
         than its noise.
+    ShapeError
+        If shapes disagree.
 
     Warns
     -----
@@ -63,57 +98,114 @@ def smoothed_path(
 
     Notes
     -----
-    Source: Reinsch 1967 (the principle); Dierckx 1993, Curve and Surface Fitting with Splines (the algorithm).
+    Source: Reinsch 1967 (the spline); Mallows 1973 (C_p); own derivation (the bias).
     """
-    if not noise.any():
-        plain = ShapePath.spline(times, shapes, periodic, joint_names=joint_names)
-        return plain, _residual(plain, times, shapes)
-    if len(times) < _FEWEST:
-        raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(times)}")
-    gap = shapes[-1] - shapes[0]
-    loop = bool(np.all(np.abs(gap) <= 1e-9 * np.maximum(1.0, np.abs(shapes[0])))) if periodic is None else periodic
-    if loop:
-        _check_gap(gap, noise, joint_names)
-    _check_signal(shapes, noise, joint_names)
-    splines = [_spline(times, shapes[:, j], float(noise[j]), loop, name) for j, name in enumerate(joint_names)]
-    knots = np.unique(np.concatenate([times[[0, -1]], *(spline.t for spline in splines)]))
-    knots = knots[(knots >= 0.0) & (knots <= times[-1])]
-    coefficients = np.empty((4, len(knots) - 1, len(splines)))
-    for power, divisor in enumerate((1.0, 1.0, 2.0, 6.0)):
-        for j, spline in enumerate(splines):
-            coefficients[power, :, j] = spline(knots[:-1], nu=power) / divisor
-    curve = PiecewisePolynomial(knots, coefficients)
-    path = ShapePath(curve, float(times[-1]), knots, shapes.shape[1], tuple(joint_names), 0.5)
-    return path, _residual(path, times, shapes)
+    plain = ShapePath.spline(times, shapes, False, joint_names=joint_names)
+    at, recorded = plain.breaks, np.array(finite_array(shapes, "shapes"))
+    levels = finite_array(noise, "noise")
+    if levels.shape not in ((), (plain.n_shape,)) or np.any(levels < 0.0):
+        raise ShapeError(f"noise: a number or {plain.n_shape} of them, zero or above, are needed, got {noise}")
+    samples = Recorded(at, recorded, np.broadcast_to(levels, plain.n_shape), plain.joint_names)
+    return prepared_path(samples, periodic=samples.meets if periodic is None else periodic, penalty=penalty)
 
 
-def _spline(times: Array, samples: Array, noise: float, loop: bool, name: str) -> Any:
-    """SciPy's spline of one joint."""
-    from scipy.interpolate import BSpline, make_interp_spline, splrep
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Samples of joints and what is known of their noise.
 
-    spread = float(_spread(samples))
-    if noise <= _EXACT * spread:
-        through = np.append(samples[:-1], samples[0]) if loop else samples
-        return make_interp_spline(times, through, k=3, bc_type="periodic" if loop else "not-a-knot")
-    # Scaled, so that metres and radians, large and small, are the same to the routine.
-    middle, scale = float(samples.mean()), spread or 1.0
-    values, weights = (samples - middle) / scale, np.ones(len(samples))
-    squares = len(samples) * min(noise / scale, _ANY) ** 2
-    if loop:
-        # Two samples y -+ d/2 weigh like one y of weight sqrt(2), and are off by d^2/2 whatever the spline does.
-        squares = max(squares - 0.5 * (values[-1] - values[0]) ** 2, 0.0)
-        values[[0, -1]] = 0.5 * (values[0] + values[-1])
-        weights[0] = np.sqrt(2.0)
-    fitted: Any = splrep(times, values, weights, k=3, s=squares, per=int(loop), full_output=1, quiet=1)
-    knots, numbers, _ = fitted[0]
-    spline = BSpline(knots, numbers * scale + middle, 3)
-    off = np.sqrt(np.mean((spline(times) - samples) ** 2))
-    if off > (1.0 + _OFF) * noise:
-        raise TrajectoryError(
-            f"joint {name} could not be smoothed to {noise:.6g}: the spline stays {off:.6g} from the samples; state "
-            "another noise level, or zero for interpolation"
-        )
-    return spline
+    Attributes
+    ----------
+    times, shapes : (N,) ascending from 0 [s], (N, n) [rad or m]
+    noise : (n,) rms [rad or m]
+    joint_names : n names, or None
+    """
+
+    times: Array
+    shapes: Array
+    noise: Array
+    joint_names: tuple[str, ...] | None
+
+    @property
+    def meets(self) -> bool:
+        """Whether the last sample is the first, as far as files can say."""
+        first, last = self.shapes[0], self.shapes[-1]
+        return bool(np.all(np.abs(last - first) <= CLOSED * np.maximum(1.0, np.abs(first))))
+
+
+def prepared_path(
+    recorded: Recorded,
+    *,
+    periodic: bool,
+    penalty: float | None = None,
+    turns: Array | None = None,
+    drift: bool = False,
+) -> tuple[ShapePath, Smoothing]:
+    """The path near recorded samples, as `smoothed_path`.
+
+    Parameters
+    ----------
+    turns : (n,) whole turns that are taken off evenly before, and given back afterwards [rad]
+    drift : whether the gap between last and first sample is taken off evenly
+    """
+    times, noise = recorded.times, recorded.noise
+    given = None if penalty is None else positive_argument(penalty, "smooth_penalty", "a penalty in s^3")
+    if given is not None and not noise.any():
+        raise TrajectoryError("smooth_penalty: state the noise of the samples too (smooth, --smooth)")
+    steps = Prepared(
+        samples=recorded.shapes,
+        bias=np.zeros((len(times) - periodic, len(noise))),
+        smoother=LinearSmoother(times, periodic, 0.0),
+        smoothed=np.zeros(len(noise), dtype=bool),
+        turns=np.zeros(len(noise)) if turns is None else turns,
+        drift=drift,
+        joint_names=recorded.joint_names,
+    )
+    if noise.any():
+        if len(times) < _FEWEST:
+            raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(times)}")
+        names = recorded.joint_names or tuple(f"number {joint}" for joint in range(len(noise)))
+        if periodic and not drift:
+            _check_gap(recorded.shapes[-1] - recorded.shapes[0] - steps.turns, noise, names)
+        _check_signal(steps.joined(recorded.shapes), noise, names)
+    elif not drift and not steps.turns.any():
+        plain = ShapePath.spline(times, recorded.shapes, periodic, joint_names=recorded.joint_names)
+        return plain, _report(recorded, steps, plain, 0.0)
+    steps, in_bars = _smoothed(steps, noise, given)
+    path = steps.path(recorded.shapes)
+    return path, _report(recorded, steps, path, in_bars)
+
+
+def _smoothed(steps: Prepared, noise: Array, given: float | None) -> tuple[Prepared, float]:
+    """The steps with the smoother that the noise asks for, and the largest bias in bars."""
+    spread = _spread(steps.joined(steps.samples))
+    steps = replace(steps, smoothed=noise > _EXACT * spread)
+    moving = steps.smoothed & (spread > 0.0)
+    if not moving.any():
+        return steps, 0.0
+    values = steps.joined(steps.samples)
+    smoother = steps.smoother
+    first = pilot(smoother.times, smoother.periodic, values[:, moving] - values[0, moving], noise[moving])
+    # Of the number that shows it most; it grows with the penalty.
+    weighted = np.sqrt(smoother.weights)[:, None] * first.taken_off / noise[moving]
+    in_bars = float(np.linalg.norm(weighted))
+    most = first.smoother.penalty
+    penalty = most * min(1.0, _BIAS / in_bars if in_bars else 1.0) if given is None else given
+    chosen = replace(first.smoother, penalty=penalty)
+    bias = np.zeros_like(values)
+    bias[:, moving] = chosen(first.motion) - first.motion
+    return replace(steps, smoother=chosen, bias=bias), in_bars * penalty / most
+
+
+def _report(recorded: Recorded, steps: Prepared, path: ShapePath, in_bars: float) -> Smoothing:
+    smoother = steps.smoother
+    return Smoothing(
+        noise=np.where(steps.smoothed, recorded.noise, 0.0),
+        penalty=smoother.penalty,
+        degrees_of_freedom=smoother.degrees_of_freedom if smoother.penalty else float(smoother.count),
+        bias=steps.bias,
+        bias_in_bars=in_bars,
+        residual=np.sqrt(np.mean((recorded.shapes - path.shape(recorded.times)) ** 2, axis=0)),
+    )
 
 
 def _check_gap(gap: Array, noise: Array, joint_names: Sequence[str]) -> None:
@@ -138,14 +230,10 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
     for joint in map(int, np.flatnonzero(drowned)):
         warn(
             f"joint {joint_names[joint]} moves by {spread[joint]:.6g} rms about its mean, no more than the noise level "
-            f"{noise[joint]:.6g}: little but its mean is left"
+            f"{noise[joint]:.6g}: of what it does, little is sure"
         )
 
 
 def _spread(samples: Array) -> Array:
     """Rms about the mean, along the first axis; exactly zero where nothing moves."""
     return np.where(np.ptp(samples, axis=0) > 0.0, samples.std(axis=0), 0.0)
-
-
-def _residual(path: ShapePath, times: Array, shapes: Array) -> Array:
-    return np.sqrt(np.mean((shapes - path.shape(times)) ** 2, axis=0))

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import WrongObjectError
-from ..shape_space.curves import PiecewisePolynomial, Reordered
-from ..shape_space.shape_path import ShapePath
+from .curves import PiecewisePolynomial, Reordered
+from .shape_path import ShapePath
 
 # The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
 _REST_TO_REST = (10.0, -15.0, 6.0)
@@ -22,7 +22,7 @@ class PathSamples:
 
     Attributes
     ----------
-    curve : the polynomials through the samples
+    curve : the polynomials through the samples, or through what was made of them
     order : (n,) which column of theirs is which of the path's
     """
 
@@ -31,17 +31,37 @@ class PathSamples:
 
     @property
     def count(self) -> int:
-        """How many samples there are that may differ: of a periodic path the last is the first."""
-        return len(self.curve.knots) - (self.curve.through == "periodic")
+        """How many samples there are that may differ: of a periodic path the last is the first, unless both were
+        recorded."""
+        return self._at_knots if self.curve.origin is None else len(self.curve.origin.samples)
 
     @property
     def values(self) -> Array:
         """(count, n) [rad or m]."""
-        return self.curve(self.curve.knots[: self.count])[0][:, self.order]
+        origin = self.curve.origin
+        if origin is not None:
+            return origin.samples[:, self.order]
+        return self.curve(self.curve.knots[: self._at_knots])[0][:, self.order]
+
+    @property
+    def bias(self) -> Array:
+        """What smoothing took off the motion at the knots, as far as it is known: (knots n,) [rad or m]."""
+        origin = self.curve.origin
+        if origin is None:
+            return np.zeros(self._at_knots * len(self.order))
+        return origin.bias[:, self.order].ravel()
+
+    @property
+    def _at_knots(self) -> int:
+        return len(self.curve.knots) - (self.curve.through == "periodic")
 
     def path_through(self, values: Array) -> ShapePath:
-        """The path of the same kind through other samples (count, n)."""
-        times = self.curve.knots
+        """The path of the same kind through other samples (count, n), made of them in the same way."""
+        times, origin = self.curve.knots, self.curve.origin
+        if origin is not None:
+            recorded = np.empty_like(values)
+            recorded[:, self.order] = values
+            return origin.path(recorded)
         if self.curve.through == "rest to rest":
             return ShapePath.waypoints(times, values)
         periodic = self.curve.through == "periodic"
@@ -49,6 +69,10 @@ class PathSamples:
 
     def derivative(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
         """Sums over times of (N, k, n) derivatives by shapes and rates, by the samples: (k, count n)."""
+        return self.by_samples(self.by_knots(times, by_shape, by_rate))
+
+    def by_knots(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
+        """The same by the values at the knots: (k, knots n)."""
         curve = self.curve
         order, pieces, n_shape = curve.coefficients.shape
         piece = np.searchsorted(curve.knots[1:-1], times, side="right")
@@ -63,7 +87,17 @@ class PathSamples:
             np.add.at(by_coefficients[power], piece, part.reshape(len(times), -1))
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
         found = rule(np.diff(curve.knots), by_coefficients, curve.through == "periodic")
-        return np.moveaxis(found.reshape(self.count, count, n_shape), 0, 1).reshape(count, -1)
+        return np.moveaxis(found.reshape(-1, count, n_shape), 0, 1).reshape(count, -1)
+
+    def by_samples(self, by_knots: Array) -> Array:
+        """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
+        if self.curve.origin is None:
+            return by_knots
+        n_shape = len(self.order)
+        of_curve = np.empty((self._at_knots, len(by_knots), n_shape))
+        of_curve[:, :, self.order] = np.moveaxis(by_knots.reshape(len(by_knots), -1, n_shape), 1, 0)
+        found = self.curve.origin.by_samples(of_curve)[:, :, self.order]
+        return np.moveaxis(found, 0, 1).reshape(len(by_knots), -1)
 
 
 def path_samples(path: ShapePath) -> PathSamples:
@@ -74,7 +108,7 @@ def path_samples(path: ShapePath) -> PathSamples:
     if not isinstance(curve, PiecewisePolynomial) or curve.through is None:
         raise WrongObjectError(
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
-            "ShapePath.waypoints and of recorded motions that were not smoothed"
+            "ShapePath.waypoints and of recorded motions"
         )
     return PathSamples(curve, order)
 

@@ -1,0 +1,154 @@
+"""Paths made of recorded samples by linear steps: the steps, taken again with other samples and backwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...arrays import Array, Mask, lock_arrays
+from ..curves import PiecewisePolynomial
+from ..path_samples import path_samples
+from ..shape_path import ShapePath
+from ._linear_smoother import LinearSmoother
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Prepared:
+    """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
+
+    Attributes
+    ----------
+    samples : (N, n) as recorded [rad or m]
+    bias : (knots, n) that smoothing took off the motion, as far as it is known [rad or m]
+    smoother : knows the times of the samples, and whether the spline is periodic
+    smoothed : (n,) whether a joint is smoothed
+    turns : (n,) whole turns that a loop makes, evenly [rad]
+    drift : whether what is left between the last sample and the first is taken off evenly in time
+    joint_names : n names, or None
+    """
+
+    samples: Array
+    bias: Array
+    smoother: LinearSmoother
+    smoothed: Mask
+    turns: Array
+    drift: bool
+    joint_names: tuple[str, ...] | None
+
+    __post_init__ = lock_arrays
+
+    @cached_property
+    def _share(self) -> Array:
+        times = self.smoother.times
+        return (times / times[-1])[:, None]
+
+    def joined(self, samples: Array) -> Array:
+        """Of recorded samples (N, n), the values that are smoothed: (count, n)."""
+        even = samples - self._share * self.turns
+        if self.drift:
+            even = even - self._share * (even[-1] - even[0])
+            even[-1] = even[0]
+        if not self.smoother.periodic:
+            return even
+        first = np.where(self.smoothed, 0.5 * (even[0] + even[-1]), even[0])
+        return np.concatenate([first[None], even[1:-1]])
+
+    def values(self, samples: Array) -> Array:
+        """The values of the spline at its knots: (count, n)."""
+        found = self.joined(samples)
+        chosen = found[:, self.smoothed]
+        if chosen.size:
+            # About the first, so that what does not move stays to the last digit.
+            found[:, self.smoothed] = chosen[0] + self.smoother(chosen - chosen[0])
+        return found
+
+    def path(self, samples: Array) -> ShapePath:
+        """As `SampleOrigin`."""
+        values, periodic, times = self.values(samples), self.smoother.periodic, self.smoother.times
+        if periodic:
+            values = np.concatenate([values, values[:1]])
+        plain = ShapePath.spline(times, values, periodic, joint_names=self.joint_names)
+        curve = plain.curve
+        assert isinstance(curve, PiecewisePolynomial)
+        coefficients = curve.coefficients
+        if self.turns.any():
+            rate = self.turns / times[-1]
+            coefficients = coefficients.copy()
+            coefficients[0] += curve.knots[:-1, None] * rate
+            coefficients[1] += rate
+        through = PiecewisePolynomial(curve.knots, coefficients, curve.through, replace(self, samples=samples))
+        return replace(plain, curve=through)
+
+    def by_samples(self, by_values: Array) -> Array:
+        """As `SampleOrigin`."""
+        found = by_values.copy()
+        chosen = found[:, :, self.smoothed]
+        if chosen.size:
+            found[:, :, self.smoothed] = self.smoother.transposed(chosen.reshape(len(chosen), -1)).reshape(chosen.shape)
+        if not self.smoother.periodic:
+            return found
+        last = np.where(self.smoothed, 0.5 * found[0], 0.0)
+        first = found[0] - last
+        even = np.concatenate([first[None], found[1:], last[None]])
+        if not self.drift:
+            return even
+        # Of a drift, the last sample is the first, and all go back by their share of the gap.
+        even[0], even[-1] = even[0] + even[-1], 0.0
+        by_gap = (self._share[:, :, None] * even).sum(axis=0)
+        even[0] += by_gap
+        even[-1] -= by_gap
+        return even
+
+
+@dataclass(frozen=True, eq=False)
+class Resampled:
+    """Values of a path through samples, evenly in time, through which another spline is put.
+
+    Attributes
+    ----------
+    inner : the path through samples
+    times : (M,) of its values [s]
+    count : how many values may differ: of a periodic spline the last is the first
+    """
+
+    inner: ShapePath
+    times: Array
+    count: int
+
+    __post_init__ = lock_arrays
+
+    @property
+    def samples(self) -> Array:
+        """As `SampleOrigin`."""
+        return path_samples(self.inner).values
+
+    @property
+    def bias(self) -> Array:
+        """As `SampleOrigin`."""
+        samples = path_samples(self.inner)
+        knots = samples.curve.knots
+        taken = samples.bias.reshape(-1, self.inner.n_shape)
+        periodic = len(taken) < len(knots)
+        through = ShapePath.spline(knots, np.concatenate([taken, taken[:1]]) if periodic else taken, periodic)
+        return through.shape(self.times[: self.count])
+
+    def path(self, samples: Array) -> ShapePath:
+        """As `SampleOrigin`."""
+        return resampled(path_samples(self.inner).path_through(samples), self.times, self.inner.joint_names)
+
+    def by_samples(self, by_values: Array) -> Array:
+        """As `SampleOrigin`."""
+        samples = path_samples(self.inner)
+        found = samples.derivative(self.times[: self.count], by_values, np.zeros_like(by_values))
+        return np.moveaxis(found.reshape(by_values.shape[1], samples.count, -1), 0, 1)
+
+
+def resampled(path: ShapePath, times: Array, joint_names: tuple[str, ...] | None) -> ShapePath:
+    """The spline through values of a path at times (M,), which remembers the samples of that path."""
+    plain = ShapePath.spline(times, path.shape(times), joint_names=joint_names)
+    curve = plain.curve
+    assert isinstance(curve, PiecewisePolynomial)
+    origin = Resampled(path, times, len(times) - (curve.through == "periodic"))
+    return replace(plain, curve=PiecewisePolynomial(curve.knots, curve.coefficients, curve.through, origin))
