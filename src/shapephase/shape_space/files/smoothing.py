@@ -127,9 +127,9 @@ class Recorded:
 
     @property
     def meets(self) -> bool:
-        """Whether the last sample is the first, as far as files can say."""
+        """Whether the last sample is the first, as far as files can say, and another is between them."""
         first, last = self.shapes[0], self.shapes[-1]
-        return bool(np.all(np.abs(last - first) <= CLOSED * np.maximum(1.0, np.abs(first))))
+        return len(self.times) > 2 and bool(np.all(np.abs(last - first) <= CLOSED * np.maximum(1.0, np.abs(first))))
 
 
 def prepared_path(
