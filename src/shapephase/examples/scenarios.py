@@ -322,6 +322,8 @@ class _CatRighting:
         return _untwisted(axis, axis_rate)
 
 
+# Squares of what is next to nothing are nothing, also for those who let NumPy raise.
+@np.errstate(under="ignore")
 def _untwisted(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
     """Waist angles pitch, yaw, roll (Ry Rz Rx) that carry the x axis to `axis` without twist, and their rates.
 

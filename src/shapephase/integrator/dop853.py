@@ -44,10 +44,12 @@ def dop853_rotation(
 
     quaternion, pieces, evaluations = np.array([0.0, 0.0, 0.0, 1.0]), [], 0
     for a, b, left, right in zip(breaks[:-1], breaks[1:], *inner, strict=True):
-        run = solve_ivp(
-            slope, (a, b), quaternion, "DOP853", dense_output=True, rtol=rtol, atol=1e-2 * tolerance,
-            args=(left, right),
-        )  # fmt: skip
+        # SciPy asks for the float next to zero, which is an underflow to those who want to be told.
+        with np.errstate(under="ignore"):
+            run = solve_ivp(
+                slope, (a, b), quaternion, "DOP853", dense_output=True, rtol=rtol, atol=1e-2 * tolerance,
+                args=(left, right),
+            )  # fmt: skip
         if not run.success:
             raise AccuracyNotReached(f"DOP853 stopped at t = {run.t[-1]:.9g} s: {run.message}")
         pieces.append(run.sol)
