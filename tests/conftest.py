@@ -71,6 +71,12 @@ def fast(monkeypatch):
 
 
 @pytest.fixture
+def compiled(monkeypatch):
+    """Machine code where there is Numba, else none: for tests of what stands on the integrator."""
+    monkeypatch.setenv("SHAPEPHASE_FAST", "1")
+
+
+@pytest.fixture
 def load_urdf(tmp_path):
     """Text of a URDF -> Body, through a file."""
 

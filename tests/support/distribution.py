@@ -9,7 +9,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from support.places import ROOT
 
-_MACHINE_CODE = re.compile(r'usefixtures\("fast"\)|getfixturevalue\("fast"\)|def test_\w+\([^)]*\bfast\b')
+_MACHINE_CODE = re.compile(r'usefixtures\("(fast|compiled)"\)|getfixturevalue\("fast"\)|def test_\w+\([^)]*\bfast\b')
 
 
 class WholeFiles(LoadScopeScheduling):
