@@ -77,15 +77,20 @@ def exact_local_coordinate(times: Array, left: Array, right: Array) -> Array:
 
 
 def inside(left: Array, right: Array) -> tuple[Array, Array]:
-    """Times just inside intervals.
-
-    The margin is wider than the rounding of stretching, reversing and joining paths, and too small to matter.
-    """
-    margin = np.minimum(64.0 * np.spacing(np.max(right)), 1e-3 * (right - left))
+    """Times just inside intervals."""
+    margin = end_margin(right - left, float(np.max(right)))
     return left + margin, right - margin
 
 
-@lru_cache(maxsize=16)
+def end_margin(width: Array, end: float) -> Array:
+    """How far inside intervals of this width times are on this side of a break, if all are over at `end`.
+
+    It is wider than the rounding of stretching, reversing and joining paths, and too small to matter.
+    """
+    return np.minimum(64.0 * np.spacing(end), 1e-3 * width)
+
+
+@lru_cache(maxsize=64)
 def unit_nodes(degree: int) -> Array:
     """The ascending Chebyshev points of [-1, 1], ends included: (degree + 1,)."""
     return -np.cos(np.pi * np.arange(degree + 1) / degree) if degree else np.zeros(1)
@@ -96,7 +101,14 @@ def nodes_on(left: Array, right: Array, degree: int) -> Array:
     return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)
 
 
-@lru_cache(maxsize=16)
+def nodes_of(left: Array, right: Array, degree: Integers) -> Array:
+    """The same of panels of different degrees, one after another: (P,), (P,), (P,) -> (the sum of degree + 1,)."""
+    local = np.concatenate([unit_nodes(one) for one in degree.tolist()])
+    each = degree + 1
+    return np.repeat(0.5 * (left + right), each) + np.repeat(0.5 * (right - left), each) * local
+
+
+@lru_cache(maxsize=64)
 def values_to_coefficients(degree: int) -> Array:
     """Values at the ascending Chebyshev points of [-1, 1] -> Chebyshev coefficients: (degree + 1, degree + 1)."""
     if degree == 0:

@@ -10,22 +10,17 @@ import numpy as np
 
 from ..arrays import Array, Integers, read_only
 from ._spectral_error import spectral_norms
-
-# Terms of a panel's series that are changed: two, since one may be small by chance, or by the symmetry of a motion.
-_LAST = 2
-# Degree below which a series has too few terms to show how they fall.
-_LEAST_DEGREE = 4
-# The slowest decay from one degree to the next that is believed.
-_SLOWEST = 0.99
-# Of the largest term of a series: what is smaller may be rounding, which does not fall any more.
-_ROUNDING = 3e-14
-# Of what is missing by the decay of the terms: they may fall more slowly beyond, and what aliases adds to it.
-_SAFETY_FACTOR = 3.0
-# Of few terms the decay is less sure: the factor is twice as large at this degree.
-_FEW_TERMS = 10.0
-# Keeps quotients of coefficients defined where these are zero.
-_TINY = 1e-300
-
+from .fast import engine
+from .fast.estimate_constants import (
+    FEW_TERMS,
+    LAST_TERMS,
+    LEAST_DEGREE,
+    MISSING_FACTOR,
+    ROUNDED_TERM,
+    SLOWEST_DECAY,
+    TINY,
+)
+from .fast.panels import series_with_changed_ends
 
 @dataclass(frozen=True, eq=False)
 class Perturbed:
@@ -57,21 +52,22 @@ class Perturbed:
 
 def perturbed_series(coefficients: Array, degrees: Integers, widths: Array, momentum: float) -> Array:
     """Chebyshev series (P, n, 9) of degrees (P,) on panels of widths (P,) [s], for momenta of this magnitude."""
-    sizes = (spectral_norms(coefficients) @ np.array([momentum, 1.0])) * widths[:, None]
-    changed = coefficients.copy()
-    for degree in np.unique(degrees):
-        if degree < _LEAST_DEGREE:
-            continue
-        rows = np.flatnonzero(degrees == degree)
-        x = sizes[rows, : degree + 1]
-        late, start = x[:, degree - 1 :].max(axis=1), max(1, min(3 * int(degree) // 5, int(degree) - _LEAST_DEGREE))
-        middle = np.maximum(x[:, start : degree - 1].max(axis=1), late)
-        decay = (np.maximum(late, _TINY) / np.maximum(middle, _TINY)) ** (1.0 / (degree - 1 - start))
-        decay = np.minimum(decay, _SLOWEST)
-        # Where the body turns as fast as the series swings, what aliases to lower degrees weighs more.
-        fast = 2.0 * x.sum(axis=1) / degree
-        missing = _SAFETY_FACTOR * (1.0 + _FEW_TERMS / degree) * decay / (1.0 - decay) * (1.0 + fast * fast)
-        # Rounding is as large in the terms that are missing as in the last ones, and no larger.
-        missing = np.where(late <= _ROUNDING * x.max(axis=1), 1.0, np.minimum(missing, _SAFETY_FACTOR * degree))
-        changed[rows, degree + 1 - _LAST : degree + 1] *= (1.0 - missing)[:, None, None]
-    return changed
+    if engine.is_ready():
+        return series_with_changed_ends(coefficients, degrees, widths, momentum)
+    x = (spectral_norms(coefficients) @ np.array([momentum, 1.0])) * widths[:, None]
+    terms, degree = np.arange(x.shape[1]), degrees[:, None]
+    start = np.maximum(1, np.minimum(3 * degrees // 5, degrees - LEAST_DEGREE))
+    is_last = (terms > degree - LAST_TERMS) & (terms <= degree)
+    is_middle = (terms >= start[:, None]) & (terms < degree - 1)
+    late, middle = (x * is_last).max(axis=1), (x * is_middle).max(axis=1)
+    middle = np.maximum(middle, late)
+    power = 1.0 / np.maximum(degrees - 1 - start, 1)
+    decay = np.minimum((np.maximum(late, TINY) / np.maximum(middle, TINY)) ** power, SLOWEST_DECAY)
+    # Where the body turns as fast as the series swings, what aliases to lower degrees weighs more.
+    count = np.maximum(degrees, 1)
+    fast = 2.0 * x.sum(axis=1) / count
+    missing = MISSING_FACTOR * (1.0 + FEW_TERMS / count) * decay / (1.0 - decay) * (1.0 + fast * fast)
+    # Rounding is as large in the terms that are missing as in the last ones, and no larger.
+    missing = np.where(late <= ROUNDED_TERM * x.max(axis=1), 1.0, np.minimum(missing, MISSING_FACTOR * degrees))
+    changes = is_last & (degree >= LEAST_DEGREE)
+    return coefficients * np.where(changes, 1.0 - missing[:, None], 1.0)[:, :, None]

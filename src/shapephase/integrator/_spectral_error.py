@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 from math import expm1, inf, isfinite, log
 from operator import mul
 from typing import Any, NamedTuple
@@ -11,26 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import run_progress
-from ..arrays import Array, Mask
+from ..arrays import Array, Integers, Mask
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from .casadi_calls import map_rows
+from .fast.estimate_constants import CONVERGED_TAIL, EPS, LEAST_OF_FLOOR, ROUNDING, TINY, UNAVERAGED_PHASE
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 # The channels in one call, or None where that cannot be done: (N,) -> (N, 9).
 Directly = Callable[[Array], Array | None]
 
-EPS = float(np.finfo(float).eps)
-# Rounding of a coefficient, relative to the largest: samples are right to some ten units, and their sums to thirty.
-_ROUNDING = 30.0 * EPS
-# Keeps quotients and logarithms of coefficients defined where these are zero.
-_TINY = 1e-300
-# Chebyshev degrees still missing beyond the tail of at most this part of the spectrum's middle count as convergence.
-_CONVERGED_TAIL = 1e-2
-# Of the floor: what a spectrum's estimate is at least, since tails can be small by chance.
-_LEAST_OF_FLOOR = 0.02
-# [rad] phase of the missing terms, beyond the body's turn, over which they do not average out.
-_UNAVERAGED_PHASE = 8.0
 # Times in one call of the body: some seconds of work at most, and its arrays stay within some hundred MB.
 _AT_ONCE = 16_384
 # Numbers in spectra whose norms are computed together: their squares take ten megabytes.
@@ -126,7 +115,7 @@ def tail_length(degree: int) -> int:
 
 
 def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
-    """As `estimate_spectrum`, for one series with the norms of its coefficients at degrees 0, 1, 2 ..."""
+    """As `estimate_spectra`, for one series with the norms of its coefficients at degrees 0, 1, 2 ..."""
     degree = len(norms) - 1
     largest = max(norms)
     if degree == 0:
@@ -134,14 +123,14 @@ def estimate_tail(norms: list[float], time_rounding: float) -> TailEstimate:
             error=0.0, decay=inf, converging=True, at_rounding=True, largest=largest, floor=EPS * largest, tail=0.0
         )
     tail, middle = max(norms[-tail_length(degree) :]), max(norms[degree // 2 - 1 : degree // 2 + 2])
-    floor = _ROUNDING * largest + 4.0 * time_rounding * sum(map(mul, norms, range(degree + 1)))
+    floor = ROUNDING * largest + 4.0 * time_rounding * sum(map(mul, norms, range(degree + 1)))
     decay = log(middle / tail) * 2.0 / degree if middle > tail > 0.0 else 0.0
     beyond_tail = 2.0 * tail / expm1(decay) if decay > 0.0 else inf
     at_noise_floor = tail <= floor
     return TailEstimate(
-        error=max(min(beyond_tail, (2.0 if at_noise_floor else degree) * tail), _LEAST_OF_FLOOR * floor),
+        error=max(min(beyond_tail, (2.0 if at_noise_floor else degree) * tail), LEAST_OF_FLOOR * floor),
         decay=inf if at_noise_floor else decay,
-        converging=at_noise_floor or tail < _CONVERGED_TAIL * middle,
+        converging=at_noise_floor or tail < CONVERGED_TAIL * middle,
         # More samples of a loop cost little, and only they show what is truly rounding.
         at_rounding=tail <= 0.05 * floor,
         largest=largest,
@@ -156,84 +145,95 @@ def unaveraged_share(converging: bool, phase: float, turn: float) -> float:
     The missing terms of the series run through `phase` or more [rad] while the body turns by `turn`. Only a quarter of
     the averaging is relied on; the error of a kink does not average out at all.
     """
-    return min(1.0, _UNAVERAGED_PHASE / max(phase - turn, _UNAVERAGED_PHASE)) if converging else 1.0
+    return min(1.0, UNAVERAGED_PHASE / max(phase - turn, UNAVERAGED_PHASE)) if converging else 1.0
 
 
-def averaged_share(phase: float, turn: Array) -> Array:
+def averaged_share(phase: Array, turn: Array) -> Array:
     """The same for many panels that converge: (G,) -> (G,)."""
-    return np.minimum(1.0, _UNAVERAGED_PHASE / np.maximum(phase - turn, _UNAVERAGED_PHASE))
+    return np.minimum(1.0, UNAVERAGED_PHASE / np.maximum(phase - turn, UNAVERAGED_PHASE))
 
 
-@dataclass(frozen=True, eq=False)
-class SpectralEstimate:
-    """Error estimates from the spectra of some panels: (G,) each."""
+# Columns of the table of a `SpectralEstimate`.
+_INVERSE, _DRIFT, _DECAY, _CONVERGING, _AT_ROUNDING, _INVERSE_NORM, _DRIFT_NORM, _FLOOR = range(8)
 
-    inverse: Array  # error estimate of I^-1
-    drift: Array  # error estimate of I^-1 L_o
-    decay: Array  # of the spectrum, per degree; the slower one
-    converging: Mask
-    at_rounding: Mask
-    inverse_norm: Array
-    drift_norm: Array
-    floor: Array  # (G, 2) the part of rounding alone
 
-    def error(self, momentum: float, width: Array, phase: float) -> Array:
+class SpectralEstimate(NamedTuple):
+    """Error estimates from the spectra of some panels: (G, 9), a row for each."""
+
+    table: Array
+
+    @property
+    def decay(self) -> Array:
+        """Of the spectrum, per degree; the slower one: (G,)."""
+        return self.table[:, _DECAY]
+
+    @property
+    def at_rounding(self) -> Mask:
+        """(G,)."""
+        return self.table[:, _AT_ROUNDING] > 0.0
+
+    @property
+    def inverse_norm(self) -> Array:
+        """The largest term of I^-1: (G,)."""
+        return self.table[:, _INVERSE_NORM]
+
+    @property
+    def drift_norm(self) -> Array:
+        """The largest term of I^-1 L_o: (G,)."""
+        return self.table[:, _DRIFT_NORM]
+
+    def error(self, momentum: float, width: Array, phase: Array) -> Array:
         """Attitude error caused by the interpolation error: (G,) [rad]; it averages out as in `unaveraged_share`."""
-        rate = momentum * self.inverse + self.drift
+        rate = momentum * self.table[:, _INVERSE] + self.table[:, _DRIFT]
         turn = width * (momentum * self.inverse_norm + self.drift_norm)
-        return 0.5 * width * rate * np.where(self.converging, averaged_share(phase, turn), 1.0)
+        converging = self.table[:, _CONVERGING] > 0.0
+        return 0.5 * width * rate * np.where(converging, averaged_share(phase, turn), 1.0)
 
-    def raised_to(self, gaps: Array, seen: Mask) -> SpectralEstimate:
-        """The same with errors at least as large as gaps that were seen (G, 2), which do not average out."""
-        return replace(
-            self,
-            inverse=np.maximum(self.inverse, gaps[:, 0]),
-            drift=np.maximum(self.drift, gaps[:, 1]),
-            converging=self.converging & ~seen,
-            at_rounding=self.at_rounding & np.all(gaps <= 4.0 * self.floor, axis=1),
-        )
+    def some(self, rows: Mask) -> SpectralEstimate:
+        """Of some panels."""
+        return SpectralEstimate(self.table[rows])
+
+    def raised_to(self, gaps: Array, rows: Integers) -> SpectralEstimate:
+        """With errors of some panels (R,) at least as large as gaps that were seen (R, 2), which do not average out."""
+        table = self.table.copy()
+        table[rows, :_DECAY] = np.maximum(table[rows, :_DECAY], gaps)
+        table[rows, _CONVERGING] = 0.0
+        table[rows, _AT_ROUNDING] *= np.all(gaps <= 4.0 * table[rows, _FLOOR:], axis=1)
+        return SpectralEstimate(table)
 
 
-def estimate_spectrum(norms: Array, time_rounding: Array | float) -> SpectralEstimate:
-    """Error estimates from the tails of spectra; norms (G, degree + 1, 2) of I^-1 and of I^-1 L_o.
+def estimate_spectra(norms: Array, degree: Integers, time_rounding: Array) -> SpectralEstimate:
+    """Error estimates from the tails of spectra; norms (G, n, 2) of I^-1 and of I^-1 L_o, zero above the degree (G,).
 
-    `time_rounding` is the rounding of the sample times in units of half a panel (or of a radian): it limits the
+    `time_rounding` (G,) is the rounding of the sample times in units of half a panel: it limits the
     accuracy of samples of a fast motion.
     """
-    degree = norms.shape[1] - 1
-    if degree == 0:
-        zero = np.zeros(len(norms))
-        certain = zero == 0.0
-        return SpectralEstimate(
-            inverse=zero,
-            drift=zero,
-            decay=zero + np.inf,
-            converging=certain,
-            at_rounding=certain,
-            inverse_norm=norms[:, 0, 0],
-            drift_norm=norms[:, 0, 1],
-            floor=norms[:, 0] * EPS,
-        )
-    centre, last_tenth = degree // 2, degree + 1 - tail_length(degree)
-    parts = np.maximum.reduceat(norms, (0, centre - 1, centre + 2, last_tenth), axis=1)
-    largest, middle, tail = parts.max(axis=1), parts[:, 1], parts[:, 3]
-    floor = _ROUNDING * largest + (4.0 * np.reshape(time_rounding, (-1, 1))) * (np.arange(degree + 1) @ norms)
-    decay = np.log(np.maximum(middle, _TINY) / np.maximum(tail, _TINY)) * (2.0 / degree)
+    terms, ends, most = np.arange(norms.shape[1]), degree[:, None], np.maximum(degree, 1)[:, None]
+    is_tail = terms > ends - np.maximum(2, ends // 10)
+    is_middle = np.abs(terms - ends // 2) <= 1
+    largest = norms.max(axis=1)
+    tail, middle = ((norms * part[:, :, None]).max(axis=1) for part in (is_tail, is_middle))
+    floor = ROUNDING * largest + (4.0 * time_rounding)[:, None] * (terms.astype(np.float64) @ norms)
+    decay = np.log(np.maximum(middle, TINY) / np.maximum(tail, TINY)) * (2.0 / most)
     # The rest of a geometric series with this decay beyond its last term; twice, for aliasing.
-    beyond_tail = 2.0 * tail / np.expm1(np.maximum(decay, _TINY))
+    beyond_tail = 2.0 * tail / np.expm1(np.maximum(decay, TINY))
     at_noise_floor = tail <= floor
     # A tail at the noise floor shows no decay any more; the terms beyond it are smaller than it.
-    error = np.maximum(np.minimum(beyond_tail, np.where(at_noise_floor, 2.0, degree) * tail), _LEAST_OF_FLOOR * floor)
-    return SpectralEstimate(
-        inverse=error[:, 0],
-        drift=error[:, 1],
-        decay=np.where(at_noise_floor, np.inf, np.maximum(decay, 0.0)).min(axis=1),
-        converging=(at_noise_floor | (tail < _CONVERGED_TAIL * middle)).all(axis=1),
-        at_rounding=at_noise_floor.all(axis=1),
-        inverse_norm=largest[:, 0],
-        drift_norm=largest[:, 1],
-        floor=floor,
-    )
+    error = np.maximum(np.minimum(beyond_tail, np.where(at_noise_floor, 2.0, most) * tail), LEAST_OF_FLOOR * floor)
+    table = np.empty((len(norms), 9))
+    table[:, :_DECAY] = error
+    table[:, _DECAY] = np.where(at_noise_floor, np.inf, np.maximum(decay, 0.0)).min(axis=1)
+    table[:, _CONVERGING] = (at_noise_floor | (tail < CONVERGED_TAIL * middle)).all(axis=1)
+    table[:, _AT_ROUNDING] = at_noise_floor.all(axis=1)
+    table[:, _INVERSE_NORM:_FLOOR] = largest
+    table[:, _FLOOR:] = floor
+    constant = degree == 0
+    if constant.any():
+        table[constant, :_DECAY] = 0.0
+        table[constant, _DECAY] = np.inf
+        table[constant, _CONVERGING : _AT_ROUNDING + 1] = 1.0
+        table[constant, _FLOOR:] = EPS * largest[constant]
+    return SpectralEstimate(table)
 
 
 def spectral_norms(coefficients: Array) -> Array:

@@ -8,10 +8,11 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ._spectral_error import spectral_norms
+from .fast import engine
+from .fast.estimate_constants import DEGREES_A_RADIAN, MOST_TURN, ORDER, SIGNIFICANT
+from .fast.panels import sizes_of_terms
 from .interpolant import Interpolant
 
-# Of the formula.
-ORDER = 8.0
 # Significant Chebyshev degrees of a panel that one step may span, so that half as many steps still see all of them.
 _DEGREES_A_STEP = 2.4
 # The error of the steps, as a part of their distance from half as many. An eighth-order formula would allow 1/255; that
@@ -37,16 +38,10 @@ _SHORT_TURN_A_STEP = 0.6
 _FAR = 25.0
 # [rad] the same of short steps; they were right to 3 % in turns of half as much, and to 30 % in the double.
 _VERY_FAR = 100.0
-# [rad] on a panel, that a plan of steps is made for.
-_MOST_TURN = 1e9
-# A term of the rate of turning, times the panel's width, is significant above this part of the tolerance.
-_SIGNIFICANT = 0.2
 # The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
 # each the sum of its terms times the eighth power of their degree over half the steps. Three of four random motions
 # need no more.
 _DISTANCE = 10.0**-8.1
-# What a radian turned on a panel adds to the degrees of its series: they swing as seen from space.
-_DEGREES_A_RADIAN = 0.6
 # Of the tolerance: the distance that is planned for; its part that counts is far smaller, and so is the usual one.
 _AIM = 40.0
 
@@ -76,23 +71,14 @@ class StepRequirements(NamedTuple):
     @classmethod
     def from_interpolant(cls, interpolant: Interpolant, magnitude: float, tolerance: float) -> StepRequirements:
         """For momenta up to a magnitude [kg m^2/s] and a tolerance [rad]."""
-        count, degrees, _ = interpolant.coefficients.shape
-        edges = interpolant.edges[: count + 1]
-        widths = (edges[1:] - edges[:-1])[:, None]
-        rates = (spectral_norms(interpolant.coefficients) @ np.array([magnitude, 1.0])) * widths
-        degree, turn = np.arange(float(degrees)), rates.sum(axis=1)
-        last = ((rates > _SIGNIFICANT * tolerance) * degree).max(axis=1)
-        swinging = rates
-        if not magnitude:
-            # Without momentum a steady turn is exact.
-            swinging = rates.copy()
-            swinging[:, 0] = 0.0
-        # More turns than can be stepped are refused, and their powers would overflow.
-        seen = degree + (_DEGREES_A_RADIAN * np.minimum(turn, _MOST_TURN))[:, None] if magnitude else degree
+        coefficients, edges = interpolant.coefficients, interpolant.edges
+        widths, least = np.diff(edges[: len(coefficients) + 1]), SIGNIFICANT * tolerance
+        find = sizes_of_terms if engine.is_ready() else _sizes_of_terms
+        rates, (turn, swing, degree) = find(coefficients, widths, magnitude, least)
         return cls(
             turn=turn,
-            swing=(swinging * seen**ORDER).sum(axis=1),
-            degree=last,
+            swing=swing,
+            degree=degree,
             rates=rates,
             whole_turn=interpolant.loops * float(turn.sum()),
             tolerance=tolerance,
@@ -134,6 +120,21 @@ class StepRequirements(NamedTuple):
         by_chance = self.tolerance * np.interp(most, _CHANCE_DEGREES, _CHANCE_PARTS)
         part = np.exp(np.interp(most, _DEGREES, np.log(_PARTS)))
         return np.maximum(part * distance, np.minimum(by_chance, _MOST_BY_CHANCE * distance))
+
+
+def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
+    """As `fast.panels.sizes_of_terms`."""
+    rates = (spectral_norms(coefficients) @ np.array([magnitude, 1.0])) * widths[:, None]
+    degree, turn = np.arange(float(rates.shape[1])), rates.sum(axis=1)
+    last = ((rates > least) * degree).max(axis=1)
+    swinging = rates
+    if not magnitude:
+        # Without momentum a steady turn is exact.
+        swinging = rates.copy()
+        swinging[:, 0] = 0.0
+    # More turns than can be stepped are refused, and their powers would overflow.
+    seen = degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None] if magnitude else degree
+    return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
 
 
 def even_steps(planned: Array, subdivide: Integers | int) -> Integers:

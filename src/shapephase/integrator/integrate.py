@@ -18,7 +18,8 @@ from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._error_propagator import amplification, exact_propagators, rounding_error
-from ._step_control import ORDER, StepRequirements, even_steps
+from ._step_control import StepRequirements, even_steps
+from .fast.estimate_constants import ORDER
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .interpolant import Interpolant
 from .sampling import Sampler

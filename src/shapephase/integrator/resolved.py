@@ -41,11 +41,24 @@ class FirstPanels:
 
 
 class Hidden(NamedTuple):
-    """What the nodes of panels do not show of a path: (P, 2) of the shapes and of their rates times half the width."""
+    """What the nodes of panels do not show of a path: (P, 5), shapes and rates times half the width, rates second."""
 
-    higher: Array  # terms of higher degrees, which swing and mostly average out
-    misfit: Array  # what series on these panels cannot follow
-    noise: Array  # (P,) the larger of both
+    table: Array
+
+    @property
+    def higher(self) -> Array:
+        """Terms of higher degrees, which swing and mostly average out: (P, 2)."""
+        return self.table[:, :2]
+
+    @property
+    def misfit(self) -> Array:
+        """What series on these panels cannot follow: (P, 2)."""
+        return self.table[:, 2:4]
+
+    @property
+    def noise(self) -> Array:
+        """The larger of both: (P,)."""
+        return self.table[:, 4]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +85,7 @@ class ResolvedPath:
     roots: Integers
     duration: float
     _first: dict[float, FirstPanels] = field(default_factory=dict, init=False, repr=False)
-    _hidden: dict[tuple[int, bytes, bytes], Hidden] = field(default_factory=dict, init=False, repr=False)
+    _hidden: dict[tuple[bytes, bytes, bytes], Hidden] = field(default_factory=dict, init=False, repr=False)
 
     __post_init__ = lock_arrays
 
@@ -111,25 +124,30 @@ class ResolvedPath:
             halved = self.children[rows[splits[rows]]]
             rows = np.concatenate([halved, halved + 1])
         chosen = np.concatenate(kept)
+        chosen = chosen[np.argsort(self.left[chosen])]
         return FirstPanels(degree[chosen], self.left[chosen], self.right[chosen])
 
-    def hidden(self, left: Array, right: Array, degree: int) -> Hidden:
-        """What of the path lies beyond a degree on panels (P,) [rad]."""
-        key = degree, left.tobytes(), right.tobytes()
+    def hidden(self, left: Array, right: Array, degree: Integers) -> Hidden:
+        """What of the path lies beyond the degrees (P,) of panels [rad]; of degree zero nothing does."""
+        key = degree.tobytes(), left.tobytes(), right.tobytes()
         if key not in self._hidden:
             _remember(self._hidden, key, self._found_hidden(left, right, degree))
         return self._hidden[key]
 
-    def _found_hidden(self, left: Array, right: Array, degree: int) -> Hidden:
-        rows = self._smallest_around(left, right)
-        nodes = 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(_TEST_DEGREE)
+    def _found_hidden(self, left: Array, right: Array, degree: Integers) -> Hidden:
+        rows, half = self._smallest_around(left, right), 0.5 * (right - left)
+        nodes = 0.5 * (left + right)[:, None] + half[:, None] * unit_nodes(_TEST_DEGREE)
         local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])
         values = chebyshev(local, DEGREE + 1) @ self.coefficients[rows]
         series = np.abs(values_to_coefficients(_TEST_DEGREE) @ values)
-        beyond = series[:, degree + 1 :].sum(axis=1) if degree < _TEST_DEGREE else 0.0 * series[:, 0]
-        shapes, rates = beyond[:, : self._n_shape], beyond[:, self._n_shape :]
-        largest = [shapes.max(axis=1, initial=0.0), 0.5 * (right - left) * rates.max(axis=1, initial=0.0)]
-        return Hidden(np.stack(largest, axis=1), self.misfit[rows], self.noise[rows])
+        series *= (np.arange(_TEST_DEGREE + 1) > degree[:, None])[:, :, None]
+        beyond = series.sum(axis=1)
+        table = np.empty((len(left), 5))
+        table[:, 0] = beyond[:, : self._n_shape].max(axis=1, initial=0.0)
+        table[:, 1] = half * beyond[:, self._n_shape :].max(axis=1, initial=0.0)
+        table[:, 2:4], table[:, 4] = self.misfit[rows], self.noise[rows]
+        table[degree == 0] = 0.0
+        return Hidden(table)
 
     def reversed(self) -> ResolvedPath:
         """Of the path in the opposite order of time."""

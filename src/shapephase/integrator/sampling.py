@@ -15,10 +15,10 @@ import numpy as np
 from ..arrays import Array
 from ._even_sampling import EvenSampler
 from ._last_terms import Perturbed
-from ._panel_sampling import PanelSampler
 from ._spectral_error import Channels, Directly, Evaluate
 from .fast import engine
 from .interpolant import Interpolant
+from .panels.panel_sampling import PanelSampler
 from .recorded.knot_path import KnotPath
 from .recorded.knot_sampling import KnotSampler
 from .resolved import ResolvedPath

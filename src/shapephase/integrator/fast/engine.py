@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import marches, tree, variants
+from . import marches, panels, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, may_compile
 
@@ -25,6 +25,10 @@ _KERNELS = {
     "march_variants": "._variant_kernel",
     "largest_growths": "._growth_kernel",
     "step_derivatives": "._derivative_kernel",
+    "series_of_panels": "._panel_kernel",
+    "errors_of_panels": "._panel_kernel",
+    "change_ends": "._panel_kernel",
+    "sizes_of_terms": "._panel_kernel",
 }
 """And the modules that they are in."""
 # A version of Numba that does not go with this NumPy or this Python says so in many ways.
@@ -127,4 +131,5 @@ def _warm() -> None:
     """Call every kernel, so that it is loaded, or compiled and kept."""
     tree.warm()
     marches.warm()
+    panels.warm()
     variants.warm()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Array, Mask
 from .._last_terms import perturbed_series
-from .._panel_sampling import PanelGroup, PanelSampler, PanelsToSample, hidden_errors, panel_group, sum_of_noise
+from ..panels.panel_sampling import PanelSampler
+from ..panels.panel_series import panel_errors, sum_of_noise
 from ..resolved import Hidden
 
 
@@ -39,54 +40,27 @@ class SharedPanels:
 
     def __init__(self, sampler: PanelSampler) -> None:
         interpolant = sampler.interpolant()
-        self._parts = sampler.panels
-        self._order = np.argsort(np.concatenate([panels.left for panels, _ in self._parts]))
-        degrees = np.concatenate([np.full(len(panels.left), panels.degree) for panels, _ in self._parts])
-        self.degrees = degrees[self._order]
+        self._sampler, self._panels, self._hidden = sampler, sampler.series, sampler.hidden
+        self.degrees, self.widths = self._panels.degree, self._panels.width
         self.edges, self.loops = interpolant.edges, interpolant.loops
-        self.widths = np.diff(interpolant.edges[: len(self._order) + 1])
-        self.times = np.concatenate([panels.new_points().ravel() for panels, _ in self._parts])
+        self.times = sampler.sample_times
 
     def series(self, channels: Array, momentum: float) -> ManySeries:
         """Of deformations whose channels at the times are (V, S, 9), for momenta of this magnitude."""
-        count, terms = len(channels), int(self.degrees.max()) + 1
-        coefficients = np.zeros((count, len(self._order), terms, 9))
-        error, hidden, noises, start, first = np.zeros(count), np.zeros(count), [np.zeros((count, 1))], 0, 0
-        for panels, of_path in self._parts:
-            degree, each = panels.degree, len(panels.left)
-            stop, last = start + each * (degree + 1), first + each
-            g = _repeated(panels, channels[:, start:stop])
-            coefficients[:, first:last, : degree + 1] = g.coefficients.reshape(count, each, degree + 1, 9)
-            errors = g.estimate.error(momentum, g.width, 2.0 * degree)
-            if of_path is not None:
-                between, noise = hidden_errors(_tiled(of_path, count), g, momentum)
-                errors = np.maximum(errors, between)
-                hidden += _sums(between.reshape(count, each))
-                noises.append(noise.reshape(count, each))
-            error += _sums(errors.reshape(count, each))
-            start, first = stop, last
-        noise = np.array([sum_of_noise(row) for row in np.concatenate(noises, axis=1)])
-        coefficients = coefficients[:, self._order]
-        degrees, widths = np.tile(self.degrees, count), np.tile(self.widths, count)
-        changed = perturbed_series(coefficients.reshape(-1, terms, 9), degrees, widths, momentum)
+        count, each = len(channels), len(self.degrees)
+        ends = (np.tile(part, count) for part in (self._panels.left, self._panels.right))
+        values = np.array(channels, dtype=np.float64).reshape(-1, 9)
+        found = self._sampler.through(np.tile(self.degrees, count), *ends, values)
+        hidden = None if self._hidden is None else Hidden(np.tile(self._hidden.table, (count, 1)))
+        errors = panel_errors(found, hidden, momentum)
+        noise = np.array([sum_of_noise(row) for row in errors.noise.reshape(count, each)])
+        changed = perturbed_series(found.coefficients, found.degree, found.width, momentum)
         return ManySeries(
-            coefficients=coefficients,
-            perturbed=changed.reshape(coefficients.shape),
-            error=self.loops * (error + noise),
-            hidden=self.loops * (hidden + noise),
+            coefficients=found.coefficients.reshape(count, each, -1, 9),
+            perturbed=changed.reshape(count, each, -1, 9),
+            error=self.loops * (_sums(errors.whole.reshape(count, each)) + noise),
+            hidden=self.loops * (_sums(errors.hidden.reshape(count, each)) + noise),
         )
-
-
-def _repeated(panels: PanelsToSample, channels: Array) -> PanelGroup:
-    """The panels once for each of many deformations, whose channels there are (V, G (degree + 1), 9)."""
-    count = len(channels)
-    tiled = replace(panels, left=np.tile(panels.left, count), right=np.tile(panels.right, count))
-    values = tiled.with_values(channels.reshape(len(tiled.left), panels.degree + 1, 9))
-    return panel_group(panels.degree, tiled.left, tiled.right, values)
-
-
-def _tiled(hidden: Hidden, count: int) -> Hidden:
-    return Hidden(*(np.concatenate([part] * count) for part in hidden))
 
 
 def _sums(rows: Array) -> Array:

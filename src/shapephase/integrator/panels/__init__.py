@@ -1,0 +1,1 @@
+"""Deformations sampled on panels between their breaks."""

@@ -1,0 +1,259 @@
+"""Any deformation sampled on panels between its breaks, at nested Chebyshev points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from ...arrays import Array, Integers, Mask
+from ...chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
+from ...errors import AccuracyNotReached
+from .._last_terms import Perturbed, perturbed_series
+from .._spectral_error import Channels, spectral_norms
+from ..interpolant import Interpolant
+from ..resolved import Hidden, ResolvedPath
+from .panel_series import (
+    PanelErrors,
+    PanelSeries,
+    joined,
+    panel_errors,
+    sample_starts,
+    sample_times,
+    series_through,
+    sum_of_noise,
+)
+
+# Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
+_FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
+# Panels that are a few.
+_FEW = 4
+# Of both halves of a bisected panel: enough to see how fast the spectrum decays.
+_HALF_DEGREE = 10
+# The highest of a panel; bisecting needs fewer samples than a higher degree.
+_HIGHEST_DEGREE = 80
+# How many times the degree can be raised by at once.
+_MOST_RAISED = 4
+# Panels before bisecting ends, besides 40 for every break: a motion that needs more is rough, not merely long.
+_MOST_PANELS = 4000
+# Of the tolerance: what the first panels may leave hidden of a path that is resolved.
+_HIDDEN_SHARE = 0.1
+# Of a panel, relative to the interval: narrower ones would consist of rounding.
+_LEAST_WIDTH = 1e-13
+# Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
+_TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
+
+
+class PanelSampler:
+    """Samples on panels between the breaks, at nested Chebyshev points."""
+
+    def __init__(
+        self,
+        channels: Channels,
+        breaks: Array,
+        loops: int,
+        oscillations: float | None,
+        probe: Callable[[Array], Array] | None,
+        resolved: ResolvedPath | None = None,
+        *,
+        checked: bool = False,
+    ) -> None:
+        self._channels, self._probe, self._loops, self._resolved = channels, probe, loops, resolved
+        self._is_bandlimited = oscillations is not None or (resolved is not None and not checked)
+        self._breaks, self._oscillations = breaks, oscillations
+        self._end, self._span = float(breaks[-1]), float(breaks[-1] - breaks[0])
+        self._most_panels = _MOST_PANELS + 40 * len(breaks)
+        self._series: PanelSeries | None = None
+        self._errors: tuple[float, PanelErrors] | None = None
+        self._interpolant: Interpolant | None = None
+
+    def refine(self, momentum: float, tolerance: float) -> None:
+        """As `Sampler.refine`."""
+        if self._series is None:
+            self._keep(self._sampled(*self._first_panels(tolerance)))
+        while True:
+            errors = self._errors_at(momentum)
+            total = self._loops * float(errors.whole.sum())
+            if total <= tolerance:
+                if self._is_bandlimited or not self._check_between_nodes():
+                    return
+                continue
+            series = self.series
+            share = tolerance / (self._span * self._loops) * series.width
+            rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
+            if not rough.any():
+                return
+            self._refine_panels(rough, errors.whole, share, tolerance, total)
+
+    @property
+    def series(self) -> PanelSeries:
+        """All panels so far, of which `refine` makes the first."""
+        if self._series is None:
+            raise RuntimeError("nothing is sampled before `refine` was called")
+        return self._series
+
+    @property
+    def hidden(self) -> Hidden | None:
+        """What a resolved path has beyond the nodes of these panels; None: nothing is known of that."""
+        if self._resolved is None:
+            return None
+        series = self.series
+        return self._resolved.hidden(series.left, series.right, series.degree)
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether its interpolant is compared with the deformation between the nodes."""
+        return not self._is_bandlimited
+
+    @property
+    def sample_times(self) -> Array:
+        """Where the panels so far are sampled: (S,) [s]."""
+        series = self.series
+        return sample_times(series.degree, series.left, series.right, self._end)
+
+    def through(self, degree: Integers, left: Array, right: Array, values: Array) -> PanelSeries:
+        """The series of other deformations on panels of this sampler, from their values at its times."""
+        return series_through(degree, left, right, values, self._end, np.ones(len(degree), dtype=np.bool_))
+
+    def error(self, momentum: float) -> float:
+        """As `Sampler.error`."""
+        errors = self._errors_at(momentum)
+        return self._loops * (float(errors.whole.sum()) + sum_of_noise(errors.noise))
+
+    def interpolant(self) -> Interpolant:
+        """As `Sampler.interpolant`."""
+        if self._interpolant is None:
+            series = self.series
+            edges = np.append(series.left, series.right[-1])
+            if self._loops > 1:
+                starts = edges[-1] * np.arange(self._loops)
+                edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
+            self._interpolant = Interpolant(edges, series.coefficients, self._loops, self._channels.count)
+        return self._interpolant
+
+    def perturbed(self, momentum: float) -> Perturbed:
+        """As `Sampler.perturbed`."""
+        series, errors = self.series, self._errors_at(momentum)
+        hidden = float(errors.hidden.sum()) + sum_of_noise(errors.noise)
+        if not self._is_bandlimited:
+            hidden += float((0.5 * series.width * (np.nan_to_num(series.gaps) @ np.array([momentum, 1.0]))).sum())
+        make = partial(perturbed_series, series.coefficients, series.degree, series.width, momentum)
+        return Perturbed(make, self._loops * hidden)
+
+    def _first_panels(self, tolerance: float) -> tuple[Integers, Array, Array]:
+        """Degrees and ends."""
+        if self._resolved is not None:
+            first = self._resolved.first_panels(_HIDDEN_SHARE * tolerance)
+            return first.degree, first.left, first.right
+        pieces = 4 if self._oscillations is None else max(1, int(np.ceil(self._oscillations / 2.0)))
+        left, right = self._breaks[:-1], self._breaks[1:]
+        if pieces > 1:
+            ends = np.linspace(left, right, pieces + 1, axis=1)
+            left, right = ends[:, :-1].ravel(), ends[:, 1:].ravel()
+        of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
+        degree = np.full(len(left), of_many if len(left) > _FEW else of_few)
+        degree[self._panels_at_rest(left, right)] = 0
+        return degree, left, right
+
+    def _refine_panels(self, rough: Mask, errors: Array, share: Array, tolerance: float, total: float) -> None:
+        """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
+        series = self.series
+        degree, width = series.degree[rough], series.width[rough]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            missing = np.log(np.maximum(errors[rough] / share[rough], 1.0)) / series.estimate.decay[rough]
+            # Without any missing degrees, the error was seen between the nodes: the degree is doubled.
+            times = np.ceil(np.nan_to_num(missing / degree, nan=0.0, posinf=9.9) + 0.9)
+        factor = np.clip(times, 2, _MOST_RAISED).astype(np.int64)
+        factor[(missing > 3.1 * degree) | (factor * degree > _HIGHEST_DEGREE)] = 0
+        halves = factor == 0
+        if halves.any():
+            narrow = (width[halves] < _LEAST_WIDTH * self._span).any()
+            if narrow or len(series.degree) > self._most_panels:
+                where = float(series.left[rough][halves][np.argmin(width[halves])])
+                raise AccuracyNotReached(
+                    f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
+                    f"{tolerance:.3g} was requested; declare the times of its jumps as breaks, smooth the data, or "
+                    "loosen the tolerance"
+                )
+        source = np.flatnonzero(rough)
+        raised, halved = source[~halves], source[halves]
+        left, right = series.left[halved], series.right[halved]
+        middle = 0.5 * (left + right)
+        new = self._sampled(
+            np.concatenate([series.degree[raised] * factor[~halves], np.full(2 * len(halved), _HALF_DEGREE)]),
+            np.concatenate([series.left[raised], left, middle]),
+            np.concatenate([series.right[raised], middle, right]),
+            raised,
+        )
+        self._keep(joined([series.kept(~rough), new]))
+
+    def _sampled(self, degree: Integers, left: Array, right: Array, known: Integers | None = None) -> PanelSeries:
+        """Panels sampled in one call; the first ones are those of the present series at `known`, of a higher degree."""
+        times, count = sample_times(degree, left, right, self._end), 0 if known is None else len(known)
+        if known is None or not count:
+            # What machine code computes in work arrays is overwritten by the next call.
+            return series_through(degree, left, right, self._channels(times).copy(), self._end, degree > 0)
+        old, starts = self.series, sample_starts(degree)
+        values, fresh = np.empty((len(times), 9)), np.ones(len(times), dtype=np.bool_)
+        factor, counts = degree[:count] // old.degree[known], old.degree[known] + 1
+        within = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+        again = np.repeat(starts[:count], counts) + within * np.repeat(factor, counts)
+        fresh[again] = False
+        values[again] = old.values[np.repeat(old.starts[known], counts) + within]
+        values[fresh] = self._channels(times[fresh])
+        # What was sampled before has had its ends corrected.
+        return series_through(degree, left, right, values, self._end, np.arange(len(degree)) >= count)
+
+    def _keep(self, series: PanelSeries) -> None:
+        self._series, self._errors, self._interpolant = series, None, None
+
+    def _errors_at(self, momentum: float) -> PanelErrors:
+        if self._errors is None or self._errors[0] != momentum:
+            self._errors = momentum, panel_errors(self.series, self.hidden, momentum)
+        return self._errors[1]
+
+    def _panels_at_rest(self, left: Array, right: Array) -> Mask:
+        """Panels on which nothing moves: one sample each is enough."""
+        at_rest = np.full(len(left), self._oscillations == 0.0)
+        if self._oscillations == 0.0 or self._probe is None:
+            return at_rest
+        for fractions in (_TEST_FRACTIONS[31:32], _TEST_FRACTIONS):
+            rows = np.flatnonzero(~at_rest) if len(fractions) == 1 else np.flatnonzero(at_rest)
+            times = left[rows, None] + (right - left)[rows, None] * fractions
+            seen = self._probe(times.ravel()).reshape(len(rows), len(fractions), -1)
+            at_rest[rows] = ~seen[:, :, seen.shape[-1] // 2 :].any(axis=(1, 2))
+            if not at_rest.any():
+                break
+        return at_rest
+
+    def _check_between_nodes(self) -> bool:
+        """Compare new panels of a black box with samples between their nodes. False: no panel was new."""
+        series = self.series
+        new = np.flatnonzero(np.isnan(series.gaps[:, 0]) & (series.degree > 0))
+        if not len(new):
+            return False
+        gaps = np.empty((len(new), 2))
+        for degree in np.unique(series.degree[new]).tolist():
+            of_degree = series.degree[new] == degree
+            rows = new[of_degree]
+            left, width = series.left[rows, None], series.width[rows, None]
+            points = self._suspicious_points(degree, series.left[rows], series.right[rows])
+            here = chebyshev(2.0 * points - 1.0, degree + 1) @ series.coefficients[rows, : degree + 1]
+            truth = self._channels((left + width * points).ravel()).reshape(*points.shape, 9)
+            gaps[of_degree] = spectral_norms(here - truth).max(axis=1)
+        self._keep(series.with_gaps(new, gaps))
+        return True
+
+    def _suspicious_points(self, degree: int, left: Array, right: Array) -> Array:
+        """Where in panels of a degree (in [0, 1]) the probe is farthest from its own interpolant: (R, k)."""
+        if self._probe is None:
+            return np.broadcast_to(_TEST_FRACTIONS[::16], (len(left), 4))
+        there = chebyshev(2.0 * _TEST_FRACTIONS - 1.0, degree + 1) @ values_to_coefficients(degree)
+        nodes = nodes_on(*inside(left, right), degree)
+        between = left[:, None] + (right - left)[:, None] * _TEST_FRACTIONS
+        seen, truth = (self._probe(t.ravel()).reshape(*t.shape, -1) for t in (nodes, between))
+        gap = np.abs(there @ seen - truth)
+        half = gap.shape[-1] // 2
+        worst = [np.argmax(part.max(axis=-1), axis=1) for part in (gap[..., :half], gap[..., half:])]
+        return _TEST_FRACTIONS[np.stack(worst, axis=-1)]

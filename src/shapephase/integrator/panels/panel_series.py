@@ -1,0 +1,201 @@
+"""Panels sampled at Chebyshev points, the series through the samples, and what these are off by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array, Integers, Mask
+from ...chebyshev import end_margin, nodes_of, values_to_coefficients
+from .._spectral_error import SpectralEstimate, averaged_share, estimate_spectra, spectral_norms
+from ..fast import engine
+from ..fast.estimate_constants import NOISE_FACTOR
+from ..fast.panels import errors_of_panels, series_of_panels
+from ..resolved import Hidden
+
+
+@dataclass(frozen=True, eq=False)
+class PanelSeries:
+    """Panels in the order of time, each of a degree of its own.
+
+    Attributes
+    ----------
+    degree, left, right : (P,) their ends [s]
+    values : (S, 9) channels at the ascending Chebyshev points, panel after panel
+    coefficients : (P, n, 9) of the Chebyshev series through them, padded with zeros
+    estimate : of their errors
+    gaps : (P, 2) errors seen between the nodes; NaN: not looked at
+    """
+
+    degree: Integers
+    left: Array
+    right: Array
+    values: Array
+    coefficients: Array
+    estimate: SpectralEstimate
+    gaps: Array
+
+    @cached_property
+    def width(self) -> Array:
+        """(P,) [s]."""
+        return self.right - self.left
+
+    @cached_property
+    def starts(self) -> Integers:
+        """The first sample of each panel, and their number: (P + 1,)."""
+        return sample_starts(self.degree)
+
+    def kept(self, rows: Mask) -> PanelSeries:
+        """Some of the panels."""
+        return PanelSeries(
+            degree=self.degree[rows],
+            left=self.left[rows],
+            right=self.right[rows],
+            values=self.values[np.repeat(rows, self.degree + 1)],
+            coefficients=self.coefficients[rows],
+            estimate=self.estimate.some(rows),
+            gaps=self.gaps[rows],
+        )
+
+    def with_gaps(self, rows: Integers, gaps: Array) -> PanelSeries:
+        """The same after a look between the nodes of some panels (R,), which found gaps (R, 2)."""
+        seen = self.gaps.copy()
+        seen[rows] = gaps
+        return PanelSeries(
+            degree=self.degree,
+            left=self.left,
+            right=self.right,
+            values=self.values,
+            coefficients=self.coefficients,
+            estimate=self.estimate.raised_to(2.0 * gaps, rows),
+            gaps=seen,
+        )
+
+
+class PanelErrors(NamedTuple):
+    """What panels are off by: (P,) each [rad]."""
+
+    whole: Array  # attitude error due to what lies between the samples
+    hidden: Array  # its part that a path which is resolved has beyond the nodes
+    noise: Array  # of that path
+
+
+def sample_starts(degree: Integers) -> Integers:
+    """The first sample of each panel, and their number: (P,) -> (P + 1,)."""
+    starts = np.zeros(len(degree) + 1, dtype=np.int64)
+    np.cumsum(degree + 1, out=starts[1:])
+    return starts
+
+
+def sample_times(degree: Integers, left: Array, right: Array, end: float) -> Array:
+    """The Chebyshev points of panels, one after another; the first and last moved to this side of a break: (S,) [s].
+
+    `end` : of all panels [s]
+    """
+    times, starts = nodes_of(left, right, degree), sample_starts(degree)
+    margin = np.where(degree > 0, end_margin(right - left, end), 0.0)
+    moved = degree > 0
+    times[starts[:-1][moved]] = (left + margin)[moved]
+    times[starts[1:][moved] - 1] = (right - margin)[moved]
+    return times
+
+
+def series_through(degree: Integers, left: Array, right: Array, values: Array, end: float, moved: Mask) -> PanelSeries:
+    """Through samples (S, 9), which are corrected in their place where the ends of panels were `moved` (P,)."""
+    shift = np.where(moved & (degree > 0), 2.0 * end_margin(right - left, end) / (right - left), 0.0)
+    rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
+    if engine.is_ready():
+        coefficients, table = series_of_panels(degree, values, shift, rounding)
+        estimate = SpectralEstimate(table)
+    else:
+        coefficients = _coefficients(degree, values, shift)
+        estimate = estimate_spectra(spectral_norms(coefficients), degree, rounding)
+    return PanelSeries(
+        degree=degree,
+        left=left,
+        right=right,
+        values=values,
+        coefficients=coefficients,
+        estimate=estimate,
+        gaps=np.full((len(degree), 2), np.nan),
+    )
+
+
+def _coefficients(degree: Integers, values: Array, shift: Array) -> Array:
+    """Of the series; the values at the ends are moved along their slopes by `shift` (P,) half widths."""
+    coefficients = np.zeros((len(degree), int(degree.max(initial=0)) + 1, 9))
+    starts = sample_starts(degree)[:-1]
+    for one in np.unique(degree).tolist():
+        rows = np.flatnonzero(degree == one)
+        alike = len(rows) == len(degree)
+        places = starts[rows, None] + np.arange(one + 1)
+        there = values.reshape(len(rows), one + 1, 9) if alike else values[places]
+        matrix = values_to_coefficients(one)
+        series = matrix @ there
+        if one and shift[rows].any():
+            slopes = end_slopes(one) @ series * (shift[rows, None, None] * _OUTWARDS)
+            series += matrix[:, [0, -1]] @ slopes
+            values[places[:, [0, -1]]] += slopes
+        coefficients[rows, : one + 1] = series
+    return coefficients
+
+
+# From this side of an end to the end itself, on the left and on the right.
+_OUTWARDS = np.array([[-1.0], [1.0]])
+
+
+@lru_cache(maxsize=64)
+def end_slopes(degree: int) -> Array:
+    """Chebyshev coefficients -> slopes at -1 and 1: (2, degree + 1)."""
+    degrees = np.arange(degree + 1.0)
+    return np.stack([(-1.0) ** (degrees + 1.0), np.ones_like(degrees)]) * degrees**2
+
+
+def joined(parts: list[PanelSeries]) -> PanelSeries:
+    """All panels of several series in the order of time."""
+    if len(parts) == 1:
+        return parts[0]
+    degree = np.concatenate([part.degree for part in parts])
+    left = np.concatenate([part.left for part in parts])
+    order, n = np.argsort(left), int(degree.max()) + 1
+    coefficients, row = np.zeros((len(left), n, 9)), 0
+    for part in parts:
+        coefficients[row : row + len(part.left), : part.coefficients.shape[1]] = part.coefficients[:, :n]
+        row += len(part.left)
+    starts, counts = sample_starts(degree)[:-1], (degree + 1)[order]
+    first = np.repeat(starts[order] - (np.cumsum(counts) - counts), counts)
+    return PanelSeries(
+        degree=degree[order],
+        left=left[order],
+        right=np.concatenate([part.right for part in parts])[order],
+        values=np.concatenate([part.values for part in parts])[first + np.arange(len(first))],
+        coefficients=coefficients[order],
+        estimate=SpectralEstimate(np.concatenate([part.estimate.table for part in parts])[order]),
+        gaps=np.concatenate([part.gaps for part in parts])[order],
+    )
+
+
+def panel_errors(series: PanelSeries, hidden: Hidden | None, momentum: float) -> PanelErrors:
+    """Of an attitude, for a momentum of this magnitude; hidden: as the series' panels have it, None: nothing is."""
+    estimate, width = series.estimate, series.width
+    if engine.is_ready():
+        found = errors_of_panels(series.degree, width, estimate.table, None if hidden is None else hidden.table, momentum)
+        return PanelErrors(*found)
+    phase = 2.0 * series.degree
+    of_series = estimate.error(momentum, width, phase)
+    if hidden is None:
+        return PanelErrors(of_series, np.zeros(len(width)), np.zeros(len(width)))
+    # A shape that is off turns the body by the inertia, for as long as the panel lasts.
+    turn = momentum * estimate.inverse_norm * width
+    share = averaged_share(phase, turn + width * estimate.drift_norm)
+    of_path = (share * hidden.higher[:, 0] + hidden.misfit[:, 0]) * turn + share * hidden.higher[:, 1]
+    of_path += hidden.misfit[:, 1]
+    return PanelErrors(np.maximum(of_series, of_path), of_path, hidden.noise * (1.0 + turn))
+
+
+def sum_of_noise(noise: Array) -> float:
+    """Of panels whose noise is independent of one another: (P,)."""
+    return min(float(noise.sum()), NOISE_FACTOR * float(np.sqrt((noise * noise).sum())))
