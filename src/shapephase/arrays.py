@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any, TypeVar
 
 import numpy as np
@@ -100,7 +99,7 @@ def read_only(array: AnyArray) -> AnyArray:
 
 def lock_arrays(result: Any) -> None:
     """Show the arrays among the fields of a frozen dataclass as read-only views: what they mean would change else."""
-    for field in dataclasses.fields(result):
-        value = getattr(result, field.name)
+    fields = result.__dict__
+    for name, value in fields.items():
         if isinstance(value, np.ndarray) and value.flags.writeable:
-            object.__setattr__(result, field.name, read_only(value))
+            fields[name] = read_only(value)

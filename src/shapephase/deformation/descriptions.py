@@ -170,11 +170,11 @@ class ArticulatedDescription(UngaugedDescription):
         return self.body.link_pose(shapes, link)[:, :3, :3], self.body.link_angular_velocity(shapes, rates, link)
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
-        return replace(self.path.smoothness, knots=self._knots)
+        return self._smoothness
 
     @cached_property
-    def _knots(self) -> KnotPath | None:
-        return recorded_path(self.body, self.path)
+    def _smoothness(self) -> Smoothness:
+        return replace(self.path.smoothness, knots=recorded_path(self.body, self.path))
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: what was found out about the path is found out again."""

@@ -13,14 +13,8 @@ from ._rotation_step import STAGES, attitude_step
 from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, momentum_step_function
 from .casadi_calls import call_casadi
 from .fast import engine
-from .fast.marches import amplifications, derivatives
-
-_EPS = float(np.finfo(float).eps)
-# Units of rounding: of the first attitude, of a step (at random), and of each radian turned; of 250 motions with errors
-# that are rounding alone none was above, and the median is a sixth.
-_BY_STARTING = 4.0
-_BY_A_STEP = 2.0
-_BY_A_RADIAN = 1.0
+from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
+from .fast.marches import amplifications, derivatives, sums_of_turns
 
 
 def amplification(propagators: Array) -> Array:
@@ -59,17 +53,21 @@ def rounding_error(propagators: Array, quaternions: Array, amplifications: Array
     amplifications : (B,) the largest growth of all
     least : [rad]; where an error is below by the largest growth alone, that is enough
     """
-    chords = quaternions[:, 1:] - quaternions[:, :-1]
-    turned = 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords))
-    count = turned.shape[1]
-    committed = _BY_STARTING + _BY_A_STEP * np.sqrt(count) + _BY_A_RADIAN * turned.sum(axis=1)
-    bound = _EPS * amplifications * committed
+    count = quaternions.shape[1] - 1
+    sums = sums_of_turns(quaternions) if engine.is_ready() else _turns(quaternions).sum(axis=1)
+    bound = EPS * amplifications * (ROUNDING_OF_START + ROUNDING_OF_STEP * np.sqrt(count) + ROUNDING_OF_RADIAN * sums)
     if propagators.shape[1] == 0:
         return bound
     large = (bound > least) & np.isfinite(bound)
     if large.any():
-        bound[large] = _rounding_at_worst(propagators[large], turned[large])
+        bound[large] = _rounding_at_worst(propagators[large], _turns(quaternions[large]))
     return bound
+
+
+def _turns(quaternions: Array) -> Array:
+    """How far each step turns: (B, K + 1, 4) -> (B, K) [rad]."""
+    chords = quaternions[:, 1:] - quaternions[:, :-1]
+    return 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords))
 
 
 def _rounding_at_worst(propagators: Array, turned: Array) -> Array:
@@ -83,7 +81,8 @@ def _rounding_at_worst(propagators: Array, turned: Array) -> Array:
     random = np.sqrt(growth * growth @ np.diff(marks).astype(np.float64))
     steady = np.einsum("bjk,bk->bj", growth, turned)
     largest = growth.max(axis=(1, 2), initial=1.0)
-    return _EPS * (_BY_STARTING * largest + (_BY_A_STEP * random + _BY_A_RADIAN * steady).max(axis=1))
+    committed = (ROUNDING_OF_STEP * random + ROUNDING_OF_RADIAN * steady).max(axis=1)
+    return EPS * (ROUNDING_OF_START * largest + committed)
 
 
 def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loops: int) -> Array:

@@ -10,7 +10,7 @@ from ..arrays import Array, Integers
 from ._spectral_error import spectral_norms
 from .fast import engine
 from .fast.estimate_constants import DEGREES_A_RADIAN, MOST_TURN, ORDER, SIGNIFICANT
-from .fast.panels import sizes_of_terms
+from .fast.panels import most_degrees, sizes_of_terms
 from .interpolant import Interpolant
 
 # Significant Chebyshev degrees of a panel that one step may span, so that half as many steps still see all of them.
@@ -20,7 +20,7 @@ _DEGREES_A_STEP = 2.4
 # a step spans of terms that are not small against the distance.
 _NOT_SMALL = 0.02
 _DEGREES = np.array([1.6, 1.9, 2.4, 3.0, 3.5, 5.0])
-_PARTS = np.array([1.0 / 80.0, 1.0 / 40.0, 1.0 / 12.0, 1.0 / 6.0, 1.0 / 4.0, 1.0])
+_LOGARITHMS = np.log([1.0 / 80.0, 1.0 / 40.0, 1.0 / 12.0, 1.0 / 6.0, 1.0 / 4.0, 1.0])
 # The distance of steps that span so many degrees may be small by chance: then the error is at least a part of the
 # tolerance, as far as the distance allows.
 _CHANCE_DEGREES = np.array([1.6, 2.4])
@@ -110,15 +110,10 @@ class StepRequirements(NamedTuple):
 
     def stepping_error(self, steps: Integers, distance: Array) -> Array:
         """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad]."""
-        spanned = np.arange(self.rates.shape[1]) / steps[:, None]
-        most = np.empty(len(distance))
-        at_once = max(1, _MOST_COMPARED // spanned.size)
-        for first in range(0, len(distance), at_once):
-            part = slice(first, first + at_once)
-            counts = self.rates > _NOT_SMALL * distance[part, None, None]
-            most[part] = (counts * spanned).max(axis=(1, 2), initial=0.0)
+        least = _NOT_SMALL * distance
+        most = (most_degrees if engine.is_ready() else _most_degrees)(self.rates, steps, least)
         by_chance = self.tolerance * np.interp(most, _CHANCE_DEGREES, _CHANCE_PARTS)
-        part = np.exp(np.interp(most, _DEGREES, np.log(_PARTS)))
+        part = np.exp(np.interp(most, _DEGREES, _LOGARITHMS))
         return np.maximum(part * distance, np.minimum(by_chance, _MOST_BY_CHANCE * distance))
 
 
@@ -135,6 +130,17 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     # More turns than can be stepped are refused, and their powers would overflow.
     seen = degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None] if magnitude else degree
     return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
+
+
+def _most_degrees(rates: Array, steps: Integers, least: Array) -> Array:
+    """As `fast.panels.most_degrees`."""
+    spanned = np.arange(rates.shape[1]) / steps[:, None]
+    most = np.empty(len(least))
+    at_once = max(1, _MOST_COMPARED // spanned.size)
+    for first in range(0, len(least), at_once):
+        part = slice(first, first + at_once)
+        most[part] = ((rates > least[part, None, None]) * spanned).max(axis=(1, 2), initial=0.0)
+    return most
 
 
 def even_steps(planned: Array, subdivide: Integers | int) -> Integers:

@@ -195,10 +195,10 @@ class Integration:
     def is_long(self) -> bool:
         """Whether it takes exact error propagators, and a plan of steps for each momentum by its own."""
         _, requirements = self._sampled()
-        return self._is_long(requirements)
+        return self._is_long(requirements, requirements.loops * float(self._planned(requirements).sum()))
 
-    def _is_long(self, requirements: StepRequirements) -> bool:
-        count = requirements.loops * float(self._planned(requirements).sum())
+    def _is_long(self, requirements: StepRequirements, count: float) -> bool:
+        """Count : of the steps planned."""
         return self._largest > 0.0 and (requirements.very_far or count > _MANY_STEPS)
 
     def _sampled(self) -> tuple[Interpolant, StepRequirements]:
@@ -250,7 +250,7 @@ class Integration:
         count = interpolant.loops * float(planned.sum())
         if count > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
-        if self._is_long(requirements):
+        if self._is_long(requirements, count):
             if self._propagators is None:
                 self._propagators = _propagators_by_derivative(interpolant, self._momentum, self._largest)
             # Errors will be amplified: each must be that much smaller.

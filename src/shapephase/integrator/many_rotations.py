@@ -142,10 +142,10 @@ def rotations_of_each(
     """
     ceilings = rounded_up(norms(momentum), _CLASSES)
     parts: list[RotationPart] = []
-    for ceiling in np.unique(ceilings) if len(ceilings) else (0.0,):
+    for ceiling in sorted(set(ceilings.tolist())) or (0.0,):
         rows = np.flatnonzero(ceilings == ceiling)
         first = Refinement.at_first(tolerance)
-        waiting = [_Group(rows, np.full(len(rows), np.inf), float(ceiling), (first,), None)]
+        waiting = [_Group(rows, np.full(len(rows), np.inf), ceiling, (first,), None)]
         while waiting:
             found, further = _integrated(samplers, waiting.pop(), momentum, tolerance, threads)
             parts += found

@@ -68,7 +68,7 @@ def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
 
     None where a tensor is nearly singular or a number is not finite.
     """
-    return channels_at(body, *path.curve(times))
+    return channels_at(body, *path.at_samples(times))
 
 
 def channels_at(body: Body, shapes: Array, rates: Array) -> Array | None:

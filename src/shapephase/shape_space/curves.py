@@ -25,6 +25,9 @@ _WHOLE_TURN = 2.0 * np.pi
 _MANY_BREAKS = 64
 # Knots of a loop repeated that are still written out.
 _MOST_REPEATED = 100_000
+# Sets of times of which a curve's values are kept, and numbers of all of them: sixteen megabytes.
+_MOST_KEPT = 32
+_MOST_NUMBERS = 2_000_000
 
 
 class Curve(Protocol):
@@ -33,6 +36,30 @@ class Curve(Protocol):
     def __call__(self, times: Array, /) -> tuple[Array, Array]:
         """Shapes and their rates."""
         ...
+
+
+class KeptValues:
+    """What a curve is at sets of times that are asked for again and again; too many, and all are forgotten."""
+
+    def __init__(self) -> None:
+        self._known: dict[bytes, tuple[Array, Array]] = {}
+
+    def __call__(self, curve: Curve, times: Array) -> tuple[Array, Array]:
+        """Shapes and rates: (N,) -> (N, n), (N, n)."""
+        key = times.tobytes()
+        found = self._known.get(key)
+        if found is None:
+            found = curve(times)
+            each = _MOST_NUMBERS // _MOST_KEPT
+            if 2 * found[0].size <= each:
+                if len(self._known) >= _MOST_KEPT:
+                    self._known.clear()
+                self._known[key] = found
+        return found
+
+    def __getstate__(self) -> dict[str, object]:
+        """Values are not pickled."""
+        return {"_known": {}}
 
 
 @dataclass(frozen=True, eq=False)

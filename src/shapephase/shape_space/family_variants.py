@@ -18,7 +18,6 @@ class FamilyVariants:
     def __init__(self, family: BodyFamily, path: ShapePath) -> None:
         self._family, self._path = family, path
         self.model = path_samplers(family.body, path)
-        self._known: dict[bytes, tuple[Array, Array]] = {}
 
     def __len__(self) -> int:
         """How many they are."""
@@ -26,7 +25,7 @@ class FamilyVariants:
 
     def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
         """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
-        shapes, rates = self._curve(times)
+        shapes, rates = self._path.at_samples(times)
         if engine.is_ready():
             masses = self._family.mass[rows]
             return trees_channels(self._family.body.chain.rows, self._family.rows[rows], masses, shapes, rates)
@@ -35,9 +34,3 @@ class FamilyVariants:
     def alone(self, row: int) -> Samplers:
         """Of one of them."""
         return path_samplers(self._family[row], self._path)
-
-    def _curve(self, times: Array) -> tuple[Array, Array]:
-        key = times.tobytes()
-        if key not in self._known:
-            self._known[key] = self._path.curve(times)
-        return self._known[key]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -23,6 +23,7 @@ from .curves import (
     Function,
     Interpolation,
     Joined,
+    KeptValues,
     PiecewisePolynomial,
     Reordered,
     Repeated,
@@ -78,6 +79,7 @@ class ShapePath:
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
+    _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
     __post_init__ = lock_arrays
 
@@ -213,7 +215,11 @@ class ShapePath:
         """r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
         return self._evaluated(t)[1]
 
-    @property
+    def at_samples(self, times: Array) -> tuple[Array, Array]:
+        """What `curve` gives at times at which a body is sampled, kept for the next momentum or body."""
+        return self._seen(self.curve, times)
+
+    @cached_property
     def smoothness(self) -> Smoothness:
         """Of whatever depends smoothly on shapes and rates."""
         scan = self.scan
@@ -227,9 +233,12 @@ class ShapePath:
             loops=self.loops,
             smooth_loop=self.smooth_loop,
             sparse=self.sparse,
-            probe=lambda times: np.concatenate(self.curve(times), axis=1),
+            probe=self._shapes_and_rates,
             resolved=scan.resolved if scan is not None else None,
         )
+
+    def _shapes_and_rates(self, times: Array) -> Array:
+        return np.concatenate(self.at_samples(times), axis=1)
 
     @property
     def scan(self) -> FunctionScan | None:

@@ -41,3 +41,17 @@ def largest_growths(propagators, growths):
                 largest = max(largest, 0.5 * (_squares_of_product(matrices[later], adjugates[earlier]) - 1.0))
         known = math.isfinite(total) and math.isfinite(largest)
         growths[row] = math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if known else math.inf
+
+
+@kernel
+def sums_of_turns(quaternions, sums):
+    """How far each motion turns step by step, (B, K + 1, 4) -> (B,): twice the chords between neighbours [rad]."""
+    for row in range(len(quaternions)):
+        motion, total = quaternions[row], 0.0
+        for k in range(1, len(motion)):
+            square = 0.0
+            for i in range(4):
+                chord = motion[k, i] - motion[k - 1, i]
+                square += chord * chord
+            total += math.sqrt(square)
+        sums[row] = 2.0 * total

@@ -111,6 +111,21 @@ def _estimate(series, degree, rounding, out):
 
 
 @kernel
+def times_of_samples(degree, left, right, margin, nodes, places, times):
+    """Arguments as of `panels.times_of_samples`; nodes of [-1, 1] and where those of a degree begin; times filled."""
+    first = 0
+    for panel in range(len(degree)):
+        count, here = degree[panel] + 1, nodes[places[degree[panel]] :]
+        middle, half = 0.5 * (left[panel] + right[panel]), 0.5 * (right[panel] - left[panel])
+        for k in range(count):
+            times[first + k] = middle + half * here[k]
+        if count > 1:
+            times[first] = left[panel] + margin[panel]
+            times[first + count - 1] = right[panel] - margin[panel]
+        first += count
+
+
+@kernel
 def series_of_panels(degree, values, shift, rounding, matrices, places, coefficients, table):
     """Arguments as of `panels.series_of_panels`; the last two, (P, n * 9) and (P, 9), are filled.
 
@@ -195,3 +210,15 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
         for k in range(0 if magnitude else 1, rates.shape[1]):
             swing += rates[panel, k] * (k + radians) ** ORDER
         found[0, panel], found[1, panel], found[2, panel] = turn, swing, last
+
+
+@kernel
+def most_degrees(rates, steps, least, most):
+    """The most degrees that a step spans of terms above each of some sizes: (P, n), (P,), (B,) -> (B,)."""
+    for row in range(len(least)):
+        found = 0.0
+        for panel in range(len(steps)):
+            for k in range(rates.shape[1]):
+                if rates[panel, k] > least[row]:
+                    found = max(found, k / steps[panel])
+        most[row] = found

@@ -16,7 +16,7 @@ from pathlib import Path
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
 from . import marches, panels, tree, variants
 from .cache_folder import kernel_folder
-from .switch import is_installed, is_on, may_compile
+from .switch import is_installed, is_on, is_wanted, may_compile
 
 _KERNELS = {
     "sample_trees": "._tree_kernel",
@@ -24,11 +24,14 @@ _KERNELS = {
     "march_at_rest": "._march_kernel",
     "march_variants": "._variant_kernel",
     "largest_growths": "._growth_kernel",
+    "sums_of_turns": "._growth_kernel",
     "step_derivatives": "._derivative_kernel",
+    "times_of_samples": "._panel_kernel",
     "series_of_panels": "._panel_kernel",
     "errors_of_panels": "._panel_kernel",
     "change_ends": "._panel_kernel",
     "sizes_of_terms": "._panel_kernel",
+    "most_degrees": "._panel_kernel",
 }
 """And the modules that they are in."""
 # A version of Numba that does not go with this NumPy or this Python says so in many ways.
@@ -40,7 +43,7 @@ _is_broken = False
 
 def is_ready() -> bool:
     """Whether kernels are to be used now; they are imported, and compiled if they never were."""
-    return is_on() and not _is_broken and (_is_ready or _load())
+    return is_wanted() if _is_ready else is_on() and not _is_broken and _load()
 
 
 def compile_steps() -> list[Path]:

@@ -99,6 +99,13 @@ def amplifications(propagators: Array) -> Array:
     return growths
 
 
+def sums_of_turns(quaternions: Array) -> Array:
+    """How far motions turn in all their steps: (B, K + 1, 4) -> (B,) [rad]."""
+    sums = np.empty(len(quaternions))
+    _growth_kernel().sums_of_turns(plain(quaternions), sums)
+    return sums
+
+
 def derivatives(
     channels: Array, loops: int, direction: Array, seeds: Array, magnitude: float, marks: Integers
 ) -> tuple[Array, Array]:
@@ -142,6 +149,7 @@ def warm() -> None:
     march_in_threads(width, series, None, steps, 1, direction, np.ones(1), marks=none)
     quaternions_at_rest(width, series, steps)
     amplifications(np.zeros((1, 1, 3, 3)))
+    sums_of_turns(np.zeros((1, 1, 4)))
     derivatives(np.zeros((1, 108)), 1, direction[0], direction, 1.0, steps)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array, Integers
-from ...chebyshev import values_to_coefficients
+from ...chebyshev import unit_nodes, values_to_coefficients
 from ._plain import plain
 
 _NOTHING_HIDDEN = np.zeros((0, 5))
@@ -27,9 +27,17 @@ def series_of_panels(degree: Integers, values: Array, shift: Array, rounding: Ar
     """
     count, terms = len(degree), int(degree.max(initial=0)) + 1
     coefficients, table = np.empty((count, terms * 9)), np.empty((count, 9))
-    matrices, places = _matrices(tuple(np.unique(degree).tolist()))
+    matrices, places, _, _ = _tables(tuple(sorted(set(degree.tolist()))))
     _kernel().series_of_panels(degree, values, shift, rounding, matrices, places, coefficients, table)
     return coefficients.reshape(count, terms, 9), table
+
+
+def times_of_samples(degree: Integers, left: Array, right: Array, margin: Array) -> Array:
+    """What `sample_times` finds, by how far the first and last times of panels are moved: (P,) each -> (S,) [s]."""
+    _, _, nodes, places = _tables(tuple(sorted(set(degree.tolist()))))
+    times = np.empty(int(degree.sum()) + len(degree))
+    _kernel().times_of_samples(degree, plain(left), plain(right), plain(margin), nodes, places, times)
+    return times
 
 
 def errors_of_panels(
@@ -61,22 +69,35 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
     return rates, found
 
 
+def most_degrees(rates: Array, steps: Integers, least: Array) -> Array:
+    """The most degrees that a step spans of terms above each of some sizes: (P, n), (P,), (B,) -> (B,)."""
+    most = np.empty(len(least))
+    _kernel().most_degrees(plain(rates), np.array(steps, dtype=np.int64), plain(least), most)
+    return most
+
+
 def warm() -> None:
     """Call the kernels with the least that they take."""
     degree, one = np.array([4]), np.ones(1)
     coefficients, table = series_of_panels(degree, np.ones((5, 9)), one, one)
+    times_of_samples(degree, one, one, one)
     errors_of_panels(degree, one, table, None, 1.0)
     series_with_changed_ends(coefficients, degree, one, 1.0)
-    sizes_of_terms(coefficients, one, 1.0, 1.0)
+    rates, _ = sizes_of_terms(coefficients, one, 1.0, 1.0)
+    most_degrees(rates, np.array([2]), one)
 
 
 @lru_cache(maxsize=64)
-def _matrices(degrees: tuple[int, ...]) -> tuple[Array, Integers]:
-    """From values to coefficients of some degrees, column after column, and where each degree's begins."""
-    parts = [values_to_coefficients(degree).T.ravel() for degree in degrees]
-    places = np.zeros(degrees[-1] + 1, dtype=np.int64)
-    places[list(degrees)] = np.cumsum([0, *(part.size for part in parts)])[:-1]
-    return np.concatenate(parts), places
+def _tables(degrees: tuple[int, ...]) -> tuple[Array, Integers, Array, Integers]:
+    """Of some degrees from values to coefficients, column after column, and the nodes; and where each degree's begin."""
+    matrices = [values_to_coefficients(degree).T.ravel() for degree in degrees]
+    nodes = [unit_nodes(degree) for degree in degrees]
+    found: list[Any] = []
+    for parts in (matrices, nodes):
+        places = np.zeros(degrees[-1] + 1, dtype=np.int64)
+        places[list(degrees)] = np.cumsum([0, *(part.size for part in parts)])[:-1]
+        found += [np.concatenate(parts), places]
+    return found[0], found[1], found[2], found[3]
 
 
 @lru_cache(maxsize=1)

@@ -30,19 +30,29 @@ def is_installed() -> bool:
 
 def is_allowed() -> bool:
     """Whether machine code may be used in this process."""
-    # A Numba that is told to interpret would take the loops one operation after another.
-    interpreting = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
-    return _setting() != "0" and not interpreting and is_installed()
+    return _setting() != "0" and _can_compile()
 
 
 def is_on() -> bool:
     """Whether machine code is to be used now."""
-    return is_allowed() and (_is_large or may_compile())
+    return is_wanted() and _can_compile()
+
+
+def is_wanted() -> bool:
+    """The same where Numba is known to work."""
+    setting = _setting()
+    return setting == "1" or (setting != "0" and (_is_large or not _is_command))
 
 
 def may_compile() -> bool:
     """Whether kernels that this machine does not have yet are compiled."""
     return not _is_command or _setting() == "1"
+
+
+def _can_compile() -> bool:
+    # A Numba that is told to interpret would take the loops one operation after another.
+    interpreting = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
+    return not interpreting and is_installed()
 
 
 def begin_command() -> None:

@@ -17,7 +17,6 @@ from ..resolved import Hidden, ResolvedPath
 from .panel_series import (
     PanelErrors,
     PanelSeries,
-    joined,
     panel_errors,
     sample_starts,
     sample_times,
@@ -71,7 +70,10 @@ class PanelSampler:
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
         if self._series is None:
-            self._keep(self._sampled(*self._first_panels(tolerance)))
+            degree, left, right = self._first_panels(tolerance)
+            # A copy: what machine code computes in work arrays is overwritten by the next call.
+            values = self._channels(sample_times(degree, left, right, self._end)).copy()
+            self._keep(series_through(degree, left, right, values, self._end, degree > 0))
         while True:
             errors = self._errors_at(momentum)
             total = self._loops * float(errors.whole.sum())
@@ -159,51 +161,45 @@ class PanelSampler:
     def _refine_panels(self, rough: Mask, errors: Array, share: Array, tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
         series = self.series
-        degree, width = series.degree[rough], series.width[rough]
+        degree = series.degree
         with np.errstate(divide="ignore", invalid="ignore"):
-            missing = np.log(np.maximum(errors[rough] / share[rough], 1.0)) / series.estimate.decay[rough]
+            missing = np.log(np.maximum(errors / share, 1.0)) / series.estimate.decay
             # Without any missing degrees, the error was seen between the nodes: the degree is doubled.
             times = np.ceil(np.nan_to_num(missing / degree, nan=0.0, posinf=9.9) + 0.9)
         factor = np.clip(times, 2, _MOST_RAISED).astype(np.int64)
-        factor[(missing > 3.1 * degree) | (factor * degree > _HIGHEST_DEGREE)] = 0
-        halves = factor == 0
+        halves = rough & ((missing > 3.1 * degree) | (factor * degree > _HIGHEST_DEGREE))
+        factor[~rough], factor[halves] = 1, 0
         if halves.any():
-            narrow = (width[halves] < _LEAST_WIDTH * self._span).any()
-            if narrow or len(series.degree) > self._most_panels:
-                where = float(series.left[rough][halves][np.argmin(width[halves])])
+            narrow = (series.width[halves] < _LEAST_WIDTH * self._span).any()
+            if narrow or len(degree) > self._most_panels:
+                where = float(series.left[halves][np.argmin(series.width[halves])])
                 raise AccuracyNotReached(
                     f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
                     f"{tolerance:.3g} was requested; declare the times of its jumps as breaks, smooth the data, or "
                     "loosen the tolerance"
                 )
-        source = np.flatnonzero(rough)
-        raised, halved = source[~halves], source[halves]
-        left, right = series.left[halved], series.right[halved]
-        middle = 0.5 * (left + right)
-        new = self._sampled(
-            np.concatenate([series.degree[raised] * factor[~halves], np.full(2 * len(halved), _HALF_DEGREE)]),
-            np.concatenate([series.left[raised], left, middle]),
-            np.concatenate([series.right[raised], middle, right]),
-            raised,
-        )
-        self._keep(joined([series.kept(~rough), new]))
+        self._refined(factor)
 
-    def _sampled(self, degree: Integers, left: Array, right: Array, known: Integers | None = None) -> PanelSeries:
-        """Panels sampled in one call; the first ones are those of the present series at `known`, of a higher degree."""
-        times, count = sample_times(degree, left, right, self._end), 0 if known is None else len(known)
-        if known is None or not count:
-            # What machine code computes in work arrays is overwritten by the next call.
-            return series_through(degree, left, right, self._channels(times).copy(), self._end, degree > 0)
-        old, starts = self.series, sample_starts(degree)
-        values, fresh = np.empty((len(times), 9)), np.ones(len(times), dtype=np.bool_)
-        factor, counts = degree[:count] // old.degree[known], old.degree[known] + 1
+    def _refined(self, factor: Integers) -> None:
+        """Sample panels of so many times the degree, 1: kept as they are, 0: halved; one call for all points."""
+        old = self.series
+        origin = np.repeat(np.arange(len(factor)), 1 + (factor == 0))
+        factor, left, right = factor[origin], old.left[origin], old.right[origin]
+        degree = np.where(factor == 0, _HALF_DEGREE, old.degree[origin] * factor)
+        first = np.flatnonzero(factor == 0)[::2]
+        right[first] = left[first + 1] = 0.5 * (left[first] + right[first])
+        times, starts, known = sample_times(degree, left, right, self._end), sample_starts(degree), factor > 0
+        counts = (old.degree[origin] + 1)[known]
         within = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
-        again = np.repeat(starts[:count], counts) + within * np.repeat(factor, counts)
+        again = np.repeat(starts[:-1][known], counts) + within * np.repeat(factor[known], counts)
+        values, fresh = np.empty((len(times), 9)), np.ones(len(times), dtype=np.bool_)
         fresh[again] = False
-        values[again] = old.values[np.repeat(old.starts[known], counts) + within]
+        values[again] = old.values[np.repeat(old.starts[origin[known]], counts) + within]
         values[fresh] = self._channels(times[fresh])
         # What was sampled before has had its ends corrected.
-        return series_through(degree, left, right, values, self._end, np.arange(len(degree)) >= count)
+        series = series_through(degree, left, right, values, self._end, ~known)
+        seen = np.flatnonzero((factor == 1) & ~np.isnan(old.gaps[origin, 0]))
+        self._keep(series.with_gaps(seen, old.gaps[origin[seen]]) if len(seen) else series)
 
     def _keep(self, series: PanelSeries) -> None:
         self._series, self._errors, self._interpolant = series, None, None

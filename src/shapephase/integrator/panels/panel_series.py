@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from ...chebyshev import end_margin, nodes_of, values_to_coefficients
 from .._spectral_error import SpectralEstimate, averaged_share, estimate_spectra, spectral_norms
 from ..fast import engine
 from ..fast.estimate_constants import NOISE_FACTOR
-from ..fast.panels import errors_of_panels, series_of_panels
+from ..fast.panels import errors_of_panels, series_of_panels, times_of_samples
 from ..resolved import Hidden
 
 
@@ -48,31 +48,11 @@ class PanelSeries:
         """The first sample of each panel, and their number: (P + 1,)."""
         return sample_starts(self.degree)
 
-    def kept(self, rows: Mask) -> PanelSeries:
-        """Some of the panels."""
-        return PanelSeries(
-            degree=self.degree[rows],
-            left=self.left[rows],
-            right=self.right[rows],
-            values=self.values[np.repeat(rows, self.degree + 1)],
-            coefficients=self.coefficients[rows],
-            estimate=self.estimate.some(rows),
-            gaps=self.gaps[rows],
-        )
-
     def with_gaps(self, rows: Integers, gaps: Array) -> PanelSeries:
         """The same after a look between the nodes of some panels (R,), which found gaps (R, 2)."""
         seen = self.gaps.copy()
         seen[rows] = gaps
-        return PanelSeries(
-            degree=self.degree,
-            left=self.left,
-            right=self.right,
-            values=self.values,
-            coefficients=self.coefficients,
-            estimate=self.estimate.raised_to(2.0 * gaps, rows),
-            gaps=seen,
-        )
+        return replace(self, estimate=self.estimate.raised_to(2.0 * gaps, rows), gaps=seen)
 
 
 class PanelErrors(NamedTuple):
@@ -95,9 +75,10 @@ def sample_times(degree: Integers, left: Array, right: Array, end: float) -> Arr
 
     `end` : of all panels [s]
     """
-    times, starts = nodes_of(left, right, degree), sample_starts(degree)
-    margin = np.where(degree > 0, end_margin(right - left, end), 0.0)
-    moved = degree > 0
+    margin = end_margin(right - left, end)
+    if engine.is_ready():
+        return times_of_samples(degree, left, right, margin)
+    times, starts, moved = nodes_of(left, right, degree), sample_starts(degree), degree > 0
     times[starts[:-1][moved]] = (left + margin)[moved]
     times[starts[1:][moved] - 1] = (right - margin)[moved]
     return times
@@ -152,30 +133,6 @@ def end_slopes(degree: int) -> Array:
     """Chebyshev coefficients -> slopes at -1 and 1: (2, degree + 1)."""
     degrees = np.arange(degree + 1.0)
     return np.stack([(-1.0) ** (degrees + 1.0), np.ones_like(degrees)]) * degrees**2
-
-
-def joined(parts: list[PanelSeries]) -> PanelSeries:
-    """All panels of several series in the order of time."""
-    if len(parts) == 1:
-        return parts[0]
-    degree = np.concatenate([part.degree for part in parts])
-    left = np.concatenate([part.left for part in parts])
-    order, n = np.argsort(left), int(degree.max()) + 1
-    coefficients, row = np.zeros((len(left), n, 9)), 0
-    for part in parts:
-        coefficients[row : row + len(part.left), : part.coefficients.shape[1]] = part.coefficients[:, :n]
-        row += len(part.left)
-    starts, counts = sample_starts(degree)[:-1], (degree + 1)[order]
-    first = np.repeat(starts[order] - (np.cumsum(counts) - counts), counts)
-    return PanelSeries(
-        degree=degree[order],
-        left=left[order],
-        right=np.concatenate([part.right for part in parts])[order],
-        values=np.concatenate([part.values for part in parts])[first + np.arange(len(first))],
-        coefficients=coefficients[order],
-        estimate=SpectralEstimate(np.concatenate([part.estimate.table for part in parts])[order]),
-        gaps=np.concatenate([part.gaps for part in parts])[order],
-    )
 
 
 def panel_errors(series: PanelSeries, hidden: Hidden | None, momentum: float) -> PanelErrors:
