@@ -7,7 +7,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.integrator import _spectral_error
-from shapephase.integrator._spectral_error import estimate_spectrum, estimate_tail, spectral_norms
+from shapephase.integrator._spectral_error import estimate_spectra, estimate_tail, spectral_norms
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.stepped import SteppedRotation
 from support.independent import apart
@@ -85,12 +85,13 @@ def test_both_estimates_of_a_spectrum_agree(degree: int, rng):
         norms[-int(rng.integers(1, 3)) :] *= rng.integers(0, 2)
         plain, arrays = (
             estimate_tail(norms.tolist(), EPS),
-            estimate_spectrum(np.stack([norms, norms], axis=1)[None], EPS),
+            estimate_spectra(np.stack([norms, norms], axis=1)[None], np.array([degree]), np.array([EPS])),
         )
-        assert plain.error == pytest.approx(arrays.inverse[0], rel=1e-12)
-        assert plain.error == pytest.approx(arrays.drift[0], rel=1e-12)
-        assert plain.decay == pytest.approx(arrays.decay[0], rel=1e-12)
-        assert plain.converging == arrays.converging[0]
+        errors, decay, converging = arrays.table[0, :2], arrays.decay[0], arrays.table[0, 3]
+        assert plain.error == pytest.approx(errors[0], rel=1e-12)
+        assert plain.error == pytest.approx(errors[1], rel=1e-12)
+        assert plain.decay == pytest.approx(decay, rel=1e-12)
+        assert plain.converging == converging
         assert plain.largest == arrays.inverse_norm[0]
 
 

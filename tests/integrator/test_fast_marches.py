@@ -12,11 +12,12 @@ from scipy.integrate import DOP853, solve_ivp
 import shapephase as sp
 from shapephase import so3
 from shapephase.arrays import read_only
+from shapephase.integrator._error_propagator import _growths_and_rounding
 from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
 from shapephase.integrator.fast._plain import plain
 from shapephase.integrator.fast.marches import (
-    amplifications,
     derivatives,
+    growths_and_rounding,
     march_in_threads,
     quaternions_at_rest,
 )
@@ -166,8 +167,11 @@ def test_the_largest_growth_is_about_the_largest_singular_value(path, rng):
     """Between any two marks, from the sum of squares as if the three were s, 1 and 1/s, which they are nearly."""
     directions, magnitudes = momenta(rng, 12)
     count = int(path.steps.sum())
-    propagators = path.march(directions, magnitudes, marks=np.arange(6) * count // 5).propagators
-    found = amplifications(propagators)
+    record = path.march(directions, magnitudes, marks=np.arange(6) * count // 5)
+    propagators = record.propagators
+    found, rounding = growths_and_rounding(propagators, record.quaternions)
+    interpreted = _growths_and_rounding(propagators, record.quaternions)
+    assert np.allclose(interpreted, (found, rounding), rtol=1e-13, atol=0.0)
     for row, matrices in enumerate(propagators):
         between = [matrices[j] @ np.linalg.inv(matrices[i]) for j in range(1, 6) for i in range(j)]
         half = max(1.0, 0.5 * (max(np.linalg.norm(one) for one in between) ** 2 - 1.0))
@@ -176,7 +180,7 @@ def test_the_largest_growth_is_about_the_largest_singular_value(path, rng):
     assert found.max() > 1.2
     propagators[3, 2, 1, 1] = np.nan
     propagators[4] *= 1e200
-    assert np.array_equal(np.flatnonzero(np.isinf(amplifications(propagators))), [3, 4])
+    assert np.array_equal(np.flatnonzero(np.isinf(growths_and_rounding(propagators, record.quaternions)[0])), [3, 4])
 
 
 @pytest.mark.parametrize("loops", [1, 2])

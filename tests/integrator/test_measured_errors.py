@@ -11,7 +11,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.chebyshev import nodes_on, values_to_coefficients
 from shapephase.integrator import _step_loop as step_loop
-from shapephase.integrator._error_propagator import amplification, rounding_error
+from shapephase.integrator._error_propagator import growth_and_rounding, largest_growth
 from shapephase.integrator._even_sampling import EvenSampler
 from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._spectral_error import Channels
@@ -185,7 +185,7 @@ def test_amplification_is_the_largest_singular_value_from_one_time_to_a_later_on
             between = propagators[0, later] @ np.linalg.inv(propagators[0, earlier])
             largest = max(largest, np.linalg.svd(between, compute_uv=False)[0])
     # The sum of squares cancels down to one where nothing grows: then only half the digits are left.
-    assert amplification(propagators)[0] == pytest.approx(largest, rel=1e-12 if rate else 1e-6)
+    assert largest_growth(propagators)[0] == pytest.approx(largest, rel=1e-12 if rate else 1e-6)
 
 
 def test_growth_that_shrinks_again_counts_from_the_lowest_to_the_highest():
@@ -193,7 +193,7 @@ def test_growth_that_shrinks_again_counts_from_the_lowest_to_the_highest():
     propagators = growing(3.0)
     falls = np.stack([propagators[0, -1 - k] for k in range(step_loop.CHECKPOINTS)])[None]
     turned_round = falls @ np.linalg.inv(falls[:, :1])
-    assert amplification(turned_round)[0] == pytest.approx(np.exp(3.0), rel=1e-12)
+    assert largest_growth(turned_round)[0] == pytest.approx(np.exp(3.0), rel=1e-12)
 
 
 def test_rounding_grows_from_where_it_is_made():
@@ -201,9 +201,8 @@ def test_rounding_grows_from_where_it_is_made():
     propagators, count = growing(6.0), 70
     half = 0.5 * np.linspace(0.0, 7.0, count + 1)
     quaternions = np.stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)], axis=-1)[None]
-    growth = amplification(propagators)
-    (rough,) = rounding_error(propagators, quaternions, growth, np.inf)
-    (found,) = rounding_error(propagators, quaternions, growth, 0.0)
+    growth, (rough,) = growth_and_rounding(propagators, quaternions, np.inf)
+    _, (found,) = growth_and_rounding(propagators, quaternions, 0.0)
     # The growth of what is made at a share of the way is exp(6 (1 - share)); its integral is a sixth.
     evenly = growth[0] / 6.0
     assert EPS * (7.0 * evenly) < found < rough
@@ -214,7 +213,8 @@ def test_rounding_grows_from_where_it_is_made():
 def test_without_growth_rounding_is_by_steps_and_turns(turn: float):
     half = 0.5 * np.linspace(0.0, turn, 1001)
     quaternions = np.stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)], axis=-1)[None]
-    (found,) = rounding_error(np.empty((1, 0, 3, 3)), quaternions, np.ones(1), 0.0)
+    growth, (found,) = growth_and_rounding(np.empty((1, 0, 3, 3)), quaternions, 0.0)
+    assert growth[0] == 1.0
     assert EPS * turn < found < EPS * (turn + 2.0 * np.sqrt(1000.0) + 10.0)
 
 

@@ -18,7 +18,6 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
-from ..integrator.recorded.knot_path import KnotPath
 from ..shape_space.body_path import channels_along, recorded_path
 from ..shape_space.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.scanning import scanned

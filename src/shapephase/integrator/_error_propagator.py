@@ -14,23 +14,49 @@ from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, momen
 from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
-from .fast.marches import amplifications, derivatives, sums_of_turns
+from .fast.marches import derivatives, growths_and_rounding
 
 
-def amplification(propagators: Array) -> Array:
-    """Largest growth of an error from one time to a later one, from propagators: (B, CHECKPOINTS, 3, 3) -> (B,).
+def growth_and_rounding(propagators: Array, quaternions: Array, least: float) -> tuple[Array, Array]:
+    """Largest growth of an error from one time to a later one, and the error due to rounding when it is largest.
 
     A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
-    values as s, 1, 1/s, the sum of their squares gives the largest.
+    values of a propagator as s, 1, 1/s, the sum of their squares gives the largest. Every step commits rounding of its
+    own, at random, and every radian turned some of the rate's; the propagators carry them on.
+
+    Parameters
+    ----------
+    propagators : (B, CHECKPOINTS, 3, 3), or (B, 0, 3, 3) without momentum
+    quaternions : (B, K + 1, 4) at the step ends
+    least : [rad]; where the rounding is below by the largest growth alone, that is enough
+
+    Returns
+    -------
+    growth, infinite where it is not known, and rounding [rad]: (B,) each
     """
+    find = growths_and_rounding if engine.is_ready() else _growths_and_rounding
+    growth, rounding = find(propagators, quaternions)
+    large = (rounding > least) & np.isfinite(rounding)
+    if propagators.shape[1] and large.any():
+        rounding[large] = _rounding_at_worst(propagators[large], _turns(quaternions[large]))
+    return growth, rounding
+
+
+def largest_growth(propagators: Array) -> Array:
+    """Of an error from one time to a later one: (B, CHECKPOINTS, 3, 3) -> (B,), infinite where it is not known."""
     if propagators.shape[1] == 0:
-        return np.ones(1)
-    if engine.is_ready():
-        return amplifications(propagators)
+        return np.ones(len(propagators))
     with np.errstate(over="ignore", invalid="ignore"):
         largest = np.tril(_growth_between(propagators)).max(axis=(1, 2))
     # Where steps were so long that they overflowed, the growth is unknown.
     return np.where(np.isfinite(propagators.sum(axis=(1, 2, 3)) + largest), largest, np.inf)
+
+
+def _growths_and_rounding(propagators: Array, quaternions: Array) -> tuple[Array, Array]:
+    """As `fast.marches.growths_and_rounding`."""
+    growth, sums, count = largest_growth(propagators), _turns(quaternions).sum(axis=1), quaternions.shape[1] - 1
+    committed = ROUNDING_OF_START + ROUNDING_OF_STEP * np.sqrt(count) + ROUNDING_OF_RADIAN * sums
+    return growth, EPS * growth * committed
 
 
 def _growth_between(propagators: Array) -> Array:
@@ -39,29 +65,6 @@ def _growth_between(propagators: Array) -> Array:
     between = propagators[:, :, None] @ adjugates[:, None]
     half = np.maximum(0.5 * (np.einsum("bjkmn,bjkmn->bjk", between, between) - 1.0), 1.0)
     return np.asarray(np.sqrt(half + np.sqrt(half * half - 1.0)))
-
-
-def rounding_error(propagators: Array, quaternions: Array, amplifications: Array, least: float) -> Array:
-    """Error due to rounding at the end of the time at which it is largest: (B,) [rad].
-
-    Every step commits its own, at random, and every radian turned some of the rate's; the propagators carry them on.
-
-    Parameters
-    ----------
-    propagators : (B, CHECKPOINTS, 3, 3), or (B, 0, 3, 3) without momentum
-    quaternions : (B, K + 1, 4) at the step ends
-    amplifications : (B,) the largest growth of all
-    least : [rad]; where an error is below by the largest growth alone, that is enough
-    """
-    count = quaternions.shape[1] - 1
-    sums = sums_of_turns(quaternions) if engine.is_ready() else _turns(quaternions).sum(axis=1)
-    bound = EPS * amplifications * (ROUNDING_OF_START + ROUNDING_OF_STEP * np.sqrt(count) + ROUNDING_OF_RADIAN * sums)
-    if propagators.shape[1] == 0:
-        return bound
-    large = (bound > least) & np.isfinite(bound)
-    if large.any():
-        bound[large] = _rounding_at_worst(propagators[large], _turns(quaternions[large]))
-    return bound
 
 
 def _turns(quaternions: Array) -> Array:

@@ -14,7 +14,21 @@ from ..arrays import Array, Integers, Mask
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from .casadi_calls import map_rows
-from .fast.estimate_constants import CONVERGED_TAIL, EPS, LEAST_OF_FLOOR, ROUNDING, TINY, UNAVERAGED_PHASE
+from .fast.estimate_constants import (
+    AT_ROUNDING,
+    CONVERGED_TAIL,
+    CONVERGING,
+    DECAY,
+    DRIFT_NORM,
+    EPS,
+    FLOOR,
+    INVERSE,
+    INVERSE_NORM,
+    LEAST_OF_FLOOR,
+    ROUNDING,
+    TINY,
+    UNAVERAGED_PHASE,
+)
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 # The channels in one call, or None where that cannot be done: (N,) -> (N, 9).
@@ -153,10 +167,6 @@ def averaged_share(phase: Array, turn: Array) -> Array:
     return np.minimum(1.0, UNAVERAGED_PHASE / np.maximum(phase - turn, UNAVERAGED_PHASE))
 
 
-# Columns of the table of a `SpectralEstimate`.
-_INVERSE, _DRIFT, _DECAY, _CONVERGING, _AT_ROUNDING, _INVERSE_NORM, _DRIFT_NORM, _FLOOR = range(8)
-
-
 class SpectralEstimate(NamedTuple):
     """Error estimates from the spectra of some panels: (G, 9), a row for each."""
 
@@ -165,28 +175,28 @@ class SpectralEstimate(NamedTuple):
     @property
     def decay(self) -> Array:
         """Of the spectrum, per degree; the slower one: (G,)."""
-        return self.table[:, _DECAY]
+        return self.table[:, DECAY]
 
     @property
     def at_rounding(self) -> Mask:
         """(G,)."""
-        return self.table[:, _AT_ROUNDING] > 0.0
+        return self.table[:, AT_ROUNDING] > 0.0
 
     @property
     def inverse_norm(self) -> Array:
         """The largest term of I^-1: (G,)."""
-        return self.table[:, _INVERSE_NORM]
+        return self.table[:, INVERSE_NORM]
 
     @property
     def drift_norm(self) -> Array:
         """The largest term of I^-1 L_o: (G,)."""
-        return self.table[:, _DRIFT_NORM]
+        return self.table[:, DRIFT_NORM]
 
     def error(self, momentum: float, width: Array, phase: Array) -> Array:
         """Attitude error caused by the interpolation error: (G,) [rad]; it averages out as in `unaveraged_share`."""
-        rate = momentum * self.table[:, _INVERSE] + self.table[:, _DRIFT]
+        rate = momentum * self.table[:, INVERSE] + self.table[:, INVERSE + 1]
         turn = width * (momentum * self.inverse_norm + self.drift_norm)
-        converging = self.table[:, _CONVERGING] > 0.0
+        converging = self.table[:, CONVERGING] > 0.0
         return 0.5 * width * rate * np.where(converging, averaged_share(phase, turn), 1.0)
 
     def some(self, rows: Mask) -> SpectralEstimate:
@@ -196,9 +206,9 @@ class SpectralEstimate(NamedTuple):
     def raised_to(self, gaps: Array, rows: Integers) -> SpectralEstimate:
         """With errors of some panels (R,) at least as large as gaps that were seen (R, 2), which do not average out."""
         table = self.table.copy()
-        table[rows, :_DECAY] = np.maximum(table[rows, :_DECAY], gaps)
-        table[rows, _CONVERGING] = 0.0
-        table[rows, _AT_ROUNDING] *= np.all(gaps <= 4.0 * table[rows, _FLOOR:], axis=1)
+        table[rows, :DECAY] = np.maximum(table[rows, :DECAY], gaps)
+        table[rows, CONVERGING] = 0.0
+        table[rows, AT_ROUNDING] *= np.all(gaps <= 4.0 * table[rows, FLOOR:], axis=1)
         return SpectralEstimate(table)
 
 
@@ -221,18 +231,18 @@ def estimate_spectra(norms: Array, degree: Integers, time_rounding: Array) -> Sp
     # A tail at the noise floor shows no decay any more; the terms beyond it are smaller than it.
     error = np.maximum(np.minimum(beyond_tail, np.where(at_noise_floor, 2.0, most) * tail), LEAST_OF_FLOOR * floor)
     table = np.empty((len(norms), 9))
-    table[:, :_DECAY] = error
-    table[:, _DECAY] = np.where(at_noise_floor, np.inf, np.maximum(decay, 0.0)).min(axis=1)
-    table[:, _CONVERGING] = (at_noise_floor | (tail < CONVERGED_TAIL * middle)).all(axis=1)
-    table[:, _AT_ROUNDING] = at_noise_floor.all(axis=1)
-    table[:, _INVERSE_NORM:_FLOOR] = largest
-    table[:, _FLOOR:] = floor
+    table[:, :DECAY] = error
+    table[:, DECAY] = np.where(at_noise_floor, np.inf, np.maximum(decay, 0.0)).min(axis=1)
+    table[:, CONVERGING] = (at_noise_floor | (tail < CONVERGED_TAIL * middle)).all(axis=1)
+    table[:, AT_ROUNDING] = at_noise_floor.all(axis=1)
+    table[:, INVERSE_NORM:FLOOR] = largest
+    table[:, FLOOR:] = floor
     constant = degree == 0
     if constant.any():
-        table[constant, :_DECAY] = 0.0
-        table[constant, _DECAY] = np.inf
-        table[constant, _CONVERGING : _AT_ROUNDING + 1] = 1.0
-        table[constant, _FLOOR:] = EPS * largest[constant]
+        table[constant, :DECAY] = 0.0
+        table[constant, DECAY] = np.inf
+        table[constant, CONVERGING : AT_ROUNDING + 1] = 1.0
+        table[constant, FLOOR:] = EPS * largest[constant]
     return SpectralEstimate(table)
 
 

@@ -17,10 +17,10 @@ import numpy as np
 from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from ._error_propagator import amplification, exact_propagators, rounding_error
+from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth
 from ._step_control import StepRequirements, even_steps
-from .fast.estimate_constants import ORDER
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
+from .fast.estimate_constants import ORDER
 from .interpolant import Interpolant
 from .sampling import Sampler
 from .step_record import StepRecord
@@ -221,7 +221,8 @@ class Integration:
         record = self._take_steps(interpolant, perturbed.coefficients if counts else None, steps)
         stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
         propagators = record.propagators if self._propagators is None else self._propagators
-        amplifications = amplification(propagators)
+        little = _LITTLE_ROUNDING * self._tolerance
+        amplifications, rounding = growth_and_rounding(propagators, record.quaternions, little)
         sampling = amplifications * expected
         if counts:
             measured = record.truncation + amplifications * perturbed.hidden
@@ -236,9 +237,7 @@ class Integration:
             dynamics=record.dynamics,
             sampling_error=sampling,
             stepping_error=requirements.stepping_error(steps, stepping),
-            rounding_error=rounding_error(
-                propagators, record.quaternions, amplifications, _LITTLE_ROUNDING * self._tolerance
-            ),
+            rounding_error=rounding,
             amplification=amplifications,
             perturbed=perturbed,
         )
@@ -254,7 +253,7 @@ class Integration:
             if self._propagators is None:
                 self._propagators = _propagators_by_derivative(interpolant, self._momentum, self._largest)
             # Errors will be amplified: each must be that much smaller.
-            growth = amplification(self._propagators)
+            growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
         steps = even_steps(planned, self._subdivide)

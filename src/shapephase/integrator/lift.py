@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, Integers, lock_arrays
-from ._error_propagator import rounding_error
+from ._error_propagator import growth_and_rounding
 from ._step_loop import largest_angle, quaternions_alone
 from .stepped import SteppedRotation
 
@@ -57,7 +57,8 @@ def lift_along(rotation: SteppedRotation) -> Lift:
     steps, ends = times_finer * rotation.steps, times_finer * np.arange(rotation.quaternions.shape[1])
     turns = _turns_of_lift(rotation, quaternions, finer, steps, ends)
     stepping, sampling = np.sqrt(np.einsum("sbki,sbki->sbk", turns, turns).max(axis=-1))
-    one, nothing = np.ones(1), np.zeros((1, quaternions.shape[1] - 1))
+    growth, rounding = growth_and_rounding(np.empty((1, 0, 3, 3)), quaternions, tolerance)
+    nothing = np.zeros((1, quaternions.shape[1] - 1))
     lift = SteppedRotation(
         interpolant=interpolant,
         momentum=np.zeros((1, 3)),
@@ -68,8 +69,8 @@ def lift_along(rotation: SteppedRotation) -> Lift:
         dynamics=nothing,
         sampling_error=rotation.perturbed.hidden + sampling,
         stepping_error=_SAFETY_FACTOR * stepping,
-        rounding_error=rounding_error(np.empty((1, 0, 3, 3)), quaternions, one, tolerance),
-        amplification=one,
+        rounding_error=rounding,
+        amplification=growth,
         perturbed=rotation.perturbed,
     )
     return Lift(lift, turns, ends)

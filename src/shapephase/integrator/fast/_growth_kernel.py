@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ._jit import kernel, part
+from .estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
 
 
 @part
@@ -26,32 +27,36 @@ def _squares_of_product(a, b):
     return total
 
 
+@part
+def _largest_growth(matrices, adjugates):
+    """By the sum of the squares of the singular values, which are s, 1 and 1/s."""
+    largest, total = 1.0, 0.0
+    for k in range(len(matrices)):
+        _adjugate(matrices[k], adjugates[k])
+        for i in range(9):
+            total += matrices[k, i]
+    for later in range(1, len(matrices)):
+        for earlier in range(later):
+            largest = max(largest, 0.5 * (_squares_of_product(matrices[later], adjugates[earlier]) - 1.0))
+    known = math.isfinite(total) and math.isfinite(largest)
+    return math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if known else math.inf
+
+
 @kernel
-def largest_growths(propagators, growths):
-    """(B, M, 9) -> (B,), by the sum of the squares of the singular values, which are s, 1 and 1/s."""
+def growths_and_rounding(propagators, quaternions, growths, rounding):
+    """The largest growth of an error, and the rounding of all steps grown by it: (B, M, 9), (B, K + 1, 4) -> (B,) each.
+
+    Without propagators nothing grows.
+    """
     adjugates = np.empty((propagators.shape[1], 9))
-    for row in range(len(propagators)):
-        matrices, largest, total = propagators[row], 1.0, 0.0
-        for k in range(len(matrices)):
-            _adjugate(matrices[k], adjugates[k])
-            for i in range(9):
-                total += matrices[k, i]
-        for later in range(1, len(matrices)):
-            for earlier in range(later):
-                largest = max(largest, 0.5 * (_squares_of_product(matrices[later], adjugates[earlier]) - 1.0))
-        known = math.isfinite(total) and math.isfinite(largest)
-        growths[row] = math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if known else math.inf
-
-
-@kernel
-def sums_of_turns(quaternions, sums):
-    """How far each motion turns step by step, (B, K + 1, 4) -> (B,): twice the chords between neighbours [rad]."""
     for row in range(len(quaternions)):
-        motion, total = quaternions[row], 0.0
+        motion, turned = quaternions[row], 0.0
         for k in range(1, len(motion)):
             square = 0.0
             for i in range(4):
                 chord = motion[k, i] - motion[k - 1, i]
                 square += chord * chord
-            total += math.sqrt(square)
-        sums[row] = 2.0 * total
+            turned += 2.0 * math.sqrt(square)
+        growths[row] = _largest_growth(propagators[row], adjugates)
+        committed = ROUNDING_OF_START + ROUNDING_OF_STEP * math.sqrt(len(motion) - 1.0) + ROUNDING_OF_RADIAN * turned
+        rounding[row] = EPS * growths[row] * committed

@@ -8,23 +8,44 @@ import numpy as np
 
 from ._jit import kernel, part
 from .estimate_constants import (
+    AIM,
+    AT_ROUNDING,
+    CHANCE_DEGREES,
+    CHANCE_PARTS,
     CONVERGED_TAIL,
+    CONVERGING,
+    DECAY,
     DEGREES_A_RADIAN,
+    DEGREES_A_STEP,
+    DISTANCE,
+    DRIFT_NORM,
     EPS,
     FEW_TERMS,
+    FLOOR,
+    HALF_DEGREE,
+    HIGHEST_DEGREE,
+    INVERSE,
+    INVERSE_NORM,
     LAST_TERMS,
     LEAST_DEGREE,
     LEAST_OF_FLOOR,
     MISSING_FACTOR,
+    MOST_BY_CHANCE,
+    MOST_MISSING,
+    MOST_RAISED,
     MOST_TURN,
+    NOT_SMALL,
     ORDER,
+    PARTS_OF_DISTANCE,
     ROUNDED_TERM,
     ROUNDING,
     SLOWEST_DECAY,
+    SPANNED_DEGREES,
     TINY,
     UNAVERAGED_PHASE,
 )
 
+_LOGARITHMS = tuple(math.log(share) for share in PARTS_OF_DISTANCE)
 _CHANNELS = 9
 _DRIFT = 6
 """The first channel of I^-1 L_o; before it come three diagonal and three other entries of I^-1."""
@@ -81,11 +102,11 @@ def _move_ends(values, matrix, rows, shift, out):
 @part
 def _estimate(series, degree, rounding, out):
     """The errors of a panel's series by its tail, as `estimate_spectra` has them."""
-    out[2], out[3], out[4] = math.inf, 1.0, 1.0
+    out[DECAY], out[CONVERGING], out[AT_ROUNDING] = math.inf, 1.0, 1.0
     for which in range(2):
         if degree == 0:
-            out[which], out[5 + which] = 0.0, _norm(series, 0, which)
-            out[7 + which] = EPS * out[5 + which]
+            out[INVERSE + which], out[INVERSE_NORM + which] = 0.0, _norm(series, 0, which)
+            out[FLOOR + which] = EPS * out[INVERSE_NORM + which]
             continue
         largest = middle = tail = weighted = 0.0
         centre, start = degree // 2, degree - max(2, degree // 10)
@@ -101,13 +122,13 @@ def _estimate(series, degree, rounding, out):
         decay = math.log(max(middle, TINY) / max(tail, TINY)) * (2.0 / degree)
         beyond = 2.0 * tail / math.expm1(max(decay, TINY))
         rounded = tail <= floor
-        out[which] = max(min(beyond, (2.0 if rounded else float(degree)) * tail), LEAST_OF_FLOOR * floor)
+        out[INVERSE + which] = max(min(beyond, (2.0 if rounded else float(degree)) * tail), LEAST_OF_FLOOR * floor)
         if not rounded:
-            out[2] = min(out[2], max(decay, 0.0))
-            out[4] = 0.0
+            out[DECAY] = min(out[DECAY], max(decay, 0.0))
+            out[AT_ROUNDING] = 0.0
             if not tail < CONVERGED_TAIL * middle:
-                out[3] = 0.0
-        out[5 + which], out[7 + which] = largest, floor
+                out[CONVERGING] = 0.0
+        out[INVERSE_NORM + which], out[FLOOR + which] = largest, floor
 
 
 @kernel
@@ -144,6 +165,77 @@ def series_of_panels(degree, values, shift, rounding, matrices, places, coeffici
         _estimate(series, degree[panel], rounding[panel], table[panel])
 
 
+@kernel
+def factors_of_refining(degree, table, rough, errors, share, factor):
+    """Arguments as of `panels.factors_of_refining`; the last one is filled."""
+    for panel in range(len(degree)):
+        factor[panel] = 1
+        if not rough[panel]:
+            continue
+        missing = math.log(max(errors[panel] / share[panel], 1.0)) / table[panel, DECAY]
+        # Without any missing degrees, the error was seen between the nodes: the degree is doubled.
+        if math.isnan(missing):
+            missing = 0.0
+        times = max(2, int(min(math.ceil(min(missing / degree[panel], 9.9) + 0.9), float(MOST_RAISED))))
+        too_many = missing > MOST_MISSING * degree[panel] or times * degree[panel] > HIGHEST_DEGREE
+        factor[panel] = 0 if too_many else times
+
+
+@kernel
+def finer_panels(degree, left, right, factor, origin, times, degrees, ends):
+    """Arguments as of `panels.finer_panels`; the last four are filled."""
+    at = 0
+    for panel in range(len(degree)):
+        halves = 2 if factor[panel] == 0 else 1
+        middle = 0.5 * (left[panel] + right[panel])
+        for half in range(halves):
+            origin[at], times[at] = panel, factor[panel]
+            degrees[at] = HALF_DEGREE if factor[panel] == 0 else factor[panel] * degree[panel]
+            ends[0, at] = middle if half else left[panel]
+            ends[1, at] = middle if halves == 2 and not half else right[panel]
+            at += 1
+
+
+@kernel
+def times_of_fresh_samples(degree, factor, left, right, margin, nodes, places, times):
+    """Arguments as of `panels.times_of_fresh_samples`, nodes as above; times are filled, and counted."""
+    at = 0
+    for panel in range(len(degree)):
+        last, here, each = degree[panel], nodes[places[degree[panel]] :], factor[panel]
+        middle, half = 0.5 * (left[panel] + right[panel]), 0.5 * (right[panel] - left[panel])
+        for k in range(last + 1):
+            if each and k % each == 0:
+                continue
+            times[at] = middle + half * here[k]
+            if last and k == 0:
+                times[at] = left[panel] + margin[panel]
+            elif last and k == last:
+                times[at] = right[panel] - margin[panel]
+            at += 1
+    return at
+
+
+@kernel
+def merged_values(old_degree, old_values, origin, factor, degree, fresh, values):
+    """Arguments as of `panels.merged_values`; the last one is filled."""
+    at = new = first = 0
+    panel = 0
+    for finer in range(len(degree)):
+        while panel < origin[finer]:
+            first += old_degree[panel] + 1
+            panel += 1
+        each = factor[finer]
+        for k in range(degree[finer] + 1):
+            for j in range(_CHANNELS):
+                if each and k % each == 0:
+                    values[at, j] = old_values[first + k // each, j]
+                else:
+                    values[at, j] = fresh[new, j]
+            if not (each and k % each == 0):
+                new += 1
+            at += 1
+
+
 @part
 def _share(phase, turn):
     return min(1.0, UNAVERAGED_PHASE / max(phase - turn, UNAVERAGED_PHASE))
@@ -154,9 +246,9 @@ def errors_of_panels(degree, width, table, hidden, momentum, found):
     """Arguments as of `panels.errors_of_panels`; found (3, P) is filled."""
     for panel in range(len(degree)):
         row, wide = table[panel], width[panel]
-        phase, turn = 2.0 * degree[panel], momentum * row[5] * wide
-        share = _share(phase, turn + wide * row[6])
-        error = 0.5 * wide * (momentum * row[0] + row[1]) * (share if row[3] > 0.0 else 1.0)
+        phase, turn = 2.0 * degree[panel], momentum * row[INVERSE_NORM] * wide
+        share = _share(phase, turn + wide * row[DRIFT_NORM])
+        error = 0.5 * wide * (momentum * row[INVERSE] + row[INVERSE + 1]) * (share if row[CONVERGING] > 0.0 else 1.0)
         of_path = noise = 0.0
         if len(hidden):
             path = hidden[panel]
@@ -213,12 +305,41 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
 
 
 @kernel
-def most_degrees(rates, steps, least, most):
-    """The most degrees that a step spans of terms above each of some sizes: (P, n), (P,), (B,) -> (B,)."""
-    for row in range(len(least)):
-        found = 0.0
+def plan_steps(turn, swing, degree, loops, tolerance, turn_a_step, planned):
+    """As `StepRequirements.plan`; planned (P,) is filled."""
+    total = 0.0
+    for panel in range(len(turn)):
+        each = swing[panel] ** (1.0 / (ORDER + 1.0))
+        planned[panel] = each
+        total += each * each
+    common = 2.0 * (loops * DISTANCE * math.sqrt(total) / (AIM * tolerance)) ** (1.0 / ORDER)
+    for panel in range(len(turn)):
+        least = max(degree[panel] / DEGREES_A_STEP, turn[panel] / turn_a_step)
+        planned[panel] = max(max(common * planned[panel], least), 1.0)
+
+
+@part
+def _between(x, places, values):
+    """Along straight lines, beyond the ends as at the ends."""
+    if x <= places[0]:
+        return values[0]
+    for k in range(1, len(places)):
+        if x <= places[k]:
+            share = (x - places[k - 1]) / (places[k] - places[k - 1])
+            return values[k - 1] + share * (values[k] - values[k - 1])
+    return values[len(values) - 1]
+
+
+@kernel
+def errors_of_steps(rates, steps, tolerance, distances, errors):
+    """As `StepRequirements.stepping_error`: (P, n), (P,), (B,) -> (B,), the last one filled."""
+    for row in range(len(distances)):
+        distance, most = distances[row], 0.0
+        least = NOT_SMALL * distance
         for panel in range(len(steps)):
             for k in range(rates.shape[1]):
-                if rates[panel, k] > least[row]:
-                    found = max(found, k / steps[panel])
-        most[row] = found
+                if rates[panel, k] > least:
+                    most = max(most, k / steps[panel])
+        by_chance = tolerance * _between(most, CHANCE_DEGREES, CHANCE_PARTS)
+        share = math.exp(_between(most, SPANNED_DEGREES, _LOGARITHMS))
+        errors[row] = max(share * distance, min(by_chance, MOST_BY_CHANCE * distance))

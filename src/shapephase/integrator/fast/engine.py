@@ -23,15 +23,19 @@ _KERNELS = {
     "march_momenta": "._march_kernel",
     "march_at_rest": "._march_kernel",
     "march_variants": "._variant_kernel",
-    "largest_growths": "._growth_kernel",
-    "sums_of_turns": "._growth_kernel",
+    "growths_and_rounding": "._growth_kernel",
     "step_derivatives": "._derivative_kernel",
     "times_of_samples": "._panel_kernel",
     "series_of_panels": "._panel_kernel",
+    "factors_of_refining": "._panel_kernel",
+    "finer_panels": "._panel_kernel",
+    "times_of_fresh_samples": "._panel_kernel",
+    "merged_values": "._panel_kernel",
     "errors_of_panels": "._panel_kernel",
     "change_ends": "._panel_kernel",
     "sizes_of_terms": "._panel_kernel",
-    "most_degrees": "._panel_kernel",
+    "plan_steps": "._panel_kernel",
+    "errors_of_steps": "._panel_kernel",
 }
 """And the modules that they are in."""
 # A version of Numba that does not go with this NumPy or this Python says so in many ways.

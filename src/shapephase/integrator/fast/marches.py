@@ -92,18 +92,22 @@ def quaternions_at_rest(widths: Array, coefficients: Array, steps: Integers) -> 
     return quaternions
 
 
-def amplifications(propagators: Array) -> Array:
-    """The largest growth of an error from one mark to a later one; not known is infinite: (B, M, 3, 3) -> (B,)."""
-    growths = np.empty(len(propagators))
-    _growth_kernel().largest_growths(plain(propagators).reshape(*propagators.shape[:2], 9), growths)
-    return growths
+def growths_and_rounding(propagators: Array, quaternions: Array) -> tuple[Array, Array]:
+    """The largest growth of an error from one mark to a later one, and what the rounding of all steps grows to.
 
+    Parameters
+    ----------
+    propagators : (B, M, 3, 3); without any nothing grows
+    quaternions : (B, K + 1, 4) at the ends of steps
 
-def sums_of_turns(quaternions: Array) -> Array:
-    """How far motions turn in all their steps: (B, K + 1, 4) -> (B,) [rad]."""
-    sums = np.empty(len(quaternions))
-    _growth_kernel().sums_of_turns(plain(quaternions), sums)
-    return sums
+    Returns
+    -------
+    growths, infinite where not known, and rounding [rad]: (B,) each
+    """
+    growths, rounding = np.empty(len(quaternions)), np.empty(len(quaternions))
+    matrices = plain(propagators).reshape(*propagators.shape[:2], 9)
+    _growth_kernel().growths_and_rounding(matrices, plain(quaternions), growths, rounding)
+    return growths, rounding
 
 
 def derivatives(
@@ -148,8 +152,7 @@ def warm() -> None:
     direction, none = np.array([[0.0, 0.0, 1.0]]), np.zeros(0, dtype=np.int64)
     march_in_threads(width, series, None, steps, 1, direction, np.ones(1), marks=none)
     quaternions_at_rest(width, series, steps)
-    amplifications(np.zeros((1, 1, 3, 3)))
-    sums_of_turns(np.zeros((1, 1, 4)))
+    growths_and_rounding(np.zeros((1, 1, 3, 3)), np.zeros((1, 1, 4)))
     derivatives(np.zeros((1, 108)), 1, direction[0], direction, 1.0, steps)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array, Integers
+from ...arrays import Array, Integers, Mask
 from ...chebyshev import unit_nodes, values_to_coefficients
 from ._plain import plain
 
@@ -40,6 +40,39 @@ def times_of_samples(degree: Integers, left: Array, right: Array, margin: Array)
     return times
 
 
+def factors_of_refining(degree: Integers, table: Array, rough: Mask, errors: Array, share: Array) -> Integers:
+    """What `refining_factors` finds: (P,)."""
+    factor = np.empty(len(degree), dtype=np.int64)
+    _kernel().factors_of_refining(degree, plain(table), rough, plain(errors), plain(share), factor)
+    return factor
+
+
+def finer_panels(degree: Integers, left: Array, right: Array, factor: Integers) -> tuple[Any, ...]:
+    """The fields of `FinerPanels`."""
+    count = len(factor) + int(np.count_nonzero(factor == 0))
+    origin, times, degrees = np.empty((3, count), dtype=np.int64)
+    ends = np.empty((2, count))
+    _kernel().finer_panels(degree, plain(left), plain(right), factor, origin, times, degrees, ends)
+    return origin, times, degrees, ends[0], ends[1]
+
+
+def times_of_fresh_samples(degree: Integers, factor: Integers, left: Array, right: Array, margin: Array) -> Array:
+    """What `FinerPanels.fresh_times` finds, by how far the first and last times of new panels are moved."""
+    _, _, nodes, places = _tables(tuple(sorted(set(degree.tolist()))))
+    times = np.empty(int(degree.sum()) + len(degree))
+    count = _kernel().times_of_fresh_samples(degree, factor, left, right, margin, nodes, places, times)
+    return times[:count]
+
+
+def merged_values(
+    old_degree: Integers, old_values: Array, origin: Integers, factor: Integers, degree: Integers, fresh: Array
+) -> Array:
+    """What `FinerPanels.values` finds."""
+    values = np.empty((int(degree.sum()) + len(degree), 9))
+    _kernel().merged_values(old_degree, plain(old_values), origin, factor, degree, plain(fresh), values)
+    return values
+
+
 def errors_of_panels(
     degree: Integers, width: Array, table: Array, hidden: Array | None, momentum: float
 ) -> tuple[Array, Array, Array]:
@@ -69,11 +102,18 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
     return rates, found
 
 
-def most_degrees(rates: Array, steps: Integers, least: Array) -> Array:
-    """The most degrees that a step spans of terms above each of some sizes: (P, n), (P,), (B,) -> (B,)."""
-    most = np.empty(len(least))
-    _kernel().most_degrees(plain(rates), np.array(steps, dtype=np.int64), plain(least), most)
-    return most
+def plan_of_steps(sizes: Array, loops: int, tolerance: float, turn_a_step: float) -> Array:
+    """Steps per panel, not yet whole, from turn, swing and degree of each (3, P): (P,)."""
+    planned = np.empty(sizes.shape[1])
+    _kernel().plan_steps(*sizes, float(loops), float(tolerance), turn_a_step, planned)
+    return planned
+
+
+def errors_of_steps(rates: Array, steps: Integers, tolerance: float, distances: Array) -> Array:
+    """What `StepRequirements.stepping_error` finds: (P, n), (P,), (B,) -> (B,) [rad]."""
+    errors = np.empty(len(distances))
+    _kernel().errors_of_steps(plain(rates), steps, float(tolerance), plain(distances), errors)
+    return errors
 
 
 def warm() -> None:
@@ -81,15 +121,21 @@ def warm() -> None:
     degree, one = np.array([4]), np.ones(1)
     coefficients, table = series_of_panels(degree, np.ones((5, 9)), one, one)
     times_of_samples(degree, one, one, one)
+    values, none = np.ones((5, 9)), np.zeros(1, dtype=np.bool_)
+    factor = factors_of_refining(degree, table, none, one, one)
+    finer_panels(degree, one, one, factor)
+    times_of_fresh_samples(degree, factor, one, one, one)
+    merged_values(degree, values, np.zeros(1, dtype=np.int64), factor, degree, values)
     errors_of_panels(degree, one, table, None, 1.0)
     series_with_changed_ends(coefficients, degree, one, 1.0)
-    rates, _ = sizes_of_terms(coefficients, one, 1.0, 1.0)
-    most_degrees(rates, np.array([2]), one)
+    rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
+    plan_of_steps(sizes, 1, 1.0, 1.0)
+    errors_of_steps(rates, np.array([2]), 1.0, one)
 
 
 @lru_cache(maxsize=64)
 def _tables(degrees: tuple[int, ...]) -> tuple[Array, Integers, Array, Integers]:
-    """Of some degrees from values to coefficients, column after column, and the nodes; and where each degree's begin."""
+    """From values to coefficients, column after column, and nodes of some degrees; after both, where each's begin."""
     matrices = [values_to_coefficients(degree).T.ravel() for degree in degrees]
     nodes = [unit_nodes(degree) for degree in degrees]
     found: list[Any] = []

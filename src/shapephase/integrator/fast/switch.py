@@ -30,7 +30,7 @@ def is_installed() -> bool:
 
 def is_allowed() -> bool:
     """Whether machine code may be used in this process."""
-    return _setting() != "0" and _can_compile()
+    return _setting() != "0" and is_installed() and _can_compile()
 
 
 def is_on() -> bool:
@@ -41,7 +41,7 @@ def is_on() -> bool:
 def is_wanted() -> bool:
     """The same where Numba is known to work."""
     setting = _setting()
-    return setting == "1" or (setting != "0" and (_is_large or not _is_command))
+    return is_installed() and (setting == "1" or (setting != "0" and (_is_large or not _is_command)))
 
 
 def may_compile() -> bool:
@@ -52,7 +52,7 @@ def may_compile() -> bool:
 def _can_compile() -> bool:
     # A Numba that is told to interpret would take the loops one operation after another.
     interpreting = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() not in ("", "0")
-    return not interpreting and is_installed()
+    return not interpreting
 
 
 def begin_command() -> None:

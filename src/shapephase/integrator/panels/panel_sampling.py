@@ -14,11 +14,11 @@ from .._last_terms import Perturbed, perturbed_series
 from .._spectral_error import Channels, spectral_norms
 from ..interpolant import Interpolant
 from ..resolved import Hidden, ResolvedPath
+from .finer_panels import FinerPanels, refining_factors
 from .panel_series import (
     PanelErrors,
     PanelSeries,
     panel_errors,
-    sample_starts,
     sample_times,
     series_through,
     sum_of_noise,
@@ -28,12 +28,6 @@ from .panel_series import (
 _FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
 # Panels that are a few.
 _FEW = 4
-# Of both halves of a bisected panel: enough to see how fast the spectrum decays.
-_HALF_DEGREE = 10
-# The highest of a panel; bisecting needs fewer samples than a higher degree.
-_HIGHEST_DEGREE = 80
-# How many times the degree can be raised by at once.
-_MOST_RAISED = 4
 # Panels before bisecting ends, besides 40 for every break: a motion that needs more is rough, not merely long.
 _MOST_PANELS = 4000
 # Of the tolerance: what the first panels may leave hidden of a path that is resolved.
@@ -160,46 +154,25 @@ class PanelSampler:
 
     def _refine_panels(self, rough: Mask, errors: Array, share: Array, tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
-        series = self.series
-        degree = series.degree
-        with np.errstate(divide="ignore", invalid="ignore"):
-            missing = np.log(np.maximum(errors / share, 1.0)) / series.estimate.decay
-            # Without any missing degrees, the error was seen between the nodes: the degree is doubled.
-            times = np.ceil(np.nan_to_num(missing / degree, nan=0.0, posinf=9.9) + 0.9)
-        factor = np.clip(times, 2, _MOST_RAISED).astype(np.int64)
-        halves = rough & ((missing > 3.1 * degree) | (factor * degree > _HIGHEST_DEGREE))
-        factor[~rough], factor[halves] = 1, 0
+        old = self.series
+        factor = refining_factors(old, rough, errors, share)
+        halves = factor == 0
         if halves.any():
-            narrow = (series.width[halves] < _LEAST_WIDTH * self._span).any()
-            if narrow or len(degree) > self._most_panels:
-                where = float(series.left[halves][np.argmin(series.width[halves])])
+            narrow = (old.width[halves] < _LEAST_WIDTH * self._span).any()
+            if narrow or len(factor) > self._most_panels:
+                where = float(old.left[halves][np.argmin(old.width[halves])])
                 raise AccuracyNotReached(
                     f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
                     f"{tolerance:.3g} was requested; declare the times of its jumps as breaks, smooth the data, or "
                     "loosen the tolerance"
                 )
-        self._refined(factor)
-
-    def _refined(self, factor: Integers) -> None:
-        """Sample panels of so many times the degree, 1: kept as they are, 0: halved; one call for all points."""
-        old = self.series
-        origin = np.repeat(np.arange(len(factor)), 1 + (factor == 0))
-        factor, left, right = factor[origin], old.left[origin], old.right[origin]
-        degree = np.where(factor == 0, _HALF_DEGREE, old.degree[origin] * factor)
-        first = np.flatnonzero(factor == 0)[::2]
-        right[first] = left[first + 1] = 0.5 * (left[first] + right[first])
-        times, starts, known = sample_times(degree, left, right, self._end), sample_starts(degree), factor > 0
-        counts = (old.degree[origin] + 1)[known]
-        within = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
-        again = np.repeat(starts[:-1][known], counts) + within * np.repeat(factor[known], counts)
-        values, fresh = np.empty((len(times), 9)), np.ones(len(times), dtype=np.bool_)
-        fresh[again] = False
-        values[again] = old.values[np.repeat(old.starts[origin[known]], counts) + within]
-        values[fresh] = self._channels(times[fresh])
+        finer = FinerPanels.of(old, factor)
+        # One call for all points.
+        values = finer.values(old, self._channels(finer.fresh_times(self._end)))
         # What was sampled before has had its ends corrected.
-        series = series_through(degree, left, right, values, self._end, ~known)
-        seen = np.flatnonzero((factor == 1) & ~np.isnan(old.gaps[origin, 0]))
-        self._keep(series.with_gaps(seen, old.gaps[origin[seen]]) if len(seen) else series)
+        series = series_through(finer.degree, finer.left, finer.right, values, self._end, finer.factor == 0)
+        seen = np.flatnonzero((finer.factor == 1) & ~np.isnan(old.gaps[finer.origin, 0]))
+        self._keep(series.with_gaps(seen, old.gaps[finer.origin[seen]]) if len(seen) else series)
 
     def _keep(self, series: PanelSeries) -> None:
         self._series, self._errors, self._interpolant = series, None, None

@@ -139,9 +139,9 @@ def panel_errors(series: PanelSeries, hidden: Hidden | None, momentum: float) ->
     """Of an attitude, for a momentum of this magnitude; hidden: as the series' panels have it, None: nothing is."""
     estimate, width = series.estimate, series.width
     if engine.is_ready():
-        found = errors_of_panels(series.degree, width, estimate.table, None if hidden is None else hidden.table, momentum)
-        return PanelErrors(*found)
-    phase = 2.0 * series.degree
+        of_path = None if hidden is None else hidden.table
+        return PanelErrors(*errors_of_panels(series.degree, width, estimate.table, of_path, momentum))
+    phase = np.asarray(2.0 * series.degree, dtype=np.float64)
     of_series = estimate.error(momentum, width, phase)
     if hidden is None:
         return PanelErrors(of_series, np.zeros(len(width)), np.zeros(len(width)))

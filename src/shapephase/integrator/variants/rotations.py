@@ -18,7 +18,7 @@ import numpy as np
 from ... import run_progress, so3
 from ...arrays import Array, Integers, Mask
 from ...errors import AccuracyNotReached, SingularInertiaError
-from .._error_propagator import amplification, rounding_error
+from .._error_propagator import growth_and_rounding
 from .._last_terms import Perturbed, perturbed_series
 from .._spectral_error import spectral_norms
 from .._step_control import StepRequirements, even_steps
@@ -356,7 +356,9 @@ def _stepped(
     panels = plan.panels
     record = _record(panels, series, steps, momentum)
     distances = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
-    amplifications = amplification(record.propagators)
+    amplifications, rounding = growth_and_rounding(
+        record.propagators, record.quaternions, _LITTLE_ROUNDING * plan.tolerance
+    )
     requirements, rates = plan.requirements(turning), plan.rates(series.coefficients)
     stepping = np.array(
         [
@@ -375,9 +377,7 @@ def _stepped(
         record=record,
         sampling_error=np.fmin(amplifications * series.error, record.truncation + amplifications * series.hidden),
         stepping_error=stepping[:, 0],
-        rounding_error=rounding_error(
-            record.propagators, record.quaternions, amplifications, _LITTLE_ROUNDING * plan.tolerance
-        ),
+        rounding_error=rounding,
         amplification=amplifications,
     )
 

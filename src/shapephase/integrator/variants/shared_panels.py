@@ -48,9 +48,9 @@ class SharedPanels:
     def series(self, channels: Array, momentum: float) -> ManySeries:
         """Of deformations whose channels at the times are (V, S, 9), for momenta of this magnitude."""
         count, each = len(channels), len(self.degrees)
-        ends = (np.tile(part, count) for part in (self._panels.left, self._panels.right))
+        left, right = np.tile(self._panels.left, count), np.tile(self._panels.right, count)
         values = np.array(channels, dtype=np.float64).reshape(-1, 9)
-        found = self._sampler.through(np.tile(self.degrees, count), *ends, values)
+        found = self._sampler.through(np.tile(self.degrees, count), left, right, values)
         hidden = None if self._hidden is None else Hidden(np.tile(self._hidden.table, (count, 1)))
         errors = panel_errors(found, hidden, momentum)
         noise = np.array([sum_of_noise(row) for row in errors.noise.reshape(count, each)])
