@@ -55,7 +55,7 @@ class PanelSampler:
         self._channels, self._probe, self._loops, self._resolved = channels, probe, loops, resolved
         self._is_bandlimited = oscillations is not None or (resolved is not None and not checked)
         self._breaks, self._oscillations = breaks, oscillations
-        self._end, self._span = float(breaks[-1]), float(breaks[-1] - breaks[0])
+        self.end, self._span = float(breaks[-1]), float(breaks[-1] - breaks[0])
         self._most_panels = _MOST_PANELS + 40 * len(breaks)
         self._series: PanelSeries | None = None
         self._errors: tuple[float, PanelErrors] | None = None
@@ -66,8 +66,8 @@ class PanelSampler:
         if self._series is None:
             degree, left, right = self._first_panels(tolerance)
             # A copy: what machine code computes in work arrays is overwritten by the next call.
-            values = self._channels(sample_times(degree, left, right, self._end)).copy()
-            self._keep(series_through(degree, left, right, values, self._end, degree > 0))
+            values = self._channels(sample_times(degree, left, right, self.end)).copy()
+            self._keep(series_through(degree, left, right, values, self.end, degree > 0))
         while True:
             errors = self._errors_at(momentum)
             total = self._loops * float(errors.whole.sum())
@@ -106,11 +106,7 @@ class PanelSampler:
     def sample_times(self) -> Array:
         """Where the panels so far are sampled: (S,) [s]."""
         series = self.series
-        return sample_times(series.degree, series.left, series.right, self._end)
-
-    def through(self, degree: Integers, left: Array, right: Array, values: Array) -> PanelSeries:
-        """The series of other deformations on panels of this sampler, from their values at its times."""
-        return series_through(degree, left, right, values, self._end, np.ones(len(degree), dtype=np.bool_))
+        return sample_times(series.degree, series.left, series.right, self.end)
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
@@ -168,9 +164,9 @@ class PanelSampler:
                 )
         finer = FinerPanels.of(old, factor)
         # One call for all points.
-        values = finer.values(old, self._channels(finer.fresh_times(self._end)))
+        values = finer.values(old, self._channels(finer.fresh_times(self.end)))
         # What was sampled before has had its ends corrected.
-        series = series_through(finer.degree, finer.left, finer.right, values, self._end, finer.factor == 0)
+        series = series_through(finer.degree, finer.left, finer.right, values, self.end, finer.factor == 0)
         seen = np.flatnonzero((finer.factor == 1) & ~np.isnan(old.gaps[finer.origin, 0]))
         self._keep(series.with_gaps(seen, old.gaps[finer.origin[seen]]) if len(seen) else series)
 

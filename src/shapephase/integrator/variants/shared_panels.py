@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Array, Mask
 from .._last_terms import perturbed_series
 from ..panels.panel_sampling import PanelSampler
-from ..panels.panel_series import panel_errors, sum_of_noise
+from ..panels.panel_series import panel_errors, series_through, sum_of_noise
 from ..resolved import Hidden
 
 
@@ -40,7 +40,7 @@ class SharedPanels:
 
     def __init__(self, sampler: PanelSampler) -> None:
         interpolant = sampler.interpolant()
-        self._sampler, self._panels, self._hidden = sampler, sampler.series, sampler.hidden
+        self._end, self._panels, self._hidden = sampler.end, sampler.series, sampler.hidden
         self.degrees, self.widths = self._panels.degree, self._panels.width
         self.edges, self.loops = interpolant.edges, interpolant.loops
         self.times = sampler.sample_times
@@ -50,7 +50,8 @@ class SharedPanels:
         count, each = len(channels), len(self.degrees)
         left, right = np.tile(self._panels.left, count), np.tile(self._panels.right, count)
         values = np.array(channels, dtype=np.float64).reshape(-1, 9)
-        found = self._sampler.through(np.tile(self.degrees, count), left, right, values)
+        degree = np.tile(self.degrees, count)
+        found = series_through(degree, left, right, values, self._end, degree > 0)
         hidden = None if self._hidden is None else Hidden(np.tile(self._hidden.table, (count, 1)))
         errors = panel_errors(found, hidden, momentum)
         noise = np.array([sum_of_noise(row) for row in errors.noise.reshape(count, each)])
