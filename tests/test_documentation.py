@@ -9,7 +9,6 @@ import re
 import sys
 import types
 from collections import Counter
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,8 +21,15 @@ DOCS = ROOT / "docs"
 STUBS = sorted((ROOT / "src" / "shapephase").rglob("__init__.pyi"))
 MODULES = ("elliptic", "errors", "inertia_tensor", "so3", "sphere")
 FACES = [".".join(stub.parent.relative_to(ROOT / "src").parts) for stub in STUBS] + [f"shapephase.{m}" for m in MODULES]
-WITHOUT_EXAMPLE = ROOT / "tests" / "data" / "names_without_example.txt"
 MOST_LINES = 8
+# Examples that take a second, or half a minute where machine code has to be compiled.
+LONG = (
+    "shapephase.compile_steps",
+    "shapephase.examples.closed_orbit",
+    "shapephase.optimal_control.Plan",
+    "shapephase.plan_reorientation",
+    "shapephase.plotting.write_report",
+)
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
 
 
@@ -99,19 +105,31 @@ def examples(thing: Any) -> list[doctest.Example]:
     return doctest.DocTestParser().get_examples(inspect.getdoc(thing) or "")
 
 
+def ran(name: str, thing: Any) -> None:
+    """The steps of an example, of which at least one prints."""
+    steps = examples(thing)
+    assert sum(len(step.source.splitlines()) for step in steps) <= MOST_LINES, name
+    assert any(step.want for step in steps), name
+    said: list[str] = []
+    test = doctest.DocTest(steps, {"np": np, "sp": sp}, name, None, None, None)
+    assert doctest.DocTestRunner(verbose=False).run(test, out=said.append).failed == 0, "".join(said)
+
+
 @pytest.mark.parametrize("face", FACES)
 def test_examples_in_docstrings_print_what_they_say(face, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    runner = doctest.DocTestRunner(verbose=False)
     for name, thing in NAMES.items():
-        if name.rpartition(".")[0] == face and (steps := examples(thing)):
-            assert sum(len(step.source.splitlines()) for step in steps) <= MOST_LINES, name
-            assert any(step.want for step in steps), name
-            said: list[str] = []
-            test = doctest.DocTest(steps, {"np": np, "sp": sp}, name, None, None, None)
-            assert runner.run(test, out=said.append).failed == 0, "".join(said)
+        if name.rpartition(".")[0] == face and name not in LONG and examples(thing):
+            ran(name, thing)
 
 
-def test_names_without_an_example_get_fewer():
-    missing = sorted(name for name, thing in NAMES.items() if not examples(thing))
-    assert missing == Path(WITHOUT_EXAMPLE).read_text(encoding="utf-8").split()
+@pytest.mark.full
+@pytest.mark.parametrize("name", LONG)
+def test_long_examples_print_what_they_say(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    ran(name, NAMES[name])
+
+
+def test_every_exported_function_and_class_has_an_example():
+    assert len(NAMES) > 490
+    assert not [name for name, thing in NAMES.items() if not examples(thing)]

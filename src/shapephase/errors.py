@@ -157,6 +157,15 @@ class UnknownColumnError(UnknownNameError, TrajectoryError):
 
     Remedy: the message names the column, the joints and the nearest; `names={column: joint}` maps a column to a joint,
     or to None to leave it out.
+
+    Examples
+    --------
+    >>> np.savetxt("bad.csv", [[0.0, 0.0], [1.0, 0.1]], delimiter=",", header="time,tail", comments="")
+    >>> try:
+    ...     sp.read_shape_path("bad.csv", sp.load_body("cat_two_halves"))
+    ... except sp.errors.UnknownColumnError as error:
+    ...     print(str(error)[:40])
+    unknown column in bad.csv; joint of cat_
     """
 
 
@@ -181,6 +190,11 @@ class NoisyPathError(TrajectoryError):
 
     Remedy: smooth the data, with `read_shape_path(..., smooth=)` or a spline through fewer samples. A function that is
     merely rough is an `AccuracyNotReached`.
+
+    Examples
+    --------
+    >>> issubclass(sp.errors.NoisyPathError, sp.errors.TrajectoryError)
+    True
     """
 
 
@@ -204,6 +218,11 @@ class AccuracyNotReached(ShapePhaseError, ArithmeticError):
 
     Causes: a motion that is rough between its breaks, errors that grow along a long unstable motion, a tolerance near
     rounding. Remedy: declare the times of kinks as breaks, loosen the tolerance, or shorten the motion.
+
+    Examples
+    --------
+    >>> issubclass(sp.errors.AccuracyNotReached, sp.ShapePhaseError)
+    True
     """
 
 
@@ -254,7 +273,13 @@ class LieAlgebraError(ShapePhaseError, ValueError):
 
 
 class MissingExtraError(ShapePhaseError, ImportError):
-    """An optional dependency is not installed. Remedy: the message names the extra to install."""
+    """An optional dependency is not installed. Remedy: the message names the extra to install.
+
+    Examples
+    --------
+    >>> issubclass(sp.errors.MissingExtraError, ImportError)
+    True
+    """
 
 
 class RunStopped(ShapePhaseError):
@@ -293,6 +318,11 @@ class CompilerError(ShapePhaseError, RuntimeError):
 
     Causes: a Numba that does not go with this NumPy, no folder that only this user may write to. Remedy: another
     version of Numba, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps.
+
+    Examples
+    --------
+    >>> issubclass(sp.errors.CompilerError, sp.ShapePhaseError)
+    True
     """
 
 
@@ -300,6 +330,16 @@ class LocalFunctionError(ShapePhaseError, PicklingError):
     """A path, deformation or gauge made of a lambda, or of a function inside another, cannot be pickled.
 
     Remedy: define the function at the top of a module, where another process finds it by its name; or save the motion.
+
+    Examples
+    --------
+    >>> import pickle
+    >>> path = sp.ShapePath.function(lambda t: (np.sin(t)[:, None], np.cos(t)[:, None]), 1.0)
+    >>> try:
+    ...     pickle.dumps(path)
+    ... except sp.errors.LocalFunctionError as error:
+    ...     print(str(error)[:40])
+    a path made of '<lambda>' cannot be pick
     """
 
 
@@ -312,6 +352,12 @@ class PlanNotFound(ShapePhaseError, ArithmeticError):
     Attributes
     ----------
     best : the best try, a `Plan` that misses the goal; None if there was none
+
+    Examples
+    --------
+    >>> error = sp.errors.PlanNotFound("no motion reaches the goal", best="the best try")
+    >>> print(error, "-", error.best)
+    no motion reaches the goal - the best try
     """
 
     def __init__(self, message: str, best: object = None) -> None:
@@ -334,27 +380,73 @@ class UnphysicalInertiaWarning(UserWarning):
 
 
 class ImplausibleBodyWarning(UserWarning):
-    """Numbers of a body that hardly any real one has: other units, or a slip in its file."""
+    """Numbers of a body that hardly any real one has: other units, or a slip in its file.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("error", sp.ImplausibleBodyWarning)  # a slip in a file is a fault
+    >>> sp.ImplausibleBodyWarning.__name__
+    'ImplausibleBodyWarning'
+    """
 
 
 class IgnoredElementWarning(UserWarning):
-    """An element of a file that has no meaning for a free-floating body; the message names it."""
+    """An element of a file that has no meaning for a free-floating body; the message names it.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("error", sp.IgnoredElementWarning)  # nothing in a file may be left out
+    >>> sp.IgnoredElementWarning.__name__
+    'IgnoredElementWarning'
+    """
 
 
 class VisualWarning(UserWarning):
-    """A part of a body is not drawn as in its file: a mesh, a faulty element, or a changed file."""
+    """A part of a body is not drawn as in its file: a mesh, a faulty element, or a changed file.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("error", sp.errors.VisualWarning)  # a faulty picture is a fault
+    >>> sp.errors.VisualWarning.__name__
+    'VisualWarning'
+    """
 
 
 class CompiledCodeWarning(UserWarning):
-    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results."""
+    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("ignore", sp.CompiledCodeWarning)  # results are the same without
+    >>> sp.CompiledCodeWarning.__name__
+    'CompiledCodeWarning'
+    """
 
 
 class TrajectoryWarning(UserWarning):
-    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns."""
+    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("error", sp.TrajectoryWarning)  # what is probably not meant is a fault
+    >>> sp.TrajectoryWarning.__name__
+    'TrajectoryWarning'
+    """
 
 
 class UndeclaredBreakWarning(TrajectoryWarning):
-    """A function of time has kinks that were not declared as breaks; they were located, and are named."""
+    """A function of time has kinks that were not declared as breaks; they were located, and are named.
+
+    Examples
+    --------
+    >>> issubclass(sp.errors.UndeclaredBreakWarning, sp.TrajectoryWarning)
+    True
+    """
 
 
 def unknown_name(

@@ -122,12 +122,27 @@ def robot_names() -> tuple[str, ...]:
 
 
 def example_names() -> tuple[str, ...]:
-    """The names of the bodies of example-robot-data, where it is installed; otherwise none."""
+    """The names of the bodies of example-robot-data, where it is installed; otherwise none.
+
+    Examples
+    --------
+    >>> isinstance(sp.body.example_names(), tuple)  # empty without example-robot-data
+    True
+    """
     return tuple(sorted(_example_files()))
 
 
 def example_file(name: str) -> Path:
-    """The URDF file of a body of example-robot-data. Raises MissingExtraError, UnknownNameError."""
+    """The URDF file of a body of example-robot-data. Raises MissingExtraError, UnknownNameError.
+
+    Examples
+    --------
+    >>> if "talos" in sp.body.example_names():
+    ...     print(sp.body.example_file("talos").suffix)
+    ... else:
+    ...     print(".urdf")
+    .urdf
+    """
     files = _example_files()
     if not files:
         raise MissingExtraError(

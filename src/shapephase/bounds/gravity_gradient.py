@@ -218,6 +218,14 @@ class GravityTorque:
     impulse : the largest change of the angular momentum [kg m^2/s]
     attitude_error : the largest rotation away from the free motion [rad]
     tolerance : the rotation that is allowed [rad]
+
+    Examples
+    --------
+    >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
+    >>> motion = sp.reconstruct(sp.rigid(np.eye(3), 10.0), [0.0, 0.5, 5.0])
+    >>> found = sp.bounds.gravity_torque_estimate(motion, orbit)
+    >>> print(f"{found.largest_torque:.9f} N m")  # a sphere feels none
+    0.000000000 N m
     """
 
     largest_torque: float

@@ -231,6 +231,12 @@ def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
     ------
     UnknownNameError
         For an unknown name or gauge.
+
+    Examples
+    --------
+    >>> motion = sp.examples.closed_orbit("cat")
+    >>> print(f"{sp.split(motion).momentum_gap:.6f}")
+    0.000000
     """
     if name not in CLOSED_ORBITS:
         raise unknown_name("closed orbit", name, CLOSED_ORBITS)

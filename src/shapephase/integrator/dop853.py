@@ -28,6 +28,14 @@ def dop853_rotation(
     -------
     dense : times (N,) -> quaternions (N, 4)
     evaluations : of I and L_o
+
+    Examples
+    --------
+    >>> def evaluate(t):
+    ...     return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(t), 3, 3)), np.zeros((len(t), 3))
+    >>> turn, _ = sp.integrator.dop853_rotation(evaluate, np.array([0.0, 1.0]), np.array([0.0, 0.0, 5.0]), 1e-9)
+    >>> print(f"{np.linalg.norm(sp.so3.rotation_vector_from_quat(turn(np.array([1.0])))):.6f}")
+    2.000000
     """
     from scipy.integrate import solve_ivp
 

@@ -45,6 +45,13 @@ class Hamiltonian:
     energy : state, charge -> H
     slopes : r, u, l -> gradient of L by all three, (2 n + 3,)
     metric : r -> g
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> found = sp.optimal_control.hamiltonian(cat, "rate")
+    >>> print(np.array(found.metric(np.zeros(3))).diagonal())  # the identity
+    [1. 1. 1.]
     """
 
     field: Any
@@ -63,7 +70,15 @@ class Hamiltonian:
 
 
 def hamiltonian(body: Body, metric: str) -> Hamiltonian:
-    """The equations of a body; built at the first call for it, kept as long as the body is. Raises UnknownNameError."""
+    """The equations of a body; built at the first call for it, kept as long as the body is. Raises UnknownNameError.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> found = sp.optimal_control.hamiltonian(cat, "kinetic")
+    >>> print(np.array(found.metric(np.zeros(3))).diagonal().round(6))
+    [0.005   0.005   0.00125]
+    """
     if metric not in _COSTS:
         raise unknown_name("metric", metric, _COSTS)
     with _building:

@@ -53,6 +53,14 @@ class JacobiFields:
     momentum_scales, charge_scale : (n,) and a number: units of g rate and of the charge that the columns of `matrix`
         are per
     solution : times -> (2 n + 4 + (2 n + 3)(n + 3), N): the extremal, then the fields
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> rate, charge = np.array([1.0, 0.0, 0.0]), np.zeros(3)
+    >>> fields = sp.optimal_control.jacobi_fields(cat, "kinetic", np.zeros(3), rate, charge, 0.2, 1e-9)
+    >>> fields.matrix(np.array([0.1, 0.2])).shape
+    (2, 6, 6)
     """
 
     duration: float
@@ -83,6 +91,11 @@ class ConjugateTime:
     ----------
     time : [s]
     multiplicity : how many independent Jacobi fields vanish there
+
+    Examples
+    --------
+    >>> sp.optimal_control.ConjugateTime(time=0.8, multiplicity=1).time
+    0.8
     """
 
     time: float
@@ -95,6 +108,14 @@ def jacobi_fields(
     """All Jacobi fields that vanish at the start, along the extremal of these (trusted) arguments.
 
     Raises AccuracyNotReached as `extremal`.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> rate, charge = np.array([1.0, 0.0, 0.0]), np.zeros(3)
+    >>> fields = sp.optimal_control.jacobi_fields(cat, "kinetic", np.zeros(3), rate, charge, 0.2, 1e-9)
+    >>> print(np.abs(fields.matrix(np.array([0.0]))).max())  # they vanish at the start
+    0.0
     """
     n, equations = body.n_shape, hamiltonian(body, metric)
     momenta, charge_scale = natural_scales(body, equations, shape, rate, charge)

@@ -169,6 +169,13 @@ def shoot(
         If it does not converge: the message holds the remaining distance. Plans of bodies of up to 36 joints are near
         enough from 20 pieces on, except where light joints whirl.
     As `extremal` and `wong_residual`.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> path = sp.optimal_control.shoot(cat, loop)
+    >>> print(f"{path.cost:.4f} <= {sp.optimal_control.path_cost(cat, loop):.4f} J s")
+    0.0204 <= 0.0204 J s
     """
     route = path.matched(body.joint_names, body.name)
     goal = tolerance_argument(tolerance)

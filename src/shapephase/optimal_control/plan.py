@@ -21,6 +21,12 @@ class Progress:
     iteration : of the solver, from 0
     cost : so far [unit of the plan's cost]
     infeasibility : the largest violation of a constraint so far, scaled: the equations of motion, the goal, the limits
+
+    Examples
+    --------
+    >>> said = sp.optimal_control.Progress("solve", 1, 1, 12, 0.09, 1e-9)
+    >>> said.iteration, said.cost
+    (12, 0.09)
     """
 
     stage: str
@@ -44,6 +50,12 @@ class Start:
     kkt_residual, infeasibility : remaining violation of the optimality conditions and of the constraints, scaled
     iterations : of the solver
     seconds : time it took
+
+    Examples
+    --------
+    >>> start = sp.optimal_control.Start("Solve_Succeeded", True, 0.09, 1e-10, 1e-9, 1e-9, 25, 0.4)
+    >>> start.converged, start.iterations
+    (True, 25)
     """
 
     status: str
@@ -77,6 +89,14 @@ class Plan:
     iterations : over all starts
     seconds : over all starts
     starts : one for each start, in their order
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> goal, search = sp.so3.exp(np.array([1.0, 0.0, 0.0])), sp.optimal_control.Search(pieces=16)
+    >>> plan = sp.plan_reorientation(cat, goal, search=search)
+    >>> plan.cost_name, plan.goal_error < 1e-8
+    ('kinetic', True)
     """
 
     body: Body

@@ -101,6 +101,14 @@ def plan_reorientation(
     Notes
     -----
     Source: Montgomery 1990, Isoholonomic problems and some applications.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> goal, search = sp.so3.exp(np.array([1.0, 0.0, 0.0])), sp.optimal_control.Search(pieces=16)
+    >>> plan = sp.plan_reorientation(cat, goal, search=search)
+    >>> print(f"{sp.so3.angle(goal.T @ plan.motion.final_attitude):.6f} rad off")
+    0.000000 rad off
     """
     check_object(body, "Body", "body")
     chosen = Search() if search is None else search

@@ -182,6 +182,13 @@ def plot_caustic(
     Notes
     -----
     Source: Bates and Fasso 2007, for two equal moments; theory.md Q6.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> ax = Figure().add_subplot(projection="3d")
+    >>> len(sp.plotting.plot_caustic(ax, [2.0, 2.0, 1.0], circles=8).collections) >= 1
+    True
     """
     check_axes(ax)
     if getattr(ax, "name", "") != "3d":

@@ -74,6 +74,14 @@ def write_report(
         Without viser or Matplotlib: pip install 'shapephase[viz,plot]'.
     ShapeError
         If the motion is a batch.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.write_report(motion, sp.split(motion, "base"), "report.html")
+    >>> from pathlib import Path
+    >>> Path("report.html").read_text()[:9]
+    '<!doctype'
     """
     check_object(motion, "Motion", "motion")
     check_object(result, "PhaseSplit", "result")

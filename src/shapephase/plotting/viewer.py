@@ -78,6 +78,14 @@ def motion_page(
     VisualWarning
         As `visuals`; and, where `frames` is None, if something turns by more than a quarter turn from one frame to the
         next, so that it may seem to turn the other way.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.motion_page(motion, "page.html", frames=5)
+    >>> from pathlib import Path
+    >>> Path("page.html").stat().st_size > 1000
+    True
     """
     check_object(motion, "Motion", "motion")
     page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, **fall)
@@ -93,7 +101,14 @@ def motion_html(
     ghost: bool = True,
     **fall: ArrayLike,
 ) -> str:
-    """The page that `motion_page` writes, as text: arguments, errors and warnings as there."""
+    """The page that `motion_page` writes, as text: arguments, errors and warnings as there.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plotting.motion_html(motion, frames=5)[:15].lower()
+    '<!doctype html>'
+    """
     check_object(motion, "Motion", "motion")
     viser_module()
     playing_speed = _playing_speed(motion, speed)
@@ -133,6 +148,13 @@ def view(
     Notes
     -----
     Raises and warns as `motion_page`.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> with sp.view(motion, browser=False, port=0) as shown:
+    ...     print(shown is not None)
+    True
     """
     check_object(motion, "Motion", "motion")
     viser_module()
@@ -165,6 +187,13 @@ class LiveView:
     Attributes
     ----------
     server : the viser server, to which other things can be added
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> with sp.view(motion, browser=False, port=0) as shown:
+    ...     print(type(shown).__name__)
+    LiveView
     """
 
     def __init__(self, server: viser.ViserServer, scene: MovingScene, speed: float, ghost: bool) -> None:

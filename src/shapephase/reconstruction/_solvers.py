@@ -32,7 +32,14 @@ _LEAST_RTOL = 1e-12
 
 
 class Solution(Protocol):
-    """S(t), the attitude relative to the start, for a batch."""
+    """S(t), the attitude relative to the start, for a batch.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.eye(3), 1.0), [0.0, 0.0, 0.5])
+    >>> print(f"{float(np.max(sp.so3.angle(motion.solution.rotation(np.array([1.0]))))):.9f}")
+    0.500000000
+    """
 
     @property
     def times(self) -> Array:

@@ -382,6 +382,13 @@ def heavy_top_steps(
     ------
     AccuracyNotReached
         After 200 000 steps, or where the step shrinks to nothing.
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.HeavyTop(np.diag([1.0, 1.0, 0.5]), 2.0)
+    >>> steps = list(sp.rigid_body.heavy_top_steps(top, np.eye(3), np.array([0.0, 0.0, 3.0]), 1.0, 1e-9))
+    >>> print(f"{steps[-1][0]:.6f} s")
+    1.000000 s
     """
     vertical, scale, start = _packed(top, attitude, momentum)
     strength = top.mgl / scale

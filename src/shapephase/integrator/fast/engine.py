@@ -67,6 +67,12 @@ def compile_steps() -> list[Path]:
         If Numba is not installed.
     CompilerError
         If it does not work, or there is no folder that only this user may write to.
+
+    Examples
+    --------
+    >>> kept = sp.compile_steps()
+    >>> len(kept) > 0
+    True
     """
     if not is_installed():
         raise MissingExtraError("compiled steps need Numba; install it with: pip install 'shapephase[fast]'")

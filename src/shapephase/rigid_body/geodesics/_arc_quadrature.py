@@ -37,7 +37,15 @@ _SETTLED = np.array([2e-13, 2e-13, 2e-12, 1e-8])
 
 
 class Arcs(NamedTuple):
-    """Integrals from the equator to a phase, any shape."""
+    """Integrals from the equator to a phase, any shape.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> arcs = geodesics.Arcs(np.array(1.0), np.array(0.5), np.array(0.0))
+    >>> float(arcs.time), float(arcs.longitude)
+    (1.0, 0.5)
+    """
 
     time: Array
     """Arc length."""

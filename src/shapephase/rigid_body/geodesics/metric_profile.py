@@ -82,7 +82,17 @@ class Assumptions:
 
 @dataclass(frozen=True, eq=False)
 class TabulatedStretch:
-    """D and its derivatives by Chebyshev series in Y on panels."""
+    """D and its derivatives by Chebyshev series in Y on panels.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> def sphere(x):
+    ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
+    >>> stretch = geodesics.surface_of_metric(sphere, np.pi / 2.0).stretch
+    >>> type(stretch).__name__, len(stretch.edges) >= 2
+    ('TabulatedStretch', True)
+    """
 
     edges: Array
     """(P + 1,) ascending depth - Y."""

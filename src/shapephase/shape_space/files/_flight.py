@@ -34,6 +34,11 @@ class Flight:
     first_time, last_time : as the file tells the time
     by : "auto", "all" or "times": how it was found
     fall : how the centre of mass falls there, where the flight was found by it
+
+    Examples
+    --------
+    >>> sp.shape_space.files.Flight(first_time=12.5, last_time=13.9, by="times").record["last_time"]
+    13.9
     """
 
     first_time: float

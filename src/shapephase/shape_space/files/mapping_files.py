@@ -25,6 +25,13 @@ def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
         If there is no such file.
     ShapeError
         For anything else in it, with the line.
+
+    Examples
+    --------
+    >>> with open("names.txt", "w") as file:
+    ...     _ = file.write("LKnee=left_knee")
+    >>> sp.shape_space.files.read_names("names.txt")
+    {'LKnee': 'left_knee'}
     """
     where = Path(file)
     data = file_bytes(where, _MOST_BYTES)

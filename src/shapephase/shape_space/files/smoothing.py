@@ -99,6 +99,14 @@ def smoothed_path(
     Notes
     -----
     Source: Reinsch 1967 (the spline); Mallows 1973 (C_p); own derivation (the bias).
+
+    Examples
+    --------
+    >>> times = np.linspace(0.0, 1.0, 41)
+    >>> noisy = np.sin(2.0 * np.pi * times)[:, None] + 0.01 * np.cos(40.0 * times)[:, None]
+    >>> path, told = sp.shape_space.files.smoothed_path(times, noisy, 0.01)
+    >>> print(path.duration, told.residual.shape)
+    1.0 (1,)
     """
     plain = ShapePath.spline(times, shapes, False, joint_names=joint_names)
     at, recorded = plain.breaks, np.array(finite_array(shapes, "shapes"))
