@@ -15,6 +15,7 @@ from benchmarks.peer import NoPeer, Peer
 
 import shapephase as sp
 from shapephase.examples.scenarios import cat_righting
+from support.long_runs import full_but
 
 NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
 needs_compiler = pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
@@ -74,7 +75,7 @@ def test_polynomials_for_the_extended_precision_follow_the_cat():
 
 
 @needs_compiler
-@pytest.mark.parametrize("family", ["harmonics", "mixed"])
+@pytest.mark.parametrize("family", full_but(["harmonics", "mixed"], "mixed"))
 def test_no_error_is_above_its_estimate(family: str, tmp_path):
     """A sample of `python -m benchmarks.estimates`, and that a file of runs is taken up where it ends."""
     kept = tmp_path / "runs"

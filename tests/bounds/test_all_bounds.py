@@ -23,7 +23,7 @@ from shapephase.bounds.energy import energy_along, homoclinic_energy
 from shapephase.bounds.regimes import crown_region, regime_certificate
 from support.random_deformations import KINDS, random_case
 
-QUICK, FULL = 40, 2000
+QUICK, FULL = 20, 2000
 ALLOWED = 1e-8
 
 

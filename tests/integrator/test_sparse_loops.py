@@ -7,6 +7,7 @@ import pytest
 
 import shapephase as sp
 from support.independent import collocated_attitude
+from support.long_runs import full_but
 
 # Body, joint, harmonics and their amplitudes [rad], momentum [kg m^2/s], tolerance [rad]. The first two were wrong by
 # two thousand and a million times their estimates where even samples met only every fourth term of a spectrum.
@@ -28,7 +29,7 @@ def loop_of(body: sp.Body, joint: str, harmonics: dict[int, float]) -> sp.ShapeP
     return sp.ShapePath.fourier(np.zeros(body.n_shape), 0.0 * sines, sines, 1.0)
 
 
-@pytest.mark.parametrize(("name", "joint", "harmonics", "momentum", "tolerance"), LOOPS)
+@pytest.mark.parametrize(("name", "joint", "harmonics", "momentum", "tolerance"), full_but(LOOPS, *LOOPS[::2]))
 def test_the_estimate_holds_in_the_middle_of_the_loop(name, joint, harmonics, momentum, tolerance):
     """Against Gauss collocation on Pinocchio's own momentum, at times between all that the library may sample."""
     body = sp.load_body(name)

@@ -45,6 +45,8 @@ UP = np.array([0.0, 0.0, 1.0])
 # Besides one Fourier loop for every body: the other kinds of paths, and one so long that its steps take another route.
 KINDS = ("spline", "open spline", "waypoints", "function", "long", "fast")
 CASES = (*BODIES, *KINDS)
+# The long path takes as long as all others together; differences show it right in the quick run.
+QUICK = tuple(case for case in CASES if case != "long")
 
 
 def path_of(kind: str, joints: int, seed: int) -> sp.ShapePath:
@@ -139,7 +141,7 @@ def test_sensitivity_is_the_limit_of_differences(case: str):
     check_differences(motion, momentum_scale(case), 4e-3 / np.linalg.norm(motion.sensitivity.by_attitude))
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
 def test_sensitivity_without_momentum(case: str):
     """Another route: by_momentum is then the integral of S I^-1 S^T, and a turned start is a turned end."""
     motion = motion_of(case, moving=False)
@@ -149,7 +151,7 @@ def test_sensitivity_without_momentum(case: str):
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-9])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
 def test_sensitivity_is_as_good_as_the_motion(case: str, tolerance: float):
     tight = motion_of(case)
     loose = sp.reconstruct(tight.deformation, tight.momentum, tight.initial_attitude, tolerance=tolerance)
@@ -237,7 +239,7 @@ def test_sensitivity_and_amplification_of_the_symmetric_top(across: float, along
 
 
 @pytest.mark.parametrize("moving", [True, False])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
 def test_turning_momentum_and_start_turns_the_whole_motion(case: str, moving: bool):
     """Inertial axes are a choice: by_momentum (xi x mu) + by_attitude R(0)^T xi = R(T)^T xi for every xi."""
     motion = motion_of(case, moving=moving)
@@ -248,7 +250,7 @@ def test_turning_momentum_and_start_turns_the_whole_motion(case: str, moving: bo
         assert np.linalg.norm(moved - motion.final_attitude.T @ xi) < EXACT * size
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", full_but(CASES, *QUICK))
 def test_a_turn_about_the_momentum_stays_one(case: str):
     motion = motion_of(case)
     carried = motion.sensitivity.by_attitude @ motion.body_momentum(0.0)
@@ -256,7 +258,7 @@ def test_a_turn_about_the_momentum_stays_one(case: str):
     assert np.linalg.norm(carried - motion.body_momentum(motion.duration)) < EXACT * size
 
 
-@pytest.mark.parametrize("share", [1.0, 1e-2, 1e-4, 0.0])
+@pytest.mark.parametrize("share", full_but([1.0, 1e-2, 1e-4, 0.0], 1.0, 0.0))
 @pytest.mark.parametrize("name", BODIES)
 def test_sensitivity_of_two_motions_one_after_the_other(name: str, share: float):
     """by_attitude is the product, by_momentum that of the second part and the first one's carried through it.

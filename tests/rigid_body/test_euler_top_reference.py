@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from shapephase import so3
 from shapephase.rigid_body.euler_top import EulerTop
+from support.long_runs import full_but
 from support.places import DATA
 
 EPS = np.finfo(float).eps
@@ -133,7 +134,7 @@ def test_a_given_attitude_comes_before_the_motion():
         assert top.momentum == pytest.approx(given @ REFERENCE["momentum"][row], abs=8.0 * EPS * SIZE[row])
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", full_but(NAMES, *NAMES[::2]))
 def test_rotated_tensors_lose_no_more_than_their_condition(name):
     """A tensor turned out of its axes and its momentum are rounded: each turn of a hundred times loses a few digits."""
     rows = rows_of(name)
