@@ -26,6 +26,8 @@ _RANDOM_BYTES = 4
 _ENDING = ".part"
 # Links that may follow one another, as in the kernel.
 _MOST_LINKS = 40
+# Of an archive, what is unpacked at once [bytes].
+_PIECE = 2**20
 # The folders whose entries are the open files of a process.
 _OPEN_FILES = re.compile(r"/dev/fd|/proc/[^/]+(/task/[0-9]+)?/fd")
 
@@ -126,19 +128,38 @@ def size_text(path: str | os.PathLike[str]) -> str:
 def npz_arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
     """The arrays of an NPZ file, by name. Raises ValueError for what cannot be read, or unpacks to more than that."""
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            # A small file can unpack to any size.
-            if sum(entry.file_size for entry in entries) > most_bytes:
-                raise ValueError(f"more than {most_bytes >> 20} MiB when unpacked")
-            names = [entry.filename.removesuffix(".npy") for entry in entries]
-            if len(set(names)) != len(names):
-                raise ValueError("an array stands twice in the file")
-            return {name: npy_array(archive.read(entry)) for name, entry in zip(names, entries, strict=True)}
+        found = zip_members(data, most_bytes)
     except ValueError:
         raise
     except Exception as error:  # a damaged archive fails in the decoders in many ways
         raise ValueError(f"no NPZ file that can be read ({error})") from None
+    names = [name.removesuffix(".npy") for name in found]
+    if len(set(names)) != len(names):
+        raise ValueError("an array stands twice in the file")
+    return {name: npy_array(content) for name, content in zip(names, found.values(), strict=True)}
+
+
+def zip_members(data: bytes, most_bytes: int) -> dict[str, bytes]:
+    """The files in a ZIP archive, by name, in no more memory than they are said to take.
+
+    Raises ValueError for more than that, for names that stand twice and for packing that takes any memory; for what is
+    damaged, whatever `zipfile` raises.
+    """
+    found: dict[str, bytes] = {}
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        entries = archive.infolist()
+        # A small file can unpack to any size.
+        if sum(entry.file_size for entry in entries) > most_bytes:
+            raise ValueError(f"more than {most_bytes >> 20} MiB when unpacked")
+        for entry in entries:
+            if entry.filename in found:
+                raise ValueError(f"{entry.filename[:40]!r} stands twice in the file")
+            if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise ValueError(f"{entry.filename[:40]!r} is packed in an unusual way; save the file anew")
+            with archive.open(entry) as stream:
+                # Asked for all at once, an entry is unpacked to the end, however small it is said to be.
+                found[entry.filename] = b"".join(iter(lambda stream=stream: stream.read(_PIECE), b""))
+    return found
 
 
 def npy_array(data: bytes) -> Any:

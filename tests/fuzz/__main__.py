@@ -24,6 +24,7 @@ def main() -> int:
     parser.add_argument("--only", nargs="*", choices=tuple(GRAMMARS), default=tuple(GRAMMARS), help="grammars to use")
     parser.add_argument("--seed", type=int, default=int.from_bytes(os.urandom(3)), help="begin here; printed")
     parser.add_argument("--processes", type=int, default=0, help="trials of commands in processes of their own")
+    parser.add_argument("--no-shrink", action="store_true", help="keep finds as they are, and search on")
     parser.add_argument("--finds", type=Path, default=Path("fuzz_finds"), help="folder for inputs that show a fault")
     asked = parser.parse_args()
     print(f"seed {asked.seed}", flush=True)
@@ -33,20 +34,21 @@ def main() -> int:
         process = LimitedProcess(Path(folder), long=True)
         try:
             if asked.processes:
-                find = searched(process, "command", asked.processes, start, tally, by_command_line=True)
+                find = searched(process, "command", asked.processes, start, tally, by_command_line=True, shrink=False)
                 _note(find, "process", faulty, asked.finds)
             while tally.trials < asked.trials + asked.processes and time.monotonic() < end:
                 rounds = min(10, max(1, (asked.trials - tally.trials) // _ROUND))
                 for grammar in asked.only:
-                    if grammar not in faulty and time.monotonic() < end:
-                        share = max(1, SHARES[grammar] * rounds * (len(GRAMMARS) if len(asked.only) == 1 else 1))
-                        _note(searched(process, grammar, share, start, tally), grammar, faulty, asked.finds)
+                    if (asked.no_shrink or grammar not in faulty) and time.monotonic() < end:
+                        share = SHARES[grammar] * rounds
+                        find = searched(process, grammar, share, start, tally, shrink=not asked.no_shrink)
+                        _note(find, f"{grammar}{start}" if asked.no_shrink else grammar, faulty, asked.finds)
                 start += 1
                 if set(asked.only) <= set(faulty):
                     break
         finally:
             process.stop()
-    print(tally.table())
+            print(tally.table(), flush=True)
     print(f"{len(faulty)} finds" + (f", kept in {asked.finds}" if faulty else ""))
     return 1 if faulty else 0
 

@@ -1,7 +1,7 @@
-"""A process that tries one input after the other, each in a child with limits of processor time and memory.
+"""A process that tries one input after the other, in children with limits of processor time and memory.
 
 Run as a script this is the process. It has imported what the library imports late, so that a child is a fork and costs
-milliseconds; what a child does to itself hurts no other.
+milliseconds; a child tries some inputs, and those after one that ends it are for the next.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ _ROOM = 2**31 + 2**29
 """Addresses that a child may take beyond those of the process it was forked from [bytes]."""
 _WIDE = 2**34
 """The same for an input that was refused for want of them [bytes]: now it shows how many of them it would use."""
+_TRIES = 40
+"""Inputs of one child: a fork costs as much as twenty small files."""
 _PATIENCE = 300
 """A child that has not ended after so long hangs [s of the clock]; it has used next to no processor time."""
 _CODES = (0, 2, 3, 4, 5, 6, 7)
@@ -101,56 +103,136 @@ class LimitedProcess:
 
 def _limit(room: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     resource.setrlimit(resource.RLIMIT_AS, (room, room))
+
+
+def _limit_seconds() -> None:
+    """So much processor time from now on, of this process and of each that it starts."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    end = int(used.ru_utime + used.ru_stime) + 1 + SECONDS
+    resource.setrlimit(resource.RLIMIT_CPU, (end, resource.RLIM_INFINITY))
     signal.alarm(_PATIENCE)
 
 
-def _watched(request: dict[str, Any], room: int) -> dict[str, Any]:
-    """Try an input in a child, and measure it."""
-    read, write = os.pipe()
+def _used() -> tuple[float, int]:
+    """Processor time [s] and most memory [bytes] of this process and those that it has waited for."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used), max(u.ru_maxrss for u in used) * 1024
+
+
+def _redirected(place: Path) -> None:
+    os.chdir(place)
+    for number, name in ((1, "stdout.txt"), (2, "stderr.txt")):
+        file = os.open(place / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(file, number)
+        os.close(file)
+
+
+class _Child:
+    """A child that tries inputs one after the other, until one ends it or there were enough."""
+
+    def __init__(self, room: int) -> None:
+        self.tries, self.room = 0, room
+        (requests, self._requests), (self._answers, answers) = os.pipe(), os.pipe()
+        self._pid = os.fork()
+        if self._pid == 0:
+            os.close(self._requests)
+            os.close(self._answers)
+            with contextlib.suppress(BaseException), os.fdopen(requests) as lines, os.fdopen(answers, "w") as parts:
+                gc.enable()
+                os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+                _limit(room)
+                for line in lines:
+                    self._try(json.loads(line), parts)
+            os._exit(70)
+        os.close(requests)
+        os.close(answers)
+        self._lines = os.fdopen(self._answers)
+
+    @staticmethod
+    def _try(request: dict[str, Any], parts: Any) -> None:
+        _redirected(Path(request["folder"]))
+        _limit_seconds()
+        before, _ = _used()
+        for part in _TRIALS[request["kind"]](request):
+            print(json.dumps(part), file=parts, flush=True)
+        seconds, memory = _used()
+        print(json.dumps({"seconds": seconds - before, "memory": memory}), file=parts, flush=True)
+
+    def tried(self, request: dict[str, Any]) -> tuple[dict[str, Any], int | None]:
+        """What became of an input, and how the child ended if it did."""
+        self.tries += 1
+        answer: dict[str, Any] = {"outcome": "nothing", "message": "", "faults": []}
+        with contextlib.suppress(BrokenPipeError):
+            os.write(self._requests, json.dumps(request).encode() + b"\n")
+        for line in self._lines:
+            part = json.loads(line)
+            answer["faults"] += part.pop("faults", [])
+            answer |= part
+            if "seconds" in part:
+                return answer, None
+        return answer, self.stop()
+
+    def stop(self) -> int:
+        with contextlib.suppress(OSError):
+            os.close(self._requests)
+        self._lines.close()
+        return os.waitstatus_to_exitcode(os.waitpid(self._pid, 0)[1])
+
+
+def _command_alone(request: dict[str, Any], room: int) -> tuple[dict[str, Any], int]:
+    """A command in a child that is forked, or in a process that starts from nothing."""
     place = Path(request["folder"])
     child = os.fork()
     if child == 0:
-        os.close(read)
-        os.chdir(place)
-        for number, name in ((1, "stdout.txt"), (2, "stderr.txt")):
-            os.dup2(os.open(place / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
-        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         code = 70
         with contextlib.suppress(BaseException):
+            _redirected(place)
+            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            gc.enable()
             _limit(room)
+            _limit_seconds()
             if request["kind"] == "process":
-                os.set_inheritable(write, False)
-                command = ["-m", "shapephase", *request["arguments"]]
-                os.execv(sys.executable, [sys.executable, *command])
-            with os.fdopen(write, "w") as answers:
-                for part in _TRIALS[request["kind"]](request):
-                    print(json.dumps(part), file=answers, flush=True)
-            code = 0
+                os.execv(sys.executable, [sys.executable, "-m", "shapephase", *request["arguments"]])
+            code = _command(request)
         os._exit(code)
-    os.close(write)
-    with os.fdopen(read) as answers:
-        parts = [json.loads(line) for line in answers]
     _, status, used = os.wait4(child, 0)
-    answer: dict[str, Any] = {"outcome": "nothing", "message": "", "faults": []}
-    for part in parts:
-        answer["faults"] += part.pop("faults", [])
-        answer |= part
     code = os.waitstatus_to_exitcode(status)
-    if code < 0:
-        answer["faults"].append(f"signal {-code} ({signal.Signals(-code).name}); before it: {answer['outcome']}")
-    elif request["kind"] in ("command", "process"):
-        answer |= {"outcome": f"exit {answer.pop('code', code)}"}
+    said = (place / "stderr.txt").read_text(encoding="utf-8", errors="backslashreplace")
+    answer = {"outcome": f"exit {code}", "message": said[-500:], "faults": []}
+    answer |= {"seconds": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024}
+    if code >= 0:
         answer["faults"] += list(_command_faults(request, answer["outcome"], place))
-    elif answer["outcome"] == "nothing":
-        answer["faults"].append(f"it ended with {code}: {(place / 'stderr.txt').read_text(errors='replace')[-2000:]}")
-    answer["seconds"], answer["memory"] = used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
+    return answer, code
+
+
+def _watched(request: dict[str, Any], child: _Child) -> dict[str, Any]:
+    """Try an input, and say what is wrong with how that went."""
+    if request["kind"] in ("command", "process"):
+        answer, ended = _command_alone(request, child.room)
+        ended = ended if ended < 0 else None
+    else:
+        answer, ended = child.tried(request)
+    answer = {"seconds": 0.0, "memory": 0} | answer
+    if ended is not None:
+        said = (Path(request["folder"]) / "stderr.txt").read_text(errors="replace")[-2000:]
+        how = f"signal {-ended} ({signal.Signals(-ended).name})" if ended < 0 else f"exit {ended}"
+        answer["faults"].append(f"{how}; before it: {answer['outcome']} {said}")
+    if answer["seconds"] > SECONDS:
+        answer["faults"].append(f"{answer['seconds']:.1f} s of the processor")
     if answer["memory"] > MOST_MEMORY:
         answer["faults"].append(f"{answer['memory'] >> 20} MiB of memory")
-    if room < _WIDE and any(word in answer["message"] for word in _OF_MEMORY):
-        return _watched(request, _WIDE)
+    if child.room < _WIDE and any(word in answer["message"] for word in _OF_MEMORY):
+        second = _Child(_room() + _WIDE)
+        answer = _watched(request, second)
+        with contextlib.suppress(OSError, ChildProcessError):
+            second.stop()
     return answer
+
+
+def _room() -> int:
+    """The addresses that this process has [bytes]."""
+    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
 
 
 def _outcome(request: dict[str, Any], call: Any, names_file: bool = True) -> tuple[Any, list[str], dict[str, Any]]:
@@ -225,21 +307,21 @@ def _record(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield _checked(record_faults(motion))
 
 
-def _command(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def _command(request: dict[str, Any]) -> int:
     from shapephase.cli.main import main
 
-    code: Any = 0
+    code = 0
     try:
         main(request["arguments"])
     except SystemExit as stopped:
-        code = stopped.code or 0
+        code = int(stopped.code or 0)
     except BaseException:
         traceback.print_exc()
-        code = "escaped"
+        code = 70
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
         sys.stderr.flush()
-    yield {"code": code}
+    return code
 
 
 def _command_faults(request: dict[str, Any], outcome: str, place: Path) -> Iterator[str]:
@@ -331,11 +413,15 @@ def _work() -> None:
     gc.collect()
     gc.freeze()
     gc.disable()
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
-    room = pages * resource.getpagesize() + _ROOM
+    child = _Child(_room() + _ROOM)
     print(json.dumps({"ready": True}), file=answers, flush=True)
     for line in sys.stdin:
-        print(json.dumps(_watched(json.loads(line), room)), file=answers, flush=True)
+        answer = _watched(json.loads(line), child)
+        if answer["faults"] or child.tries >= _TRIES:
+            with contextlib.suppress(OSError, ChildProcessError):
+                child.stop()
+            child = _Child(_room() + _ROOM)
+        print(json.dumps(answer), file=answers, flush=True)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,10 @@ import numpy as np
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _UNIT_WORDS = re.compile(r"[\s\[\]()°]*[^\W\d_]*[\s\[\]()°]*")
 
+CLOCK = "\0time"
+"""The label of times that are no column of the file."""
+IN_BODY_ORDER = ("\0first", "\0second", "\0third")
+"""The labels of joints without names."""
 Columns = dict[str, list[float]]
 
 
@@ -154,7 +158,7 @@ def ros_yaml(data: bytes) -> Columns:
     names = {str(name) for row in rows.values() for name in row}
     if any(set(row) != names for row in rows.values()):
         raise NotPlain("rows of several joints")
-    return {"": list(rows)} | {name: [row[name] for row in rows.values()] for name in names}
+    return {CLOCK: list(rows)} | {name: [row[name] for row in rows.values()] for name in names}
 
 
 def _put(rows: dict[float, dict[str, float]], time: float, names: list, values: list) -> None:
@@ -184,7 +188,7 @@ def npz(data: bytes) -> Columns:
         if "qpos" in arrays:
             return _qpos(np.asarray(arrays["qpos"]), dict(arrays))
         names, shapes = [str(name) for name in np.ravel(arrays["joint_names"])], np.asarray(arrays["shapes"])
-        return {"": list(arrays["time"])} | {name: list(shapes[:, k]) for k, name in enumerate(names)}
+        return {CLOCK: list(arrays["time"])} | {name: list(shapes[:, k]) for k, name in enumerate(names)}
 
 
 def _qpos(qpos: np.ndarray, arrays: dict) -> Columns:
@@ -193,14 +197,17 @@ def _qpos(qpos: np.ndarray, arrays: dict) -> Columns:
     times = arrays.get("time", np.arange(len(qpos)) * np.ravel(arrays.get("timestep", [np.nan]))[0])
     if not np.isfinite(np.asarray(times, dtype=float)).all():
         raise NotKnown
-    return {"": list(times)} | dict(zip("012", qpos[:, -3:].T.tolist(), strict=True))
+    return {CLOCK: list(times)} | dict(zip(IN_BODY_ORDER, qpos[:, -3:].T.tolist(), strict=True))
 
 
 def _of_arrays(entries: dict) -> Columns:
     """Vectors by name, or a matrix with names."""
     if "shapes" in entries and "joint_names" in entries:
         names = [str(name).strip() for name in np.ravel(entries["joint_names"])]
-        found = {name: list(np.asarray(entries["shapes"])[:, k]) for k, name in enumerate(names)}
+        shapes = np.asarray(entries["shapes"])
+        if shapes.shape != (np.size(entries["time"]), len(names)):
+            raise NotKnown
+        found = {name: list(shapes[:, k]) for k, name in enumerate(names)}
         return found | {"time": list(np.ravel(entries["time"]))}
     return {name: list(np.ravel(value)) for name, value in entries.items() if np.asarray(value).size > 1}
 
@@ -298,7 +305,7 @@ READERS: dict[str, Callable[[bytes], Columns]] = {
 
 
 def plain_columns(file: Path, joint_names: Sequence[str]) -> Columns | None:
-    """What a file says, in the units that stand there; "" are times [s]. None where nothing is known of it.
+    """What a file says, in the units that stand there. None where nothing is known of it.
 
     Raises NotPlain for what no strict reader should take.
     """
@@ -310,4 +317,5 @@ def plain_columns(file: Path, joint_names: Sequence[str]) -> Columns | None:
     except NotKnown:
         return None
     # MuJoCo's qpos has no names: its columns are in the body's order.
-    return {joint_names[int(name)] if name.isdecimal() else name: values for name, values in found.items()}
+    own = dict(zip(IN_BODY_ORDER, joint_names, strict=True))
+    return {own.get(name, name): values for name, values in found.items()}

@@ -98,9 +98,16 @@ class _Fault(Exception):
 
 
 def searched(
-    process: LimitedProcess, grammar: str, trials: int, start: int, tally: Tally, *, by_command_line: bool = False
+    process: LimitedProcess,
+    grammar: str,
+    trials: int,
+    start: int,
+    tally: Tally,
+    *,
+    by_command_line: bool = False,
+    shrink: bool = True,
 ) -> Find | None:
-    """Try inputs of a grammar until one shows a fault; that one is made smaller, and comes back."""
+    """Try inputs of a grammar until one shows a fault; that one is made smaller where `shrink`, and comes back."""
     found: list[Find] = []
 
     @seed(start)
@@ -108,7 +115,7 @@ def searched(
         max_examples=trials,
         deadline=None,
         database=None,
-        phases=(Phase.generate, Phase.shrink),
+        phases=(Phase.generate, Phase.shrink) if shrink else (Phase.generate,),
         suppress_health_check=list(HealthCheck),
         report_multiple_bugs=False,
     )
@@ -117,7 +124,7 @@ def searched(
         trial = GRAMMARS[grammar](chance)
         answer = process.tried(trial, by_command_line=by_command_line)
         if not found:
-            tally.count(trial.source, answer)
+            tally.count(trial.source + " process" * by_command_line, answer)
         if answer["faults"]:
             found.append(Find(trial=trial, faults=tuple(answer["faults"])))
             raise _Fault

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import pytest
 
+from fuzz.finds import CASES
 from fuzz.limited_process import LimitedProcess
 from fuzz.pieces import Trial
 from fuzz.search import GRAMMARS, SHARES, Tally, searched
@@ -39,6 +40,15 @@ def test_a_larger_sample_shows_no_fault(grammar: str, process: LimitedProcess):
     assert find is None, find
     good = sum(found["accepted"] + found["exit 0"] for found in tally.outcomes.values())
     assert 0 < good < tally.trials, f"damage that nothing notices or nothing survives shows little\n{tally.table()}"
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.full) if c.slow else n for n, c in CASES.items()])
+def test_a_find(name: str, process: LimitedProcess):
+    case = CASES[name]
+    answer = process.tried(case.make())
+    assert not answer["faults"], answer
+    assert answer["outcome"] == case.outcome, answer
+    assert case.said in answer["message"]
 
 
 def test_what_ends_badly_is_seen(process: LimitedProcess):

@@ -237,10 +237,11 @@ def _body(reading: _Reading, here: Placed, parent: str | None) -> None:
     held = contents_of(reading, node, own, owner, ("inertial", "joint", "freejoint", "geom", "body"))
     geoms = [each for each in held if each.node.tag == "geom"]
     reading.links[name] = _link(reading, node, name, geoms)
+    # Where the body that floats is in the world is read, too: what is no pose is a fault.
+    place, turn = _pose(reading, node, owner)
     if parent is None:
         _root_joint(reading, node, surrounding, owner)
     else:
-        place, turn = _pose(reading, node, owner)
         pose = here.place + here.turn @ place, here.turn @ turn
         _joints(reading, node, parent, name, pose, surrounding)
     for each in held:

@@ -63,13 +63,13 @@ def _from_lines(text: str, where: Path) -> dict[str, str | None]:
 
 def _from_json(text: str, where: Path) -> dict[str, str | None]:
     try:
-        pairs = json.loads(text, object_pairs_hook=lambda found: found)
+        pairs = json.loads(text, object_pairs_hook=tuple)
     except (ValueError, RecursionError) as error:
         raise ShapeError(f"{where}: no JSON ({error!s:.100})") from None
-    entries = pairs if isinstance(pairs, list) and all(isinstance(pair, tuple) for pair in pairs) else None
-    if entries is None or not all(new is None or isinstance(new, str) for _, new in entries):
+    # Only an object becomes a tuple, of pairs.
+    if not isinstance(pairs, tuple) or not all(new is None or isinstance(new, str) for _, new in pairs):
         raise ShapeError(f'{where}: one object of texts, {{"column": "joint", "other": null}}, is needed')
-    found = dict(entries)
-    if len(found) < len(entries):
+    found = dict(pairs)
+    if len(found) < len(pairs):
         raise ShapeError(f"{where}: a column stands twice")
     return found

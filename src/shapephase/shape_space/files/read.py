@@ -28,6 +28,7 @@ from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
 from ._recording import Recording, Table
 from ._sample_origins import resampled
+from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
 from .closing import Closing, close_argument, closed_path
@@ -202,6 +203,7 @@ def read_recorded_motion(
         noise = _noise_levels(smooth, body)
         samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)
         path, smoothing, closing = _path(samples, body, within, close_by, loop=close is None, penalty=smooth_penalty)
+        check_swings(path, body)
     except (TrajectoryError, ShapeError) as error:
         raise TrajectoryError(f"{table.where}: {error}") from None
     if rate is not None:

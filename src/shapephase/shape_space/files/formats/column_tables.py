@@ -81,7 +81,7 @@ def _numbers(values: Any) -> tuple[Array, dict[int, str], bool]:
     for k, entry in enumerate(entries):
         try:
             found[k] = float(entry) if isinstance(entry, int | float) and not isinstance(entry, bool) else _text(entry)
-        except TrajectoryError:
+        except (TrajectoryError, OverflowError):  # Python's whole numbers may be larger than any double
             found[k] = np.nan
             if len(faults) < _MOST_FAULTS:
                 faults[k] = "" if entry is None else str(entry)[:60]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,30 @@ from ....errors import ShapePhaseError, TrajectoryError
 from .._recording import Table
 from .hdf5 import MOST_VALUES, is_hdf5, read_hdf5
 from .named_arrays import arrays_table
+from .parser_process import table_apart
 
 _DEEPEST = 4
 """Structures inside each other that are read."""
+_SMALL = 2**22
+"""Arrays in a file, unpacked [bytes], that are read in this process."""
+_PLAIN = (
+    "double",
+    "single",
+    "logical",
+    "char",
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+)
+"""Classes of arrays whose size SciPy knows before it reads them."""
+_COMPRESSED = 15
+"""The type of a packed element of a `.mat` file of version 5."""
+_HEAD = 128
+"""Bytes before the first element there."""
 
 
 def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
     """A `.mat` file: vectors by name, or a matrix with names of its columns, on top or in a structure.
 
-    Objects of MATLAB, tables among them, are not read.
+    Objects of MATLAB, tables among them, are not read. What may unpack to any size is parsed in a process of its own.
 
     Raises
     ------
@@ -29,6 +45,13 @@ def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
     """
     if is_hdf5(data):
         return read_hdf5(where, data, chosen)
+    if _may_be_large(data):
+        return table_apart(where, data, "MATLAB", read_arrays_of, chosen)
+    return read_arrays_of(where, data, chosen)
+
+
+def read_arrays_of(where: Path, data: bytes, chosen: str | None = None) -> Table:
+    """A `.mat` file up to version 7, here and now. Raises as `read_matlab`."""
     import scipy.io
 
     try:
@@ -52,6 +75,35 @@ def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
         )
     entries = {name: _plain(value, 0) for name, value in loaded.items() if not name.startswith("__")}
     return arrays_table(str(where), "MATLAB", entries, chosen)
+
+
+def _may_be_large(data: bytes) -> bool:
+    """Whether arrays may take more memory than a few times the file."""
+    import scipy.io
+
+    if len(data) > _SMALL or _unpacks_far(data):
+        return True
+    try:
+        return any(kind not in _PLAIN for _, _, kind in scipy.io.whosmat(io.BytesIO(data)))
+    except Exception:  # a damaged file, of which the reader says so
+        return False
+
+
+def _unpacks_far(data: bytes) -> bool:
+    """Whether packed elements are large when unpacked, or damaged."""
+    room, place = _SMALL, _HEAD
+    order = "big" if data[_HEAD - 2 : _HEAD] == b"MI" else "little"
+    while place + 8 <= len(data):
+        kind, size = (int.from_bytes(data[k : k + 4], order) for k in (place, place + 4))
+        if kind == _COMPRESSED:
+            try:
+                room -= len(zlib.decompressobj().decompress(data[place + 8 : place + 8 + size], room + 1))
+            except zlib.error:
+                return True
+            if room < 0:
+                return True
+        place += 8 + size
+    return False
 
 
 def _plain(value: Any, depth: int) -> Any:

@@ -87,7 +87,7 @@ def _check_counts(header: dict[str, str], where: Path, rows: int, columns: int) 
         said = header.get(kind)
         if said is None:
             continue
-        if not said.isascii() or not said.isdigit() or int(said[:18]) != found:
+        if not said.isascii() or not said.isdigit() or (said.lstrip("0") or "0") != str(found):
             raise TrajectoryError(
                 f"{where}: the header says {said:.40} {kind}, the table has {found}; the file is cut off or was edited"
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -13,6 +14,7 @@ import numpy as np
 from ....arrays import Array
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
 from .._recording import Table, check_size, check_text, number
+from .parser_process import table_apart
 from .strict_yaml import Word, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
@@ -27,6 +29,9 @@ _NANO = 10**9
 _WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")
 _SECONDS = ("sec", "secs")
 _NANOSECONDS = ("nanosec", "nsecs", "nsec")
+
+# How chunks say that they are compressed: in rosbag1, in MCAP, in the metadata of a folder.
+_PACKED = re.compile(rb"compression=(?!none)|\x04\0\0\0zstd|\x03\0\0\0lz4|compression_format: *\S*[a-z]")
 
 
 class _State(NamedTuple):
@@ -98,6 +103,13 @@ def read_bag(where: Path, topic: str | None) -> Table:
     except ImportError:
         raise MissingExtraError("ROS bags need rosbags; install it with: pip install 'shapephase[ros]'") from None
     _check_sizes(where)
+    if _is_packed(where):
+        return table_apart(where, b"", "bag", read_plain_bag, topic)
+    return read_plain_bag(where, b"", topic)
+
+
+def read_plain_bag(where: Path, _: bytes, topic: str | None = None) -> Table:
+    """A bag that is read from its place, here and now. Raises as `read_bag`."""
     try:
         return _read_messages(where, topic)
     except ShapePhaseError:
@@ -115,6 +127,12 @@ def _check_sizes(where: Path) -> None:
     check_size(where / "metadata.yaml", _MOST_METADATA)
     for part in where.iterdir():
         check_size(part)
+
+
+def _is_packed(where: Path) -> bool:
+    """Whether parts of a bag are compressed, so that they may unpack to any size."""
+    parts = list(where.iterdir()) if where.is_dir() else [where]
+    return any(_PACKED.search(part.read_bytes()) for part in parts if part.is_file())
 
 
 def _check_database(where: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import threading
 import warnings
 import zipfile
@@ -13,9 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
+from ....files import zip_members
 from .._labels import unit_of
 from .._recording import Table
 from .column_tables import column_table
+from .parser_process import table_apart
 
 _MOST_UNPACKED = 2**28
 """Size of a workbook's parts, unpacked [bytes]; a cell takes some forty."""
@@ -24,6 +27,12 @@ _MOST_CELLS = 5_000_000
 _MOST_VALUES = 2**24
 """Values of a Parquet file: an hour of a hundred joints at forty samples a second."""
 
+_SMALL = 2**22
+"""A workbook's parts, unpacked [bytes], that are read in this process; a Parquet file's list of its columns."""
+_FLAT = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
+"""Types of Parquet whose values take no more memory than is known before they are read."""
+_ROW = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["'](\d+)["']""")
+_SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
 _WARNINGS = threading.Lock()
 
 
@@ -40,24 +49,51 @@ def read_excel(where: Path, data: bytes, sheet: str | None) -> Table:
         For faults, with row and column; for a sheet that is not there; without openpyxl.
     """
     try:
-        import openpyxl
+        import openpyxl  # noqa: F401
     except ImportError:
         raise MissingExtraError("Excel files need openpyxl; install it with: pip install 'shapephase[data]'") from None
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
-        if size > _MOST_UNPACKED:
-            raise TrajectoryError(f"{where}: {size >> 20} MiB when unpacked, up to {_MOST_UNPACKED >> 20} MiB are read")
+    except Exception as error:  # as below
+        raise _no_workbook(where, error) from None
+    if size > _MOST_UNPACKED:
+        raise TrajectoryError(f"{where}: {size >> 20} MiB when unpacked, up to {_MOST_UNPACKED >> 20} MiB are read")
+    if size > _SMALL:
+        return table_apart(where, data, "workbook", read_workbook, sheet)
+    return read_workbook(where, data, sheet)
+
+
+def read_workbook(where: Path, data: bytes, sheet: str | None = None) -> Table:
+    """A workbook, here and now. Raises as `read_excel`."""
+    import openpyxl
+
+    try:
+        for name, part in zip_members(data, _MOST_UNPACKED).items():
+            if _SHEETS.fullmatch(name):
+                _check_rows(part, where)
         with _silent_openpyxl():
             book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
             sheets = {name: _cells(book[name], where) for name in book.sheetnames if hasattr(book[name], "iter_rows")}
     except ShapePhaseError:
         raise
     except Exception as error:  # a damaged workbook fails inside openpyxl in many ways
-        raise TrajectoryError(
-            f"{where}: no workbook that can be read ({type(error).__name__}: {error!s:.200})"
-        ) from None
+        raise _no_workbook(where, error) from None
     return _sheet_table(_chosen_sheet(sheets, where, sheet), where)
+
+
+def _no_workbook(where: Path, error: Exception) -> TrajectoryError:
+    return TrajectoryError(f"{where}: no workbook that can be read ({type(error).__name__}: {error!s:.200})")
+
+
+def _check_rows(part: bytes, where: Path) -> None:
+    """Raise TrajectoryError for rows whose numbers do not ascend, which openpyxl would leave out."""
+    before = 0
+    for found in _ROW.finditer(part):
+        number = int(found[1][:18])
+        if number <= before:
+            raise TrajectoryError(f"{where}: row {number} comes after row {before}; the file is damaged, save it anew")
+        before = number
 
 
 @contextlib.contextmanager
@@ -137,6 +173,20 @@ def read_parquet(where: Path, data: bytes) -> Table:
     except ImportError:
         raise MissingExtraError("Parquet files need pyarrow; install it with: pip install 'shapephase[data]'") from None
     try:
+        apart = int.from_bytes(data[-8:-4], "little") > _SMALL
+        leaves = [] if apart else list(parquet.ParquetFile(io.BytesIO(data)).schema)
+    except Exception as error:  # as below
+        raise _no_parquet(where, error) from None
+    if apart or any(leaf.max_repetition_level or leaf.physical_type not in _FLAT for leaf in leaves):
+        return table_apart(where, data, "Parquet", read_columns)
+    return read_columns(where, data)
+
+
+def read_columns(where: Path, data: bytes) -> Table:
+    """A Parquet file, here and now. Raises as `read_parquet`."""
+    import pyarrow.parquet as parquet
+
+    try:
         file = parquet.ParquetFile(io.BytesIO(data))
         values = file.metadata.num_rows * file.metadata.num_columns
         if values > _MOST_VALUES:
@@ -153,7 +203,9 @@ def read_parquet(where: Path, data: bytes) -> Table:
     except ShapePhaseError:
         raise
     except Exception as error:  # a damaged file fails inside pyarrow in many ways
-        raise TrajectoryError(
-            f"{where}: no Parquet file that can be read ({type(error).__name__}: {error!s:.200})"
-        ) from None
+        raise _no_parquet(where, error) from None
     return column_table(str(where), "Parquet", columns, units=units, row="sample")
+
+
+def _no_parquet(where: Path, error: Exception) -> TrajectoryError:
+    return TrajectoryError(f"{where}: no Parquet file that can be read ({type(error).__name__}: {error!s:.200})")

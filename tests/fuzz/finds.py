@@ -1,0 +1,157 @@
+"""What was found and mended: inputs that crashed, took endless memory, or were taken though they make no sense."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .array_motions import BOOK
+from .pieces import Trial
+
+_BLOCK = 2**24
+"""Zeros of which a packed file is made [bytes]."""
+_ROWS = "0,0,0,0\n0.1,0.1,0.2,0.1\n0.2,0.2,0.1,0\n"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """An input, and what must come of it: the error's name, or "accepted", and words of its message."""
+
+    make: Callable[[], Trial]
+    outcome: str = "TrajectoryError"
+    said: str = ""
+    slow: bool = False
+
+
+def _motion(name: str, content: bytes | str, **options: object) -> Trial:
+    data = content.encode() if isinstance(content, str) else content
+    return Trial(kind="motion", source="find", files={name: data}, main=name, options=options)
+
+
+def _table(rows: str) -> Trial:
+    return _motion("motion.csv", "time,hip,wrist,boom\n" + rows)
+
+
+def _zeros(size: int, packer: zlib._Compress | None = None, start: bytes = b"") -> bytes:
+    """A deflated stream of a start and zeros, made of one block again and again, without an end."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15) if packer is None else packer
+    first = packer.compress(start) + packer.flush(zlib.Z_FULL_FLUSH)
+    return first + (packer.compress(bytes(_BLOCK)) + packer.flush(zlib.Z_FULL_FLUSH)) * (size // _BLOCK)
+
+
+def _lying_archive() -> Trial:
+    """An NPZ that says it has a hundred bytes, and unpacks to four GiB."""
+    packed, name = _zeros(2**32), b"time.npy"
+    local = struct.pack("<IHHHHHIIIHH", 0x04034B50, 20, 0, 8, 0, 0, 0, len(packed), 100, len(name), 0) + name + packed
+    entry = struct.pack(
+        "<IHHHHHHIIIHHHHHII", 0x02014B50, 20, 20, 0, 8, 0, 0, 0, len(packed), 100, len(name), 0, 0, 0, 0, 0, 0
+    )
+    end = struct.pack("<IHHHHIIH", 0x06054B50, 0, 0, 1, 1, len(entry) + len(name), len(local), 0)
+    return _motion("motion.npz", local + entry + name + end)
+
+
+def _element(kind: int, data: bytes) -> bytes:
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def _matrix(kind: int, shape: tuple[int, int], name: bytes) -> bytes:
+    return _element(6, struct.pack("<II", kind, 0)) + _element(5, struct.pack("<ii", *shape)) + _element(1, name)
+
+
+def _large_structure() -> Trial:
+    """A `.mat` file of a structure of one entry, which has three GiB of zeros."""
+    size = 3 * 2**30
+    numbers = _matrix(6, (size // 8, 1), b"")
+    field = struct.pack("<II", 14, len(numbers) + 8 + size) + numbers + struct.pack("<II", 9, size)
+    inner = _matrix(2, (1, 1), b"s") + struct.pack("<HHI", 5, 4, 8) + _element(1, b"time\0\0\0\0") + field
+    start = struct.pack("<II", 14, len(inner) + size) + inner
+    packed = _zeros(size, zlib.compressobj(9), start)
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    return _motion("motion.mat", head + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def _long_words() -> Trial:
+    """A Parquet file of ten kilobytes, one of whose columns is four thousand times a word of a megabyte."""
+    import pyarrow
+    import pyarrow.parquet
+
+    places = pyarrow.array(np.zeros(4000, dtype=np.int32))
+    words = pyarrow.DictionaryArray.from_arrays(places, pyarrow.array(["x" * 2**20]))
+    stream = io.BytesIO()
+    table = pyarrow.table({"time": np.arange(4000.0), "hip": words})
+    pyarrow.parquet.write_table(table, stream, compression="zstd", store_schema=False)
+    return _motion("motion.parquet", stream.getvalue())
+
+
+def _workbook(rows: str) -> Trial:
+    stream = io.BytesIO()
+    sheet = '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as book:
+        for name, text in BOOK.items():
+            book.writestr(name, text)
+        book.writestr("xl/worksheets/sheet1.xml", f"{sheet}{rows}</sheetData></worksheet>")
+    return _motion("motion.xlsx", stream.getvalue())
+
+
+def _row(number: int, *values: object) -> str:
+    cells = "".join(
+        f'<c t="inlineStr"><is><t>{value}</t></is></c>' if isinstance(value, str) else f"<c><v>{value}</v></c>"
+        for value in values
+    )
+    return f'<row r="{number}">{cells}</row>'
+
+
+_HEADER = _row(1, "time", "hip", "wrist", "boom")
+_FIRST = _row(2, 0, 0, 0, 0)
+_POSE = b"""<mujoco><worldbody><body name="a" axisangle="nan 0 1 30"><freejoint/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+_OPENSIM = "Coordinates\nnRows={}\nnColumns=4\ninDegrees=no\nendheader\ntime hip wrist boom\n" + _ROWS.replace(",", " ")
+
+CASES = {
+    "a step of 1e16 s, over which a spline leaves its samples": Case(
+        make=lambda: _table(_ROWS + "1e16,0,0,0\n"), said="would swing by some"
+    ),
+    "samples 1e-15 s apart, after which a spline leaves its samples": Case(
+        make=lambda: _table("0,0,0,0\n1e-15,0.1,0,0\n0.002,0,0,0\n"), said="would swing by some"
+    ),
+    "a list for a mapping": Case(
+        make=lambda: Trial(kind="names", source="find", files={"names.json": b"[]"}, main="names.json"),
+        outcome="ShapeError",
+        said="one object of texts",
+    ),
+    "a count of rows of which eighteen digits were read": Case(
+        make=lambda: _motion("motion.mot", _OPENSIM.format("000000000000000003999")), said="the table has 3"
+    ),
+    "a count of rows with zeros before it": Case(
+        make=lambda: _motion("motion.mot", _OPENSIM.format("000000000000000000003")), outcome="accepted"
+    ),
+    "a row that openpyxl leaves out": Case(
+        make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, 0.1, 0.1) + _row(0, 2, 0, 0, 0)),
+        said="row 0 comes after row 3",
+    ),
+    "a workbook without styles, of which openpyxl warned": Case(
+        make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, 0.1, 0.1)), outcome="accepted"
+    ),
+    "a whole number of 400 digits": Case(
+        make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, int("9" * 400), 0.1)), said="is no finite number"
+    ),
+    "a pose in the world that is none, of the body that floats": Case(
+        make=lambda: Trial(kind="body", source="find", files={"body.xml": _POSE}, main="body.xml"),
+        outcome="ModelFileError",
+        said="finite numbers are needed",
+    ),
+    "an archive that lies about its size": Case(make=_lying_archive, said="no NPZ file"),
+    "a structure of three GiB": Case(make=_large_structure, said="no MATLAB file that can be read", slow=True),
+    "a column of four GiB of words": Case(make=_long_words, said="no Parquet file that can be read"),
+    "a row of 20 million cells": Case(
+        make=lambda: _workbook('<row r="1">' + "<c/>" * 20_000_000 + "</row>"),
+        said="reading it took more than",
+        slow=True,
+    ),
+}
