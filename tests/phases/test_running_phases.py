@@ -474,7 +474,7 @@ def test_a_curve_that_passes_close_to_the_point_opposite_its_start(off, turns):
     motion = sp.reconstruct(ROUND, momentum, tolerance=1e-12)
     gauge = partial(great_circle, angle=2.0 * np.pi * turns)
     times = np.linspace(0.0, 1.0, 400 * turns + 1)
-    phases = running_phases(motion, times, gauge)
+    phases = running_phases(motion, times, gauge, closing="reference")
     whole = phases.solid_angle[::400]
     pole = UP if phases.reference[2] > 0.0 else -UP
     one = 2.0 * np.pi * (1.0 - height) if pole[2] > 0.0 else -2.0 * np.pi * (1.0 + height)

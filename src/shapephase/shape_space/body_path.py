@@ -57,7 +57,7 @@ def path_samplers(body: Body, path: ShapePath) -> Samplers:
         return body.sample(*path.curve(times))
 
     def directly(times: Array) -> Array | None:
-        return channels_along(body, path, times)
+        return channels_at(body, *path.curve(times))
 
     smoothness = replace(path.smoothness, knots=recorded_path(body, path))
     return Samplers(evaluate, **vars(smoothness), directly=directly)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_picklable
-from ..arrays import Array, Integers, check_reach, lock_arrays, real_array
+from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_array
 from ..errors import ShapeError, TrajectoryError
 
 if TYPE_CHECKING:
@@ -45,11 +45,12 @@ class KeptValues:
         self._known: dict[bytes, tuple[Array, Array]] = {}
 
     def __call__(self, curve: Curve, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates: (N,) -> (N, n), (N, n)."""
+        """Shapes and rates, read-only: (N,) -> (N, n), (N, n)."""
         key = times.tobytes()
         found = self._known.get(key)
         if found is None:
-            found = curve(times)
+            shapes, rates = curve(times)
+            found = read_only(shapes), read_only(rates)
             each = _MOST_NUMBERS // _MOST_KEPT
             if 2 * found[0].size <= each:
                 if len(self._known) >= _MOST_KEPT:

@@ -216,10 +216,10 @@ class ShapePath:
         return self._evaluated(t)[1]
 
     def at_samples(self, times: Array) -> tuple[Array, Array]:
-        """What `curve` gives at times at which a body is sampled, kept for the next momentum or body."""
+        """What `curve` gives at times at which a body is sampled, read-only: kept for the next momentum or body."""
         return self._seen(self.curve, times)
 
-    @cached_property
+    @property
     def smoothness(self) -> Smoothness:
         """Of whatever depends smoothly on shapes and rates."""
         scan = self.scan

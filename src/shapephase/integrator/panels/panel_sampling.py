@@ -39,7 +39,12 @@ _TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=
 
 
 class PanelSampler:
-    """Samples on panels between the breaks, at nested Chebyshev points."""
+    """Samples on panels between the breaks, at nested Chebyshev points.
+
+    Attributes
+    ----------
+    end : of all panels of a loop [s]
+    """
 
     def __init__(
         self,
