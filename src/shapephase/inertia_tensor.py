@@ -88,6 +88,10 @@ def second_moment(inertia: Array) -> Array:
     Any real distribution of mass has J positive semidefinite, which is the triangle inequality of the
     principal moments. Source: theory.md A4.
 
+    Notes
+    -----
+    Equation :eq:`triangle` of the documentation.
+
     Examples
     --------
     >>> sp.inertia_tensor.second_moment(np.diag([3.0, 4.0, 5.0])).diagonal().tolist()

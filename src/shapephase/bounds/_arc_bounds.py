@@ -143,6 +143,7 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
 
     Notes
     -----
+    Equation :eq:`azimuth` of the documentation.
     Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
 
     Examples
@@ -209,6 +210,10 @@ def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
     the largest moment they are the same, with the least moment in them.
 
     Source: Cabrera 2006, remark 4.1, as corrected in theory.md C-E10; E12.
+
+    Notes
+    -----
+    Equation :eq:`return-time` of the documentation.
 
     Examples
     --------

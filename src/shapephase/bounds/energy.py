@@ -112,6 +112,10 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
 
     Source: Cabrera 2006, section 4.1, with L_o where L(d_0) is printed (theory.md C-E9); E3.
 
+    Notes
+    -----
+    Equation :eq:`energy-rate` of the documentation.
+
     Examples
     --------
     >>> growing = sp.prescribed(lambda t: np.eye(3) * (1.0 + t)[:, None, None], None, 1.0)
@@ -136,6 +140,10 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
 
     Raises GaugeError if the deformation is known by its inertia only.
     Source: Cabrera 2006, equation (4), with the missing half (theory.md C-E1); A6.
+
+    Notes
+    -----
+    Equation :eq:`energies` of the documentation.
 
     Examples
     --------
@@ -162,6 +170,7 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
 
     Notes
     -----
+    Equation :eq:`homoclinic` of the documentation.
     Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
 
     Examples

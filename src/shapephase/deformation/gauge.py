@@ -86,6 +86,7 @@ def in_gauge(
 
     Notes
     -----
+    Equation :eq:`gauge` of the documentation.
     Source: theory.md B4.
 
     Examples
@@ -181,6 +182,10 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
 
     U(0) is the identity and U' = -U hat(I^-1 L_o). For a loop the closure is the holonomy (base axes at t = 0).
     Source: Cabrera 2006, section 2.3.1 (a); theory.md B2.
+
+    Notes
+    -----
+    Equation :eq:`horizontal-gauge` of the documentation.
 
     Examples
     --------

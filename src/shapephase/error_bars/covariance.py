@@ -142,6 +142,7 @@ def uncertainty(
 
     Notes
     -----
+    Equation :eq:`covariance` of the documentation.
     Source: the derivatives are those of `derivatives`.
 
     Examples

@@ -236,6 +236,10 @@ def derivatives(motion: Motion) -> Derivatives:
     ShapeError
         If the motion is a batch.
 
+    Notes
+    -----
+    Equation :eq:`adjoint` of the documentation.
+
     Examples
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)

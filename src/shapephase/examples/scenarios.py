@@ -53,6 +53,7 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
 
     Notes
     -----
+    Equation :eq:`kane-scher` of the documentation.
     With axial to transverse inertia 0.25 the cat turns by 180 degrees about the bisector of the two half axes at
     (alpha, beta) = (0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222),
     (60, 77.132402) degrees, and at (20, 40) by 259.512497 degrees, counted through the motion.

@@ -131,6 +131,7 @@ def extremal(
 
     Notes
     -----
+    Equation :eq:`wong` of the documentation.
     Source: Montgomery, Isoholonomic problems and some applications, Comm. Math. Phys. 128 (1990) 565-592, theorem 1 and
     its Hamiltonian form; signs as in theory.md section 1.
 

@@ -100,6 +100,7 @@ def plan_reorientation(
 
     Notes
     -----
+    Equation :eq:`isoholonomic` of the documentation.
     Source: Montgomery 1990, Isoholonomic problems and some applications.
 
     Examples

@@ -54,6 +54,7 @@ def split(
 
     Notes
     -----
+    Equation :eq:`tilt` of the documentation.
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
 
     Examples
@@ -397,6 +398,7 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
 
     Notes
     -----
+    Equation :eq:`open-arc` of the documentation.
     Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
 
     Examples

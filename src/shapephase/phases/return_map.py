@@ -191,6 +191,7 @@ def fixed_points(
 
     Notes
     -----
+    Equation :eq:`lefschetz` of the documentation.
     Source: theory.md section 2, B9, D16.
 
     Examples

@@ -399,6 +399,7 @@ def reconstruct(
 
     Notes
     -----
+    Equation :eq:`reconstruction` of the documentation.
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
 
     Examples

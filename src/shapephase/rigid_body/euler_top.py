@@ -61,6 +61,10 @@ class EulerTop:
     UnphysicalInertiaError, SingularInertiaError
         If the inertia is not symmetric, or not positive definite.
 
+    Notes
+    -----
+    Equation :eq:`rigid-phase` of the documentation.
+
     Examples
     --------
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [0.6, 0.3, 1.5])

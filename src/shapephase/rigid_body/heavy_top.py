@@ -64,6 +64,7 @@ class HeavyTop:
 
     Notes
     -----
+    Equation :eq:`heavy-top` of the documentation.
     Source: Marsden and Ratiu (15.10.1-3).
 
     Examples

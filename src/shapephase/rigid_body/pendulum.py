@@ -301,6 +301,7 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
 
     Notes
     -----
+    Equation :eq:`pendulum` of the documentation.
     Source: Marsden and Ratiu (15.11.7) to (15.11.13).
 
     Examples

@@ -47,6 +47,7 @@ def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
 
     Notes
     -----
+    Equation :eq:`connection` of the documentation.
     Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
 
     Examples
@@ -74,6 +75,7 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
 
     Notes
     -----
+    Equation :eq:`curvature` of the documentation.
     Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
 
     Examples
@@ -126,6 +128,7 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
 
     Notes
     -----
+    Equation :eq:`holonomy` of the documentation.
     Source: Cabrera 2006, section 3.1.1 (R_G); theory.md B7.
 
     Examples

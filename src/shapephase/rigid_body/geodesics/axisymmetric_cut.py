@@ -242,6 +242,10 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     ShapeError
         If a moment is not a number above 0, or I_1 is not finite.
 
+    Notes
+    -----
+    Equation :eq:`conjugate-time` of the documentation.
+
     Examples
     --------
     >>> from shapephase.rigid_body import geodesics

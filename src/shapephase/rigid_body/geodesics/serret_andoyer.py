@@ -282,6 +282,10 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
     ShapeError
         If the moments are not positive, or two of them are equal.
 
+    Notes
+    -----
+    Equation :eq:`andoyer-metric` of the documentation.
+
     Examples
     --------
     >>> from shapephase.rigid_body import geodesics

@@ -59,6 +59,7 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
 
     Notes
     -----
+    Equation :eq:`bracket` of the documentation.
     Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
 
     Examples
@@ -263,6 +264,10 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
 
     omega(X_H, v) = dH . v for tangent v. Raises ShapeError for a zero momentum. Source: theory.md K2, D3.
 
+    Notes
+    -----
+    Equation :eq:`symplectic` of the documentation.
+
     Examples
     --------
     >>> from shapephase.rigid_body import lie
@@ -283,6 +288,7 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
     Notes
     -----
+    Equation :eq:`euler-rigid` of the documentation.
     Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
 
     Examples
