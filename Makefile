@@ -1,4 +1,4 @@
-# The same checks as .ci/run, on the environment that the README's commands make.
+# The checks of .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
 .PHONY: check lint types imports test times notebooks docs full fuzz bench
@@ -26,7 +26,7 @@ times:
 notebooks:
 	$(BIN)/pytest --nbmake notebooks -p no:cacheprovider -W default
 
-# The notebooks are executed here, too; `notebooks` also fails on their asserts in an environment without Sphinx.
+# This executes the notebooks with their asserts, as `notebooks` does without Sphinx; it needs the extra `docs`.
 docs:
 	$(BIN)/sphinx-build -nW --keep-going docs docs/_build/html
 
