@@ -15,6 +15,8 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._dense_output import TERMS, convolved, direction_terms, end_channels, hermite_matrix, piece_channels, transported
+from .fast import engine
+from .fast.curves import curve_terms
 from .lift import Lift
 from .stepped import SteppedRotation
 
@@ -69,32 +71,17 @@ def curve_integrals(rotation: SteppedRotation, lift: Lift | None = None, edges: 
         else:
             channels = piece_channels(rotation.interpolant, edges[part.start : part.stop + 1])
         both = np.stack([ends[:, :, part], ends[:, :, after]], axis=2)
-        p, rates = direction_terms(both, magnitude, channels)
         # The piece's first corner, as it is seen from the body at both ends.
-        still = np.zeros((3, TERMS, *both.shape[1:]))
-        if frames is None:
-            still[:, 0] = both[:, :, :1]
-        else:
-            still[:, 0, :, 0] = both[:, :, 0]
-            still[:, 0, :, 1] = so3.apply(so3.transpose(frames[after]), corners[:, part]).transpose(2, 0, 1)
-            transported(still, -channels[6:, :, None])
-            rates += channels[6:, :, None]
+        still = np.broadcast_to(both[:, :, :1], both.shape).copy()
+        if frames is not None:
+            still[:, :, 1] = so3.apply(so3.transpose(frames[after]), corners[:, part]).transpose(2, 0, 1)
+        find = curve_terms if engine.is_ready() else _curve_terms
+        by_rule, rates = find(channels, both, still, magnitude, _rules(), lifted=frames is not None)
         if frames is None:
             drift[part], drift[part.stop] = (channels[6:, 0, 0] / lengths[part]).T, channels[6:, 0, 1, -1]
             drift[part.stop] /= lengths[part.stop - 1]
-        turning[:, part] = (rates[:, 0, :, 0] / lengths[part]).transpose(1, 2, 0)
-        turning[:, part.stop] = (rates[:, 0, :, 1, -1] / lengths[part.stop - 1]).T
-        along = convolved(p, rates)
-        turn, cosine = along + convolved(still, rates), convolved(still, p)
-        cosine[0] += 1.0
-        # The rate of the turn about the first corner, a quotient of series.
-        for order in range(TERMS):
-            if order:
-                turn[order] -= (cosine[1 : order + 1] * turn[:order][::-1]).sum(axis=0)
-            turn[order] /= cosine[0]
-        integrands = np.stack([along, along - turn])
-        by_rule = _rules() @ integrands.transpose(3, 1, 0, 2, 4).reshape(2 * TERMS, -1)
-        by_rule = by_rule.reshape(3, 2, batch, integrands.shape[-1])
+        turning[:, part] = (rates[:, :, 0] / lengths[part]).transpose(1, 2, 0)
+        turning[:, part.stop] = (rates[:, :, 1, -1] / lengths[part.stop - 1]).T
         dynamic[:, part], slivers[:, part] = by_rule[0]
         differences += np.abs(by_rule[:2] - by_rule[1:]).sum(axis=-1)
     late, early = differences
@@ -102,6 +89,29 @@ def curve_integrals(rotation: SteppedRotation, lift: Lift | None = None, edges: 
     slopes = so3.cross(directions, turning)
     by_momentum = slopes + so3.cross(directions, drift) if frames is None else slopes
     return CurveIntegrals(dynamic, slivers, corners, error, slopes, by_momentum, directions)
+
+
+def _curve_terms(
+    channels: Array, directions: Array, corners: Array, magnitudes: Array, rules: Array, *, lifted: bool
+) -> tuple[Array, Array]:
+    """As `fast.curves.curve_terms`."""
+    p, rates = direction_terms(directions, magnitudes, channels)
+    still = np.zeros((3, TERMS, *directions.shape[1:]))
+    still[:, 0] = corners
+    if lifted:
+        transported(still, -channels[6:, :, None])
+        rates += channels[6:, :, None]
+    along = convolved(p, rates)
+    turn, cosine = along + convolved(still, rates), convolved(still, p)
+    cosine[0] += 1.0
+    # The rate of the turn about the first corner, a quotient of series.
+    for order in range(TERMS):
+        if order:
+            turn[order] -= (cosine[1 : order + 1] * turn[:order][::-1]).sum(axis=0)
+        turn[order] /= cosine[0]
+    integrands = np.stack([along, along - turn])
+    by_rule = rules @ integrands.transpose(3, 1, 0, 2, 4).reshape(2 * TERMS, -1)
+    return by_rule.reshape(3, 2, *directions.shape[1::2]), rates[:, 0]
 
 
 @lru_cache(maxsize=1)

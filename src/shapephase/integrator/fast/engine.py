@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import marches, panels, tree, variants
+from . import curves, marches, panels, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, is_wanted, may_compile
 
@@ -25,6 +25,7 @@ _KERNELS = {
     "march_variants": "._variant_kernel",
     "growths_and_rounding": "._growth_kernel",
     "step_derivatives": "._derivative_kernel",
+    "curve_terms": "._curve_kernel",
     "times_of_samples": "._panel_kernel",
     "series_of_panels": "._panel_kernel",
     "factors_of_refining": "._panel_kernel",
@@ -145,4 +146,5 @@ def _warm() -> None:
     tree.warm()
     marches.warm()
     panels.warm()
+    curves.warm()
     variants.warm()
