@@ -49,7 +49,7 @@ def test_a_checkout_holds_the_bodies(tmp_path):
 
 def test_importing_brings_nothing_heavy():
     code = (
-        "import sys, shapephase; heavy = {'casadi', 'matplotlib', 'viser', 'mujoco', 'scipy.integrate', "
+        "import sys, shapephase; heavy = {'casadi', 'matplotlib', 'jinja2', 'mujoco', 'scipy.integrate', "
         "'scipy.interpolate', 'cyclopts', 'numba'}; print(sorted(heavy & set(sys.modules)))"
     )
     said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout

@@ -9,9 +9,6 @@ import shutil
 import numpy as np
 import pytest
 
-# Frames that a browser draws from one picture to the next, and how many like the first show that nothing moves.
-_FRAMES_BETWEEN = 3
-_PICTURES_ALIKE = 3
 _NEVER = 180_000.0
 """What has not come in this time never will, however busy the machine is [ms]."""
 CHROMIUM_FLAGS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -33,37 +30,36 @@ def chromium():
         browser.close()
 
 
-def stopped(page, scene):
-    """Stop the playing: the number beside the bar does not change any more."""
-    number = scene.locator("input").first
-    for _ in range(20):
-        before = number.input_value()
-        page.wait_for_timeout(500)
-        if number.input_value() == before:
+def opened(chromium, file):
+    """A page in the browser, stopped at its start; what it says on its console, and what it asks for."""
+    page = chromium.new_page()
+    page.set_viewport_size({"width": 520, "height": 640})
+    said, asked = [], []
+    page.on("console", lambda message: said.append((message.type, message.text)))
+    page.on("pageerror", lambda error: said.append(("error", str(error))))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    wait_for(page, "window.page !== undefined")
+    page.evaluate("page.clock.play(false); page.clock.show(0)")
+    return page, said, asked
+
+
+def wait_for(page, condition):
+    """Return once a condition holds in the page; its policy lets nobody wait for a text within."""
+    for _ in range(1200):
+        if page.evaluate(condition):
             return
-        scene.locator("body").press("Space")
-        page.wait_for_timeout(200)
-    raise AssertionError("the playing does not stop")
+        page.wait_for_timeout(100)
+    raise AssertionError(f"never: {condition}")
 
 
-def seen(page, scene, second):
-    """The picture once it stands still at a second of the playing, the bar below and notices left out."""
+def seen(page, time):
+    """The picture of the scene at a time of the clock, drawn at once."""
     from PIL import Image
 
-    scene.locator("input").first.fill(str(second))
-    before, same = None, 0
-    for _ in range(600):
-        # On a busy machine frames are drawn seldom, and two pictures are alike before the new one is there.
-        for _ in range(_FRAMES_BETWEEN):
-            scene.locator("body").evaluate("() => new Promise(done => requestAnimationFrame(done))")
-        page.wait_for_timeout(100)
-        shot = scene.locator("canvas").first.screenshot()
-        picture = np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=int)
-        same = same + 1 if before is not None and np.array_equal(picture, before) and np.ptp(picture) > 100 else 0
-        if same == _PICTURES_ALIKE:
-            return picture
-        before = picture
-    raise AssertionError("the picture never came to rest")
+    page.evaluate("time => { page.clock.show(time); page.scene.draw(); }", time)
+    shot = page.locator("#scene").screenshot()
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=int)
 
 
 def furred(picture):

@@ -49,7 +49,7 @@ def hull(points: Array) -> tuple[Array, Array] | None:
     return vertices, faces
 
 
-def _outermost(points: Array) -> Array:
+def outermost(points: Array) -> Array:
     """The points that are farthest in some directions, all around: (N, 3) -> (M, 3)."""
     number = np.arange(_DIRECTIONS) + 0.5
     height, turn = 1.0 - 2.0 * number / _DIRECTIONS, math.pi * (1.0 + math.sqrt(5.0)) * number
@@ -70,7 +70,7 @@ def _with_fewer_faces(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
         shape = shapes[place]
         # Visuals of one file share their arrays.
         if id(shape.vertices) not in hulls:
-            hulls[id(shape.vertices)] = hull(_outermost(shape.vertices))
+            hulls[id(shape.vertices)] = hull(outermost(shape.vertices))
         result[place] = _as_hull(shape, shape.vertices, hulls[id(shape.vertices)])
         left += len(result[place].faces) - int(counts[place])
         simplified += 1
@@ -92,7 +92,7 @@ def _with_fewer_shapes(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
         if left <= _MOST_SHAPES or len(own) == 1:
             break
         corners = np.concatenate([shape.corners @ shape.pose[:3, :3].T + shape.pose[:3, 3] for shape in own])
-        by_link[link] = [_as_hull(replace(own[0], pose=np.eye(4), mesh=None), corners, hull(_outermost(corners)))]
+        by_link[link] = [_as_hull(replace(own[0], pose=np.eye(4), mesh=None), corners, hull(outermost(corners)))]
         left += 1 - len(own)
         simplified.append(link)
     said = (

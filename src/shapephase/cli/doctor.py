@@ -9,7 +9,7 @@ from .outcome import Outcome
 
 _PACKAGES = (
     ("shapephase", "numpy", "scipy", "pin", "casadi", "cyclopts", "rich"),
-    ("matplotlib", "viser", "trimesh", "pycollada", "example-robot-data", "rosbags", "pyyaml", "numba"),
+    ("matplotlib", "trimesh", "pycollada", "example-robot-data", "rosbags", "pyyaml", "numba"),
 )
 """What is needed, and what may be there."""
 _FEATURES = ("WITH_URDFDOM", "WITH_COLLISION", "WITH_OPENMP", "WITH_SDFORMAT", "WITH_CPPAD")

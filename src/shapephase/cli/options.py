@@ -57,6 +57,15 @@ ReportFile = Annotated[
         "`--html report.html`."
     ),
 ]
+UpAxis = Annotated[
+    str | None,
+    Parameter(
+        allow_leading_hyphen=True,  # "-z" is an axis
+        show_default=False,
+        help="The axis that is up in 3-D: x, y, z, -x, -y or -z, without unit; without it z, or y for a body whose "
+        "left and right are across z. For example `--up y`.",
+    ),
+]
 FigureFile = Annotated[
     Path, Parameter(help="Write the figure to this file, .svg, .pdf or .png; for example `--out figure.pdf`.")
 ]

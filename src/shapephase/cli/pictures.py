@@ -17,6 +17,7 @@ from .options import (
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    UpAxis,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -32,6 +33,7 @@ def view_command(
     html: Path | None = None,
     trail: str | None = None,
     speed: float | None = None,
+    up: UpAxis = None,
     recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome | None:
@@ -48,10 +50,12 @@ def view_command(
         Seconds of motion in a second of playing; without it 1, or such that playing takes from 4 to 20 s. For example
         `--speed 0.1` for slow motion.
     """
+    from ..plotting.pages.up_axis import up_axis
     from ..plotting.viewer import motion_page, view
     from . import motion as motions
     from .recording_text import recording_data
 
+    up_axis(up, None)
     if speed is not None and not 0.0 < speed < math.inf:
         raise ShapeError(f"--speed: seconds of motion in a second of playing, above 0, are needed, got {speed:g}")
     aside = check_writable(html, "--html", ".html")
@@ -60,11 +64,11 @@ def view_command(
         flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail)
         if html is not None:
             work.begin("recording the animation")
-            motion_page(flown.motion, html, trail=trail, speed=speed)
+            motion_page(flown.motion, html, trail=trail, speed=speed, up=up)
             say_written(html)
             data = {"html": str(html)} | recording_data(flown.recorded)
             return Outcome("", data, aside=aside, made_from=flown.motion.deformation.made_from)
-    live = view(flown.motion, trail=trail, speed=speed, notebook=False)
+    live = view(flown.motion, trail=trail, speed=speed, up=up, notebook=False)
     if live is not None:
         with live:
             put(f"{live.url}  (Ctrl-C to stop)")

@@ -18,6 +18,7 @@ from .options import (
     RecordingOptions,
     ReportFile,
     Tolerance,
+    UpAxis,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -40,6 +41,7 @@ def split_command(
     out: Path | None = None,
     phases: Path | None = None,
     html: ReportFile = None,
+    up: UpAxis = None,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase.
@@ -64,6 +66,10 @@ def split_command(
     aside = check_writable(out, "--out", ".npz")
     aside = check_writable(phases, "--phases", ".csv") or aside
     aside = check_writable(html, "--html", ".html") or aside
+    if html is not None:
+        from ..plotting.pages.up_axis import up_axis
+
+        up_axis(up, None)
     with steps(13 if html else 2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge)
@@ -81,7 +87,16 @@ def split_command(
             from ..plotting.report import write_report
 
             title = f"{flown.body.name} along {Path(motion).name}"
-            write_report(flown.motion, result, html, shape_path=flown.path, title=title, begin=work.begin)
+            write_report(
+                flown.motion,
+                result,
+                html,
+                shape_path=flown.path,
+                title=title,
+                up=up,
+                error_bars=error_bar_lines(result, bars),
+                begin=work.begin,
+            )
             say_written(html)
     lines, data = recorded_base_text(flown.motion, flown.recorded)
     text = [

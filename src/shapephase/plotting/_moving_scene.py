@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array
-from ..body._drawing_limits import hull
+from ..body._drawing_limits import hull, outermost
 from ..body.appearance import BOX_COLOUR, Visual, visuals
+from ..body.body import Body
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription, Description, ParticleDescription
 from ..deformation.frames import principal_frames
@@ -60,7 +62,8 @@ class MovingScene:
     centre : (F, 3) centre of mass
     momentum : (3,) the angular momentum [kg m^2/s]
     trail : (F, 3) positions of the origin of a link; None: no trail
-    articulated : whether the nodes are the links of a body, else particles or the locked inertia
+    body, shapes : whose links the nodes are, and its joints (F, n); None: particles or the locked inertia
+    falls : whether gravity moves the centre of mass
 
     Examples
     --------
@@ -76,7 +79,9 @@ class MovingScene:
     centre: Array
     momentum: Array
     trail: Array | None
-    articulated: bool
+    body: Body | None = None
+    shapes: Array | None = None
+    falls: bool = False
 
     def world_pose(self, node: MovingNode) -> Array:
         """Pose of a node: (F, 4, 4)."""
@@ -101,14 +106,19 @@ class MovingScene:
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
     @cached_property
+    def extent(self) -> Array:
+        """The outermost of all corners over all frames, in directions all around: (K, 3)."""
+        return outermost(self.corners.reshape(-1, 3))
+
+    @cached_property
     def corners(self) -> Array:
         """Corners of boxes around all shapes of a node, the outermost of many: (F, K, 3)."""
         found = []
         for node in self.nodes:
             pose = self.world_pose(node)
             points = np.concatenate([s.corners @ s.pose[:3, :3].T + s.pose[:3, 3] for s in node.shapes])
-            outermost = hull(points) if len(points) > _FEW_CORNERS else None
-            points = points if outermost is None else outermost[0]
+            around = hull(points) if len(points) > _FEW_CORNERS else None
+            points = points if around is None else around[0]
             stretched = points[None] if node.scales is None else points * node.scales[:, None]
             found.append(stretched @ so3.transpose(pose[:, :3, :3]) + pose[:, None, :3, 3])
         return np.concatenate(found, axis=1) if found else self.centre[:, None]
@@ -157,12 +167,12 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     base[:, :3, 3] = motion.base_position(times, **fall)
     in_base = description.centre_of_mass(times)
     centre = base[:, :3, 3] + so3.apply(base[:, :3, :3], in_base)
-    points = None
+    body = shapes = points = None
     if isinstance(description, ArticulatedDescription):
-        nodes = _link_nodes(description, times)
+        body, shapes = description.body, description.path.curve(times)[0]
+        nodes = _link_nodes(body, shapes)
         if trail is not None:
-            link_pose = description.body.link_pose(description.path.curve(times)[0], trail)
-            points = (base @ link_pose)[:, :3, 3]
+            points = (base @ body.link_pose(shapes, trail))[:, :3, 3]
     elif trail is not None:
         raise unknown_name(f"link of {motion.deformation.label}", trail, ())
     elif isinstance(description, ParticleDescription):
@@ -177,7 +187,9 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
         centre=centre,
         momentum=motion.momentum,
         trail=points,
-        articulated=isinstance(description, ArticulatedDescription),
+        body=body,
+        shapes=shapes,
+        falls=bool(np.any(fall.get("gravity", 0.0))),
     )
 
 
@@ -189,15 +201,19 @@ def _ungauged(deformation: Deformation) -> Description:
     return description
 
 
-def _link_nodes(description: ArticulatedDescription, times: Array) -> tuple[MovingNode, ...]:
-    by_link: dict[str, list[Visual]] = {}
-    for shape in visuals(description.body):
-        by_link.setdefault(shape.link, []).append(shape)
-    configuration = description.path.curve(times)[0]
+def _link_nodes(body: Body, joints: Array) -> tuple[MovingNode, ...]:
     return tuple(
-        MovingNode(name=link, shapes=tuple(shapes), poses=description.body.link_pose(configuration, link))
-        for link, shapes in by_link.items()
+        MovingNode(name=link, shapes=shapes, poses=body.link_pose(joints, link))
+        for link, shapes in shapes_by_link(visuals(body)).items()
     )
+
+
+def shapes_by_link(shapes: Iterable[Visual]) -> dict[str, tuple[Visual, ...]]:
+    """Shapes by the link that carries them, links in the order of their first shapes."""
+    found: dict[str, list[Visual]] = {}
+    for shape in shapes:
+        found.setdefault(shape.link, []).append(shape)
+    return {link: tuple(own) for link, own in found.items()}
 
 
 def _particle_nodes(description: ParticleDescription, times: Array) -> tuple[MovingNode, ...]:

@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
 import html
 import math
 import os
 import threading
-import time
 import warnings
 import webbrowser
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from functools import partial
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_object
-from ..errors import MissingExtraError, ShapeError, VisualWarning
+from ..errors import ShapeError, VisualWarning
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
 from ._letters import printable
 from ._moving_scene import MovingScene, moving_scene
-from ._page_policy import guarded
-from ._scene_drawing import DrawnScene, set_camera
-from ._silent_server import silence_thread_of, silenced
-
-if TYPE_CHECKING:
-    import viser
+from .pages.motion_data import motion_data
+from .pages.templates import SCENE_SCRIPTS, page_html
+from .pages.up_axis import up_axis
 
 # Seconds that a motion is played in, unless a speed is given: long enough to follow it, not so long as to tire.
 _MIN_PLAYING = 4.0
@@ -36,9 +33,10 @@ _MAX_PLAYING = 20.0
 _FRAME_RATE = 30
 # Frames of a page, unless their number is given: keeps its file below some megabytes.
 _MAX_FRAMES = 3000
-# Seconds that the first and the last frame stand still, so that start and end can be seen before it repeats.
-_HOLD_FIRST = 0.5
-_HOLD_LAST = 1.0
+# Ports after the given one that are tried when that is in use.
+_PORTS = 100
+# Height of a motion in a notebook [px].
+_HEIGHT = 520
 
 
 def motion_page(
@@ -49,12 +47,14 @@ def motion_page(
     frames: int | None = None,
     trail: str | None = None,
     ghost: bool = True,
+    up: str | None = None,
     **fall: ArrayLike,
 ) -> None:
     """Write a motion as one HTML page to play, stop and scrub; it needs no network and no server, and may use none.
 
-    The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass, and the
-    body at the start as a transparent ghost.
+    The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass, the axes
+    of the base and of space, and the body at the start as a transparent ghost. The clock is the time of the body. Its
+    joints can be moved by hand.
 
     Parameters
     ----------
@@ -63,15 +63,15 @@ def motion_page(
     frames : None: 30 in a second of playing
     trail : a link whose origin leaves a trail, light at the start and dark at the end
     ghost : whether the body at the start is shown
+    up : the inertial axis that is up in the picture: "x", "y", "z", "-x", "-y" or "-z"; None: against gravity if there
+        is any, else y for a body whose left and right are mirror images across z and not across y, else z
     fall : start, velocity, gravity of the centre of mass as in `Motion.base_position`; by default it rests at the
-        origin
+        origin, and there is no ground
 
     Raises
     ------
-    MissingExtraError
-        If viser is not installed.
     ShapeError, UnknownNameError
-        As `moving_scene`, and for a speed that is not above 0.
+        As `moving_scene`, for a speed that is not above 0, and for an axis that there is not.
 
     Warns
     -----
@@ -88,7 +88,7 @@ def motion_page(
     True
     """
     check_object(motion, "Motion", "motion")
-    page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, **fall)
+    page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, **fall)
     write_whole(path, lambda stream: stream.write(page.encode()))
 
 
@@ -99,6 +99,7 @@ def motion_html(
     frames: int | None = None,
     trail: str | None = None,
     ghost: bool = True,
+    up: str | None = None,
     **fall: ArrayLike,
 ) -> str:
     """The page that `motion_page` writes, as text: arguments, errors and warnings as there.
@@ -109,14 +110,38 @@ def motion_html(
     >>> sp.plotting.motion_html(motion, frames=5)[:15].lower()
     '<!doctype html>'
     """
+    scene, data = scene_and_data(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, fall=fall)
+    return page_html(
+        "motion.html",
+        title=printable(scene.title),
+        scripts=(*SCENE_SCRIPTS, "motion_page"),
+        styles=("page", "motion_page"),
+        data={"motion": data},
+        with_joints=bool(data["joints"]),
+    )
+
+
+def scene_and_data(
+    motion: Motion,
+    *,
+    speed: float | None,
+    frames: int | None,
+    trail: str | None,
+    ghost: bool,
+    up: str | None,
+    fall: Mapping[str, ArrayLike],
+) -> tuple[MovingScene, dict[str, Any]]:
+    """A motion as a scene, and as the data of a page; arguments, errors and warnings as `motion_page`."""
     check_object(motion, "Motion", "motion")
-    viser_module()
     playing_speed = _playing_speed(motion, speed)
+    up_axis(up, None)
     scene = _scene(motion, playing_speed, frames, trail, fall)
-    with _server() as server:
-        page = _recording(server, scene, playing_speed, ghost).as_html()
-    title = f"<title>{html.escape(printable(scene.title))}</title>"
-    return guarded(page.replace("<title>Viser</title>", title, 1))
+    if up is None and scene.falls:
+        gravity = np.asarray(fall["gravity"], dtype=float)
+        upwards = -gravity / np.linalg.norm(gravity)
+    else:
+        upwards = up_axis(up, scene.body)
+    return scene, motion_data(scene, speed=playing_speed, ghost=ghost, up=upwards)
 
 
 def view(
@@ -126,6 +151,7 @@ def view(
     frames: int | None = None,
     trail: str | None = None,
     ghost: bool = True,
+    up: str | None = None,
     notebook: bool | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -136,8 +162,8 @@ def view(
 
     Parameters
     ----------
-    speed, frames, trail, ghost, fall : as in `motion_page`
-    notebook : whether to show it in a cell, recorded as by `motion_page`; None: if this runs in a notebook
+    speed, frames, trail, ghost, up, fall : as in `motion_page`
+    notebook : whether to show it in a cell; None: if this runs in a notebook
     host, port : where the server listens; if the port is in use, the next free one
     browser : whether to open a browser there
 
@@ -157,36 +183,20 @@ def view(
     True
     """
     check_object(motion, "Motion", "motion")
-    viser_module()
-    playing_speed = _playing_speed(motion, speed)
-    scene = _scene(motion, playing_speed, frames, trail, fall)
+    page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, **fall)
     if _in_notebook() if notebook is None else notebook:
-        with _server() as server:
-            _recording(server, scene, playing_speed, ghost).show(height=480)
+        _show_in_cell(page)
         return None
-    running = LiveView(_started(host, port), scene, playing_speed, ghost)
+    running = LiveView(page, printable(motion.deformation.label), host, port)
     if browser:
         webbrowser.open(running.url)
     return running
 
 
-def viser_module() -> Any:
-    """The module viser. Raises MissingExtraError."""
-    try:
-        import viser
-    except ImportError:
-        raise MissingExtraError("3-D views need viser; install it with: pip install 'shapephase[viz]'") from None
-    return viser
-
-
 class LiveView:
-    """A motion shown by a server of this process, with a time slider, a play button and a speed.
+    """A page shown by a server of this process.
 
     Made by `view`. It runs until `stop()` or the end of the process; used in a with statement, until the end of that.
-
-    Attributes
-    ----------
-    server : the viser server, to which other things can be added
 
     Examples
     --------
@@ -196,31 +206,22 @@ class LiveView:
     LiveView
     """
 
-    def __init__(self, server: viser.ViserServer, scene: MovingScene, speed: float, ghost: bool) -> None:
-        self.server = server
-        self._scene = scene
-        self._drawn = DrawnScene(server.scene, scene, speed, ghost)
-        set_camera(server, scene)
-        self._stopped = threading.Event()
-        end = float(scene.times[-1])
-        gui = server.gui
-        self._slider = gui.add_slider("time [s]", min=0.0, max=end, step=end / 1000.0, initial_value=0.0)
-        self._playing = gui.add_checkbox("play", initial_value=True)
-        self._speed = gui.add_number("speed", initial_value=speed, min=0.0)
-        self._thread = threading.Thread(target=self._play, daemon=True, name="shapephase view")
+    def __init__(self, page: str, title: str, host: str, port: int) -> None:
+        self._title, self._host = title, host
+        self._server = _listening(host, port, page.encode())
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True, name="shapephase view")
         self._thread.start()
 
     @property
     def url(self) -> str:
         """Address for a browser."""
-        return f"http://{self.server.get_host()}:{self.server.get_port()}"
+        return f"http://{self._host}:{self._server.server_address[1]}"
 
     def stop(self) -> None:
         """End the view and its server."""
-        self._stopped.set()
+        self._server.shutdown()
         self._thread.join()
-        with silenced():
-            self.server.stop()
+        self._server.server_close()
 
     def wait(self) -> None:
         """Return when the view is stopped, by `stop()` or by Ctrl-C: for a script that has nothing else to do."""
@@ -239,50 +240,49 @@ class LiveView:
 
     def __repr__(self) -> str:
         """Title and address."""
-        return f"LiveView({self._scene.title!r}, {self.url})"
-
-    def _play(self) -> None:
-        end, last = float(self._scene.times[-1]), time.monotonic()
-        while not self._stopped.wait(1.0 / _FRAME_RATE):
-            now = time.monotonic()
-            if self._playing.value:
-                moved = self._slider.value + (now - last) * self._speed.value
-                self._slider.value = moved if moved <= end else 0.0
-            last, self._drawn.speed = now, self._speed.value
-            with self.server.atomic():
-                self._drawn.show(round(self._slider.value / end * (len(self._scene.times) - 1)))
+        return f"LiveView({self._title!r}, {self.url})"
 
 
-def _recording(server: viser.ViserServer, scene: MovingScene, speed: float, ghost: bool) -> Any:
-    """All frames of a scene as viser records them."""
-    drawn = DrawnScene(server.scene, scene, speed, ghost)
-    set_camera(server, scene)
-    serializer = server.get_scene_serializer()
-    serializer.insert_sleep(_HOLD_FIRST)
-    step = float(scene.times[1] - scene.times[0]) / speed
-    for frame in range(1, len(scene.times)):
-        serializer.insert_sleep(step)
-        drawn.show(frame)
-    serializer.insert_sleep(_HOLD_LAST)
-    return serializer
+class _PageHandler(BaseHTTPRequestHandler):
+    """Answers with the page, and prints nothing."""
+
+    def __init__(self, page: bytes, *arguments: Any) -> None:
+        self._page = page
+        super().__init__(*arguments)
+
+    def do_GET(self) -> None:
+        """The page at its root, nothing elsewhere."""
+        found = self.path == "/"
+        self.send_response(200 if found else 404)
+        self.send_header("Content-Type", "text/html; charset=utf-8")
+        self.send_header("Content-Length", str(len(self._page) if found else 0))
+        self.end_headers()
+        if found:
+            self.wfile.write(self._page)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing is said of requests."""
 
 
-@contextlib.contextmanager
-def _server() -> Iterator[viser.ViserServer]:
-    """A server while a scene is recorded, on a port that the system chooses."""
-    server = _started("127.0.0.1", 0)
-    try:
-        yield server
-    finally:
-        with silenced():
-            server.stop()
+def _listening(host: str, port: int, page: bytes) -> ThreadingHTTPServer:
+    """A server on the port, or the next one that is free. Raises OSError if there is none."""
+    last = port + _PORTS if port else port
+    while True:
+        try:
+            return ThreadingHTTPServer((host, port), partial(_PageHandler, page))
+        except OSError:
+            if port >= last:
+                raise
+            port += 1
 
 
-def _started(host: str, port: int) -> viser.ViserServer:
-    with silenced():
-        server = viser_module().ViserServer(host=host, port=port, verbose=False)
-    silence_thread_of(server)
-    return server
+def _show_in_cell(page: str) -> None:
+    """The page in a frame of the notebook, which lets it run its own scripts and no others."""
+    from IPython.display import HTML, display
+
+    frame = f'<iframe style="width: 100%; height: {_HEIGHT}px; border: 0" srcdoc="{html.escape(page)}"></iframe>'
+    # Within another element, for else IPython advises an address.
+    display(HTML(f"<div>{frame}</div>"))
 
 
 def _playing_speed(motion: Motion, speed: float | None) -> float:

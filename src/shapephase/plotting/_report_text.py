@@ -1,0 +1,184 @@
+"""What a report says in words and tables: what happened, the split, the joints and masses, and where all comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..phases.phases import PhaseSplit
+from ..provenance import provenance
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.shape_path import ShapePath
+from ..shape_space.summaries import body_summary, path_summary
+
+CONVENTIONS = (
+    ("attitude R", "", "takes base axes to inertial axes; R' = R hat(omega), omega in base axes"),
+    ("quaternion", "", "x y z w, w not negative"),
+    ("momentum", "", "about the centre of mass, inertial axes, constant"),
+    ("phase", "", "angle about the momentum, right-hand rule; solid angles are signed, seen from outside"),
+    ("split", "", "total rotation = exp(Montgomery phase about the momentum) tilt holonomy, in the horizontal gauge"),
+)
+# [rad] A smaller turn has no axis worth showing.
+_NO_TURN = 1e-12
+# [rad or m] A limit beyond this is none: some models write the largest number there is.
+_NO_LIMIT = 1e6
+# [rad] One degree: a smaller gap of the momentum is not worth a sentence.
+_GAP = np.pi / 180.0
+
+Row = tuple[str, str, str]
+
+
+def lead(motion: Motion) -> str:
+    """One line below the title."""
+    momentum = " ".join(f"{value:g}" for value in motion.momentum)
+    return f"{motion.duration:g} s, angular momentum ({momentum}) kg m²/s"
+
+
+def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
+    """What happened, in sentences."""
+    name = f"The body ({body.name}, {body.n_shape} joints, {body.mass:.4g} kg)" if body else "The body"
+    loop = "and ends in the shape it began with" if result.is_loop else "and ends in another shape than it began with"
+    words = [f"{name} changes its shape for {motion.duration:g} s {loop}."]
+    if not result.has_phase:
+        words.append(f"There is no angular momentum: the shape alone turned it by {_turn(result.total_rotation)}.")
+        return words
+    size = float(np.linalg.norm(motion.momentum))
+    words.append(
+        f"The shape alone turned it by {_turn(result.holonomy)}; the angular momentum of {size:.4g} kg m²/s added "
+        f"{_turn(result.dynamical_rotation)}. Both together turned it by {_turn(result.total_rotation)}."
+    )
+    phase, dynamic, geometric = (
+        f"{np.degrees(float(value)):.2f}°"
+        for value in (result.montgomery_phase, result.dynamic_phase, result.geometric_phase)
+    )
+    words.append(
+        f"Seen in the {result.gauge} gauge the body turned about its momentum by a Montgomery phase of {phase}: "
+        f"{dynamic} from how fast it turned (the dynamic phase), {geometric} from the solid angle that the momentum's "
+        "direction went round (the geometric phase)."
+    )
+    gap = float(result.momentum_gap)
+    if gap > _GAP:
+        words.append(
+            f"There the momentum's direction ended {np.degrees(gap):.2f}° from where it began. The great circle back "
+            f"to the start closes its curve; beside the phase, the body is tilted by {_turn(result.tilt)}."
+        )
+    return words
+
+
+def split_rows(result: PhaseSplit) -> list[Row]:
+    """The split as a table."""
+    errors = result.error_estimates
+    rows = [
+        _rotation("Total rotation", result.total_rotation, errors.total_rotation),
+        _rotation("Shape holonomy" if result.is_loop else "Shape lift (open path)", result.holonomy, errors.holonomy),
+        _rotation("Dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
+    ]
+    if not result.has_phase:
+        words = "none: there is no angular momentum, the body turns by its shape alone"
+        return [*rows, ("Montgomery phase", "", words)]
+    area = float(result.solid_angle)
+    return [
+        *rows,
+        _phase("Montgomery phase", result.montgomery_phase, errors.montgomery_phase, f"{result.gauge} gauge"),
+        _phase("Dynamic phase", result.dynamic_phase, errors.dynamic_phase, ""),
+        _phase("Geometric phase", result.geometric_phase, errors.geometric_phase, f"solid angle {area:.9f} sr"),
+        _rotation("Tilt", result.tilt, errors.tilt),
+        _phase("Momentum gap", result.momentum_gap, errors.momentum_gap, "between its directions at start and end"),
+    ]
+
+
+def joint_rows(body: Body, path: ShapePath) -> list[tuple[str, ...]]:
+    """Of each joint: name, range, limits and largest rate."""
+    found = path_summary(body, path)
+    rows = []
+    columns = zip(
+        body.joint_names, body.joint_units, found.lowest, found.highest, body.joint_limits, found.fastest, strict=True
+    )
+    for name, unit, low, high, (least, most), rate in columns:
+        limits = f"{_amount(least, unit)} … {_amount(most, unit)}"
+        rows.append((name, _amount(low, unit), _amount(high, unit), limits, f"{_amount(rate, unit)}/s"))
+    return rows
+
+
+def part_rows(body: Body) -> list[tuple[str, ...]]:
+    """Of each rigid part with mass: its first link, mass, centre of mass and principal moments."""
+    return [
+        (
+            part.links[0] if len(part.links) == 1 else f"{part.links[0]} +{len(part.links) - 1}",
+            f"{part.mass:.6g}",
+            " ".join(f"{value:.4f}" for value in part.centre_of_mass + 0.0),
+            " ".join(f"{value:.4g}" for value in part.principal_moments),
+        )
+        for part in body_summary(body).parts
+        if part.mass > 0.0
+    ]
+
+
+def input_rows(motion: Motion, gauge: str, body: Body | None) -> list[Row]:
+    """How good the numbers are, what they were computed from, and how."""
+    quaternion = ", ".join(f"{x:.9f}" for x in motion.quat_xyzw(motion.duration) + 0.0)
+    rows = [
+        ("Final attitude", "", f"quaternion x y z w ({quaternion})"),
+        ("Error estimate", f"{float(motion.error_estimate):.2e} rad", f"tolerance {motion.tolerance:g} rad"),
+        ("Evaluations", str(motion.evaluations), f"of the body, method {motion.method}"),
+        ("Gauge", "", gauge),
+        ("Deformation", "", motion.deformation.label),
+    ]
+    if body is not None and body.file is not None:
+        rows.append(("File, body", "", body.file.name))
+    rows += [(f"SHA-256, {name}", "", digest) for name, digest in motion.deformation.inputs.items()]
+    return [*rows, *_origin_rows(motion.deformation.made_from)]
+
+
+def _origin_rows(made_from: Mapping[str, Any]) -> list[Row]:
+    """The joints, the recording and what was done to it, and when, how and by what all was computed."""
+    found = provenance()
+    rows = [("Joints", "", ", ".join(made_from.get("joints", ())))] if made_from.get("joints") else []
+    for name, value in made_from.get("recording", {}).items():
+        if value not in (None, {}, []):
+            rows.append((f"Recording, {name.replace('_', ' ')}", "", _plain_text(value)))
+    versions = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
+    rows += [("Command line", "", found["command"])] if found["command"] else []
+    return [*rows, ("Computed by", "", versions), ("Date", "", found["date"])]
+
+
+def _plain_text(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name}: {_plain_text(entry)}" for name, entry in value.items())
+    if isinstance(value, list | tuple):
+        return " ".join(_plain_text(entry) for entry in value)
+    return f"{value:.9g}" if isinstance(value, float) else str(value)
+
+
+def _turn(rotation: Array) -> str:
+    """For a sentence: angle and axis."""
+    vector = so3.log(rotation)
+    angle = float(np.linalg.norm(vector))
+    if np.degrees(angle) < 0.005:
+        return "nothing (below 0.01°)"
+    return f"{np.degrees(angle):.2f}° about ({', '.join(f'{x:.2f}' for x in np.round(vector / angle, 2) + 0.0)})"
+
+
+def _rotation(name: str, rotation: Array, error: Array) -> Row:
+    vector = so3.log(rotation)
+    angle = float(np.linalg.norm(vector))
+    axis = ""
+    if angle >= _NO_TURN:
+        axis = "about (" + ", ".join(f"{x:.6f}" for x in np.round(vector / angle, 6) + 0.0) + ")"
+    return name, f"{np.degrees(angle):.6f}°", f"{angle:.9f} ± {float(error):.1e} rad {axis}".strip()
+
+
+def _phase(name: str, phase: Array, error: Array, remark: str) -> Row:
+    radians = f"{float(phase):.9f} ± {float(error):.1e} rad"
+    return name, f"{float(np.degrees(phase)):.6f}°", f"{radians}; {remark}" if remark else radians
+
+
+def _amount(value: float, unit: str) -> str:
+    if abs(value) > _NO_LIMIT:
+        return "none"
+    return f"{np.degrees(value) + 0.0:.1f}°" if unit == "rad" else f"{value + 0.0:.4g} m"

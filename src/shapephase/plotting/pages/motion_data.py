@@ -1,0 +1,132 @@
+"""A moving scene as the data of a page: poses frame by frame, shapes, meshes, and the joints to move by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...body.appearance import Visual
+from ...body.body import Body
+from .._moving_scene import MovingNode, MovingScene
+
+# Where a slider ends for a joint without a limit [rad or m], and from where on a limit is none.
+_SLIDER_END = math.pi
+_NO_LIMIT = 100.0
+# Cells of the floor along the largest extent of a motion.
+_CELLS = 8
+
+
+def motion_data(scene: MovingScene, *, speed: float, ghost: bool, up: Array) -> dict[str, Any]:
+    """What the page needs to show a scene, with the numbers that move as 32-bit floats."""
+    meshes: dict[int, int] = {}
+    stored: list[dict[str, Any]] = []
+    data: dict[str, Any] = {
+        "duration": float(scene.times[-1]),
+        "frames": len(scene.times),
+        "speed": speed,
+        "turns": _single(so3.quat_from_matrix(scene.base[:, :3, :3])),
+        "places": _single(scene.base[:, :3, 3]),
+        "centre": _single(scene.centre),
+        "momentum": scene.momentum.tolist(),
+        "trail": None if scene.trail is None else _single(scene.trail),
+        "reach": scene.reach,
+        "extent": _single(scene.extent),
+        "up": up.tolist(),
+        "ghost": ghost,
+        "floor": _single(_floor(scene, up)) if scene.falls else None,
+        "meshes": stored,
+        "chain": None,
+        "joints": [],
+    }
+    if scene.body is not None and scene.shapes is not None:
+        data |= body_data(scene.body) | {"shapes": _single(scene.shapes)}
+        data["nodes"] = frame_nodes(scene.body, {node.name: node.shapes for node in scene.nodes}, meshes, stored)
+    else:
+        data["nodes"] = [_moving_node(node, meshes, stored) for node in scene.nodes]
+    return data
+
+
+def body_data(body: Body) -> dict[str, Any]:
+    """The joints of a body: how they move its parts, and their limits for sliders."""
+    chain = body.chain
+    names = ("turns", "places", "axes", "slides", "masses", "centres", "matrix", "offset")
+    open_ended = np.abs(body.joint_limits) > _NO_LIMIT
+    limits = np.where(open_ended, np.array([-_SLIDER_END, _SLIDER_END]), body.joint_limits)
+    return {
+        "chain": {
+            "parents": list(chain.parents),
+            **{name: np.asarray(getattr(chain, name), dtype=float) for name in names},
+        },
+        "joints": [
+            {"name": name, "unit": unit, "lower": float(lower), "upper": float(upper)}
+            for name, unit, (lower, upper) in zip(body.joint_names, body.joint_units, limits, strict=True)
+        ],
+    }
+
+
+def frame_nodes(
+    body: Body, shapes: Mapping[str, Sequence[Visual]], meshes: dict[int, int], stored: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """What is drawn of a body, by link, each with the frame of the body's chain that moves it.
+
+    Meshes are added to those that are stored, `meshes` knows the place of each by its vertices.
+    """
+    found = []
+    for link, own in shapes.items():
+        frame, pose = body.chain.link_frames[link]
+        drawn = [_shape(shape, pose @ shape.pose, meshes, stored) for shape in own]
+        found.append({"name": link, "frame": frame, "shapes": drawn})
+    return found
+
+
+def _moving_node(node: MovingNode, meshes: dict[int, int], stored: list[dict[str, Any]]) -> dict[str, Any]:
+    return {
+        "name": node.name,
+        "turns": _single(so3.quat_from_matrix(node.poses[:, :3, :3])),
+        "places": _single(node.poses[:, :3, 3]),
+        "scales": None if node.scales is None else _single(node.scales),
+        "shapes": [_shape(shape, shape.pose, meshes, stored) for shape in node.shapes],
+    }
+
+
+def _shape(shape: Visual, pose: Array, meshes: dict[int, int], stored: list[dict[str, Any]]) -> dict[str, Any]:
+    described = {
+        "kind": shape.kind,
+        "dimensions": list(shape.dimensions),
+        "colour": list(shape.colour),
+        # In columns, as WebGL takes it.
+        "pose": pose.T.ravel().tolist(),
+    }
+    if shape.kind == "mesh":
+        if id(shape.vertices) not in meshes:
+            meshes[id(shape.vertices)] = len(stored)
+            stored.append({"vertices": _single(shape.vertices), "faces": shape.faces.astype(np.uint32)})
+        described["mesh"] = meshes[id(shape.vertices)]
+    return described
+
+
+def _floor(scene: MovingScene, up: Array) -> Array:
+    """Lines of a grid below the lowest point of the motion, across `up`: (N, 3)."""
+    low, high = scene.bounds
+    middle, reach = 0.5 * (low + high), float(np.max(high - low))
+    across = np.eye(3)[int(np.argmin(np.abs(up)))]
+    side = so3.normalised(across - (across @ up) * up)
+    other = np.cross(up, side)
+    height = float(np.min(scene.corners @ up)) - 0.02 * reach
+    foot = middle + (height - middle @ up) * up
+    ticks = np.linspace(-reach, reach, 2 * _CELLS + 1)
+    ends = np.array([-reach, reach])
+    lines = [
+        (foot + ticks[:, None, None] * along + ends[None, :, None] * across)
+        for along, across in ((side, other), (other, side))
+    ]
+    return np.concatenate(lines).reshape(-1, 3)
+
+
+def _single(values: Array) -> np.ndarray:
+    return np.asarray(values, dtype=np.float32)

@@ -1,0 +1,34 @@
+// Where the parts of a body are in its shapes: `chain` is what Python knows as JointChain.
+"use strict";
+
+// Coordinates of all joints, those that follow others included.
+function jointCoordinates(chain, shape) {
+  const width = shape.length;
+  return Array.from(chain.offset, (offset, k) => {
+    let sum = offset;
+    for (let n = 0; n < width; n++) sum += chain.matrix[k * width + n] * shape[n];
+    return sum;
+  });
+}
+
+// Of the base and of what each joint moves, in base axes.
+function framePoses(chain, shape) {
+  const poses = [IDENTITY];
+  jointCoordinates(chain, shape).forEach((q, k) => {
+    const slide = times(row(chain.slides, k, 3), q);
+    const rest = poseOfRows(row(chain.turns, k, 9), row(chain.places, k, 3));
+    const motion = poseOfTurn(row(chain.axes, k, 3), q, slide);
+    poses.push(product(poses[chain.parents[k]], product(rest, motion)));
+  });
+  return poses;
+}
+
+// In base axes.
+function centreOfMass(chain, poses) {
+  let sum = [0, 0, 0], mass = 0;
+  poses.forEach((pose, k) => {
+    sum = plus(sum, moved(pose, row(chain.centres, k, 3)), chain.masses[k]);
+    mass += chain.masses[k];
+  });
+  return times(sum, 1 / mass);
+}
