@@ -44,7 +44,7 @@ nitpicky = True
 _INSIDE = r"shapephase\.\w+\.(\w+\.)*"
 nitpick_ignore_regex = [
     # Other libraries' pages are not on this site, and a build without network cannot look them up.
-    ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray|viser)\..*"),
+    ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray)\..*"),
     ("py:.*", r"(pathlib|collections|typing|types|os)\..*"),
     ("py:.*", r"(Array|ArrayLike|Integers|Mask|Matrices|Spinor|Axes|TypeAliasForwardRef)"),
     # Names that stand for a union of types or a kind of function, which the docstring spells out.

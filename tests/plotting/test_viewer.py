@@ -589,4 +589,4 @@ def test_pages_are_made_in_two_threads_and_the_streams_of_the_process_stay_as_th
     assert not any(replaced)
     lines = capfd.readouterr().out.splitlines()
     assert lines == [f"{kind} {k}" for k in range(printed) for kind in ("line", "rich")]
-    assert all((tmp_path / f"page{k}_{n}.html").stat().st_size > 50_000 for k in range(2) for n in range(3))
+    assert all((tmp_path / f"page{k}_{n}.html").stat().st_size > 25_000 for k in range(2) for n in range(3))

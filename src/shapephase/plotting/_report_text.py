@@ -63,9 +63,11 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     )
     gap = float(result.momentum_gap)
     if gap > _GAP:
+        closing = f"{np.degrees(float(result.closing_phase)):.2f}°"
         words.append(
             f"There the momentum's direction ended {np.degrees(gap):.2f}° from where it began. The great circle back "
-            f"to the start closes its curve; beside the phase, the body is tilted by {_turn(result.tilt)}."
+            f"to the start closes its curve, and adds {closing} of the geometric phase; beside the phase, the body is "
+            f"tilted by {_turn(result.tilt)}."
         )
     return words
 
@@ -82,11 +84,16 @@ def split_rows(result: PhaseSplit) -> list[Row]:
         words = "none: there is no angular momentum, the body turns by its shape alone"
         return [*rows, ("Montgomery phase", "", words)]
     area = float(result.solid_angle)
+    closing = []
+    if float(result.momentum_gap) > _GAP:
+        remark = "of the geometric phase, by the great circle that closes the momentum's curve"
+        closing.append(_phase("Closing arc", result.closing_phase, errors.closing_phase, remark))
     return [
         *rows,
         _phase("Montgomery phase", result.montgomery_phase, errors.montgomery_phase, f"{result.gauge} gauge"),
         _phase("Dynamic phase", result.dynamic_phase, errors.dynamic_phase, ""),
         _phase("Geometric phase", result.geometric_phase, errors.geometric_phase, f"solid angle {area:.9f} sr"),
+        *closing,
         _rotation("Tilt", result.tilt, errors.tilt),
         _phase("Momentum gap", result.momentum_gap, errors.momentum_gap, "between its directions at start and end"),
     ]
