@@ -127,7 +127,7 @@ def _word(chance: Random) -> str:
 def command(chance: Random, only: str | None = None) -> Trial:
     """A command line and the files that it names."""
     names = tuple(_COMMANDS) if only is None else (only,)
-    weights = {"check": 8, "split": 6, "plan": 3, "conjugate": 3, "plot": 2, "orbits": 2}
+    weights = {"check": 12, "split": 6, "conjugate": 4}
     name = chance.choice([name for name in names for _ in range(weights.get(name, 1))])
     files: dict[str, bytes] = {}
     body = odd_one(
