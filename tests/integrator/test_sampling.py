@@ -259,7 +259,7 @@ def burst(centre: float, width: float, size: float, background: float, kind: str
     ("kind", "size", "background", "tolerance"),
     full_but(
         product(["gaussian", "bounded"], [1.0, 0.1], [0.01, 0.5, 2.0], [1e-4, 1e-6, 1e-9]),
-        *[("gaussian", 1.0, 0.01, 1e-4), ("gaussian", 0.1, 2.0, 1e-6), ("gaussian", 1.0, 0.5, 1e-9)],
+        *[("gaussian", 1.0, 0.01, 1e-4), ("gaussian", 0.1, 0.5, 1e-6), ("gaussian", 1.0, 2.0, 1e-9)],
         *[("bounded", 0.1, 0.01, 1e-9), ("bounded", 1.0, 2.0, 1e-4), ("bounded", 0.1, 0.5, 1e-6)],
     ),
 )
