@@ -86,6 +86,31 @@ def test_the_noise_is_what_the_fit_leaves():
     assert 0.0 < bars.montgomery_phase < 0.2
 
 
+def test_axes_of_the_base_that_nobody_knows_are_found():
+    """Any that are fixed to it; each component of their turn, and of the momentum, within four bars."""
+    motion, times = flight(np.array([4.0, 60.0, 6.0])), _TIMES[::3]
+    for seed, axes in enumerate([np.eye(3)[:, [2, 0, 1]] @ so3.exp(np.array([0.2, 0.1, -0.1]))]):
+        errors = so3.exp(_NOISE * np.random.default_rng(seed).normal(size=(len(times), 3)))
+        recorded = motion.attitude(times) @ errors @ axes.T
+        found = sp.momentum_from_recording(somersault(), times, recorded, tolerance=1e-6, find_axes=True)
+        turn = so3.log(axes.T @ found.base_axes)
+        assert np.all(np.abs(turn) < 4.0 * np.sqrt(np.diag(found.axes_covariance)))
+        off = found.momentum - motion.momentum
+        assert np.all(np.abs(off) < 4.0 * np.sqrt(np.diag(found.momentum_covariance)))
+        known = sp.momentum_from_recording(somersault(), times, recorded @ axes, tolerance=1e-6)
+        assert np.trace(known.momentum_covariance) < np.trace(found.momentum_covariance)
+        np.testing.assert_array_equal(known.base_axes, np.eye(3))
+
+
+def test_a_flight_that_does_not_tell_the_axes_says_so():
+    """A body that turns steadily about one axis: the axes may be turned about it, whatever the recording."""
+    rigid = sp.articulated(sp.load_body("diver"), sp.ShapePath.waypoints([0.0, 0.5], [[3.0, -3.0]] * 2))
+    motion, times = sp.reconstruct(rigid, [0.0, 0.0, 4.0], tolerance=1e-6), np.linspace(0.0, 0.5, 8)
+    errors = so3.exp(_NOISE * np.random.default_rng(0).normal(size=(len(times), 3)))
+    with pytest.raises(AccuracyNotReached, match="give them: base_axes"):
+        sp.momentum_from_recording(rigid, times, motion.attitude(times) @ errors, tolerance=1e-6, find_axes=True)
+
+
 def test_what_is_no_flight_is_refused():
     rng = np.random.default_rng(1)
     wild = so3.exp(rng.normal(size=(len(_TIMES), 3)))

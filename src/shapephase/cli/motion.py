@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import so3
 from ..arguments import tolerance_argument
@@ -20,10 +20,14 @@ from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.fast.switch import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
+from ..shape_space.files._base_columns import ESTIMATE
 from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
-from .options import AS_RECORDED, FlightOptions, RecordingOptions
+from .options import AS_RECORDED, AT_REST, FlightOptions, RecordingOptions
+
+if TYPE_CHECKING:
+    from ..error_bars.recorded_momentum import RecordedMomentum
 
 _STANDARD_INPUT = "-"
 """Instead of the name of a file."""
@@ -38,12 +42,19 @@ _LONGEST_SHOWN = 80
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """A reconstructed motion and what it is made of; `recorded` is None where the joints are not from a file."""
+    """A reconstructed motion and what it is made of.
+
+    Attributes
+    ----------
+    recorded : None where the joints are not from a file
+    fitted : its momentum, where it was fitted to the recorded base
+    """
 
     motion: Motion
     body: Body
     path: ShapePath
     recorded: RecordedMotion | None
+    fitted: RecordedMomentum | None = None
 
 
 def flight(
@@ -69,10 +80,27 @@ def flight(
     for link in (gauge_link(gauge), trail):
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
+    if recording.flight and options != AT_REST:
+        raise ShapeError("--momentum and --attitude are fitted to the recorded base with --flight; leave them out")
+    if recording.base_axes == ESTIMATE and not recording.flight:
+        raise ShapeError(f"--base-axes {ESTIMATE}: the axes are found by the fit to a flight; give --flight, too")
     path, recorded = joint_motion(motion, loaded, recording)
     expect_work(samples=_SAMPLES_A_BREAK * len(path.breaks))
-    moved = reconstruct(articulated(loaded, path), momentum, start, tolerance=goal, progress=progress)
-    return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
+    deformation = articulated(loaded, path)
+    if recorded is None or recorded.flight is None:
+        moved = reconstruct(deformation, momentum, start, tolerance=goal, progress=progress)
+        return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
+    from ..error_bars.recorded_momentum import momentum_from_recording
+
+    assert recorded.base_attitude is not None
+    fitted = momentum_from_recording(
+        deformation,
+        recorded.times,
+        recorded.base_attitude,
+        tolerance=goal,
+        find_axes=recording.base_axes == ESTIMATE,
+    )
+    return Flight(motion=fitted.motion, body=loaded, path=path, recorded=recorded, fitted=fitted)
 
 
 def joint_motion(
@@ -89,7 +117,11 @@ def joint_motion(
         raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
-    said = vars(recording) | {"names": _names(recording.names), "rest": _rest(recording.rest)}
+    said = vars(recording) | {
+        "names": _names(recording.names),
+        "rest": _rest(recording.rest),
+        "flight": _flight(recording.flight),
+    }
     recorded = read_recorded_motion(motion, body, **said)
     return recorded.path, recorded
 
@@ -104,6 +136,17 @@ def _names(words: tuple[str, ...]) -> dict[str, str | None]:
             raise ShapeError(f"--names: column {doubled[0]!r:.60} stands twice")
         found |= pairs
     return found
+
+
+def _flight(words: tuple[str, ...]) -> str | tuple[float, float] | None:
+    """What `--flight` says: a word or two times. Raises ShapeError."""
+    if len(words) < 2:
+        return words[0] if words else None
+    try:
+        first, last = map(float, words)
+    except ValueError:
+        raise ShapeError(f"--flight: auto, all or two times are needed, got {' '.join(words)!r:.60}") from None
+    return first, last
 
 
 def _rest(words: tuple[str, ...]) -> dict[str, str]:

@@ -223,6 +223,31 @@ class RecordingOptions:
             "example `--close-by geodesic`."
         ),
     ] = None
+    base_order: Annotated[
+        str | None,
+        _motion_option(
+            "The axes of the base's recorded angles in the order in which they turn, without unit; without it zxy for "
+            "OpenSim's tilt, list and rotation, zyx for roll, pitch and yaw. For example `--base-order yxz`."
+        ),
+    ] = None
+    base_axes: Annotated[
+        str | None,
+        _motion_option(
+            "Where the x, y and z axis of the body's base point to in the axes whose attitude was recorded, without "
+            "unit, or estimate, with --flight; without it x,-z,y for OpenSim's pelvis, else x,y,z. For example "
+            "`--base-axes x,y,z`."
+        ),
+    ] = None
+    flight: Annotated[
+        tuple[str, ...],
+        _motion_option(
+            "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (where the "
+            "centre of mass falls freely), all, or its first and last time, in s or the unit of the file; for example "
+            "`--flight auto` or `--flight 12.5 13.9`.",
+            negative_iterable="",
+            consume_multiple=True,
+        ),
+    ] = ()
 
 
 @Parameter(name="*")

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import so3
+from ..arrays import Array
 from ..body.body import Body
 from ..shape_space.files.closing import Closing
 from ..shape_space.files.read import RecordedMotion
 from ..shape_space.files.smoothing import Smoothing
 
+if TYPE_CHECKING:
+    from ..error_bars.recorded_momentum import RecordedMomentum
+
 _MOST_NAMES = 8
 """Names that one line lists."""
+_MOST_PARTS = 10
+"""Stretches of a flight of which the table has a column."""
+_BAR_DIGITS = 2
+"""Digits of a bar that are shown."""
 
 
 def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
@@ -23,6 +33,7 @@ def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
     lines = [
         *_unit_lines(record),
         *_column_lines(body, record),
+        *_base_lines(record),
         *_change_lines(record, recorded),
     ]
     return ["", *lines] if lines else []
@@ -37,6 +48,61 @@ def recording_data(recorded: RecordedMotion | None) -> dict[str, Any]:
         change = recorded.closing.holonomy_change.tolist()
         record["closing"] = record["closing"] | {"holonomy_change_rotation_vector_rad": change}
     return {"recording": record}
+
+
+def fit_lines(fitted: RecordedMomentum) -> list[str]:
+    """A momentum that was fitted to a recorded base, and how the two then differ in time, for people."""
+    bars = np.sqrt(np.diag(fitted.momentum_covariance))
+    digits = max(_BAR_DIGITS - 1 - math.floor(math.log10(float(bars.min()))), 0) if bars.all() else _BAR_DIGITS
+    momentum = ", ".join(f"{v:.{digits}f} ± {bar:.{digits}f}" for v, bar in zip(fitted.momentum, bars, strict=True))
+    angles, noise = np.degrees(fitted.angles), np.degrees(fitted.noise)
+    worst = int(np.argmax(angles))
+    lines = [
+        "",
+        f"{'momentum, fitted':24}{momentum}   kg m^2/s",
+        f"{'to the recorded base':24}{len(angles)} attitudes with {noise:.3g} deg of noise about each axis",
+    ]
+    if fitted.axes_covariance.any():
+        turned = " ".join(f"{v + 0.0:.4f}" for v in so3.quat_from_matrix(fitted.base_axes))
+        off = np.degrees(np.sqrt(np.trace(fitted.axes_covariance)))
+        lines.append(
+            f"{'its axes, fitted':24}quaternion {turned} (xyzw) from the axes of the body's base, ± {off:.2g} deg"
+        )
+    lines.append(
+        f"{'base as recorded':24}{_rms(angles):.3g} deg rms from this one, {angles[worst]:.3g} deg at most, at "
+        f"{fitted.times[worst]:.6g} s"
+    )
+    parts = np.array_split(np.arange(len(angles)), min(_MOST_PARTS, len(angles)))
+    times = "".join(f"{fitted.times[part].mean():8.3g}" for part in parts)
+    return [
+        *lines,
+        f"{'  time [s]':24}{times}",
+        f"{'  off, rms [deg]':24}{''.join(f'{_rms(angles[part]):8.3g}' for part in parts)}",
+    ]
+
+
+def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
+    """The same for programs, under `momentum_fit`."""
+    worst = int(np.argmax(fitted.angles))
+    found = {
+        "momentum_covariance": fitted.momentum_covariance.tolist(),
+        "initial_attitude_quat_xyzw": so3.quat_from_matrix(fitted.initial_attitude).tolist(),
+        "covariance_of_attitude_and_momentum": fitted.covariance.tolist(),
+        "noise_rad": fitted.noise,
+        "base_axes": fitted.base_axes.tolist(),
+        "base_axes_covariance_rad2": fitted.axes_covariance.tolist(),
+        "times_s": fitted.times.tolist(),
+        "recorded_base_difference_rotation_vector_rad": fitted.residuals.tolist(),
+    }
+    return {
+        "momentum_fit": found,
+        "recorded_base_difference_rad": float(fitted.angles[worst]),
+        "recorded_base_difference_time_s": float(fitted.times[worst]),
+    }
+
+
+def _rms(angles: Array) -> float:
+    return float(np.sqrt(np.mean(angles**2)))
 
 
 def _unit_lines(record: Any) -> list[str]:
@@ -62,6 +128,29 @@ def _column_lines(body: Body, record: Any) -> list[str]:
         lines.append(f"{'left out':24}{column}: {why}")
     if len(record["left_out"]) > _MOST_NAMES:
         lines.append(f"{'left out':24}and {len(record['left_out']) - _MOST_NAMES} more columns")
+    return lines
+
+
+def _base_lines(record: Any) -> list[str]:
+    """What the motion of the base was read from, where its columns leave a choice, and the flight that was kept."""
+    lines = []
+    base = record["base"] or {}
+    if "order" in base:
+        said = "as told" if base["order_said"] else "the usual order, --base-order says another"
+        lines.append(
+            f"{'base':24}{', '.join(base['attitude'])}, turning in the order {' '.join(base['order'])}; {said}"
+        )
+    if "axes" in base and (base["axes_said"] or base["axes"] != "x y z"):
+        said = "as told" if base["axes_said"] else "the usual ones of a pelvis, --base-axes says others"
+        lines.append(f"{'axes of the base':24}{base['axes']} of the recorded ones; {said}")
+    flight = record["flight"]
+    if flight is not None:
+        found = ""
+        if "up" in flight:
+            off = 1e3 * flight["off_parabola_rms_m"]
+            found = f", found by the centre of mass: it falls to {off:.2g} mm as gravity says, {flight['up']} is up"
+        ends = f"{flight['first_time']:.9g} to {flight['last_time']:.9g} {record['time_unit']}"
+        lines.append(f"{'flight':24}{record['samples']} of {record['samples_in_file']} samples, {ends}{found}")
     return lines
 
 

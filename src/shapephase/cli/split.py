@@ -60,7 +60,7 @@ def split_command(
     from ..phases.split_text import split_lines
     from . import motion as motions
     from .error_bar_text import error_bar_data, error_bar_lines, error_bars
-    from .recording_text import recording_data, recording_lines
+    from .recording_text import fit_data, fit_lines, recording_data, recording_lines
     from .text import recorded_base_text, split_data, split_heading
 
     aside = check_writable(out, "--out", ".npz")
@@ -98,7 +98,10 @@ def split_command(
                 begin=work.begin,
             )
             say_written(html)
-    lines, data = recorded_base_text(flown.motion, flown.recorded)
+    if flown.fitted is None:
+        lines, data = recorded_base_text(flown.motion, flown.recorded)
+    else:
+        lines, data = fit_lines(flown.fitted), fit_data(flown.fitted)
     text = [
         *split_lines(result, split_heading(flown.body, motion, flown.motion)),
         *error_bar_lines(result, bars),

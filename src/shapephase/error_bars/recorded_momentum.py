@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import permutations, product
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +27,12 @@ _NO_STEP = 1e-11
 # A step is halved so many times, at most, to come nearer to the recording.
 _MOST_HALVINGS = 12
 _UNKNOWNS = 6
+# [rad] Ways on that differ by less are one; and how many are tried.
+_SAME_AXES = 0.2
+_MOST_LIKELY = 4
+_ROUGH_ROUNDS = 15
+# [rad] Axes that are known no better are not found.
+_VAGUE_AXES = 0.3
 # Attitudes that are fitted first, or up to twice as many.
 _FIRST_TIMES = 6
 # [rad] A recording that stays so far from every motion of the body is none of its flights.
@@ -44,6 +53,9 @@ class RecordedMomentum:
     noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
     residuals : (N, 3) from reconstructed to recorded attitudes, rotation vectors in base axes [rad]
     motion : the one that was fitted
+    times : (N,) of the recorded attitudes [s]
+    base_axes : (3, 3) base axes to those whose attitude was recorded; the identity where these were the base's
+    axes_covariance : (3, 3) of their turn, base axes [rad^2]; zero where they were given
 
     Examples
     --------
@@ -62,8 +74,16 @@ class RecordedMomentum:
     noise: float
     residuals: Array
     motion: Motion
+    times: Array
+    base_axes: Array
+    axes_covariance: Array
 
     __post_init__ = lock_arrays
+
+    @property
+    def angles(self) -> Array:
+        """How far the reconstructed attitude is from the recorded one at each time: (N,) [rad]."""
+        return np.linalg.norm(self.residuals, axis=1)
 
 
 def momentum_from_recording(
@@ -73,6 +93,7 @@ def momentum_from_recording(
     *,
     noise: float | None = None,
     tolerance: float = 1e-8,
+    find_axes: bool = False,
 ) -> RecordedMomentum:
     """Fit the angular momentum of a flight to recorded attitudes of the base, by reconstructing the whole of it.
 
@@ -86,6 +107,8 @@ def momentum_from_recording(
     attitudes : (N, 3, 3), base axes to the recorder's; nearer to each other than half a turn
     noise : standard deviation of each component of a recorded attitude [rad]; None: what the fit leaves
     tolerance : of the reconstruction [rad]
+    find_axes : whether the attitudes are those of axes that are fixed to the base in an unknown way, which is fitted
+        too: from the way on with which the momentum, roughly, stays most constant
 
     Raises
     ------
@@ -94,7 +117,8 @@ def momentum_from_recording(
     TrajectoryError
         If there are fewer than three times, or they do not ascend.
     AccuracyNotReached
-        If the fit does not settle: the recording is no free flight of this body, or too coarse.
+        If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
+        the axes.
 
     Notes
     -----
@@ -117,45 +141,113 @@ def momentum_from_recording(
         raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
     if noise is not None and not noise > 0.0:
         raise ShapeError(f"noise: a positive standard deviation is needed, got {noise}")
-    motion, residuals, slopes = _fitted(deformation, at, recorded, tolerance)
+    if find_axes:
+        fit = _with_axes(deformation, at, recorded, tolerance)
+    else:
+        fit = _fitted(deformation, at, recorded, tolerance, np.eye(3))
+    residuals, slopes, motion = fit.residuals, fit.slopes, fit.motion
     if _spread(residuals) > _NO_FLIGHT:
-        raise AccuracyNotReached(f"{_apart(residuals)}: is it a free flight of this body?")
-    free = residuals.size - _UNKNOWNS
+        raise AccuracyNotReached(
+            f"{_apart(residuals)}: is it a free flight of this body, and are the recorded axes those of its base?"
+        )
     if noise is None:
-        noise = float(np.sqrt((residuals**2).sum() / free))
+        noise = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
     covariance = np.asarray(noise**2 * np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
+    of_axes = covariance[_UNKNOWNS:, _UNKNOWNS:] if find_axes else np.zeros((3, 3))
     return RecordedMomentum(
         momentum=motion.momentum,
         initial_attitude=motion.initial_attitude,
-        momentum_covariance=covariance[3:, 3:],
+        momentum_covariance=covariance[3:_UNKNOWNS, 3:_UNKNOWNS],
         attitude_covariance=covariance[:3, :3],
-        covariance=covariance,
+        covariance=covariance[:_UNKNOWNS, :_UNKNOWNS],
         noise=noise,
         residuals=residuals,
         motion=motion,
+        times=at,
+        base_axes=fit.axes,
+        axes_covariance=of_axes,
     )
 
 
-def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> tuple[Motion, Array, Array]:
-    """The nearest motion, its residuals and slopes: to the first few attitudes, then to ever more of them.
+class _Fitted(NamedTuple):
+    """The nearest motion and axes, (3, 3) base axes to those recorded; what is left, (N, 3), its slopes, (3 N, m)."""
+
+    motion: Motion
+    axes: Array
+    residuals: Array
+    slopes: Array
+
+
+def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float, axes: Array) -> _Fitted:
+    """To the first few attitudes, then to ever more of them.
 
     So that a momentum that is a little off never loses count of the turns.
     """
-    fit = _Fit(deformation, times, recorded, tolerance)
+    fit = _Least(deformation, times, recorded, tolerance)
     half = len(times) // 2
     if half < _FIRST_TIMES:
-        return fit.settled(fit.first_motion())
-    nearby, _, _ = _fitted(deformation, times[:half], recorded[:half], tolerance)
-    return fit.settled(nearby)
+        return fit.settled(fit.first_motion(axes), axes)
+    return fit.settled(_fitted(deformation, times[:half], recorded[:half], tolerance, axes).motion, axes)
+
+
+def _momenta(deformation: Deformation, times: Array, recorded: Array) -> tuple[Array, Array]:
+    """What the turns between neighbouring attitudes say, each at the middle of its time: (N - 1, 3), their times."""
+    middle = 0.5 * (times[1:] + times[:-1])
+    turns = so3.log(so3.transpose(recorded[:-1]) @ recorded[1:])
+    rates = turns / np.diff(times)[:, None]
+    inertia, internal = deformation.description.sample(middle)
+    seen = recorded[:-1] @ so3.exp(0.5 * turns)
+    return so3.apply(seen, so3.apply(inertia, rates) + internal), middle
+
+
+def _with_axes(deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> _Fitted:
+    """The nearest of all, from each of the likely axes; of a body that is nearly symmetric several are."""
+    fits, vague = [], False
+    free = _Least(deformation, times, recorded, tolerance, find_axes=True)
+    for axes in _likely_axes(deformation, times, recorded):
+        # From unlikely axes a fit may wander about.
+        with suppress(AccuracyNotReached):
+            near = _fitted(deformation, times, recorded, tolerance, axes)
+            if free.leaves_axes_open(near):
+                vague = True
+                continue
+            fits.append(free.settled(near.motion, near.axes))
+    if vague and not fits:
+        raise AccuracyNotReached("the flight does not tell the axes of the base; give them: base_axes (--base-axes)")
+    if not fits:
+        raise AccuracyNotReached("with no axes of the base the recording comes near to a free flight of this body")
+    return min(fits, key=lambda fit: _spread(fit.residuals))
+
+
+def _likely_axes(deformation: Deformation, times: Array, recorded: Array) -> list[Array]:
+    """The axes with which the momentum stays most constant, best first: near the 24 ways along the base's axes."""
+    from scipy.optimize import least_squares
+
+    def wander(turn: Array, about: Array) -> Array:
+        momenta, _ = _momenta(deformation, times, recorded @ about @ so3.exp(turn))
+        return ((momenta - momenta.mean(axis=0)) / np.sqrt((momenta**2).sum(axis=1).mean())).ravel()
+
+    found: list[tuple[float, Array]] = []
+    for order in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            axes = np.eye(3)[:, order] * signs
+            if np.linalg.det(axes) > 0.0:
+                near = least_squares(wander, np.zeros(3), args=(axes,), max_nfev=_ROUGH_ROUNDS)
+                found.append((float(near.cost), axes @ so3.exp(near.x)))
+    kept: list[Array] = []
+    for _, axes in sorted(found, key=lambda one: one[0]):
+        if all(so3.angle(so3.transpose(axes) @ other) > _SAME_AXES for other in kept):
+            kept.append(axes)
+    return kept[:_MOST_LIKELY]
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least squares over momentum and start.
+class _Least:
+    """Least squares over momentum and start, and the axes where they are to be found.
 
     Attributes
     ----------
-    deformation, tolerance : as given
+    deformation, tolerance, find_axes : as given
     times, recorded : (N,), (N, 3, 3) what is fitted
     """
 
@@ -163,60 +255,67 @@ class _Fit:
     times: Array
     recorded: Array
     tolerance: float
+    find_axes: bool = False
 
-    def settled(self, motion: Motion) -> tuple[Motion, Array, Array]:
-        """The nearest motion, its residuals and slopes, by steps of Gauss and Newton, halved where they go too far."""
-        residuals = self._residuals(motion)
+    def settled(self, motion: Motion, axes: Array) -> _Fitted:
+        """By steps of Gauss and Newton from a motion and axes, halved where they go too far."""
+        residuals = self._residuals(motion, axes)
         for _ in range(_MOST_ROUNDS):
             slopes = self._slopes(motion)
             step = np.asarray(np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0], dtype=np.float64)
             if self._is_small(step, slopes, motion, residuals):
-                return motion, residuals, slopes
-            motion, residuals = self._nearer(motion, step, float((residuals**2).sum()))
+                return _Fitted(motion, axes, residuals, slopes)
+            motion, axes, residuals = self._nearer(motion, axes, step, float((residuals**2).sum()))
         raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {_apart(residuals)}")
 
-    def first_motion(self) -> Motion:
-        """By the mean of what the turns between neighbouring attitudes say, each at the middle of its time."""
-        middle = 0.5 * (self.times[1:] + self.times[:-1])
-        turns = so3.log(so3.transpose(self.recorded[:-1]) @ self.recorded[1:])
-        rates = turns / np.diff(self.times)[:, None]
-        inertia, internal = self.deformation.description.sample(middle)
-        seen = self.recorded[:-1] @ so3.exp(0.5 * turns)
-        momenta = so3.apply(seen, so3.apply(inertia, rates) + internal)
-        return self._reconstructed(momenta.mean(axis=0), self.recorded[0])
+    def leaves_axes_open(self, near: _Fitted) -> bool:
+        """Whether the recording allows other axes, too, by what a fit to given axes leaves."""
+        slopes = self._slopes(near.motion)
+        # A turn of the axes that start and momentum undo.
+        ours, others = slopes[:, _UNKNOWNS:], slopes[:, :_UNKNOWNS]
+        alone = ours - others @ np.linalg.lstsq(others, ours, rcond=None)[0]
+        weakest = float(np.linalg.svd(alone, compute_uv=False)[-1])
+        return _spread(near.residuals) > _VAGUE_AXES * weakest
+
+    def first_motion(self, axes: Array) -> Motion:
+        """By the mean of what neighbouring attitudes say."""
+        momenta, _ = _momenta(self.deformation, self.times, self.recorded @ axes)
+        return self._reconstructed(momenta.mean(axis=0), self.recorded[0] @ axes)
 
     def _slopes(self, motion: Motion) -> Array:
-        """The change of all attitudes by start and momentum, base axes: (3 N, 6)."""
+        """The change of all attitudes by start, momentum and, backwards, axes, base axes: (3 N, 6 or 9)."""
         found = responses(motion, self.times)
         found[:, :, :3] = found[:, :, :3] @ motion.initial_attitude
-        return (so3.transpose(motion.attitude(self.times)) @ found).reshape(-1, _UNKNOWNS)
+        slopes = (so3.transpose(motion.attitude(self.times)) @ found).reshape(-1, _UNKNOWNS)
+        return np.hstack([slopes, np.tile(-np.eye(3), (len(self.times), 1))]) if self.find_axes else slopes
 
-    def _nearer(self, motion: Motion, step: Array, before: float) -> tuple[Motion, Array]:
-        trial, residuals = motion, np.empty(0)
+    def _nearer(self, motion: Motion, axes: Array, step: Array, before: float) -> tuple[Motion, Array, Array]:
+        trial, turned, residuals = motion, axes, np.empty(0)
         for halving in range(_MOST_HALVINGS):
             change = step * 0.5**halving
             start = motion.initial_attitude @ so3.exp(change[:3])
-            trial = self._reconstructed(motion.momentum + change[3:], start)
-            residuals = self._residuals(trial)
+            trial = self._reconstructed(motion.momentum + change[3:_UNKNOWNS], start)
+            turned = axes @ so3.exp(change[_UNKNOWNS:]) if self.find_axes else axes
+            residuals = self._residuals(trial, turned)
             if (residuals**2).sum() <= before:
                 break
-        return trial, residuals
+        return trial, turned, residuals
 
     def _is_small(self, step: Array, slopes: Array, motion: Motion, residuals: Array) -> bool:
         """Whether a step is far below what the recording leaves open, or next to nothing."""
-        free = residuals.size - _UNKNOWNS
+        unknowns = slopes.shape[1]
         by_unit = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
-        noise = float(np.sqrt((residuals**2).sum() / free))
-        floor = np.full(_UNKNOWNS, _NO_STEP)
-        floor[3:] *= float(np.linalg.norm(motion.momentum))
+        noise = float(np.sqrt((residuals**2).sum() / (residuals.size - unknowns)))
+        floor = np.full(unknowns, _NO_STEP)
+        floor[3:_UNKNOWNS] *= float(np.linalg.norm(motion.momentum))
         # What the tolerance of the reconstruction moves the fit by counts for nothing either.
         return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self.tolerance) * by_unit + floor))
 
     def _reconstructed(self, momentum: Array, attitude: Array) -> Motion:
         return reconstruct(self.deformation, momentum, attitude, tolerance=self.tolerance)
 
-    def _residuals(self, motion: Motion) -> Array:
-        return so3.log(so3.transpose(motion.attitude(self.times)) @ self.recorded)
+    def _residuals(self, motion: Motion, axes: Array) -> Array:
+        return so3.log(so3.transpose(motion.attitude(self.times)) @ self.recorded @ axes)
 
 
 def _spread(residuals: Array) -> float:

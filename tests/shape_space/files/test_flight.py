@@ -73,7 +73,7 @@ def recorded(file, up: int):
     times = 12.0 + np.arange(250) / 100.0
     arms = np.column_stack([1.0 + 0.5 * np.sin(times), 2.0 - np.sin(2.0 * times)])
     upright = Rotation.from_rotvec([-0.5 * np.pi if up == 1 else 0.0, 0.0, 0.0])
-    turns = upright * Rotation.from_rotvec(np.outer(times - 12.0, [0.4, 3.0, 0.2]))
+    turns = upright * Rotation.from_rotvec(np.outer(times - 12.0, [0.4, 7.0, 0.2]))
     # The centre of mass of the three parts from the pelvis: theory.md A1, with the numbers of the file.
     mass, arm = 58.801, 3.106
     centre = mass * np.array([0.0, 0.0, 0.0941])
@@ -100,6 +100,7 @@ def test_a_file_keeps_its_flight_only(name: str, up: int, tmp_path):
     flight = motion.flight
     assert flight.by == "auto"
     assert flight.fall.up == "+" + "xyz"[up]
+    assert flight.fall.off == pytest.approx(0.001, rel=0.15)
     assert TAKE_OFF <= flight.first_time - 12.0 <= TAKE_OFF + 0.1
     assert LANDING - 0.1 <= flight.last_time - 12.0 <= LANDING
     assert motion.times[0] == 0.0
