@@ -135,9 +135,9 @@ def test_the_estimate_holds_or_a_refusal_says_why(load_urdf, name):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("tolerance", [1e-10, 1e-8, 1e-6])
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-7, 1e-6])
 @pytest.mark.parametrize("name", [name for name in CASES if name != "a slider kilometres out"])
-def test_it_holds_at_every_tolerance_with_and_without_momentum(load_urdf, name, tolerance):
+def test_it_holds_where_rounding_is_small_with_and_without_momentum(load_urdf, name, tolerance):
     text, slide = CASES[name]
     body = load_urdf(text)
     for turns in (0.0, 0.5, 1.5):
