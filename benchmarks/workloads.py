@@ -14,7 +14,7 @@ import numpy as np
 
 import shapephase as sp
 
-from .cases import Case, as_function, fourier, numbered_case
+from .cases import Case, as_function, fourier, numbered_case, spline
 
 ROBOTS = Path(__file__).parents[1] / "robots"
 TOLERANCE = 1e-9
@@ -37,6 +37,8 @@ def compiled() -> str:
 _case = cache(numbered_case)
 _CAT_LOOP = 2
 """Number of the case in which many momenta share one path."""
+_DERIVED = ("cat", "astronaut", "example:human")
+"""Bodies whose results' derivatives are timed."""
 _FAMILIES = (_CAT_LOOP, 8)
 """Numbers of the cases in which many bodies do: the cat and a human."""
 
@@ -108,6 +110,37 @@ def afterwards(turns: int, numbers: list[int]) -> dict[str, float]:
         "10,000 attitudes / reconstruct": float(np.median(attitudes / single)),
         "  at most [ms]": 1e3 * float(attitudes.max()),
     }
+
+
+def derivative_costs(turns: int) -> dict[str, float]:
+    """Exact derivatives of all results, as ratios to the reconstruction: by all samples of a second at 60 Hz, by all
+    inertial parameters, and by these, momentum and start together."""
+    found: dict[str, float] = {}
+    for name in _DERIVED:
+        body = sp.load_body(name)
+        size = float(np.trace(body.locked_inertia(np.zeros(body.n_shape)))) / 3.0
+        deformation = sp.articulated(body, spline(body, 3, 60))
+        taken = []
+        for _ in range(turns + 1):
+            began = time.process_time()
+            motion = sp.reconstruct(deformation, size * np.array([0.6, -1.0, 2.0]), tolerance=TOLERANCE)
+            done = time.process_time()
+            derivatives = sp.derivatives(motion)
+            assert derivatives.by_samples.holonomy.any()
+            by_samples = time.process_time()
+            assert derivatives.by_inertias.holonomy.any()
+            by_inertias = time.process_time()
+            assert derivatives.by_momentum.final_attitude.any()
+            assert derivatives.by_attitude.final_attitude.any()
+            single = done - began
+            whole = time.process_time() - done
+            taken.append(((by_samples - done) / single, (by_inertias - by_samples) / single, whole / single))
+        samples, inertias, whole = np.median(taken[1:], axis=0)
+        short = name.removeprefix("example:")
+        found[f"{short}: by samples / reconstruct"] = float(samples)
+        found[f"{short}: by inertias / reconstruct"] = float(inertias)
+        found[f"{short}: by everything / reconstruct"] = float(whole)
+    return found
 
 
 # ---- Many at once ---------------------------------------------------------------------------------------------------

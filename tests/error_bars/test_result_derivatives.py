@@ -16,7 +16,8 @@ from shapephase.shape_space.path_samples import path_samples
 
 # Of central differences with motions at 1e-12: their error is some 1e-12 over the step, and the step squared.
 _NEAR = 1e-6
-_MOMENTA = {"cat": 0.02, "astronaut": 5.0, "diver": 20.0}
+_MOMENTA = {"cat": 0.02, "astronaut": 5.0, "diver": 20.0, "example:human": 12.0}
+HUMAN = pytest.param("example:human", marks=pytest.mark.full)
 
 
 def path_of(name: str, kind: str, values: np.ndarray | None = None) -> sp.ShapePath:
@@ -78,7 +79,7 @@ def agree(found: np.ndarray, expected: np.ndarray) -> None:
     assert np.abs(found - expected).max() < _NEAR * np.linalg.norm(expected)
 
 
-@pytest.mark.parametrize("name", ["cat", "astronaut"])
+@pytest.mark.parametrize("name", ["cat", "astronaut", HUMAN])
 def test_by_momentum_and_start(name: str):
     found, momentum = sp.derivatives(motion_of(name)), momentum_of(name)
     for axis, unit in enumerate(np.eye(3)):
@@ -103,7 +104,14 @@ def test_the_end_answers_as_the_derivative_of_the_steps_says(name: str):
 
 
 @pytest.mark.parametrize(
-    ("name", "kind"), [("cat", "spline"), ("cat", "periodic"), ("diver", "waypoints"), ("astronaut", "spline")]
+    ("name", "kind"),
+    [
+        ("cat", "spline"),
+        ("cat", "periodic"),
+        ("diver", "waypoints"),
+        ("astronaut", "spline"),
+        pytest.param("example:human", "spline", marks=pytest.mark.full),
+    ],
 )
 def test_by_samples(name: str, kind: str):
     motion, samples = motion_of(name, kind), samples_of(name)
@@ -121,7 +129,7 @@ def test_by_samples(name: str, kind: str):
         agree(flat(found, sample * width + joint), difference(moved, 1e-4))
 
 
-@pytest.mark.parametrize("name", ["cat", "astronaut"])
+@pytest.mark.parametrize("name", ["cat", "astronaut", HUMAN])
 @pytest.mark.parametrize("part", [0, 3])
 def test_by_inertias(name: str, part: int):
     body = sp.load_body(name)

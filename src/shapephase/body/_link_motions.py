@@ -35,19 +35,21 @@ def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
     turns = np.empty((count, frames, 3, 3))
     places, speeds, spins = np.zeros((3, count, frames, 3))
     turns[:, 0] = np.eye(3)
+    # Of all joints at once, from the parent's axes to the child's.
+    turned = chain.turns @ so3.exp(all_coordinates[..., None] * chain.axes)
     for joint, parent in enumerate(chain.parents):
         before, spin = turns[:, parent] @ chain.turns[joint], spins[:, parent]
         coordinate, rate = all_coordinates[:, joint, None], all_rates[:, joint, None]
         slide = before @ chain.slides[joint]
         step = turns[:, parent] @ chain.places[joint] + slide * coordinate
-        turns[:, joint + 1] = before @ so3.exp(coordinate * chain.axes[joint])
+        turns[:, joint + 1] = turns[:, parent] @ turned[:, joint]
         spins[:, joint + 1] = spin + before @ chain.axes[joint] * rate
         # From origin to origin, so that nothing far away is taken off again.
         places[:, joint + 1] = places[:, parent] + step
-        speeds[:, joint + 1] = speeds[:, parent] + np.cross(spin, step) + slide * rate
+        speeds[:, joint + 1] = speeds[:, parent] + so3.cross(spin, step) + slide * rate
     levers = so3.apply(turns, chain.centres)
     share = chain.masses / chain.masses.sum()
-    places, speeds = places + levers, speeds + np.cross(spins, levers)
+    places, speeds = places + levers, speeds + so3.cross(spins, levers)
     return LinkMotions(
         turns=turns,
         places=places - (share @ places)[:, None],

@@ -73,6 +73,8 @@ class PathSamples:
 
     def by_knots(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
         """The same by the values at the knots: (k, knots n)."""
+        from scipy.sparse import coo_array
+
         curve = self.curve
         order, pieces, n_shape = curve.coefficients.shape
         piece = np.searchsorted(curve.knots[1:-1], times, side="right")
@@ -82,9 +84,11 @@ class PathSamples:
         slopes[:, 1:] = exponents[1:] * powers[:, :-1]
         count = by_shape.shape[1]
         by_coefficients = np.zeros((order, pieces, count * n_shape))
+        # Sums over the times in each piece, as products with a matrix of ones.
+        within = coo_array((np.ones(len(times)), (piece, np.arange(len(times)))), shape=(pieces, len(times))).tocsr()
+        of_shape, of_rate = by_shape.reshape(len(times), -1), by_rate.reshape(len(times), -1)
         for power in range(order):
-            part = powers[:, power, None, None] * by_shape + slopes[:, power, None, None] * by_rate
-            np.add.at(by_coefficients[power], piece, part.reshape(len(times), -1))
+            by_coefficients[power] = within @ (powers[:, power, None] * of_shape + slopes[:, power, None] * of_rate)
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
         found = rule(np.diff(curve.knots), by_coefficients, curve.through == "periodic")
         return np.moveaxis(found.reshape(-1, count, n_shape), 0, 1).reshape(count, -1)
@@ -151,18 +155,17 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
 
 def _slope_equations(h: Array, periodic: bool) -> tuple[Any, Any]:
     """The equations left @ slopes = right @ means of a C2 cubic spline, periodic or with ends that are no knots."""
-    from scipy.sparse import lil_array
+    from scipy.sparse import coo_array
 
     pieces = len(h)
     count = pieces if periodic else pieces + 1
-    left, right = lil_array((count, count)), lil_array((count, pieces))
-    for knot in range(0 if periodic else 1, pieces):
-        before, after = h[knot - 1], h[knot]
-        left[knot, knot] += 2.0 * (before + after)
-        left[knot, knot - 1] += after
-        left[knot, (knot + 1) % count] += before
-        right[knot, knot - 1] += 3.0 * after
-        right[knot, knot] += 3.0 * before
+    knots = np.arange(0 if periodic else 1, pieces)
+    before, after = h[knots - 1], h[knots]
+    rows, columns = np.tile(knots, 3), np.concatenate([knots, (knots - 1) % count, (knots + 1) % count])
+    entries = np.concatenate([2.0 * (before + after), after, before])
+    left = coo_array((entries, (rows, columns)), shape=(count, count)).tolil()
+    sides = (np.tile(knots, 2), np.concatenate([(knots - 1) % pieces, knots]))
+    right = coo_array((3.0 * np.concatenate([after, before]), sides), shape=(count, pieces)).tolil()
     if not periodic:
         _end_equation(left, right, h, 0, 1)
         _end_equation(left, right, h, -1, -1)
