@@ -66,6 +66,10 @@ def test_bars_of_a_recording_are_those_of_the_library(capfd, take):
 def test_without_what_is_not_known_there_are_no_bars(capfd, take):
     assert "±" in said(capfd, "split", "diver", take, *MOMENTUM)
     assert "error bars" not in said(capfd, "split", "diver", take, *MOMENTUM)
+    # The numerical estimate is called what it is.
+    assert "± above                 of the computation alone" in said(capfd, "split", "diver", take, *MOMENTUM)
+    assert "of the computation alone" not in said(capfd, "split", "diver", take, "--joint-noise", "0.1deg")
+    assert "of the computation alone" not in said(capfd, "split", "cat", "cat_righting")
     assert "uncertainty" not in json.loads(said(capfd, "split", "diver", take, "--json"))
 
 
@@ -74,7 +78,7 @@ def test_an_angle_without_a_bar_is_told_as_such():
     path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 9), np.zeros((9, 2)), periodic=False)
     motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3))
     found = sp.split(motion)
-    lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01))
+    lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01), None)
     assert sum("no bar of its angle" in line for line in lines) == 2
     assert not any("phase" in line for line in lines)
 

@@ -68,6 +68,7 @@ RECORDINGS = [*product(["cat", "astronaut"], ["smooth", "drift"]), ("righting", 
     ("name", "by", "draws"),
     [("cat", "smooth", 10), *(pytest.param(*one, 400, marks=pytest.mark.full) for one in RECORDINGS)],
 )
+@pytest.mark.filterwarnings("ignore:joint .* moves by")
 def test_a_noisy_recording_that_is_closed(name: str, by: str, draws: int):
     """Both ends have noise of their own; what smooths and closes it is chosen by each recording."""
     body = sp.load_body("cat" if name == "righting" else name)

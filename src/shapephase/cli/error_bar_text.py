@@ -41,10 +41,15 @@ def error_bars(motion: Motion, options: ErrorOptions, recorded: RecordedMotion |
     )
 
 
-def error_bar_lines(result: PhaseSplit, found: Uncertainty | None) -> list[str]:
-    """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off."""
+def error_bar_lines(result: PhaseSplit, found: Uncertainty | None, recorded: RecordedMotion | None) -> list[str]:
+    """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off.
+
+    Of a recording whose noise is not stated, that the errors in the table are those of the computation alone.
+    """
     if found is None:
-        return []
+        if recorded is None:
+            return []
+        return [f"{'± above':24}of the computation alone; the recording's noise is not stated (--joint-noise 0.3deg)"]
     lines = ["", "error bars: one standard deviation of what the inputs leave open, to first order"]
     lines.append(_rotation_line("total rotation", result.total_rotation, found.total_angle, found.total_rotation))
     name = "  shape holonomy" if result.is_loop else "  shape lift (open)"

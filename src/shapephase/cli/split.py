@@ -104,7 +104,7 @@ def split_command(
         lines, data = fit_lines(flown.fitted), fit_data(flown.fitted)
     text = [
         *split_lines(result, split_heading(flown.body, motion, flown.motion)),
-        *error_bar_lines(result, bars),
+        *error_bar_lines(result, bars, flown.recorded),
         *lines,
         *recording_lines(flown.body, flown.recorded),
     ]
