@@ -78,7 +78,7 @@ def test_an_angle_without_a_bar_is_told_as_such():
     path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 9), np.zeros((9, 2)), periodic=False)
     motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3))
     found = sp.split(motion)
-    lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01), None)
+    lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01))
     assert sum("no bar of its angle" in line for line in lines) == 2
     assert not any("phase" in line for line in lines)
 

@@ -41,7 +41,7 @@ def error_bars(motion: Motion, options: ErrorOptions, recorded: RecordedMotion |
     )
 
 
-def error_bar_lines(result: PhaseSplit, found: Uncertainty | None, recorded: RecordedMotion | None) -> list[str]:
+def error_bar_lines(result: PhaseSplit, found: Uncertainty | None, recorded: RecordedMotion | None = None) -> list[str]:
     """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off.
 
     Of a recording whose noise is not stated, that the errors in the table are those of the computation alone.
