@@ -112,7 +112,7 @@ def path_samples(path: ShapePath) -> PathSamples:
     if not isinstance(curve, PiecewisePolynomial) or curve.through is None:
         raise WrongObjectError(
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
-            "ShapePath.waypoints and of recorded motions"
+            "ShapePath.waypoints and of recorded motions that no geodesic closes"
         )
     return PathSamples(curve, order)
 
