@@ -24,6 +24,7 @@ from .conjugate import conjugate_command
 from .ctrl_c import was_pressed
 from .doctor import doctor_command
 from .exit_codes import ExitCode, exit_code_list, exit_code_of
+from .explore import explore_command
 from .library import compile_command, robots_command
 from .orbits import orbits_command
 from .outcome import Outcome
@@ -43,6 +44,7 @@ app = App(
 app.command(split_command, name="split")
 app.command(view_command, name="view")
 app.command(plot_command, name="plot")
+app.command(explore_command, name="explore")
 app.command(plan_command, name="plan")
 app.command(conjugate_command, name="conjugate")
 app.command(check_command, name="check")

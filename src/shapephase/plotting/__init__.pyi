@@ -1,5 +1,6 @@
 from . import plots
 from ._moving_scene import MovingScene, moving_scene
+from .explorer import explore_page
 from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
@@ -17,6 +18,7 @@ __all__ = [
     "LiveView",
     "MovingScene",
     "column_axes",
+    "explore_page",
     "figure_image",
     "motion_html",
     "motion_page",

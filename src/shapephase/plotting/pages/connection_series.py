@@ -1,0 +1,139 @@
+"""The connection over the plane of two joints as a Chebyshev series, and gauges in which its curvature is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...chebyshev import chebyshev, nodes_on, values_to_coefficients
+from ...shape_space.connection import mechanical_connection
+
+# Degrees that are tried, along each joint.
+_DEGREES = (8, 12, 16, 24, 32, 48)
+# Largest difference from the connection at which a series is good [rad per unit of joint].
+_GOOD = 1e-9
+# Points between the nodes at which a series is compared with the connection, along each joint.
+_CHECKED = 41
+# The largest difference may lie between them.
+_SAFETY = 2.0
+# A recurrence for Chebyshev polynomials of degree n is off by n^2 of this at the edges, in each of two variables.
+_ROUNDING = 2.0 * float(np.finfo(float).eps)
+# Degree of the turns by which the frame of least perturbation differs from the base, and how often they are improved.
+_GAUGE_DEGREE = 8
+_GAUGE_ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ConnectionSeries:
+    """A(r) for two joints, all others at rest: sum of coefficients[a, b] T_a(x) T_b(y).
+
+    Attributes
+    ----------
+    box : (2, 2) lowest and highest of each joint [rad or m], where x and y are -1 and 1
+    coefficients : (n, n, 3, 2) base axes [rad per unit of joint]
+    error : largest difference from the connection that was found, doubled, and rounding [rad per unit of joint]
+    """
+
+    box: Array
+    coefficients: Array
+    error: float
+
+
+def connection_series(body: Body, joints: tuple[int, int], box: Array, rest: Array) -> ConnectionSeries:
+    """A series of the degree that is needed, up to 48; its error says how good that is."""
+    between = [np.linspace(*ends, _CHECKED + 2)[1:-1] for ends in box]
+    exact = _connection(body, joints, between, rest)
+    found = None
+    for degree in _DEGREES:
+        nodes = [nodes_on(box[k, :1], box[k, 1:], degree)[0] for k in range(2)]
+        matrix = values_to_coefficients(degree)
+        coefficients = np.einsum("ap,bq,pqij->abij", matrix, matrix, _connection(body, joints, nodes, rest))
+        terms = [chebyshev(_local(values, ends), degree + 1) for values, ends in zip(between, box, strict=True)]
+        shown = np.einsum("pa,qb,abij->pqij", *terms, coefficients)
+        rounding = _ROUNDING * degree**2 * float(np.abs(coefficients).sum(axis=(0, 1)).max())
+        error = _SAFETY * float(np.linalg.norm(shown - exact, axis=-2).max()) + rounding
+        if found is None or error < found.error:
+            found = ConnectionSeries(box=box, coefficients=coefficients, error=error)
+        if error <= _GOOD:
+            break
+    assert found is not None
+    return found
+
+
+def least_perturbation_turns(series: ConnectionSeries, first: Array, second: Array) -> Array:
+    """Turns U(r) to the frame in which the connection is least, in the mean square over the box.
+
+    A frame with axes d' = U d of what are d in base axes sees the connection U A_i + vee(d_i U U^T). U is made of turns
+    exp(hat(phi)), each of which minimises the square of A_i + d_i phi over polynomials phi: to first order that is the
+    Poisson equation of Hatton and Choset, and the rounds make it exact.
+
+    Parameters
+    ----------
+    first, second : (P,), (Q,) where the turns are given
+
+    Returns
+    -------
+    (P, Q, 3, 3)
+
+    Source: Hatton and Choset 2011, Int. J. Robotics Research 30, 988: optimal coordinates by the Hodge-Helmholtz
+    decomposition, for rotations component by component.
+    """
+    count = 2 * _GAUGE_DEGREE + 3
+    nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
+    degree = series.coefficients.shape[0]
+    terms = chebyshev(nodes, degree)
+    connection = np.einsum("pa,qb,abij->pqij", terms, terms, series.coefficients)
+    half = 0.5 * (series.box[:, 1] - series.box[:, 0])
+    inside, slopes = _basis(nodes)
+    # Derivatives of all products of two polynomials by both joints, at all nodes.
+    by_first = np.einsum("pa,qb->pqab", slopes, inside).reshape(count**2, -1)[:, 1:] / half[0]
+    by_second = np.einsum("pa,qb->pqab", inside, slopes).reshape(count**2, -1)[:, 1:] / half[1]
+    equations = np.concatenate([by_first, by_second])
+    products = np.einsum("pa,qb->pqab", inside, inside).reshape(count, count, -1)[..., 1:]
+    out = [_basis(_local(values, ends))[0] for values, ends in zip((first, second), series.box, strict=True)]
+    shown = np.einsum("pa,qb->pqab", *out).reshape(len(first), len(second), -1)[..., 1:]
+    turns = np.broadcast_to(np.eye(3), (len(first), len(second), 3, 3))
+    for _ in range(_GAUGE_ROUNDS):
+        columns = np.moveaxis(connection, -1, 0).reshape(-1, 3)
+        weights = np.linalg.lstsq(equations, -columns, rcond=None)[0]
+        phi = np.einsum("pqk,ki->pqi", products, weights)
+        change = np.stack([(rows @ weights).reshape(count, count, 3) for rows in (by_first, by_second)], axis=-1)
+        turn = so3.exp(phi)
+        connection = turn @ connection + _left_rates(phi, change)
+        turns = so3.exp(np.einsum("pqk,ki->pqi", shown, weights)) @ turns
+    return turns
+
+
+def _left_rates(phi: Array, change: Array) -> Array:
+    """vee(dU U^T) of U = exp(hat(phi)) for changes of phi: (..., 3), (..., 3, 2) -> (..., 3, 2)."""
+    angle = np.linalg.norm(phi, axis=-1)[..., None, None]
+    small = angle < 1e-3
+    safe = np.where(small, 1.0, angle)
+    across = so3.hat(phi)
+    first = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    second = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
+    return change + first * (across @ change) + second * (across @ across @ change)
+
+
+def _basis(x: Array) -> tuple[Array, Array]:
+    """Chebyshev polynomials and their derivatives: (N,) -> (N, _GAUGE_DEGREE + 1) twice."""
+    unit = np.eye(_GAUGE_DEGREE + 1)
+    series = np.polynomial.chebyshev
+    slopes = np.stack([series.chebval(x, series.chebder(row)) for row in unit], axis=-1)
+    return chebyshev(x, _GAUGE_DEGREE + 1), slopes
+
+
+def _connection(body: Body, joints: tuple[int, int], places: list[Array], rest: Array) -> Array:
+    """At all pairs of coordinates: (P,), (Q,) -> (P, Q, 3, 2)."""
+    shapes = np.empty((len(places[0]), len(places[1]), body.n_shape))
+    shapes[:] = rest
+    shapes[:, :, joints[0]], shapes[:, :, joints[1]] = places[0][:, None], places[1]
+    return mechanical_connection(body, shapes)[..., list(joints)]
+
+
+def _local(values: Array, ends: Array) -> Array:
+    return np.clip((2.0 * values - ends.sum()) / (ends[1] - ends[0]), -1.0, 1.0)
