@@ -122,7 +122,7 @@ def _plane_data(
     body: Body, joints: Sequence[str], places: tuple[int, int], shown: Array, rest: Array, series: ConnectionSeries
 ) -> dict[str, Any]:
     """The map, in base axes and in the frame of least perturbation, and the series."""
-    across, along = (np.linspace(*ends, _MAP) for ends in shown)
+    across, along = (np.linspace(ends[0], ends[1], _MAP) for ends in shown)
     field = curvature_on_plane(body, joints, across, along, rest)
     turns = least_perturbation_turns(series, across, along)
     return {
@@ -144,7 +144,7 @@ def _plane_data(
 
 def _still_motion(body: Body, places: tuple[int, int], shown: Array, rest: Array, up: Array) -> dict[str, Any]:
     """The body at rest, as the page's scripts take a motion; they put the motion along a loop in its place."""
-    grid = np.meshgrid(*(np.linspace(*ends, _SIZES) for ends in shown), indexing="ij")
+    grid = np.meshgrid(*(np.linspace(ends[0], ends[1], _SIZES) for ends in shown), indexing="ij")
     shapes = np.tile(rest, (_SIZES**2, 1))
     shapes[:, places[0]], shapes[:, places[1]] = (values.ravel() for values in grid)
     by_link = shapes_by_link(visuals(body))

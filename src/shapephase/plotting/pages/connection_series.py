@@ -45,7 +45,7 @@ class ConnectionSeries:
 
 def connection_series(body: Body, joints: tuple[int, int], box: Array, rest: Array) -> ConnectionSeries:
     """A series of the degree that is needed, up to 48; its error says how good that is."""
-    between = [np.linspace(*ends, _CHECKED + 2)[1:-1] for ends in box]
+    between = [np.linspace(ends[0], ends[1], _CHECKED + 2)[1:-1] for ends in box]
     exact = _connection(body, joints, between, rest)
     found = None
     for degree in _DEGREES:
@@ -124,7 +124,7 @@ def _basis(x: Array) -> tuple[Array, Array]:
     unit = np.eye(_GAUGE_DEGREE + 1)
     series = np.polynomial.chebyshev
     slopes = np.stack([series.chebval(x, series.chebder(row)) for row in unit], axis=-1)
-    return chebyshev(x, _GAUGE_DEGREE + 1), slopes
+    return chebyshev(x, _GAUGE_DEGREE + 1), np.asarray(slopes, dtype=np.float64)
 
 
 def _connection(body: Body, joints: tuple[int, int], places: list[Array], rest: Array) -> Array:
