@@ -30,6 +30,7 @@ def cat_plane(cat, tmp_path_factory):
     return file, explore_page(cat, JOINTS, file)
 
 
+@pytest.mark.full
 def test_a_circle_drawn_by_the_mouse_turns_the_body_as_its_file_says(cat, cat_plane, tmp_path, chromium):
     """The loop goes by a CSV file to the library, which finds its holonomy another way."""
     file, _ = cat_plane

@@ -183,6 +183,7 @@ def test_the_report_of_the_righting_opens_offline_and_the_cat_lands_on_its_feet(
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
 
 
+@pytest.mark.full
 def test_what_is_beside_the_body_follows_the_scrubber(tmp_path, chromium):
     """Half way, body, phases, joints and momentum are those of the motion at that time."""
     path = cat_righting()

@@ -530,6 +530,7 @@ def test_the_page_opens_in_a_browser_without_a_network_and_moves(righting, cat_p
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
 
+@pytest.mark.full
 def test_shapes_are_closed_and_of_their_size(chromium, cat_page):
     """Volumes and bounds of the triangles that the page draws, by the theorem of Gauss, against closed forms."""
     page, _, _ = opened(chromium, cat_page)
