@@ -153,8 +153,8 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     --------
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> scene = sp.plotting.moving_scene(motion, 5)
-    >>> scene.times.tolist(), scene.articulated
-    ([0.0, 1.0, 2.0, 3.0, 4.0], False)
+    >>> scene.times.tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0]
     """
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
