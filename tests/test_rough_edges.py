@@ -162,6 +162,9 @@ def test_a_recording_of_a_million_rows(tmp_path, rows):
 )
 def test_a_long_recording_takes_bounded_memory(tmp_path, rows, momentum):
     file = swings(tmp_path / "long.csv", rows)
-    code, memory, _ = most_memory_of("split", "diver", file, "--momentum", 0, 0, momentum)
+    # Rounding of so many samples alone comes to more than 1e-9 rad over half an hour of turning.
+    tolerance = 1e-7 if rows > 100_000 and momentum else 1e-9
+    options = ("--momentum", 0, 0, momentum, "--tolerance", tolerance)
+    code, memory, _ = most_memory_of("split", "diver", file, *options)
     assert code == ExitCode.DONE
     assert memory < 300e6 + 30e3 * rows
