@@ -56,7 +56,7 @@ def conjugate_command(
     from ..arrays import finite_array
     from ..rigid_body.geodesics import serret_andoyer_metric
 
-    check_writable(out, "--out", *_ENDINGS)
+    aside = check_writable(out, "--out", *_ENDINGS)
     metric = serret_andoyer_metric((i1, i2, i3))
     low, high = metric.separatrix_momentum, metric.largest_momentum
     p = finite_array(momenta if momenta else [low + part * (high - low) for part in _PARTS], "--momenta", (None,))
@@ -92,7 +92,7 @@ def conjugate_command(
         "theta_rad": found.theta.tolist(),
         "figure": None if out is None else str(out),
     }
-    return Outcome("\n".join(lines), data)
+    return Outcome("\n".join(lines), data, aside=aside)
 
 
 def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
