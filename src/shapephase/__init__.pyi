@@ -22,7 +22,8 @@ from .body.catalog import load_body, robot_names
 from .body.family import BodyFamily
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
-from .error_bars.covariance import InertiaErrors, Uncertainty, sampled_uncertainty, uncertainty
+from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
+from .error_bars.inertia_errors import InertiaErrors
 from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
 from .error_bars.result_derivatives import Derivatives, ResultDerivative, derivatives
 from .errors import (

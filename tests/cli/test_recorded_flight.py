@@ -30,7 +30,8 @@ def answer(capsys, *arguments):
 def test_one_command_goes_from_the_take_to_the_split(with_report, take, tmp_path, capsys):
     """Momentum and attitude lie within five bars, which are as wide as the noise says; nothing of the push is in it."""
     report = ["--html", tmp_path / "r.html"] if with_report else []
-    found = answer(capsys, "split", "diver", take, "--flight", "auto", *report, "--tolerance", "1e-6")
+    options = ("--flight", "auto", "--joint-noise", "0.3deg", "--tolerance", "1e-6")
+    found = answer(capsys, "split", "diver", take, *options, *report)
     for _, file in [report] if report else []:
         assert file.stat().st_size > 100_000
     fit, flight = found["momentum_fit"], found["recording"]["flight"]
@@ -43,9 +44,14 @@ def test_one_command_goes_from_the_take_to_the_split(with_report, take, tmp_path
     times, motion = simulated()
     end = np.searchsorted(times, flight["last_time"] - TAKE_OFF - 1e-6)
     simulated_end = Y_UP * Rotation.from_matrix(motion.attitude[end])
-    off = Rotation.from_quat(found["final_attitude_quat_xyzw"]).inv() * simulated_end
+    off = (simulated_end * Rotation.from_quat(found["final_attitude_quat_xyzw"]).inv()).as_rotvec()
+    bars = found["uncertainty"]
+    assert off @ np.linalg.solve(bars["final_attitude"], off) < chi2.ppf(1.0 - 1e-6, 3)
     # Of some 140 attitudes six numbers are fitted.
-    assert off.magnitude() < ATTITUDE_NOISE
+    assert np.sqrt(np.trace(bars["final_attitude"])) < ATTITUDE_NOISE
+    # Noise of the joints moves the fit, too, but less.
+    of_base = np.diag(fit["covariance_of_attitude_and_momentum"])
+    assert np.all((np.diag(bars["start"]) > of_base) & (np.diag(bars["start"]) < 1.5 * of_base))
     assert found["recorded_base_difference_rad"] == pytest.approx(
         np.linalg.norm(fit["recorded_base_difference_rotation_vector_rad"], axis=1).max()
     )
@@ -59,6 +65,7 @@ def test_what_was_done_is_on_the_card(take, capsys):
         "momentum, fitted",
         "71 attitudes with 0.5",
         "deg rms from this one",
+        "± of the recorded base  alone; the noise of the joints is not stated",
         "pelvis_tilt, pelvis_list, pelvis_rotation, turning in the order z x y; the usual order, --base-order",
         "x -z y of the recorded ones; the usual ones of a pelvis, --base-axes",
         "71 of 220 samples, 0.5 to 1.2 s",
@@ -91,6 +98,9 @@ def test_options_that_do_not_go_together(take, capsys):
     with pytest.raises(SystemExit):
         main(["split", "diver", "diver_twist", "--flight", "auto"])
     assert "--flight is for recorded motions" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["split", "diver", str(take), "--flight", "0.5", "1.2", "--momentum-error", "1", "--tolerance", "1e-6"])
+    assert "leave momentum and attitude out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("takes", [2, pytest.param(400, marks=pytest.mark.full)])

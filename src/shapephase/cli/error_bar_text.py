@@ -13,23 +13,29 @@ from ..phases.phase_split import PhaseSplit
 from ..plain_data import plain
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files.read import RecordedMotion
-from .options import ErrorOptions
+from .options import EXACT, ErrorOptions
 
 if TYPE_CHECKING:
     from ..error_bars.covariance import Uncertainty
+    from ..error_bars.recorded_momentum import RecordedMomentum
 
 # Digits of a bar that are shown; the number before it ends where the bar does.
 _DIGITS = 2
 
 
-def error_bars(motion: Motion, options: ErrorOptions, recorded: RecordedMotion | None) -> Uncertainty | None:
-    """The error bars that were asked for, if any were: also by the noise that a recording was smoothed for."""
+def error_bars(
+    motion: Motion, options: ErrorOptions, recorded: RecordedMotion | None, fitted: RecordedMomentum | None = None
+) -> Uncertainty | None:
+    """The error bars that were asked for, if any were: also by the noise that a recording was smoothed for, and by
+    that of the base that a momentum was fitted to."""
     relative = (options.mass_error, options.centre_error, options.inertia_error)
     smoothing = None if recorded is None else recorded.smoothing
     joints = options.joint_noise if options.joint_noise is not None or smoothing is None else smoothing.noise
-    if all(given is None for given in (joints, *relative, options.momentum_error, options.attitude_error)):
+    deviations = (joints, *relative, options.momentum_error, options.attitude_error)
+    if fitted is None and all(given is None for given in deviations):
         return None
-    from ..error_bars.covariance import InertiaErrors, uncertainty
+    from ..error_bars.covariance import uncertainty
+    from ..error_bars.inertia_errors import InertiaErrors
 
     masses, centres, inertias = (given or 0.0 for given in relative)
     return uncertainty(
@@ -38,13 +44,20 @@ def error_bars(motion: Motion, options: ErrorOptions, recorded: RecordedMotion |
         inertias=InertiaErrors(masses=masses, centres=centres, inertias=inertias) if any(relative) else None,
         momentum=options.momentum_error,
         attitude=options.attitude_error,
+        start=fitted,
     )
 
 
-def error_bar_lines(result: PhaseSplit, found: Uncertainty | None, recorded: RecordedMotion | None = None) -> list[str]:
+def error_bar_lines(
+    result: PhaseSplit,
+    found: Uncertainty | None,
+    recorded: RecordedMotion | None = None,
+    options: ErrorOptions = EXACT,
+) -> list[str]:
     """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off.
 
-    Of a recording whose noise is not stated, that the errors in the table are those of the computation alone.
+    Of a recording whose noise is not stated, that the errors in the table are those of the computation alone; of a
+    flight, that its bars are those of the recorded base alone.
     """
     if found is None:
         if recorded is None:
@@ -61,6 +74,11 @@ def error_bar_lines(result: PhaseSplit, found: Uncertainty | None, recorded: Rec
             ("  geometric phase", result.geometric_phase, found.solid_angle),
         ):
             lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
+    of_base_alone = recorded is not None and recorded.flight is not None and recorded.smoothing is None
+    if of_base_alone and options.joint_noise is None:
+        lines.append(
+            f"{'± of the recorded base':24}alone; the noise of the joints is not stated (--joint-noise 0.3deg)"
+        )
     if found.smoothing_bias:
         lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most, which the bars do not hold")
     return lines

@@ -15,6 +15,7 @@ from ..shape_space.files.read import RecordedMotion
 from ..shape_space.files.smoothing import Smoothing
 
 if TYPE_CHECKING:
+    from ..error_bars.covariance import Uncertainty
     from ..error_bars.recorded_momentum import RecordedMomentum
 
 _MOST_NAMES = 8
@@ -50,9 +51,9 @@ def recording_data(recorded: RecordedMotion | None) -> dict[str, Any]:
     return {"recording": record}
 
 
-def fit_lines(fitted: RecordedMomentum) -> list[str]:
+def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
     """A momentum that was fitted to a recorded base, and how the two then differ in time, for people."""
-    bars = np.sqrt(np.diag(fitted.momentum_covariance))
+    bars = np.sqrt(np.diag(errors.start)[3:])
     digits = max(_BAR_DIGITS - 1 - math.floor(math.log10(float(bars.min()))), 0) if bars.all() else _BAR_DIGITS
     momentum = ", ".join(f"{v:.{digits}f} ± {bar:.{digits}f}" for v, bar in zip(fitted.momentum, bars, strict=True))
     angles, noise = np.degrees(fitted.angles), np.degrees(fitted.noise)

@@ -75,7 +75,7 @@ def split_command(
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
-        bars = error_bars(flown.motion, errors, flown.recorded)
+        bars = error_bars(flown.motion, errors, flown.recorded, flown.fitted)
         if out is not None:
             flown.motion.save(out)
             say_written(out)
@@ -98,13 +98,13 @@ def split_command(
                 begin=work.begin,
             )
             say_written(html)
-    if flown.fitted is None:
+    if flown.fitted is None or bars is None:
         lines, data = recorded_base_text(flown.motion, flown.recorded)
     else:
-        lines, data = fit_lines(flown.fitted), fit_data(flown.fitted)
+        lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
     text = [
         *split_lines(result, split_heading(flown.body, motion, flown.motion)),
-        *error_bar_lines(result, bars, flown.recorded),
+        *error_bar_lines(result, bars, flown.recorded, errors),
         *lines,
         *recording_lines(flown.body, flown.recorded),
     ]

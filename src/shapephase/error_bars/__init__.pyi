@@ -1,4 +1,5 @@
-from .covariance import InertiaErrors, Uncertainty, sampled_uncertainty, uncertainty
+from .covariance import Uncertainty, sampled_uncertainty, uncertainty
+from .inertia_errors import InertiaErrors
 from .recorded_momentum import RecordedMomentum, momentum_from_recording
 from .result_derivatives import Derivatives, ResultDerivative, derivatives
 

@@ -58,10 +58,10 @@ class AlongMotion:
     adjoint_at_start: Array
 
 
-def along_motion(motion: Motion, body: Body, path: ShapePath) -> AlongMotion:
-    """A motion that is no batch, of an articulated body."""
+def along_motion(motion: Motion, body: Body, path: ShapePath, breaks: Array | None = None) -> AlongMotion:
+    """A motion that is no batch, of an articulated body; no piece of the quadrature has one of the breaks within."""
     stepped = _one_rotation(motion)
-    edges = _pieces(stepped, path.breaks)
+    edges = _pieces(stepped, path.breaks if breaks is None else np.union1d(path.breaks, breaks))
     nodes, shares, _ = _rule()
     widths = np.diff(edges)
     times = (edges[:-1, None] + widths[:, None] * nodes).ravel()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -11,56 +11,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arrays import Array, finite_array, lock_arrays
-from ..body.body import Body
-from ..body.family import BodyFamily
+from ..arrays import Array, lock_arrays
 from ..deformation.deformation import articulated
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..shape_space.files._labels import amounts
 from ..shape_space.path_samples import path_samples
-from ..shape_space.shape_path import ShapePath
-from ..shape_space.summaries import body_summary
+from ._error_sources import Inputs, by_relative_errors, drawn_bodies, inputs_of
+from ._fit_answers import fit_by_inertias, fit_by_samples
+from .inertia_errors import InertiaErrors
+from .recorded_momentum import UNKNOWNS, RecordedMomentum
 from .result_derivatives import Derivatives, ResultDerivative, derivatives, described_by
 
 # An angle has a bar of its own where it is this many of them from 0 and from 180 degrees.
 _BARS_FROM_THE_ENDS = 5.0
-# Negative eigenvalues of a covariance, relative to the largest: printed digits.
-_NEGATIVE = 1e-9
-# Relative errors of a link: of its mass, of its centre (3), of its inertia.
-_OF_A_LINK = 5
-# Of its own mass and inertia, what a link keeps in a draw at least.
-_LEAST_SHARE = 1e-3
+# Variances along other axes of a rotation than its worst, as a part of that, that are rounding.
+_ROUNDING = 1e-9
 _ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation")
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
-
-
-@dataclass(frozen=True, kw_only=True)
-class InertiaErrors:
-    """Relative standard deviations of the inertias of links, independent of each other.
-
-    Each is one number for all moving links, or a mapping from names of links.
-
-    Attributes
-    ----------
-    masses : of the mass, with which the rotational inertia grows
-    centres : of each coordinate of the centre of mass, in radii of gyration of the link
-    inertias : of the rotational inertia as a whole, the mass being as it is
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.uncertainty(motion, inertias=sp.InertiaErrors(masses=0.05))
-    >>> print(f"{found.dynamic_phase:.4f} rad")
-    0.0107 rad
-    """
-
-    masses: float | Mapping[str, float] = 0.0
-    centres: float | Mapping[str, float] = 0.0
-    inertias: float | Mapping[str, float] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +43,8 @@ class Uncertainty:
     ----------
     final_attitude, total_rotation, holonomy, dynamical_rotation : (3, 3) covariances [rad^2]
     dynamic_phase, solid_angle, montgomery_phase : standard deviations [rad]
+    start : (6, 6) covariance of the turn of the start, base axes [rad^2], and of the momentum [(kg m^2/s)^2], with all
+        that moves a fit to a recording
     total_angle, holonomy_angle : standard deviations of the angles of these rotations [rad]; NaN where an angle is
         less than five of them from 0 or from 180 degrees: there it cannot be said by one number
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
@@ -96,6 +67,7 @@ class Uncertainty:
     dynamic_phase: float
     solid_angle: float
     montgomery_phase: float
+    start: Array
     total_angle: float
     holonomy_angle: float
     smoothing_bias: float = 0.0
@@ -111,11 +83,12 @@ def uncertainty(
     inertias: InertiaErrors | None = None,
     momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
+    start: RecordedMomentum | ArrayLike | None = None,
 ) -> Uncertainty:
     """How far the results of `split` may be off, to first order, by what is not known exactly.
 
-    The four sources are independent of each other; what is not given is exact. The cost is that of a few
-    reconstructions, however many samples and links there are.
+    Sources are independent of each other; what is not given is exact. The cost is that of a few reconstructions,
+    however many samples and links there are.
 
     Parameters
     ----------
@@ -128,13 +101,17 @@ def uncertainty(
     momentum : the covariance (3, 3) [(kg m^2/s)^2], inertial axes, or one standard deviation of all components
     attitude : of the start, turned to R(0) exp(hat(delta)): the covariance (3, 3) of delta [rad^2], or one standard
         deviation [rad]
+    start : instead of these two the covariance (6, 6) of both, the turn of the start first; or the whole fit of
+        `momentum_from_recording`, whose `motion` this is: then errors of `joints` and `inertias` move the fit, too, as
+        they do where the recorded attitudes stay what they are
 
     Raises
     ------
     WrongObjectError
         If the motion is not one of an articulated body, or, with `joints`, its path not one through samples.
     ShapeError
-        For a batch, and for covariances that are not.
+        For a batch, for covariances that are not, for the fit of another motion, and for `start` beside `momentum`
+        or `attitude`.
     UnknownNameError
         For a link that the body does not have.
     TrajectoryError
@@ -154,16 +131,17 @@ def uncertainty(
     0.000813 rad
     """
     found = derivatives(motion)
-    inputs = _inputs(motion, joints, inertias, momentum, attitude)
+    inputs = inputs_of(motion, joints, inertias, momentum, attitude, start)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
-    variances = np.zeros(len(_PHASES))
-    for derivative, covariance in _by_source(found, inputs):
+    variances, of_start = np.zeros(len(_PHASES)), np.zeros((UNKNOWNS, UNKNOWNS))
+    for cause in _causes(found, inputs):
         for total, name in zip(covariances, _ROTATIONS, strict=True):
-            total += _carried(getattr(derivative, name), covariance)
-        variances += [_carried(getattr(derivative, name)[None], covariance)[0, 0] for name in _PHASES]
+            total += _carried(getattr(cause.derivative, name), cause.covariance)
+        variances += [_carried(getattr(cause.derivative, name)[None], cause.covariance)[0, 0] for name in _PHASES]
+        of_start += _carried(cause.start, cause.covariance)
     deviations = np.sqrt(variances)
     bias = 0.0 if inputs.samples is None else _smoothing_bias(found, covariances, deviations)
-    return _uncertainty(split(motion), covariances, deviations, smoothing_bias=bias, draws=0)
+    return _uncertainty(split(motion), covariances, deviations, of_start, smoothing_bias=bias, draws=0)
 
 
 def sampled_uncertainty(
@@ -173,6 +151,7 @@ def sampled_uncertainty(
     inertias: InertiaErrors | None = None,
     momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
+    start: RecordedMomentum | ArrayLike | None = None,
     draws: int = 400,
     seed: int = 0,
 ) -> Uncertainty:
@@ -182,7 +161,8 @@ def sampled_uncertainty(
 
     Parameters
     ----------
-    motion, joints, inertias, momentum, attitude : as for `uncertainty`; errors are normally distributed
+    motion, joints, inertias, momentum, attitude, start : as for `uncertainty`; errors are normally distributed, and
+        move a fit to first order
     draws : how many, two or more
     seed : of the random numbers
 
@@ -201,20 +181,24 @@ def sampled_uncertainty(
     if draws < 2:
         raise ShapeError(f"draws: two or more are needed, got {draws}")
     body, path = described_by(motion)
-    inputs, rng = _inputs(motion, joints, inertias, momentum, attitude), np.random.default_rng(seed)
+    inputs, rng = inputs_of(motion, joints, inertias, momentum, attitude, start), np.random.default_rng(seed)
     normal = partial(_drawn, rng, draws)
-    paths = [path] * draws
+    paths, bodies, changes = [path] * draws, [body] * draws, np.zeros((draws, UNKNOWNS))
     if inputs.samples is not None:
-        samples = path_samples(path)
-        moved = samples.values + normal(inputs.samples).reshape(draws, *samples.values.shape)
-        paths = [samples.path_through(values) for values in moved]
-    bodies = [body] * draws if inputs.links is None else _drawn_bodies(body, normal(inputs.links))
-    momenta = np.broadcast_to(motion.momentum, (draws, 3))
-    if inputs.momentum is not None:
-        momenta = momenta + normal(inputs.momentum)
-    starts = np.broadcast_to(motion.initial_attitude, (draws, 3, 3))
+        samples, errors = path_samples(path), normal(inputs.samples)
+        paths = [samples.path_through(samples.values + one.reshape(samples.values.shape)) for one in errors]
+        changes += errors @ _fit_by_samples(motion, inputs).T
+    if inputs.links is not None:
+        errors = normal(inputs.links)
+        bodies = drawn_bodies(body, errors)
+        changes += errors @ _fit_by_links(motion, inputs).T
     if inputs.attitude is not None:
-        starts = starts @ so3.exp(normal(inputs.attitude))
+        changes[:, :3] += normal(inputs.attitude)
+    if inputs.momentum is not None:
+        changes[:, 3:] += normal(inputs.momentum)
+    if inputs.start is not None:
+        changes += normal(inputs.start)
+    starts, momenta = motion.initial_attitude @ so3.exp(changes[:, :3]), motion.momentum + changes[:, 3:]
     middle = split(motion)
     turns, phases = np.empty((len(_ROTATIONS), draws, 3)), np.empty((draws, len(_PHASES)))
     for row in range(draws):
@@ -225,147 +209,57 @@ def sampled_uncertainty(
             turns[which, row] = so3.log(_rotation(drawn, parts, name) @ _rotation(motion, middle, name).T)
         phases[row] = [getattr(parts, name) for name in _PHASES]
     covariances = [np.cov(one, rowvar=False) for one in turns]
-    return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), draws=draws)
+    return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), np.cov(changes, rowvar=False), draws=draws)
 
 
-class _Inputs(NamedTuple):
-    """Covariances of what is not known exactly: variances (m,) or matrices (m, m); None where it is exact.
+class _Cause(NamedTuple):
+    """The derivatives by what is not known exactly, m numbers, those of attitude and momentum at the start, (6, m),
+    and the covariance of these numbers."""
 
-    Attributes
-    ----------
-    samples : of the path's samples
-    links : of the relative errors of each frame of the body's chain: mass, centre (3), inertia
-    momentum, attitude : (3, 3)
-    """
-
-    samples: Array | None
-    links: Array | None
-    momentum: Array | None
-    attitude: Array | None
+    derivative: ResultDerivative
+    start: Array
+    covariance: Array
 
 
-def _inputs(
-    motion: Motion,
-    joints: ArrayLike | str | None,
-    inertias: InertiaErrors | None,
-    momentum: ArrayLike | None,
-    attitude: ArrayLike | None,
-) -> _Inputs:
-    body, path = described_by(motion)
-    samples = None
-    if joints is not None:
-        through = path_samples(path)
-        numbers = through.count * path.n_shape
-        given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
-        if given.shape in ((), (path.n_shape,)):
-            each = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
-            if given.ndim == 0 or isinstance(joints, str):
-                each[_without_samples(path)] = 0.0
-            samples = np.tile(each**2, through.count)
-        else:
-            samples = _covariance(given, "joints", numbers)
-    links = None if inertias is None else _link_variances(body, inertias)
-    return _Inputs(samples, links, _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude"))
+def _causes(found: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
+    by_start = _combined(np.hstack, found.by_attitude, found.by_momentum)
 
+    def moving_the_fit(derivative: ResultDerivative, start: Array, covariance: Array) -> _Cause:
+        return _Cause(_combined(lambda pair: pair[0] + pair[1] @ start, derivative, by_start), start, covariance)
 
-def _without_samples(path: ShapePath) -> list[int]:
-    """The joints that rest where a reader was told, without a column in the file."""
-    resting = {} if path.record is None else path.record.get("at_rest", {})
-    return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
-
-
-def _by_joint(body: Body, text: str) -> Array:
-    """(n,) standard deviations from a text that says one of angles, of lengths or of both."""
-    said = amounts(text, "joints")
-    return np.array([said[joint.unit] for joint in body_summary(body).joints])
-
-
-def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
-    if given is None:
-        return None
-    array = finite_array(given, name)
-    return _deviations(array, name) ** 2 * np.eye(3) if array.ndim == 0 else _covariance(array, name, 3)
-
-
-def _deviations(given: Array, name: str) -> Array:
-    if np.any(given < 0.0):
-        raise ShapeError(f"{name}: a standard deviation is not negative, got {given}")
-    return given
-
-
-def _covariance(given: Array, name: str, numbers: int) -> Array:
-    if given.shape != (numbers, numbers):
-        raise ShapeError(
-            f"{name}: one standard deviation or a covariance ({numbers}, {numbers}) is needed, got {given.shape}"
-        )
-    scale = np.abs(given).max(initial=0.0)
-    if np.abs(given - given.T).max(initial=0.0) > _NEGATIVE * scale:
-        raise ShapeError(f"{name}: a covariance is symmetric")
-    least = np.linalg.eigvalsh(given)[0]
-    if least < -_NEGATIVE * scale:
-        raise ShapeError(f"{name}: a covariance has no negative eigenvalue, this one has {least:.3g}")
-    return 0.5 * (given + given.T)
-
-
-def _link_variances(body: Body, errors: InertiaErrors) -> Array:
-    """(5 (k + 1),)."""
-    deviations = np.zeros((len(body.chain.masses), _OF_A_LINK))
-    for name, columns in (("masses", slice(0, 1)), ("centres", slice(1, 4)), ("inertias", slice(4, 5))):
-        given = getattr(errors, name)
-        if isinstance(given, Mapping):
-            for link, one in given.items():
-                if link not in body.chain.link_frames:
-                    raise unknown_name(f"link of {body.name}", link, body.chain.link_frames)
-                frame, _ = body.chain.link_frames[link]
-                deviations[frame, columns] = _deviations(finite_array(one, f"{name} of link {link!r}", ()), name)
-        else:
-            deviations[:, columns] = _deviations(finite_array(given, name, ()), name)
-    return (deviations**2).ravel()
-
-
-def _by_source(found: Derivatives, inputs: _Inputs) -> Iterator[tuple[ResultDerivative, Array]]:
-    """The derivatives by what is not known exactly, and its covariance."""
     if inputs.samples is not None:
-        yield found.by_samples, inputs.samples
+        yield moving_the_fit(found.by_samples, _fit_by_samples(found.motion, inputs), inputs.samples)
     if inputs.links is not None:
-        yield _by_relative_errors(found.body, found.by_inertias), inputs.links
+        by_links = _combined(lambda only: by_relative_errors(found.body, only[0]), found.by_inertias)
+        yield moving_the_fit(by_links, _fit_by_links(found.motion, inputs), inputs.links)
     if inputs.momentum is not None:
-        yield found.by_momentum, inputs.momentum
+        yield _Cause(found.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
     if inputs.attitude is not None:
-        yield found.by_attitude, inputs.attitude
+        yield _Cause(found.by_attitude, np.eye(UNKNOWNS)[:, :3], inputs.attitude)
+    if inputs.start is not None:
+        yield _Cause(by_start, np.eye(UNKNOWNS), inputs.start)
 
 
-def _by_relative_errors(body: Body, by_inertias: ResultDerivative) -> ResultDerivative:
-    """From derivatives by the ten parameters of each frame to those by its five relative errors."""
-    chain = body.chain
-    jacobian = np.zeros((len(chain.masses), 10, _OF_A_LINK))
-    entries = chain.inertias[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
-    jacobian[:, 0, 0], jacobian[:, 4:, 0] = chain.masses, entries
-    for axis in range(3):
-        jacobian[:, 1 + axis, 1 + axis] = chain.masses * _gyration(body)
-    jacobian[:, 4:, 4] = entries
-
-    def relative(derivative: Array) -> Array:
-        by_frame = derivative.reshape(*derivative.shape[:-1], len(chain.masses), 10)
-        return np.einsum("...kp,kpe->...ke", by_frame, jacobian).reshape(*derivative.shape[:-1], -1)
-
-    return ResultDerivative(*(relative(getattr(by_inertias, name)) for name in (*_ROTATIONS, *_PHASES)))
+def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivative) -> ResultDerivative:
+    """What a rule makes of each derivative of the parts."""
+    return ResultDerivative(*(rule(tuple(getattr(part, name) for part in parts)) for name in (*_ROTATIONS, *_PHASES)))
 
 
-def _gyration(body: Body) -> Array:
-    """The radius of gyration of each frame's mass: (k + 1,) [m]."""
-    masses, traces = body.chain.masses, np.trace(body.chain.inertias, axis1=1, axis2=2)
-    return np.sqrt(np.divide(0.5 * traces, masses, out=np.zeros_like(masses), where=masses > 0.0))
+def _fit_by_samples(motion: Motion, inputs: Inputs) -> Array:
+    """How errors of the samples move attitude and momentum at the start, where these were fitted: (6, m)."""
+    assert inputs.samples is not None
+    if inputs.fit is None:
+        return np.zeros((UNKNOWNS, len(inputs.samples)))
+    return fit_by_samples(motion, inputs.fit.times, inputs.fit.by_attitudes)
 
 
-def _drawn_bodies(body: Body, errors: Array) -> BodyFamily:
-    """One body for each row of relative errors (draws, 5 (k + 1))."""
-    chain = body.chain
-    each = errors.reshape(len(errors), -1, _OF_A_LINK)
-    growth = np.maximum(1.0 + each[..., 0], _LEAST_SHARE)
-    tensors = (growth * np.maximum(1.0 + each[..., 4], _LEAST_SHARE))[..., None, None] * chain.inertias
-    centres = chain.centres + _gyration(body)[:, None] * each[..., 1:4]
-    return BodyFamily(body, growth * chain.masses, centres, tensors)
+def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
+    """The same by the relative errors of links."""
+    assert inputs.links is not None
+    if inputs.fit is None:
+        return np.zeros((UNKNOWNS, len(inputs.links)))
+    body, _ = described_by(motion)
+    return by_relative_errors(body, fit_by_inertias(motion, inputs.fit.times, inputs.fit.by_attitudes))
 
 
 def _drawn(rng: np.random.Generator, draws: int, covariance: Array) -> Array:
@@ -389,7 +283,7 @@ def _smoothing_bias(found: Derivatives, covariances: list[Array], deviations: Ar
     shifts = []
     for name, covariance in zip(_ROTATIONS, covariances, strict=True):
         values, vectors = np.linalg.eigh(covariance)
-        known = values > _NEGATIVE * max(float(values[-1]), 0.0)
+        known = values > _ROUNDING * max(float(values[-1]), 0.0)
         turn = vectors.T @ (getattr(found.by_knots, name) @ taken)
         shifts.append(float(np.sqrt((turn[known] ** 2 / values[known]).sum())))
     for name, deviation in zip(_PHASES, deviations, strict=True):
@@ -403,7 +297,13 @@ def _rotation(motion: Motion, parts: PhaseSplit, name: str) -> Array:
 
 
 def _uncertainty(
-    parts: PhaseSplit, covariances: list[Array], deviations: Array, *, draws: int, smoothing_bias: float = 0.0
+    parts: PhaseSplit,
+    covariances: list[Array],
+    deviations: Array,
+    start: Array,
+    *,
+    draws: int,
+    smoothing_bias: float = 0.0,
 ) -> Uncertainty:
     final, total, holonomy, dynamical = covariances
     return Uncertainty(
@@ -414,6 +314,7 @@ def _uncertainty(
         dynamic_phase=float(deviations[0]),
         solid_angle=float(deviations[1]),
         montgomery_phase=float(deviations[2]),
+        start=start,
         total_angle=_bar(parts.total_rotation, total),
         holonomy_angle=_bar(parts.holonomy, holonomy),
         smoothing_bias=smoothing_bias,

@@ -26,7 +26,8 @@ _SMALL_STEP = 1e-3
 _NO_STEP = 1e-11
 # A step is halved so many times, at most, to come nearer to the recording.
 _MOST_HALVINGS = 12
-_UNKNOWNS = 6
+# Of a turn of the start and a momentum.
+UNKNOWNS = 6
 # [rad] Ways on that differ by less are one; and how many are tried.
 _SAME_AXES = 0.2
 _MOST_LIKELY = 4
@@ -49,7 +50,9 @@ class RecordedMomentum:
     initial_attitude : (3, 3), base axes to the recorder's
     momentum_covariance : (3, 3) [(kg m^2/s)^2], as `uncertainty` takes it
     attitude_covariance : (3, 3) of the turn of the start, base axes [rad^2], as `uncertainty` takes it
-    covariance : (6, 6) of both, the turn of the start first
+    covariance : (6, 6) of both, the turn of the start first, as `uncertainty` takes it: by the noise of the recorded
+        attitudes alone; with that of the joints it is `uncertainty(fit.motion, start=fit, joints=...).start`
+    by_attitudes : (6, 3 N) their change by turns of the recorded attitudes, base axes
     noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
     residuals : (N, 3) from reconstructed to recorded attitudes, rotation vectors in base axes [rad]
     motion : the one that was fitted
@@ -71,6 +74,7 @@ class RecordedMomentum:
     momentum_covariance: Array
     attitude_covariance: Array
     covariance: Array
+    by_attitudes: Array
     noise: float
     residuals: Array
     motion: Motion
@@ -153,13 +157,14 @@ def momentum_from_recording(
     if noise is None:
         noise = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
     covariance = np.asarray(noise**2 * np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
-    of_axes = covariance[_UNKNOWNS:, _UNKNOWNS:] if find_axes else np.zeros((3, 3))
+    of_axes = covariance[UNKNOWNS:, UNKNOWNS:] if find_axes else np.zeros((3, 3))
     return RecordedMomentum(
         momentum=motion.momentum,
         initial_attitude=motion.initial_attitude,
-        momentum_covariance=covariance[3:_UNKNOWNS, 3:_UNKNOWNS],
+        momentum_covariance=covariance[3:UNKNOWNS, 3:UNKNOWNS],
         attitude_covariance=covariance[:3, :3],
-        covariance=covariance[:_UNKNOWNS, :_UNKNOWNS],
+        covariance=covariance[:UNKNOWNS, :UNKNOWNS],
+        by_attitudes=np.asarray(np.linalg.pinv(slopes)[:UNKNOWNS], dtype=np.float64),
         noise=noise,
         residuals=residuals,
         motion=motion,
@@ -272,7 +277,7 @@ class _Least:
         """Whether the recording allows other axes, too, by what a fit to given axes leaves."""
         slopes = self._slopes(near.motion)
         # A turn of the axes that start and momentum undo.
-        ours, others = slopes[:, _UNKNOWNS:], slopes[:, :_UNKNOWNS]
+        ours, others = slopes[:, UNKNOWNS:], slopes[:, :UNKNOWNS]
         alone = ours - others @ np.linalg.lstsq(others, ours, rcond=None)[0]
         weakest = float(np.linalg.svd(alone, compute_uv=False)[-1])
         return _spread(near.residuals) > _VAGUE_AXES * weakest
@@ -286,7 +291,7 @@ class _Least:
         """The change of all attitudes by start, momentum and, backwards, axes, base axes: (3 N, 6 or 9)."""
         found = responses(motion, self.times)
         found[:, :, :3] = found[:, :, :3] @ motion.initial_attitude
-        slopes = (so3.transpose(motion.attitude(self.times)) @ found).reshape(-1, _UNKNOWNS)
+        slopes = (so3.transpose(motion.attitude(self.times)) @ found).reshape(-1, UNKNOWNS)
         return np.hstack([slopes, np.tile(-np.eye(3), (len(self.times), 1))]) if self.find_axes else slopes
 
     def _nearer(self, motion: Motion, axes: Array, step: Array, before: float) -> tuple[Motion, Array, Array]:
@@ -294,8 +299,8 @@ class _Least:
         for halving in range(_MOST_HALVINGS):
             change = step * 0.5**halving
             start = motion.initial_attitude @ so3.exp(change[:3])
-            trial = self._reconstructed(motion.momentum + change[3:_UNKNOWNS], start)
-            turned = axes @ so3.exp(change[_UNKNOWNS:]) if self.find_axes else axes
+            trial = self._reconstructed(motion.momentum + change[3:UNKNOWNS], start)
+            turned = axes @ so3.exp(change[UNKNOWNS:]) if self.find_axes else axes
             residuals = self._residuals(trial, turned)
             if (residuals**2).sum() <= before:
                 break
@@ -307,7 +312,7 @@ class _Least:
         by_unit = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
         noise = float(np.sqrt((residuals**2).sum() / (residuals.size - unknowns)))
         floor = np.full(unknowns, _NO_STEP)
-        floor[3:_UNKNOWNS] *= float(np.linalg.norm(motion.momentum))
+        floor[3:UNKNOWNS] *= float(np.linalg.norm(motion.momentum))
         # What the tolerance of the reconstruction moves the fit by counts for nothing either.
         return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self.tolerance) * by_unit + floor))
 

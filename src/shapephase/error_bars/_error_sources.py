@@ -1,0 +1,170 @@
+"""What is not known exactly of a motion: noise of its joints, errors of its body's inertias, momentum and start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..body.family import BodyFamily
+from ..errors import ShapeError, unknown_name
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.files._labels import amounts
+from ..shape_space.path_samples import path_samples
+from ..shape_space.shape_path import ShapePath
+from ..shape_space.summaries import body_summary
+from .inertia_errors import InertiaErrors
+from .recorded_momentum import UNKNOWNS, RecordedMomentum
+from .result_derivatives import described_by
+
+# Negative eigenvalues of a covariance, relative to the largest: printed digits.
+_NEGATIVE = 1e-9
+# Relative errors of a link: of its mass, of its centre (3), of its inertia.
+_OF_A_LINK = 5
+# Of its own mass and inertia, what a link keeps in a draw at least.
+_LEAST_SHARE = 1e-3
+
+
+class Inputs(NamedTuple):
+    """Covariances of what is not known exactly: variances (m,) or matrices (m, m); None where it is exact.
+
+    Attributes
+    ----------
+    samples : of the path's samples
+    links : of the relative errors of each frame of the body's chain: mass, centre (3), inertia
+    momentum, attitude : (3, 3)
+    start : (6, 6) of attitude and momentum together
+    fit : that these come from: what else is not known moves it, too
+    """
+
+    samples: Array | None
+    links: Array | None
+    momentum: Array | None
+    attitude: Array | None
+    start: Array | None
+    fit: RecordedMomentum | None
+
+
+def inputs_of(
+    motion: Motion,
+    joints: ArrayLike | str | None,
+    inertias: InertiaErrors | None,
+    momentum: ArrayLike | None,
+    attitude: ArrayLike | None,
+    start: RecordedMomentum | ArrayLike | None,
+) -> Inputs:
+    """The arguments of `uncertainty`, checked."""
+    body, path = described_by(motion)
+    if start is not None and not (momentum is None and attitude is None):
+        raise ShapeError("start: it has the errors of momentum and attitude together; leave momentum and attitude out")
+    samples = None
+    if joints is not None:
+        through = path_samples(path)
+        numbers = through.count * path.n_shape
+        given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
+        if given.shape in ((), (path.n_shape,)):
+            each = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
+            if given.ndim == 0 or isinstance(joints, str):
+                each[_without_samples(path)] = 0.0
+            samples = np.tile(each**2, through.count)
+        else:
+            samples = _covariance(given, "joints", numbers)
+    links = None if inertias is None else _link_variances(body, inertias)
+    fit, together = None, None
+    if isinstance(start, RecordedMomentum):
+        fit, together = start, start.covariance
+        own = np.array_equal(fit.momentum, motion.momentum)
+        if not (own and np.array_equal(fit.initial_attitude, motion.initial_attitude)):
+            raise ShapeError("start: this fit has another momentum or start than the motion; its own is fit.motion")
+    elif start is not None:
+        together = _covariance(finite_array(start, "start"), "start", UNKNOWNS)
+    single = _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude")
+    return Inputs(samples, links, *single, start=together, fit=fit)
+
+
+def _without_samples(path: ShapePath) -> list[int]:
+    """The joints that rest where a reader was told, without a column in the file."""
+    resting = {} if path.record is None else path.record.get("at_rest", {})
+    return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
+
+
+def _by_joint(body: Body, text: str) -> Array:
+    """(n,) standard deviations from a text that says one of angles, of lengths or of both."""
+    said = amounts(text, "joints")
+    return np.array([said[joint.unit] for joint in body_summary(body).joints])
+
+
+def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
+    if given is None:
+        return None
+    array = finite_array(given, name)
+    return _deviations(array, name) ** 2 * np.eye(3) if array.ndim == 0 else _covariance(array, name, 3)
+
+
+def _deviations(given: Array, name: str) -> Array:
+    if np.any(given < 0.0):
+        raise ShapeError(f"{name}: a standard deviation is not negative, got {given}")
+    return given
+
+
+def _covariance(given: Array, name: str, numbers: int) -> Array:
+    if given.shape != (numbers, numbers):
+        raise ShapeError(
+            f"{name}: one standard deviation or a covariance ({numbers}, {numbers}) is needed, got {given.shape}"
+        )
+    scale = np.abs(given).max(initial=0.0)
+    if np.abs(given - given.T).max(initial=0.0) > _NEGATIVE * scale:
+        raise ShapeError(f"{name}: a covariance is symmetric")
+    least = np.linalg.eigvalsh(given)[0]
+    if least < -_NEGATIVE * scale:
+        raise ShapeError(f"{name}: a covariance has no negative eigenvalue, this one has {least:.3g}")
+    return 0.5 * (given + given.T)
+
+
+def _link_variances(body: Body, errors: InertiaErrors) -> Array:
+    """(5 (k + 1),)."""
+    deviations = np.zeros((len(body.chain.masses), _OF_A_LINK))
+    for name, columns in (("masses", slice(0, 1)), ("centres", slice(1, 4)), ("inertias", slice(4, 5))):
+        given = getattr(errors, name)
+        if isinstance(given, Mapping):
+            for link, one in given.items():
+                if link not in body.chain.link_frames:
+                    raise unknown_name(f"link of {body.name}", link, body.chain.link_frames)
+                frame, _ = body.chain.link_frames[link]
+                deviations[frame, columns] = _deviations(finite_array(one, f"{name} of link {link!r}", ()), name)
+        else:
+            deviations[:, columns] = _deviations(finite_array(given, name, ()), name)
+    return (deviations**2).ravel()
+
+
+def by_relative_errors(body: Body, derivative: Array) -> Array:
+    """From derivatives by the ten parameters of each frame (r, 10 (k + 1)) to those by its five relative errors."""
+    chain = body.chain
+    jacobian = np.zeros((len(chain.masses), 10, _OF_A_LINK))
+    entries = chain.inertias[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+    jacobian[:, 0, 0], jacobian[:, 4:, 0] = chain.masses, entries
+    for axis in range(3):
+        jacobian[:, 1 + axis, 1 + axis] = chain.masses * _gyration(body)
+    jacobian[:, 4:, 4] = entries
+    by_frame = derivative.reshape(*derivative.shape[:-1], len(chain.masses), 10)
+    return np.einsum("...kp,kpe->...ke", by_frame, jacobian).reshape(*derivative.shape[:-1], -1)
+
+
+def _gyration(body: Body) -> Array:
+    """The radius of gyration of each frame's mass: (k + 1,) [m]."""
+    masses, traces = body.chain.masses, np.trace(body.chain.inertias, axis1=1, axis2=2)
+    return np.sqrt(np.divide(0.5 * traces, masses, out=np.zeros_like(masses), where=masses > 0.0))
+
+
+def drawn_bodies(body: Body, errors: Array) -> BodyFamily:
+    """One body for each row of relative errors (draws, 5 (k + 1))."""
+    chain = body.chain
+    each = errors.reshape(len(errors), -1, _OF_A_LINK)
+    growth = np.maximum(1.0 + each[..., 0], _LEAST_SHARE)
+    tensors = (growth * np.maximum(1.0 + each[..., 4], _LEAST_SHARE))[..., None, None] * chain.inertias
+    centres = chain.centres + _gyration(body)[:, None] * each[..., 1:4]
+    return BodyFamily(body, growth * chain.masses, centres, tensors)

@@ -1,0 +1,48 @@
+"""How a fit of momentum and start to recorded attitudes answers to changes of the path and of the body's inertias.
+
+A change turns the attitude at each recorded time by eta(t_k), as `_along_motion` has it. The recording stays what it
+is, so that the fit moves as if it were recorded to have turned by -eta(t_k).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.inertial_regressor import by_link_parameters, link_motions
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.path_samples import path_samples
+from ._along_motion import AlongMotion, along_motion, responses
+from .result_derivatives import described_by
+
+
+def fit_by_samples(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+    """By the samples of the path: (6, N n); `by_attitudes` as `RecordedMomentum` has it."""
+    body, path = described_by(motion)
+    along = along_motion(motion, body, path, times)
+    rows = _by_added_momentum(motion, along, times, by_attitudes)
+    by_shape = rows @ np.swapaxes(body.angular_momentum_gradient(along.shapes, along.rates, along.spins), 1, 2)
+    samples = path_samples(path)
+    return samples.by_samples(samples.by_knots(along.times, by_shape, rows @ body.momentum_matrix(along.shapes)))
+
+
+def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+    """By mass, first moment and inertia of the frames of the body as in `Derivatives.by_inertias`: (6, 10 (k + 1))."""
+    body, path = described_by(motion)
+    along = along_motion(motion, body, path, times)
+    rows = _by_added_momentum(motion, along, times, by_attitudes)
+    return by_link_parameters(link_motions(body.chain, along.shapes, along.rates), rows, along.spins)
+
+
+def _by_added_momentum(motion: Motion, along: AlongMotion, times: Array, by_attitudes: Array) -> Array:
+    """What a unit of internal angular momentum at each node, base axes, moves the fit by: (M, 6, 3)."""
+    # From a turn at the end of the motion to those at the recorded times that come of the same.
+    from_end = np.linalg.inv(along.adjoint_at_start.T)
+    at_times = responses(motion, times)[:, :, :3] @ from_end
+    by_turn = np.moveaxis(by_attitudes.reshape(len(by_attitudes), -1, 3), 1, 0)
+    by_end = by_turn @ so3.transpose(motion.attitude(times)) @ at_times
+    # What happens at a node turns only what is recorded later.
+    later = np.concatenate([np.cumsum(by_end[::-1], axis=0)[::-1], np.zeros((1, *by_end.shape[1:]))])
+    carried = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse
+    return along.weights[:, None, None] * (later[np.searchsorted(times, along.times)] @ carried)

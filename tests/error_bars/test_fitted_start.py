@@ -1,0 +1,127 @@
+"""Error bars of motions whose momentum and start were fitted to a recorded base."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.error_bars._fit_answers import fit_by_inertias, fit_by_samples
+from shapephase.errors import ShapeError
+from shapephase.shape_space.path_samples import path_samples
+
+_NOISE = np.radians(0.4)
+_MOMENTUM = np.array([4.0, -6.0, 40.0])
+_START = so3.exp(np.array([0.3, 0.2, 0.1]))
+_BODY = sp.load_body("diver")
+
+
+def arms(times: np.ndarray) -> np.ndarray:
+    return np.stack([1.2 + np.sin(2.0 * np.pi * times), 1.0 + np.cos(5.0 * times)], axis=1)
+
+
+def through(samples: np.ndarray, duration: float = 0.6) -> sp.Deformation:
+    times = np.linspace(0.0, duration, len(samples))
+    return sp.articulated(_BODY, sp.ShapePath.spline(times, samples, periodic=False))
+
+
+def fitted(deformation: sp.Deformation, times: np.ndarray, attitudes: np.ndarray) -> sp.RecordedMomentum:
+    return sp.momentum_from_recording(deformation, times, attitudes, noise=_NOISE, tolerance=1e-10)
+
+
+@pytest.fixture(scope="module")
+def exact() -> sp.RecordedMomentum:
+    """A fit that leaves nothing: only then is the response by derivatives of the first order exact."""
+    deformation, times = through(arms(np.linspace(0.0, 0.6, 10))), np.linspace(0.05, 0.55, 12)
+    motion = sp.reconstruct(deformation, _MOMENTUM, _START, tolerance=1e-10)
+    return fitted(deformation, times, motion.attitude(times))
+
+
+def test_a_fit_answers_to_samples_as_fits_to_others_show(exact: sp.RecordedMomentum):
+    """Central differences of fits to one recording; the recorded times are no knots of the path."""
+    samples = path_samples(exact.motion.deformation.description.path).values
+    found = fit_by_samples(exact.motion, exact.times, exact.by_attitudes)
+    attitudes, step = exact.motion.attitude(exact.times), 1e-4
+    for row, joint in ((0, 1), (4, 0)):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = samples.copy()
+            moved[row, joint] += sign * step
+            ends.append(fitted(through(moved), exact.times, attitudes))
+        turn = so3.log(ends[1].initial_attitude.T @ ends[0].initial_attitude)
+        change = np.concatenate([turn, ends[0].momentum - ends[1].momentum]) / (2.0 * step)
+        np.testing.assert_allclose(found[:, 2 * row + joint], change, atol=1e-6 * np.linalg.norm(change))
+
+
+def test_a_body_that_is_heavier_throughout_has_more_momentum_in_the_same_attitudes(exact: sp.RecordedMomentum):
+    chain = _BODY.chain
+    parameters = np.zeros((len(chain.masses), 10))
+    parameters[:, 0] = chain.masses
+    parameters[:, 4:] = chain.inertias[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+    change = fit_by_inertias(exact.motion, exact.times, exact.by_attitudes) @ parameters.ravel()
+    np.testing.assert_allclose(change[:3], 0.0, atol=1e-9)
+    np.testing.assert_allclose(change[3:], exact.momentum, atol=1e-8)
+
+
+def test_the_covariance_of_a_fit_is_that_of_its_answers_to_attitudes(exact: sp.RecordedMomentum):
+    np.testing.assert_allclose(
+        exact.covariance,
+        _NOISE**2 * exact.by_attitudes @ exact.by_attitudes.T,
+        rtol=1e-9,
+        atol=1e-12 * np.abs(exact.covariance).max(),
+    )
+
+
+def test_errors_of_start_and_momentum_go_together(exact: sp.RecordedMomentum):
+    """Without the terms across they are those of both alone; with them less is left of the attitude at the end."""
+    motion, alone = exact.motion, exact.covariance.copy()
+    alone[:3, 3:] = alone[3:, :3] = 0.0
+    parts = sp.uncertainty(motion, momentum=exact.momentum_covariance, attitude=exact.attitude_covariance)
+    apart, joint = sp.uncertainty(motion, start=alone), sp.uncertainty(motion, start=exact.covariance)
+    np.testing.assert_allclose(apart.total_rotation, parts.total_rotation, rtol=1e-12)
+    assert apart.montgomery_phase == pytest.approx(parts.montgomery_phase, rel=1e-12)
+    np.testing.assert_allclose(apart.start, parts.start, rtol=1e-12)
+    np.testing.assert_allclose(joint.start, exact.covariance, rtol=1e-12)
+    turns = sp.derivatives(motion)
+    both = np.hstack([turns.by_attitude.final_attitude, turns.by_momentum.final_attitude])
+    np.testing.assert_allclose(joint.final_attitude, both @ exact.covariance @ both.T, rtol=1e-10)
+    assert np.trace(joint.final_attitude) < 0.5 * np.trace(apart.final_attitude)
+    whole = sp.uncertainty(motion, start=exact)
+    np.testing.assert_allclose(whole.final_attitude, joint.final_attitude, rtol=1e-12)
+
+
+def test_masses_that_are_not_known_move_the_momentum_instead_of_the_attitudes(exact: sp.RecordedMomentum):
+    """Whatever the masses, the recorded attitudes are what they are; the momentum that goes with them is not."""
+    errors = sp.InertiaErrors(masses=0.05)
+    fixed, moved = (
+        sp.uncertainty(exact.motion, inertias=errors),
+        sp.uncertainty(exact.motion, inertias=errors, start=exact),
+    )
+    assert np.trace(moved.final_attitude) < 0.05 * np.trace(fixed.final_attitude)
+    assert not fixed.start.any()
+    # Nearly as much as the mass of the largest link.
+    size = np.sqrt(np.trace(moved.start[3:, 3:])) / np.linalg.norm(exact.momentum)
+    assert 0.02 < size < 0.06
+
+
+@pytest.mark.parametrize("draws", [12, pytest.param(200, marks=pytest.mark.full)])
+def test_draws_of_what_goes_together_scatter_as_the_first_order_says(draws: int, exact: sp.RecordedMomentum):
+    given = {"joints": 0.005, "start": exact}
+    first = sp.uncertainty(exact.motion, **given)
+    drawn = sp.sampled_uncertainty(exact.motion, **given, draws=draws, seed=2)
+    allowed = 4.0 / np.sqrt(2.0 * draws) + 0.02
+    for name in ("final_attitude", "total_rotation", "start"):
+        ratio = np.sqrt(np.diag(getattr(drawn, name)) / np.diag(getattr(first, name)))
+        np.testing.assert_allclose(ratio, 1.0, atol=allowed)
+
+
+def test_what_does_not_go_together(exact: sp.RecordedMomentum):
+    for given in ({"momentum": 0.1}, {"attitude": 0.1}):
+        with pytest.raises(ShapeError, match="leave momentum and attitude out"):
+            sp.uncertainty(exact.motion, start=exact, **given)
+    other = sp.reconstruct(exact.motion.deformation, 2.0 * exact.momentum, exact.initial_attitude, tolerance=1e-6)
+    with pytest.raises(ShapeError, match=r"its own is fit\.motion"):
+        sp.uncertainty(other, start=exact)
+    with pytest.raises(ShapeError, match=r"start: .*\(6, 6\)"):
+        sp.uncertainty(exact.motion, start=np.eye(3))
