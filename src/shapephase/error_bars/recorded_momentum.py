@@ -109,7 +109,8 @@ def momentum_from_recording(
     deformation : how the body changes its shape meanwhile
     times : (N,) within it, ascending, three or more [s]
     attitudes : (N, 3, 3), base axes to the recorder's; nearer to each other than half a turn
-    noise : standard deviation of each component of a recorded attitude [rad]; None: what the fit leaves
+    noise : standard deviation of each component of a recorded attitude [rad]; None: what the fit leaves, which holds
+        what noise of the joints turns the reconstruction by, too
     tolerance : of the reconstruction [rad]
     find_axes : whether the attitudes are those of axes that are fixed to the base in an unknown way, which is fitted
         too: from the way on with which the momentum, roughly, stays most constant
