@@ -111,6 +111,7 @@ _HEADER = _row(1, "time", "hip", "wrist", "boom")
 _FIRST = _row(2, 0, 0, 0, 0)
 _POSE = b"""<mujoco><worldbody><body name="a" axisangle="nan 0 1 30"><freejoint/>
 <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+_STATE = "header: {stamp: 1.0}\n"
 _OPENSIM = "Coordinates\nnRows={}\nnColumns=4\ninDegrees=no\nendheader\ntime hip wrist boom\n" + _ROWS.replace(",", " ")
 
 CASES = {
@@ -130,6 +131,12 @@ CASES = {
     ),
     "a count of rows with zeros before it": Case(
         make=lambda: _motion("motion.mot", _OPENSIM.format("000000000000000000003")), outcome="accepted"
+    ),
+    "a name of 70,000 characters in a message": Case(
+        make=lambda: _motion(
+            "motion.yaml", f"{_STATE}name: [{'x' * 70_000}]\nposition: [1]\n---\n{_STATE}name: []\nposition: []\n"
+        ),
+        said="a joint's name has 70000 characters: 'xxx",
     ),
     "a row that openpyxl leaves out": Case(
         make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, 0.1, 0.1) + _row(0, 2, 0, 0, 0)),

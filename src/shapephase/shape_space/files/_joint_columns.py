@@ -13,11 +13,9 @@ from ...body.body import Body
 from ...errors import TrajectoryError, UnknownColumnError, unknown_name
 from ._base_columns import BaseChoices, BaseColumns, BaseMotion
 from ._labels import ANGLES, LENGTHS, SI, Label, in_square_brackets, label, quantity
-from ._recording import Recording
+from ._recording import LONGEST_NAME, Recording
 from ._unit_doubts import check_unit, warn_of_values
 
-LONGEST_NAME = 256
-"""Characters of a column's name, as of a joint's name in a body's file."""
 _STILL = 1e-9
 """Range of a coordinate [rad, m or degrees] below which it was locked."""
 _SAME = 1e-6

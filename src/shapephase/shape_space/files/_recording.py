@@ -17,6 +17,8 @@ from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 
 MOST_BYTES = 256 * 2**20
 """Size of a motion file [bytes]; as numbers in memory it takes several times as much."""
+LONGEST_NAME = 256
+"""Characters of a column's name, as of a joint's name in a body's file."""
 _UNEVEN_STEPS = 100.0
 """A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
 

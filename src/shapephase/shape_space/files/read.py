@@ -24,9 +24,9 @@ from ..shape_path import ShapePath
 from ._base_columns import base_choices
 from ._flight import Flight, flight_argument, in_flight
 from ._inputs import read_input
-from ._joint_columns import LONGEST_NAME, JointChoices, Matched, matched
+from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
-from ._recording import Recording, Table
+from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
 from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument

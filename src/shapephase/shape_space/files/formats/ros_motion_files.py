@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
-from .._recording import Table, check_size, check_text, number
+from .._recording import LONGEST_NAME, Table, check_size, check_text, number
 from .parser_process import table_apart
 from .strict_yaml import Word, yaml_documents
 
@@ -209,6 +209,13 @@ def _bag_time(time: Any) -> int:
     return time.sec * _NANO + time.nanosec
 
 
+def _check_lengths(names: Iterable[str], where: str) -> None:
+    """Raise TrajectoryError for a name that no message can show."""
+    for name in names:
+        if len(name) > LONGEST_NAME:
+            raise TrajectoryError(f"{where}: a joint's name has {len(name)} characters: {name[:40]!r}...")
+
+
 def _of_states(messages: list[_State], where: str, label: str) -> Table:
     """Messages with some of the joints each, merged by their times."""
     stamped = any(message.stamp for message in messages)
@@ -219,6 +226,7 @@ def _of_states(messages: list[_State], where: str, label: str) -> Table:
     if messages and not stamped and not any(message.recorded for message in messages):
         raise TrajectoryError(f"{where}: the messages have no times; record them with header stamps")
     joints = list(dict.fromkeys(name for message in messages for name in message.names))
+    _check_lengths(joints, where)
     rows: dict[int, dict[str, float]] = {}
     numbers: dict[int, int] = {}
     for count, (stamp, recorded, names, positions) in enumerate(messages, start=1):
@@ -247,6 +255,7 @@ def _of_states(messages: list[_State], where: str, label: str) -> Table:
 def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Table:
     """One trajectory, or several one after the other by the times of their headers."""
     joints = trajectories[0].names if trajectories else []
+    _check_lengths([name for trajectory in trajectories for name in trajectory.names], where)
     for count, trajectory in enumerate(trajectories, start=1):
         doubled = [name for name, times in Counter(trajectory.names).items() if times > 1]
         if doubled:
