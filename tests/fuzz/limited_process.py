@@ -156,6 +156,8 @@ class _Child:
         before, _ = _used()
         for part in _TRIALS[request["kind"]](request):
             print(json.dumps(part), file=parts, flush=True)
+        # Whoever waits for the next input may wait long.
+        signal.alarm(0)
         seconds, memory = _used()
         print(json.dumps({"seconds": seconds - before, "memory": memory}), file=parts, flush=True)
 
