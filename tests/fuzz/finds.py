@@ -138,6 +138,10 @@ CASES = {
         ),
         said="a joint's name has 70000 characters: 'xxx",
     ),
+    "the same name beside what is no number": Case(
+        make=lambda: _motion("motion.yaml", f"{_STATE}name: [{'x' * 70_000}]\nposition: [x]\n"),
+        said="a joint's name has 70000 characters: 'xxx",
+    ),
     "a row that openpyxl leaves out": Case(
         make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, 0.1, 0.1) + _row(0, 2, 0, 0, 0)),
         said="row 0 comes after row 3",

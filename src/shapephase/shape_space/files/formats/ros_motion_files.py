@@ -354,7 +354,9 @@ def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
 def _yaml_names(value: Any, place: str) -> list[str]:
     if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
         raise TrajectoryError(f"{place}: a list of joint names is needed")
-    return [entry.text for entry in value]
+    names = [entry.text for entry in value]
+    _check_lengths(names, place)
+    return names
 
 
 def _yaml_numbers(value: Any, place: str, key: str, names: list[str]) -> list[float]:
