@@ -33,6 +33,7 @@ COMMANDS = {
     "plot.svg": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "plot.pdf": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "plot.png": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
+    "explore.html": ("explore", "cat_two_halves", "--joints", "waist_pitch", ("waist_yaw", "waist_roll"), "--html"),
     "plan.csv": ("plan", "cat_two_halves", "--rotate", ("10", "12"), "--out"),
     "plan.html": ("plan", "cat_two_halves", "--rotate", ("10", "12"), "--html"),
     "conjugate.svg": ("conjugate", "1", "2", ("3", "4"), "--out"),

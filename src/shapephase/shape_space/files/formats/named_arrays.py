@@ -45,7 +45,7 @@ def arrays_table(
             raise unknown_name(f"structure in {where}", chosen, sorted(groups))
         inside = entries[chosen]
     for _ in range(_DEEPEST):
-        columns = _matrix(where, inside) or _vectors(inside)
+        columns = _matrix(where, inside) or _vectors(where, inside)
         if columns:
             base = _base_columns(inside)
             of_base = {label: units[name] for label, name, _ in base if units and name in units}
@@ -77,15 +77,15 @@ def _matrix(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
     others = [
         (name, vector)
         for name, value in entries.items()
-        if name != found[0] and (vector := _vector(value)) is not None and len(vector) == len(matrix)
+        if name != found[0] and (vector := _vector(where, name, value)) is not None and len(vector) == len(matrix)
     ]
     return [*others, *((name, matrix[:, k]) for k, name in enumerate(names))]
 
 
-def _vectors(entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
+def _vectors(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
     """Vectors as long as the longest; single numbers, such as a sampling rate, are none."""
-    vectors = {name: vector for name, value in entries.items() if (vector := _vector(value)) is not None}
-    return list(vectors.items())
+    found = ((name, _vector(where, name, value)) for name, value in entries.items())
+    return [(name, vector) for name, vector in found if vector is not None]
 
 
 def _base_columns(entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
@@ -98,10 +98,18 @@ def _base_columns(entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
     return found
 
 
-def _vector(value: Any) -> Any:
-    """A vector of two entries or more, a matrix of one row or column among them; None for anything else."""
+def _vector(where: str, name: str, value: Any) -> Any:
+    """A vector of two entries or more, a matrix of one row or column among them; None for anything else.
+
+    Of true and false it is one of ones and zeros, so that it is not left out in silence. Raises TrajectoryError for one
+    of complex numbers.
+    """
     if not isinstance(value, np.ndarray) or value.size < 2 or value.size != max(value.shape, default=0):
         return None
+    if value.dtype.kind == "c":
+        raise TrajectoryError(f"{where}: {name} holds complex numbers; write its real part alone")
+    if value.dtype.kind == "b":
+        return value.ravel().astype(np.float64)
     return value.ravel() if value.dtype.kind in "fiumM" else None
 
 
