@@ -8,6 +8,11 @@ The folders are the rooms of the theory, from the bottom up: `body` (a model and
 
 from lazy_loader import attach_stub
 
+from .offers import offer
+
 __version__ = "0.1.0"
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+
+offer("Motion.plot", "shapephase.plotting.named_figures", "motion_figure")
+offer("Motion.view", "shapephase.plotting.viewer", "view")

@@ -15,6 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from ..arrays import Array, Integers
+from ..cards import short_repr
 from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
 from ._drawing_limits import within_limits
@@ -80,6 +81,8 @@ class Visual:
     mesh: Path | None = None
     vertices: Array = field(default_factory=lambda: np.zeros((0, 3)))
     faces: Integers = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+
+    __repr__ = short_repr
 
     @property
     def corners(self) -> Array:

@@ -16,8 +16,10 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, check_reach, common_batch, finite_array
+from ..cards import card_html
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
+from ._card import body_card
 from ._changed_body import changed_body
 from ._given_inertias import Given, given_inertias
 from ._joint_map import JointMap
@@ -89,6 +91,9 @@ class Body:
     def __repr__(self) -> str:
         """One line for people."""
         return f"Body({self.name!r}, {self.n_shape} joints, {self.mass:.6g} kg)"
+
+    _repr_html_ = card_html
+    _card = body_card
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the per-thread work space."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
+from ..cards import short_repr
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
 from .link_rows import LinkRows, link_rows, rows_with
@@ -56,6 +57,8 @@ class JointChain:
     matrix: Array
     offset: Array
     link_frames: Mapping[str, tuple[int, Array]]
+
+    __repr__ = short_repr
 
     @cached_property
     def rows(self) -> LinkRows:

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..arrays import Array
+from ..cards import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,8 @@ class MovingPart:
     mass: float
     centre: Array
     inertia: Array
+
+    __repr__ = short_repr
 
 
 def moving_parts(model: pin.Model) -> tuple[MovingPart, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound
@@ -45,6 +46,8 @@ class ArcLengthBounds:
     by_drift: float
     by_energy: float
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class AzimuthBounds:
@@ -68,6 +71,8 @@ class AzimuthBounds:
     slow: Array
     fast: Array
     monotone: bool
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +99,8 @@ class ReturnTimeBounds:
     by_azimuth: float
     within: bool
     latest: float
+
+    __repr__ = short_repr
 
 
 def arc_length_bounds(bounds: EnergyBounds) -> ArcLengthBounds:

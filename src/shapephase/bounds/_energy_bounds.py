@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import body_momentum_argument
 from ..arrays import Array
+from ..cards import short_repr
 from ..deformation.deformation import Deformation
 from ._enclosure import ROUND_UP, Enclosure, enclosure
 
@@ -60,6 +61,8 @@ class EnergyBounds:
     upper: Array
     rate_lower: Array
     rate_upper: Array
+
+    __repr__ = short_repr
 
     @property
     def least(self) -> float:

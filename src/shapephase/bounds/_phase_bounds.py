@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..cards import short_repr
 from ..errors import ShapeError
 from ._arc_bounds import azimuth_bounds
 from ._energy_bounds import EnergyBounds
@@ -32,6 +33,8 @@ class PhaseBounds:
 
     lower: float
     upper: float
+
+    __repr__ = short_repr
 
     @property
     def width(self) -> float:

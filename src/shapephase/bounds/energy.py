@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
@@ -44,6 +45,8 @@ class EnergyRate:
 
     by_inertia: Array
     by_internal_momentum: Array
+
+    __repr__ = short_repr
 
     @property
     def total(self) -> Array:
@@ -76,6 +79,8 @@ class FrozenPolhode:
     homoclinic_energy: float
     period: float
     regime: str
+
+    __repr__ = short_repr
 
 
 def momentum_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, positive_argument, vector_argument
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
@@ -74,6 +75,8 @@ class KeplerOrbit:
     axes: Array
     mean_anomaly: float
     centre: Array
+
+    __repr__ = short_repr
 
     @staticmethod
     def from_state(
@@ -232,6 +235,8 @@ class GravityTorque:
     impulse: float
     attitude_error: float
     tolerance: float
+
+    __repr__ = short_repr
 
     @property
     def is_free(self) -> bool:

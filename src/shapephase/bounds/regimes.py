@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import body_momentum_argument, check_object
 from ..arrays import Array, Mask, finite_array
+from ..cards import short_repr
 from ..deformation.deformation import Deformation
 from ._enclosure import Enclosure
 from ._energy_bounds import EnergyBounds, energy_bounds
@@ -85,6 +86,8 @@ class RegimeCertificate:
     plane: Array
     why: str
 
+    __repr__ = short_repr
+
     @property
     def certain(self) -> bool:
         """Whether Pi stays on one side of the plane across the axis."""
@@ -128,6 +131,8 @@ class CrownRegion:
     """
 
     certificate: RegimeCertificate
+
+    __repr__ = short_repr
 
     def contains(self, momenta: ArrayLike) -> Mask:
         """Whether Pi may be there at some time of the interval: (..., 3), of any norm above 0 -> (...)."""

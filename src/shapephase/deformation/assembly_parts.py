@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Array
+from ..cards import short_repr
 from ..shape_space.shape_path import ShapePath
 
 
@@ -88,6 +89,8 @@ class RigidPart:
     moment: Array
     path: ShapePath | None = None
 
+    __repr__ = short_repr
+
     def moments(self, times: Array, origin: Array) -> Moments:
         """As `Part`."""
         arm = self.centre - origin
@@ -124,6 +127,8 @@ class MovingMass:
 
     mass: float
     path: ShapePath
+
+    __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
         """As `Part`."""
@@ -170,6 +175,8 @@ class Boom:
     root: Array
     direction: Array
     path: ShapePath
+
+    __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
         """As `Part`."""

@@ -21,6 +21,7 @@ from ..arguments import (
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.family import BodyFamily
+from ..cards import card_html, card_text, short_repr
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
@@ -29,6 +30,7 @@ from ..shape_space.body_path import path_gap
 from ..shape_space.family_variants import FamilyVariants
 from ..shape_space.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
+from ._card import deformation_card
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from .descriptions import (
     ArticulatedDescription,
@@ -78,6 +80,8 @@ class Deformation:
     made_from: Mapping[str, Any] = field(default_factory=dict)
 
     __post_init__ = lock_arrays
+    __repr__, _repr_html_ = card_text, card_html
+    _card = deformation_card
 
     @cached_property
     def breaks(self) -> Array:
@@ -212,6 +216,8 @@ class DeformationFamily(Sequence[Deformation]):
 
     bodies: BodyFamily
     path: ShapePath
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """N."""

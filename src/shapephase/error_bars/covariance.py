@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, lock_arrays
+from ..cards import short_repr
 from ..deformation.deformation import articulated
 from ..errors import ShapeError
 from ..phases.phase_split import PhaseSplit
@@ -74,6 +75,7 @@ class Uncertainty:
     draws: int = 0
 
     __post_init__ = lock_arrays
+    __repr__ = short_repr
 
 
 def uncertainty(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..cards import short_repr
+
 
 @dataclass(frozen=True, kw_only=True)
 class InertiaErrors:
@@ -30,3 +32,5 @@ class InertiaErrors:
     masses: float | Mapping[str, float] = 0.0
     centres: float | Mapping[str, float] = 0.0
     inertias: float | Mapping[str, float] = 0.0
+
+    __repr__ = short_repr

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array, lock_arrays
+from ..cards import short_repr
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..reconstruction.reconstruction import Motion, reconstruct
@@ -83,6 +84,7 @@ class RecordedMomentum:
     axes_covariance: Array
 
     __post_init__ = lock_arrays
+    __repr__ = short_repr
 
     @property
     def angles(self) -> Array:

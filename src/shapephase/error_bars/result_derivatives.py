@@ -12,6 +12,7 @@ from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..body.inertial_regressor import by_link_parameters, link_motions
+from ..cards import short_repr
 from ..deformation.descriptions import ArticulatedDescription
 from ..errors import ShapeError, WrongObjectError
 from ..reconstruction.reconstruction import Motion
@@ -48,6 +49,7 @@ class ResultDerivative:
     montgomery_phase: Array
 
     __post_init__ = lock_arrays
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from scipy.optimize import root_scalar
 from .. import so3
 from ..arguments import vector_argument
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..deformation.deformation import Deformation, prescribed
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..rigid_body.euler_top import EulerTop
@@ -79,6 +80,8 @@ class Example:
     turn: float | None = None
     rigid: EulerTop | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class TimeReparametrisedRigid:
@@ -99,6 +102,8 @@ class TimeReparametrisedRigid:
 
     top: EulerTop
     clock: Callable[[Array], Array]
+
+    __repr__ = short_repr
 
     def attitude(self, t: ArrayLike) -> Array:
         """R(t): times (...) -> (..., 3, 3)."""
@@ -130,6 +135,8 @@ class AxialMotion:
     momentum: Array
     axial: Callable[[Array], Array]
     transverse: Callable[[Array], Array]
+
+    __repr__ = short_repr
 
     def attitude(self, t: ArrayLike) -> Array:
         """R(t): times (...) -> (..., 3, 3)."""
@@ -166,6 +173,8 @@ class Scale:
 
     factor: Callable[[Array], ArrayLike]
     clock: Callable[[Array], Array] | None = None
+
+    __repr__ = short_repr
 
     def at(self, times: Array) -> Array:
         """The factor: (...) -> (...). Raises ShapeError for another shape, or where it is not above 0."""
@@ -222,6 +231,8 @@ class SteadyTurn:
 
     momentum: Array
     angular_velocity: Array
+
+    __repr__ = short_repr
 
     def attitude(self, t: ArrayLike) -> Array:
         """R(t): times (...) -> (..., 3, 3)."""

@@ -10,6 +10,7 @@ import numpy as np
 from ..arguments import positive_argument
 from ..arrays import Array
 from ..body.catalog import load_body
+from ..cards import short_repr
 from ..deformation.deformation import articulated
 from ..deformation.gauge import horizontal_gauge
 from ..errors import TrajectoryError, unknown_name
@@ -43,6 +44,8 @@ class NamedMotion:
     body: str
     path: Callable[[], ShapePath]
     about: str
+
+    __repr__ = short_repr
 
 
 def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:

@@ -12,6 +12,7 @@ from .. import so3
 from ..arguments import positive_argument, tolerance_argument
 from ..arrays import Array
 from ..body.body import Body
+from ..cards import short_repr
 from ..errors import ShapeError
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import mechanical_connection
@@ -69,6 +70,8 @@ class JacobiFields:
     charge_scale: float
     solution: Callable[[Array], Array]
 
+    __repr__ = short_repr
+
     def matrix(self, t: Array) -> Array:
         """Change of shape and turn of the base (inertial axes) by g rate and charge: (N,) -> (N, n + 3, n + 3)."""
         n = self.n_shape
@@ -100,6 +103,8 @@ class ConjugateTime:
 
     time: float
     multiplicity: int
+
+    __repr__ = short_repr
 
 
 def jacobi_fields(

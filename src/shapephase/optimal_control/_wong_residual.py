@@ -11,6 +11,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
+from ..cards import short_repr
 from ..errors import AccuracyNotReached
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
@@ -53,6 +54,8 @@ class WongFit:
     charge: Array
     rate: Array
     residual: float
+
+    __repr__ = short_repr
 
 
 def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> WongFit:

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 from ..arrays import Array
 from ..body.body import Body
+from ..cards import card_html, card_text, short_repr
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
+from ._card import plan_card
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,8 @@ class Progress:
     iteration: int
     cost: float
     infeasibility: float
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,8 @@ class Start:
     infeasibility: float
     iterations: int
     seconds: float
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +119,6 @@ class Plan:
     iterations: int
     seconds: float
     starts: tuple[Start, ...]
+
+    __repr__, _repr_html_ = card_text, card_html
+    _card = plan_card

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, finite_array, real_array
+from ..cards import short_repr
 from ..errors import ShapeError, unknown_name
 
 METHODS = ("collocation", "reduced")
@@ -50,6 +51,8 @@ class Goal:
     somersaults: float | None = None
     half_twists: float | None = None
     twist_axis: ArrayLike = (0.0, 0.0, 1.0)
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check what is given and keep it as read-only arrays."""
@@ -106,6 +109,8 @@ class Limits:
     joint_limits: bool = True
     rate_limits: ArrayLike | None = None
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         """Check what is given and keep it as a read-only array."""
         if not isinstance(self.joint_limits, bool | np.bool_):
@@ -155,6 +160,8 @@ class Search:
     seed: int = 0
     pieces: int | None = None
     iterations: int = 300
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check what is given."""

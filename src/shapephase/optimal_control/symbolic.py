@@ -12,6 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ..body.body import Body
 from ..body.joint_chain import JointChain
+from ..cards import short_repr
 from ..errors import unknown_name
 
 QUANTITIES = ("inertia", "momentum_matrix", "connection", "centre_of_mass", "shape_metric")
@@ -64,6 +65,8 @@ class SymbolicBody:
     shape_metric: Any
     chain: JointChain = field(repr=False)
     _made: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    __repr__ = short_repr
 
     @property
     def n_shape(self) -> int:

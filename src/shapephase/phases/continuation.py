@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, direction_argument, magnitudes_argument
 from ..arrays import Array
+from ..cards import short_repr
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, TrajectoryError
 from ._loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
@@ -52,6 +53,8 @@ class OrbitBranch:
     trace: Array
     stopped: str | None
     fold: float | None
+
+    __repr__ = short_repr
 
 
 def continued_orbits(

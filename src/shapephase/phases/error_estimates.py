@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arrays import Array
+from ..cards import short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +43,8 @@ class SplitErrors:
     momentum_gap: Array
     closing_phase: Array
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class RunningErrors:
@@ -59,6 +62,8 @@ class RunningErrors:
     geometric_phase: Array
     montgomery_phase: Array
     solid_angle: Array
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,3 +87,5 @@ class ArcErrors:
     polygon_angle: Array
     total_phase: Array
     total_tilt: Array
+
+    __repr__ = short_repr

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..arrays import Array, Mask
+from ..cards import card_html, card_text, short_repr
 from ..plain_data import plain
+from ._cards import split_card
 from ._deferred import Deferred
 from .error_estimates import SplitErrors
 from .split_text import split_lines
@@ -36,6 +38,8 @@ class SplitMotion:
     momentum: Array
     error_estimate: Array
     evaluations: int
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +101,9 @@ class PhaseSplit:
     has_phase: Mask
     about: SplitMotion = field(repr=False)
     _errors: Deferred[SplitErrors] = field(repr=False)
+
+    __repr__, _repr_html_ = card_text, card_html
+    _card = split_card
 
     def __str__(self) -> str:
         """The table that the command line prints; of a batch, how far each number spreads."""

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from .. import so3, sphere
 from ..arguments import check_object, times_argument
 from ..arrays import Array, Integers, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.motion_record import write_table
@@ -171,6 +172,8 @@ class RunningPhases:
     residual: Array
     error_estimates: RunningErrors
 
+    __repr__ = short_repr
+
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """Write a time series: each phase in degrees, then in radians, the solid angle, and the jumps so far.
 
@@ -294,6 +297,8 @@ class ArcPhases:
     total_phase: Array
     total_tilt: Array
     error_estimates: ArcErrors
+
+    __repr__ = short_repr
 
 
 def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") -> ArcPhases:

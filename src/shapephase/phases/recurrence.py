@@ -14,6 +14,7 @@ import numpy as np
 from .. import so3
 from ..arguments import check_object
 from ..arrays import Array, Integers, Mask, finite_array
+from ..cards import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
 from ..reconstruction.reconstruction import Motion
@@ -63,6 +64,8 @@ class Returns:
     times: Array
     gaps: Array
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
@@ -89,6 +92,8 @@ class Crossings:
     angles: Array
     gaps: Array
     retraced: Array
+
+    __repr__ = short_repr
 
 
 def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:

@@ -17,10 +17,12 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, direction_argument, magnitude_argument
 from ..arrays import Array, Integers
+from ..cards import card_html, card_text, short_repr
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ._cards import fixed_points_card
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
 from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
 
@@ -60,6 +62,8 @@ class ReturnMap:
     start: Array
     end: Array
     solution: SteppedRotation
+
+    __repr__ = short_repr
 
     @property
     def gap(self) -> Array:
@@ -119,6 +123,9 @@ class FixedPoints:
     index_sum: int
     complete: bool
     tolerance: float
+
+    __repr__, _repr_html_ = card_text, card_html
+    _card = fixed_points_card
 
 
 def stroboscopic_map(

@@ -1,14 +1,11 @@
-"""Names of users as figures and pages show them: letter by letter, whatever they are."""
+"""Names of users as figures show them: letter by letter, whatever they are."""
 
 from __future__ import annotations
 
+from ..letters import printable
+
 # Letters of a name in a figure: more would leave no room for the curves.
 _MAX_LETTERS = 32
-
-
-def printable(name: str) -> str:
-    """A text with what cannot be printed, or changes the direction of writing, written out."""
-    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in name)
 
 
 def plain_text(name: str) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..arguments import check_object
+from ..cards import short_repr
 from ..errors import ShapeError, unknown_name
 from ..files import write_whole
 from ..phases._momentum_curve import Gauge
@@ -52,6 +53,8 @@ class Figure:
     draw: Callable[[Axes, Motion, ShapePath | None, Gauge], object]
     with_momentum: bool = False
     with_path: bool = False
+
+    __repr__ = short_repr
 
 
 def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
@@ -103,6 +106,25 @@ FIGURES: Mapping[str, Figure] = {
 }
 
 
+def motion_figure(
+    motion: Motion, kind: str | None = None, *, ax: Axes | None = None, gauge: Gauge = "horizontal"
+) -> Axes:
+    """One of `FIGURES` as axes: `Motion.plot`, which says the rest."""
+    named = kind or ("phases" if motion.momentum.any() else "attitude")
+    axes = column_axes(_figure_of(named, motion).height) if ax is None else ax
+    FIGURES[named].draw(axes, motion, getattr(motion.deformation.description, "path", None), gauge)
+    return axes
+
+
+def _figure_of(kind: str, motion: Motion) -> Figure:
+    """A kind of figure that this motion has. Raises UnknownNameError, ShapeError."""
+    if kind not in FIGURES:
+        raise unknown_name("kind of figure", kind, FIGURES)
+    if FIGURES[kind].with_momentum and not motion.momentum.any():
+        raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
+    return FIGURES[kind]
+
+
 def figure_image(
     kind: str, motion: Motion, path: ShapePath | None = None, gauge: Gauge = "horizontal", *, ending: str = "svg"
 ) -> bytes:
@@ -129,13 +151,9 @@ def figure_image(
     b'<?xml'
     """
     check_object(motion, "Motion", "motion")
-    if kind not in FIGURES:
-        raise unknown_name("kind of figure", kind, FIGURES)
+    figure = _figure_of(kind, motion)
     if ending not in ("svg", "pdf", "png"):
         raise unknown_name("kind of image", ending, ("svg", "pdf", "png"))
-    figure = FIGURES[kind]
-    if figure.with_momentum and not motion.momentum.any():
-        raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
     ax = column_axes(figure.height)
     figure.draw(ax, motion, path, gauge)
     return axes_image(ax, ending)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import initial_state_arguments, times_argument
 from ..arrays import Array, Integers, lock_arrays
+from ..cards import short_repr
 from ..deformation.deformation import DeformationFamily
 from ..errors import ShapeError, unknown_name
 from ..integrator.variants.rotations import VariantRotations, rotations_of_variants
@@ -48,6 +49,7 @@ class MotionFamily(Sequence[Motion]):
     solution: VariantRotations
 
     __post_init__ = lock_arrays
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         """N."""

@@ -20,8 +20,9 @@ from ..arguments import (
     tolerance_argument,
 )
 from ..arrays import Array, Integers, common_batch, finite_array, lock_arrays, read_only
+from ..cards import short_repr
 from ..deformation.deformation import Deformation, DeformationFamily
-from ..errors import ShapeError, unknown_name
+from ..errors import unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
@@ -29,16 +30,12 @@ from ..integrator.lift import Lift, error_turns, lift_along
 from ..integrator.many_rotations import GroupedRotations, assembled
 from ..integrator.stepped import SteppedRotation
 from ..run_progress import RunProgress, watched
+from ._motion_views import MotionViews
 from ._solvers import METHODS, SOLVERS, Solution, check_pieces
-from .motion_record import MotionRecord, read_motion_record, write_motion_record, write_table
+from .motion_record import MotionRecord, read_motion_record, write_motion_record
 
 if TYPE_CHECKING:
     from .motion_family import MotionFamily
-
-_COLUMNS = (
-    "time", "qx", "qy", "qz", "qw", "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s",
-    "base_x_m", "base_y_m", "base_z_m",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +61,11 @@ class Sensitivity:
     by_attitude: Array
 
     __post_init__ = lock_arrays
+    __repr__ = short_repr
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(MotionViews):
     """How a free body turns: attitude, body angular momentum and angular velocity at any time of [0, T].
 
     Results have the shape batch + t.shape + item, where batch are the leading axes of momentum and attitude.
@@ -289,28 +287,6 @@ class Motion:
             solution=self.stepped,
         )
         write_motion_record(record, path)
-
-    def write_csv(self, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike) -> None:
-        """Write a time series: attitude (x y z w, one sign throughout), angular velocity, base position.
-
-        Parameters
-        ----------
-        times : (N,) [s]; None: 201 even times
-        fall : start, velocity, gravity as in `base_position`
-
-        Raises
-        ------
-        ShapeError
-            If the motion is a batch.
-        """
-        if self.batch:
-            raise ShapeError(f"a table holds one motion, this is a batch of {self.batch}; reconstruct one of them")
-        t = np.linspace(0.0, self.duration, 201) if times is None else finite_array(times, "times", (None,), unit="s")
-        quaternions = self.quat_xyzw(t)
-        flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
-        quaternions[1:] *= np.cumprod(flips)[:, None]
-        columns = [t, *quaternions.T, *self.angular_velocity(t).T, *self.base_position(t, **fall).T]
-        write_table(path, dict(zip(_COLUMNS, columns, strict=True)))
 
     @cached_property
     def _flat_attitude(self) -> Array:

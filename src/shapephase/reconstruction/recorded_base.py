@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from .reconstruction import Motion
 
@@ -35,6 +36,8 @@ class BaseDifference:
     times: Array
     rotation: Array
     angle: Array
+
+    __repr__ = short_repr
 
 
 def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> BaseDifference:

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import moments_argument
 from ..arrays import Array, common_shape, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from .pendulum import RigidBodyPendulum, rigid_body_pendulum
@@ -44,6 +45,8 @@ class AndoyerPendulum:
 
     moments: Array
     """(3,) principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
+
+    __repr__ = short_repr
 
     def coordinates(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """G, y in (-pi, pi] and p_y of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].

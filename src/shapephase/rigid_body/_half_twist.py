@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, common_shape, finite_array
+from ..cards import short_repr
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import ascending_moments
@@ -47,6 +48,8 @@ class HalfTwist:
     complement: Array
     rate: Array
     growth_rate: Array
+
+    __repr__ = short_repr
 
 
 def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from .. import elliptic
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 
@@ -77,6 +78,8 @@ class MomentumOrbit:
     precession: float
     sense: float
     condition: float
+
+    __repr__ = short_repr
 
     def directions(self, u: Array) -> Array:
         """Pi/|Pi|: (...) -> (..., 3)."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..elliptic import complete_k, incomplete_f, jacobi
 from ..errors import ShapeError
 from .lagrange_top import LagrangeTop
@@ -46,6 +47,8 @@ class Nutation:
     complement: float
     period: float
     _phase: float = field(repr=False)
+
+    __repr__ = short_repr
 
     def height(self, t: ArrayLike) -> Array:
         """cos(theta) at times t: (...) -> (...)."""

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, Mask, common_batch, finite_array
+from ..cards import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
 
@@ -46,6 +47,8 @@ class EulerChart:
     name: str
     node: tuple[float, float]
     """The x and y components of the axis of the middle turn."""
+
+    __repr__ = short_repr
 
     def attitude(self, angles: ArrayLike) -> Array:
         """The rotation from body to inertial axes: (..., 3) [rad] -> (..., 3, 3). Any real angles, poles included.

@@ -22,8 +22,10 @@ from numpy.typing import ArrayLike
 from .. import elliptic, so3
 from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
+from ..cards import card_html
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments, principal_axes
+from ._card import top_card
 from ._momentum_orbit import MomentumOrbit, momentum_orbit
 
 _TURNS = 1e12
@@ -114,6 +116,9 @@ class EulerTop:
         )
         columns = so3.quat_product(np.eye(4), np.broadcast_to(so3.quat_inverse(ends), (4, 4)))
         self._around = so3.quat_product(np.broadcast_to(left, (4, 4)), columns)
+
+    _repr_html_ = card_html
+    _card = top_card
 
     def __repr__(self) -> str:  # noqa: D105
         moments = ", ".join(f"{moment:.6g}" for moment in self.moments)

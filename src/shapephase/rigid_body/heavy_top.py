@@ -19,6 +19,7 @@ from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, common_batch, finite_array
+from ..cards import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 
@@ -78,6 +79,8 @@ class HeavyTop:
     mgl: Array
     chi: Array
     inverse: Array = field(init=False, repr=False)
+
+    __repr__ = short_repr
 
     def __init__(self, inertia: ArrayLike, mgl: ArrayLike, chi: ArrayLike = (0.0, 0.0, 1.0)) -> None:
         tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
@@ -274,6 +277,8 @@ class HeavyTopMotion:
     error_estimate: Array
     energy_drift: Array
     _run: _Run = field(repr=False)
+
+    __repr__ = short_repr
 
     def attitude(self, t: ArrayLike) -> Array:
         """R(t), body to inertial axes: (...) -> (..., 3, 3)."""

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, Mask, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError, SingularInertiaError
 from .heavy_top import HeavyTop, heavy_top_steps
 
@@ -48,6 +49,8 @@ class LagrangeTop:
     transverse: float
     axial: float
     mgl: float
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -106,6 +109,8 @@ class SleepingTop:
     spectrally_stable: bool
     verdict: str
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class StabilityChart:
@@ -131,6 +136,8 @@ class StabilityChart:
     spectrum: Mask
     simulation: Mask
     largest_tilt: Array
+
+    __repr__ = short_repr
 
 
 def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:

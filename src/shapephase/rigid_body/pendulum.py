@@ -30,6 +30,7 @@ from scipy.special import elliprf
 from .. import elliptic
 from ..arguments import moments_argument
 from ..arrays import Array, common_shape, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 
@@ -57,6 +58,8 @@ class PendulumEquilibrium:
     stability: str
     """"stable", "unstable", or "neutral" where the other two moments are equal and theta does not accelerate."""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class RigidBodyPendulum:
@@ -82,6 +85,8 @@ class RigidBodyPendulum:
     """1/(k_1 k_3)^2 = 1/k_1^2 - 1/k_2^2, so that theta'' = -stiffness r^2/2 sin(2 theta)."""
     orientation: float
     """sigma, 1 or -1: theta' = sigma p/(k_1 k_2)."""
+
+    __repr__ = short_repr
 
     def coordinates(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """r, theta in (-pi, pi] and p of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
@@ -226,6 +231,8 @@ class PendulumMotion:
     """The sine of the largest angle from the stable equilibrium; 0 at an equilibrium, 1 where theta rotates."""
     centre: float
     """The equilibrium angle that Jacobi's amplitude is counted from, a multiple of pi/2 [rad]."""
+
+    __repr__ = short_repr
 
     @property
     def modulus(self) -> float:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from .. import elliptic, so3, sphere
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from .euler_top import EulerTop
 from .portrait import inverse_difference
@@ -51,6 +52,8 @@ class Closure:
     lobes: int
     gap: float
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class Cones:
@@ -77,6 +80,8 @@ class Cones:
     precession_rate: float
     spin_rate: float
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Poinsot:
@@ -100,6 +105,8 @@ class Poinsot:
     """
 
     top: EulerTop
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Refuse a top at rest, which has no invariable plane."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import moments_argument
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 
@@ -39,6 +40,8 @@ class Equilibrium:
     direction: Array
     kind: str
     rate: float
+
+    __repr__ = short_repr
 
 
 def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:

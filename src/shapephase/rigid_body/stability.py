@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
+from ..cards import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 
@@ -74,6 +75,8 @@ class SteadyRotation:
     sphere_hessian: Array
     index: int
     verdict: str
+
+    __repr__ = short_repr
 
     def casimir(self, half_square: ArrayLike) -> Array:
         """Phi(x) = slope x + curvature/2 (x - x_e)^2 at x = |Pi|^2/2: (...) -> (...) [J].

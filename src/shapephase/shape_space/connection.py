@@ -13,6 +13,7 @@ from .. import so3
 from ..arguments import check_object, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..cards import short_repr
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -166,6 +167,8 @@ class HorizontalLift:
     body: Body
     path: ShapePath
     solution: SteppedRotation
+
+    __repr__ = short_repr
 
     @property
     def duration(self) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..cards import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap
 from .shape_path import CLOSED, ShapePath
@@ -35,6 +36,8 @@ class JointSummary:
     upper: float
     unit: str
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PartSummary:
@@ -58,6 +61,8 @@ class PartSummary:
     mass: float
     centre_of_mass: Array
     principal_moments: Array
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +99,8 @@ class BodySummary:
     links: tuple[str, ...]
     parts: tuple[PartSummary, ...]
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class PathSummary:
@@ -126,6 +133,8 @@ class PathSummary:
     still_joints: tuple[str, ...]
     gap: Array
     is_loop: bool
+
+    __repr__ = short_repr
 
 
 def body_summary(body: Body) -> BodySummary:

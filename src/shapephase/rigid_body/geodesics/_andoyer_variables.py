@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arguments import inertia_argument
 from ...arrays import Array, Mask, finite_array
+from ...cards import short_repr
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError
 from ...inertia_tensor import inverse_inertia
 from ..euler_angles import ZXZ, ZYZ, EulerChart
@@ -90,6 +91,8 @@ class AndoyerVariables:
     """K, conjugate to k: the component along the inertial third axis."""
     axial: Array
     """L, conjugate to l: the component along the body's third axis."""
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         names = ("g", "k", "l", "total", "vertical", "axial")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, folded_cosine
@@ -55,6 +56,8 @@ class ConjugatePoints:
     phase: Array
     """chi there, of the extremal mirrored northward [rad]."""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class ConjugateLocus:
@@ -75,6 +78,8 @@ class ConjugateLocus:
     """(N,) derivative of the conjugate time by the direction."""
     cusp_directions: Array
     """(C,) directions [rad] between which samples the rate changes sign, in the middle: cusps of the locus."""
+
+    __repr__ = short_repr
 
     @property
     def cusps(self) -> int:

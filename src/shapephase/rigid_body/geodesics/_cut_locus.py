@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...roots import safe_newton
 from ._conjugate_locus import conjugate_points
@@ -46,6 +47,8 @@ class CutLocus:
     """phi of the ends, ascending."""
     longitudes: tuple[float, float]
     """theta of the ends, ascending, about pi [rad]."""
+
+    __repr__ = short_repr
 
 
 def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:

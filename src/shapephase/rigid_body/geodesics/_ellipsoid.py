@@ -18,6 +18,7 @@ from scipy.special import elliprd, elliprf, elliprj
 
 from ... import elliptic
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
@@ -40,6 +41,8 @@ class EllipsoidStretch:
 
     aspect: float
     radius: float
+
+    __repr__ = short_repr
 
     def __call__(self, square: Array, rest: Array) -> tuple[Array, Array, Array]:
         """Y and 1 - Y, (N,) each -> D, D', D'', (N,) each."""

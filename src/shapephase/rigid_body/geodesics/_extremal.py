@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs
@@ -44,6 +45,8 @@ class Start:
     side: Array
     """1 for a northward start, -1 for a southward one."""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Extremal:
@@ -61,6 +64,8 @@ class Extremal:
 
     surface: SurfaceOfRevolution
     start: Start
+
+    __repr__ = short_repr
 
     def phase(self, times: ArrayLike) -> Array:
         """chi at times t, increasing, of the mirrored extremal where it starts southward [rad]."""

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from ... import elliptic, so3
 from ...arrays import Array, Mask, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
@@ -57,6 +58,8 @@ class SadovVariables:
     """dH/dJ: 2 pi over the period of the momentum in the body [rad/s]."""
     precession_rate: Array
     """dH/dG, the mean rate about the momentum [rad/s]."""
+
+    __repr__ = short_repr
 
 
 def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVariables:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, Integers, Mask, finite_array
+from ...cards import short_repr
 from ...inertia_tensor import ascending_moments
 from ._checks import check_entries
 
@@ -87,6 +88,8 @@ class GeodesicConstants:
     """c, the factor of the integral of the third kind."""
     second_kind: Array
     """q in a_3 u + q S(u), the factor of the integral S of the second kind."""
+
+    __repr__ = short_repr
 
     @property
     def oscillating(self) -> Mask:

@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 
 from ... import so3
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...roots import safe_newton
 
@@ -45,6 +46,8 @@ class AxisymmetricMetric:
     """I_1 [kg m^2]."""
     axial: float
     """I_3, infinite where turns about the axis are forbidden [kg m^2]."""
+
+    __repr__ = short_repr
 
     @property
     def eta(self) -> float:

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arrays import Array
+from ...cards import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ._momentum_flow import attitude_flow, exponential_derivative
 from .axisymmetric_cut import axisymmetric_metric
@@ -75,6 +76,8 @@ class ShortestGeodesic:
     lower_bound: float
     upper_bound: float
     residual: float
+
+    __repr__ = short_repr
 
 
 def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> ShortestGeodesic:

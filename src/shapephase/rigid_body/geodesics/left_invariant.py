@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arguments import inertia_argument, moments_argument
 from ...arrays import Array, common_batch, finite_array, real_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
 from ._conjugate_search import conjugate_times
@@ -56,6 +57,8 @@ class LeftInvariantMetric:
     """(3, 3) whose columns are the principal axes in body axes, determinant +1."""
     inverse_moments: Array
     """(3,) a_i = 1/I_i, descending [1/(kg m^2)]; 0 where the direction is forbidden."""
+
+    __repr__ = short_repr
 
     @property
     def is_sub_riemannian(self) -> bool:

@@ -16,6 +16,7 @@ from numpy.polynomial import chebyshev
 from scipy.fft import dct
 
 from ...arrays import Array
+from ...cards import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import safe_newton
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
@@ -79,6 +80,8 @@ class Assumptions:
     end: str
     """What is at the reach: "pole", "parallel" or "boundary"."""
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class TabulatedStretch:
@@ -100,6 +103,8 @@ class TabulatedStretch:
     """P times (3, terms): of the tabulated function and its two derivatives by Y."""
     has_root: bool
     """Whether sqrt(depth - Y) D is tabulated, instead of D."""
+
+    __repr__ = short_repr
 
     def __call__(self, square: Array, rest: Array) -> tuple[Array, Array, Array]:
         """Y and depth - Y, (N,) each -> D, D', D'', (N,) each."""

@@ -36,6 +36,7 @@ from scipy.special import elliprd, hyp2f1
 
 from ... import elliptic
 from ...arrays import Array, Mask, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...roots import safe_newton
 from ._checks import check_entries
@@ -62,6 +63,8 @@ class GeodesicFamily:
     """
 
     constants: GeodesicConstants
+
+    __repr__ = short_repr
 
     @property
     def p_theta(self) -> Array:
@@ -346,6 +349,8 @@ class EquatorialConjugatePoints:
     """(...) [sqrt(kg) m]; of a geodesic that starts upward. Its mirror image is conjugate too."""
     theta: Array
     """(...) from the start [rad]."""
+
+    __repr__ = short_repr
 
 
 def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
@@ -88,6 +89,8 @@ class SurfaceOfRevolution:
     """The integrals along extremals in closed form, where known."""
     splits: int
     """How fine the panels of the quadrature are."""
+
+    __repr__ = short_repr
 
     @property
     def greatest_momentum(self) -> float:

@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arguments import inertia_argument, moments_argument
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import principal_axes
 
@@ -64,6 +65,8 @@ class NambuPair:
     """(3, 3) symmetric, the matrix of N."""
     orientation: float
     """1 or -1."""
+
+    __repr__ = short_repr
 
     def values(self, momentum: ArrayLike) -> tuple[Array, Array]:
         """K and N, both constant along a motion: (..., 3) -> (...), (...).

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from .._flow import ascending_times, flow
 from .lie_algebra import LieAlgebra, Matrices, inertia_operator, linear_solution
 
@@ -45,6 +46,8 @@ class EulerPoincareMotion:
     velocity: Array
     adjoint: Array
     attitude: Matrices | None
+
+    __repr__ = short_repr
 
     @property
     def energy(self) -> Array:

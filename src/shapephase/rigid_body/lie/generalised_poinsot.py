@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import LieAlgebraError
 from .euler_poincare import EulerPoincareMotion, euler_poincare_rate
 from .lie_algebra import LieAlgebra, inertia_operator, linear_solution
@@ -39,6 +40,8 @@ class InvariableHyperplane:
 
     normal: Array
     level: Array
+
+    __repr__ = short_repr
 
     def offset(self, point: ArrayLike) -> Array:
         """<mu_s, x> - 2 E_0, zero on the hyperplane: (..., N, d) -> (..., N). Raises ShapeError."""
@@ -77,6 +80,8 @@ class RollingContact:
     contact_velocity: Array
     body_rate: Array
     space_rate: Array
+
+    __repr__ = short_repr
 
 
 def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: ArrayLike) -> InvariableHyperplane:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 
 _SYMMETRIC_PART = 1e-6
@@ -43,6 +44,8 @@ class ReducedBody:
     centre: Array
     positions: Array
     inertia: Array
+
+    __repr__ = short_repr
 
     def momentum(self, se3_momentum: ArrayLike) -> Array:
         """(Pi, P) about the material origin -> Pi - c x P about the centre of mass: (..., 6) -> (..., 3).

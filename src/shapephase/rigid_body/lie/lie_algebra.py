@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import LieAlgebraError, ShapeError
 
 Matrices = NDArray[Any]
@@ -60,6 +61,8 @@ class LieAlgebra:
     structure: Array
     basis: Matrices | None = None
     name: str = "Lie algebra"
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check the laws once, and keep structure constants that are exactly antisymmetric and read-only."""

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ... import so3
 from ...arrays import Array, finite_array
+from ...cards import short_repr
 from ...errors import ShapeError
 
 
@@ -40,6 +41,8 @@ class MagneticEquilibrium:
     moment: Array
     energy: Array
     spectrum: NDArray[np.complex128]
+
+    __repr__ = short_repr
 
 
 def magnetic_hamiltonian(moment: ArrayLike, field: ArrayLike) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ... import so3
 from ...body.body import Body
+from ...cards import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ._base_columns import ESTIMATE
 from ._free_fall import FreeFall, free_fall
@@ -45,6 +46,8 @@ class Flight:
     last_time: float
     by: str
     fall: FreeFall | None = None
+
+    __repr__ = short_repr
 
     @property
     def record(self) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from ...arguments import check_object, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
+from ...cards import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
 from ...provenance import provenance
@@ -78,6 +79,8 @@ class RecordedMotion:
     smoothing: Smoothing | None = None
     closing: Closing | None = None
     flight: Flight | None = None
+
+    __repr__ = short_repr
 
 
 def read_recorded_motion(

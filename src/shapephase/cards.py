@@ -1,0 +1,169 @@
+"""How results show themselves: in a few lines of text, and as cards of HTML with a small picture.
+
+A card has a title and rows of a name and a value with its unit; `repr` prints it as text and notebooks show it as HTML.
+Results without a card of their own print their fields by `short_repr`. Neither is ever longer than nine lines.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from .arrays import Array
+from .letters import printable, shortened
+
+MOST_LINES = 9
+"""Of a `repr`."""
+MOST_LETTERS = 1000
+"""Of a `repr`, less than which it has."""
+# Of a line.
+_WIDTH = 100
+# Letters of a value, a name, a title.
+_LONGEST_VALUE = 60
+# Entries of an array or a tuple that are shown one by one.
+_FEW = 4
+_STYLE = (
+    "display:inline-flex;flex-wrap:wrap;gap:1em;align-items:center;font-size:90%;border:1px solid #8886;"
+    "border-radius:6px;padding:0.5em 0.8em"
+)
+
+
+@dataclass(frozen=True)
+class Card:
+    """What is shown of an object.
+
+    Attributes
+    ----------
+    title : what it is, with its name
+    rows : names and values with their units
+    picture : SVG, or nothing
+    """
+
+    title: str
+    rows: Sequence[tuple[str, str]]
+    picture: str = ""
+
+    def text(self) -> str:
+        """The title and the rows in lines."""
+        shown = [(name, shortened(printable(value), _LONGEST_VALUE)) for name, value in self.rows[: MOST_LINES - 1]]
+        width = max((len(name) for name, _ in shown), default=0)
+        return "\n".join([_title(self.title), *(f"  {name:<{width}}  {value}" for name, value in shown)])
+
+    def html(self) -> str:
+        """Title, rows and picture as HTML; names are escaped."""
+        left = 'style="text-align:left"'
+        cells = "".join(
+            f"<tr><th {left}>{_escaped(name)}</th><td {left}>{_escaped(value)}</td></tr>" for name, value in self.rows
+        )
+        table = f'<table style="border-collapse:collapse">{cells}</table>'
+        words = f"<div><strong>{html.escape(_title(self.title))}</strong>{table}</div>"
+        return f'<div class="shapephase-card" style="{_STYLE}">{words}{self.picture}</div>'
+
+
+class HasCard(Protocol):
+    """An object with a card."""
+
+    def _card(self) -> Card: ...
+
+
+def card_text(self: HasCard) -> str:
+    """The `repr` of an object with a card."""
+    return self._card().text()
+
+
+def card_html(self: HasCard) -> str:
+    """What a notebook shows of an object with a card."""
+    return self._card().html()
+
+
+def short_repr(self: Any) -> str:
+    """The fields of a dataclass in a few lines: arrays by their shapes, other objects by their kinds."""
+    parts = [f"{field.name}={_value(getattr(self, field.name))}" for field in fields(self) if field.repr]
+    name = type(self).__name__
+    whole = f"{name}({', '.join(parts)})"
+    if len(whole) <= _WIDTH:
+        return whole
+    lines = [f"{name}("]
+    for part in parts:
+        if len(lines) > 1 and len(lines[-1]) + len(part) + 2 <= _WIDTH:
+            lines[-1] += f" {part},"
+        else:
+            lines.append(f"    {part},")
+    if len(lines) >= MOST_LINES:
+        lines = [*lines[: MOST_LINES - 2], "    …"]
+    return "\n".join([*lines, ")"])
+
+
+def numbers(values: Any, unit: str = "") -> str:
+    """A few numbers in brackets, one alone without, with their unit."""
+    entries = np.atleast_1d(values)
+    shown = " ".join(f"{value + 0.0:.6g}" for value in entries.ravel())
+    return f"{shown if np.ndim(values) == 0 else f'({shown})'}{f' {unit}' if unit else ''}"
+
+
+def angle_text(angle: Any) -> str:
+    """An angle in degrees and radians; of a batch its spread, in degrees."""
+    if np.ndim(angle):
+        spread = np.degrees([np.min(angle), np.max(angle)]) if np.size(angle) else np.zeros(2)
+        return f"{spread[0]:.4f} to {spread[1]:.4f} deg"
+    return f"{np.degrees(angle) + 0.0:.6f} deg ({float(angle) + 0.0:.6f} rad)"
+
+
+def error_text(error: Any) -> str:
+    """An error estimate; of a batch its largest."""
+    most = float(np.max(error)) if np.size(error) else 0.0
+    return f"{most:.1e} rad{' at most' if np.ndim(error) else ''}"
+
+
+def momentum_text(momentum: Array) -> str:
+    """One angular momentum; of a batch how many there are, and their sizes."""
+    if momentum.ndim == 1:
+        return numbers(momentum, "kg m^2/s")
+    sizes = np.linalg.norm(momentum, axis=-1)
+    spread = f", {sizes.min():.4g} to {sizes.max():.4g} kg m^2/s" if sizes.size else ""
+    return f"a batch {momentum.shape[:-1]}{spread}"
+
+
+def _title(title: str) -> str:
+    return shortened(printable(title), _WIDTH)
+
+
+def _escaped(text: str) -> str:
+    return html.escape(printable(text))
+
+
+def _value(value: Any) -> str:
+    """An entry of a `short_repr`."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        if value.ndim == 1 and value.size <= _FEW and value.dtype.kind in "fiub":
+            return f"[{', '.join(_number(entry) for entry in value)}]"
+        return f"array{value.shape}"
+    if isinstance(value, np.ndarray | np.generic):
+        return _number(value[()])
+    if isinstance(value, bool | int | float):
+        return _number(value)
+    if value is None:
+        return "None"
+    if isinstance(value, str):
+        return repr(shortened(value, _LONGEST_VALUE))
+    if isinstance(value, Mapping):
+        return f"{{{len(value)} entries}}" if value else "{}"
+    if isinstance(value, tuple | list):
+        if len(value) <= _FEW and all(isinstance(entry, str | bool | int | float | np.generic) for entry in value):
+            shown = ", ".join(map(_value, value))
+            if len(shown) <= _LONGEST_VALUE:
+                return f"({shown})"
+        return f"({len(value)} entries)"
+    if is_dataclass(value) or not callable(value):
+        return f"{type(value).__name__}(…)"
+    return getattr(value, "__name__", type(value).__name__)
+
+
+def _number(value: Any) -> str:
+    if isinstance(value, bool | np.bool_ | int | np.integer):
+        return str(value)[:_LONGEST_VALUE]
+    return f"{value:.6g}" if isinstance(value, float | np.floating) else str(value)[:_LONGEST_VALUE]

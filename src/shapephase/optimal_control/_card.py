@@ -1,0 +1,32 @@
+"""What is shown of a plan."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..card_pictures import MOST_POINTS, curves_picture
+from ..cards import Card, angle_text, momentum_text, numbers
+from ..so3 import angle
+
+if TYPE_CHECKING:
+    from .plan import Plan
+
+import numpy as np
+
+
+def plan_card(self: Plan) -> Card:
+    """What turns by how much at which cost, how far off the goal, and how it was found; with its joints in time."""
+    units = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "time": "s"}
+    converged = sum(start.converged for start in self.starts)
+    rows = [
+        ("duration", numbers(self.path.duration, "s")),
+        ("momentum", momentum_text(self.motion.momentum)),
+        ("turned", angle_text(angle(self.motion.final_attitude))),
+        ("off the goal", f"{self.goal_error:.1e} rad"),
+        ("cost", f"{numbers(self.cost, units.get(self.cost_name, ''))} ({self.cost_name})"),
+        ("found by", f"{self.method}, {self.iterations} iterations, {self.seconds:.3g} s"),
+        ("starts", f"{len(self.starts)}, {converged} of them converged"),
+        ("KKT residual", f"{self.kkt_residual:.1e}"),
+    ]
+    shapes = self.path.shape(np.linspace(0.0, self.path.duration, MOST_POINTS))
+    return Card(f"Plan for {self.body.name}", rows, curves_picture(shapes, "joints in time"))
