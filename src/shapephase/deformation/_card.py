@@ -20,10 +20,10 @@ def deformation_card(self: Deformation) -> Card:
     title = f"Deformation: {self.label}"
     times = np.linspace(0.0, self.duration, MOST_POINTS)
     try:
-        inertia, internal = self.description.sample(times)
+        inertia, internal = self.inertia(times), self.internal_momentum(times)
     except ShapePhaseError as error:
         return Card(title, [*rows, ("cannot be evaluated", str(error))])
-    moments = np.linalg.eigvalsh(inertia)
+    moments = np.asarray(np.linalg.eigvalsh(inertia), dtype=np.float64)
     rows += [
         ("principal moments", f"{moments.min():.6g} to {moments.max():.6g} kg m^2"),
         ("internal momentum", f"up to {np.linalg.norm(internal, axis=-1).max():.6g} kg m^2/s"),

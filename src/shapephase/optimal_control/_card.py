@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..cards import Card, angle_text, momentum_text, numbers
 from ..so3 import angle
 
 if TYPE_CHECKING:
     from .plan import Plan
-
-import numpy as np
 
 
 def plan_card(self: Plan) -> Card:

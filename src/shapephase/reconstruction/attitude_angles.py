@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from .. import so3
 from ..arrays import Array
@@ -50,6 +49,9 @@ def euler_angles(attitudes: Array, sequence: str) -> Array:
         For another sequence.
     """
     check_sequence(sequence)
+    # Loaded when needed: it is a large part of SciPy.
+    from scipy.spatial.transform import Rotation
+
     with warnings.catch_warnings():
         # Where the gimbals lock the third angle is taken to be zero, and what follows is continued from there.
         warnings.filterwarnings("ignore", message="Gimbal lock", category=UserWarning)
