@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.cards import Card, card_html, card_text, short_repr
+from shapephase.display import Card, card_html, card_text, short_repr
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting, kane_scher
 from shapephase.plotting import plots

@@ -8,8 +8,11 @@ import numpy as np
 
 from .arrays import Array
 
-# Width, height and margin in pixels.
-_WIDTH, _HEIGHT, _MARGIN = 200.0, 90.0, 6.0
+# Of a picture, in pixels.
+_WIDTH = 200.0
+_HEIGHT = 90.0
+# Between its edge and what is drawn, in pixels.
+_MARGIN = 6.0
 # Colours of Okabe and Ito.
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # Dashes of the same, for print in black and white.

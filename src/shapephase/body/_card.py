@@ -9,7 +9,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..card_pictures import sticks_picture
-from ..cards import Card, numbers
+from ..display import Card, numbers
 
 if TYPE_CHECKING:
     from .body import Body

@@ -15,7 +15,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
 from ._drawing_limits import within_limits

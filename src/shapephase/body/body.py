@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, check_reach, common_batch, finite_array
-from ..cards import card_html
+from ..display import card_html
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
 from ._card import body_card

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..cards import short_repr
+from ..display import short_repr
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
 from .link_rows import LinkRows, link_rows, rows_with

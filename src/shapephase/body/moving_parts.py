@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..arrays import Array
-from ..cards import short_repr
+from ..display import short_repr
 
 
 @dataclass(frozen=True, eq=False)

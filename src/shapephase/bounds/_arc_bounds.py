@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound

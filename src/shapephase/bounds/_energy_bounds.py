@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import body_momentum_argument
 from ..arrays import Array
-from ..cards import short_repr
 from ..deformation.deformation import Deformation
+from ..display import short_repr
 from ._enclosure import ROUND_UP, Enclosure, enclosure
 
 # Relative rounding of one operation. The factors before it below count the operations of each formula, generously.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ._arc_bounds import azimuth_bounds
 from ._energy_bounds import EnergyBounds

@@ -14,7 +14,7 @@ import numpy as np
 from .. import so3, sphere
 from ..arguments import check_object, interval_argument
 from ..arrays import Array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
 from ._arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds

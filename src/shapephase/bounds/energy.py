@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
-from ..cards import short_repr
 from ..deformation.deformation import Deformation
+from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion

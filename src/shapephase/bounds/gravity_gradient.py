@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, positive_argument, vector_argument
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion

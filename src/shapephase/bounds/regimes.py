@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike
 
 from ..arguments import body_momentum_argument, check_object
 from ..arrays import Array, Mask, finite_array
-from ..cards import short_repr
 from ..deformation.deformation import Deformation
+from ..display import short_repr
 from ._enclosure import Enclosure
 from ._energy_bounds import EnergyBounds, energy_bounds
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import Array
-from ..cards import short_repr
+from ..display import short_repr
 from ..shape_space.shape_path import ShapePath
 
 

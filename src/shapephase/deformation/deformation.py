@@ -21,7 +21,7 @@ from ..arguments import (
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.family import BodyFamily
-from ..cards import card_html, card_text, short_repr
+from ..display import card_html, card_text, short_repr
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, lock_arrays
-from ..cards import short_repr
 from ..deformation.deformation import articulated
+from ..display import short_repr
 from ..errors import ShapeError
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..cards import short_repr
+from ..display import short_repr
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array, lock_arrays
-from ..cards import short_repr
 from ..deformation.deformation import Deformation
+from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ._along_motion import responses

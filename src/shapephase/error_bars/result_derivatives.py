@@ -12,8 +12,8 @@ from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..body.inertial_regressor import by_link_parameters, link_motions
-from ..cards import short_repr
 from ..deformation.descriptions import ArticulatedDescription
+from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples

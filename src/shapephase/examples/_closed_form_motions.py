@@ -14,8 +14,8 @@ from scipy.optimize import root_scalar
 from .. import so3
 from ..arguments import vector_argument
 from ..arrays import Array, finite_array
-from ..cards import short_repr
 from ..deformation.deformation import Deformation, prescribed
+from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..rigid_body.euler_top import EulerTop
 

@@ -10,9 +10,9 @@ import numpy as np
 from ..arguments import positive_argument
 from ..arrays import Array
 from ..body.catalog import load_body
-from ..cards import short_repr
 from ..deformation.deformation import articulated
 from ..deformation.gauge import horizontal_gauge
+from ..display import short_repr
 from ..errors import TrajectoryError, unknown_name
 from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..card_pictures import MOST_POINTS, curves_picture
-from ..cards import Card, angle_text, momentum_text, numbers
+from ..display import Card, angle_text, momentum_text, numbers
 from ..so3 import angle
 
 if TYPE_CHECKING:

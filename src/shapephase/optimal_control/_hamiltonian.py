@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from ..arrays import Array
 from ..body.body import Body
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import mechanical_connection

@@ -12,7 +12,7 @@ from .. import so3
 from ..arguments import positive_argument, tolerance_argument
 from ..arrays import Array
 from ..body.body import Body
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import mechanical_connection

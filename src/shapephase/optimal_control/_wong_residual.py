@@ -11,7 +11,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import AccuracyNotReached
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection

@@ -13,7 +13,7 @@ from .. import so3
 from ..arguments import check_object, positive_argument, times_argument, tolerance_argument, vector_argument
 from ..arrays import Array, check_reach
 from ..body.body import Body
-from ..cards import short_repr
+from ..display import short_repr
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.shape_path import ShapePath
 from ._hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..arrays import Array
 from ..body.body import Body
-from ..cards import card_html, card_text, short_repr
+from ..display import card_html, card_text, short_repr
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._card import plan_card

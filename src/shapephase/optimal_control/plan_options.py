@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, finite_array, real_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 
 METHODS = ("collocation", "reduced")

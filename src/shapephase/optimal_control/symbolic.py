@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array
 from ..body.body import Body
 from ..body.joint_chain import JointChain
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import unknown_name
 
 QUANTITIES = ("inertia", "momentum_matrix", "connection", "centre_of_mass", "shape_metric")

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, direction_argument, magnitudes_argument
 from ..arrays import Array
-from ..cards import short_repr
 from ..deformation.deformation import Deformation
+from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ._loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
 

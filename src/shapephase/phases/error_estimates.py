@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arrays import Array
-from ..cards import short_repr
+from ..display import short_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..arrays import Array, Mask
-from ..cards import card_html, card_text, short_repr
+from ..display import card_html, card_text, short_repr
 from ..plain_data import plain
-from ._cards import split_card
+from ._card import split_card
 from ._deferred import Deferred
 from .error_estimates import SplitErrors
 from .split_text import split_lines

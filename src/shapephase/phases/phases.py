@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .. import so3, sphere
 from ..arguments import check_object, times_argument
 from ..arrays import Array, Integers, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.motion_record import write_table

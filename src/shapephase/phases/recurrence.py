@@ -14,7 +14,7 @@ import numpy as np
 from .. import so3
 from ..arguments import check_object
 from ..arrays import Array, Integers, Mask, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
 from ..reconstruction.reconstruction import Motion

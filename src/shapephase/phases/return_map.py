@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, direction_argument, magnitude_argument
 from ..arrays import Array, Integers
-from ..cards import card_html, card_text, short_repr
 from ..deformation.deformation import Deformation
+from ..display import card_html, card_text, short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ._cards import fixed_points_card
+from ._card import fixed_points_card
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
 from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..arguments import check_object
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..files import write_whole
 from ..phases._momentum_curve import Gauge

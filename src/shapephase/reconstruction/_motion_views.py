@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import MOST_POINTS, curves_picture
-from ..cards import Card, card_html, card_text, error_text, momentum_text, numbers
+from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
 from ..errors import MissingExtraError, ShapeError
 from ..offers import offered
 from .attitude_angles import continued_rotation_vectors, euler_angles, somersault_tilt_twist

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import initial_state_arguments, times_argument
 from ..arrays import Array, Integers, lock_arrays
-from ..cards import short_repr
 from ..deformation.deformation import DeformationFamily
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..integrator.variants.rotations import VariantRotations, rotations_of_variants
 from .reconstruction import Motion

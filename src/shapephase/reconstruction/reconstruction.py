@@ -20,8 +20,8 @@ from ..arguments import (
     tolerance_argument,
 )
 from ..arrays import Array, Integers, common_batch, finite_array, lock_arrays, read_only
-from ..cards import short_repr
 from ..deformation.deformation import Deformation, DeformationFamily
+from ..display import short_repr
 from ..errors import unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation

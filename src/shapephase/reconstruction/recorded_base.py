@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from .reconstruction import Motion
 

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import moments_argument
 from ..arrays import Array, common_shape, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from .pendulum import RigidBodyPendulum, rigid_body_pendulum

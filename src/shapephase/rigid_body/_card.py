@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..card_pictures import MOST_POINTS, curves_picture
-from ..cards import Card, numbers
+from ..display import Card, numbers
 
 if TYPE_CHECKING:
     from .euler_top import EulerTop

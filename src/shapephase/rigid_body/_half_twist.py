@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, common_shape, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import ascending_moments

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..elliptic import complete_k, incomplete_f, jacobi
 from ..errors import ShapeError
 from .lagrange_top import LagrangeTop

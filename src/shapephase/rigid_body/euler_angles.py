@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, Mask, common_batch, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from .. import elliptic, so3
 from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
-from ..cards import card_html
+from ..display import card_html
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments, principal_axes
 from ._card import top_card

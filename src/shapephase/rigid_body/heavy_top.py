@@ -19,7 +19,7 @@ from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, common_batch, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 

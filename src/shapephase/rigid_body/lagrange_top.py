@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, Mask, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError, SingularInertiaError
 from .heavy_top import HeavyTop, heavy_top_steps
 

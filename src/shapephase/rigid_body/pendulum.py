@@ -30,7 +30,7 @@ from scipy.special import elliprf
 from .. import elliptic
 from ..arguments import moments_argument
 from ..arrays import Array, common_shape, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from .. import elliptic, so3, sphere
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from .euler_top import EulerTop
 from .portrait import inverse_difference

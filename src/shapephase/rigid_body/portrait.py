@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import moments_argument
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import inertia_argument
 from ..arrays import Array, finite_array
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..card_pictures import MOST_POINTS, curves_picture
-from ..cards import Card, numbers
+from ..display import Card, numbers
 from ..errors import ShapePhaseError
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _CLOSED = 1e-9
 
 
-def path_card(self: ShapePath) -> Card:
+def shape_path_card(self: ShapePath) -> Card:
     """How long it is, which joints move by how much, whether it closes; with its joints in time."""
     try:
         shapes = self.shape(np.linspace(0.0, self.duration, MOST_POINTS))

@@ -12,7 +12,7 @@ from .. import so3
 from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
-from ..cards import short_repr
+from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError
 from ..integrator.many_rotations import rotations_of_each
 from .body_path import path_samplers

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..arguments import breaks_argument, check_time_steps, positive_argument, times_argument
 from ..arrays import Array, check_reach, finite_array, lock_arrays
-from ..cards import card_html, card_text
+from ..display import card_html, card_text
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
-from ._card import path_card
+from ._card import shape_path_card
 from ._derived_scan import DerivedScan, JoinedScan
 from ._rate_check import check_rates
 from .curves import (
@@ -85,7 +85,7 @@ class ShapePath:
 
     __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
-    _card = path_card
+    _card = shape_path_card
 
     @staticmethod
     def fourier(

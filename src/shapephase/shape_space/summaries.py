@@ -9,7 +9,7 @@ import numpy as np
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
-from ..cards import short_repr
+from ..display import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap
 from .shape_path import CLOSED, ShapePath

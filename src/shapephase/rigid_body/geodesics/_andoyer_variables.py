@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arguments import inertia_argument
 from ...arrays import Array, Mask, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError
 from ...inertia_tensor import inverse_inertia
 from ..euler_angles import ZXZ, ZYZ, EulerChart

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, folded_cosine

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ...roots import safe_newton
 from ._conjugate_locus import conjugate_points

@@ -18,7 +18,7 @@ from scipy.special import elliprd, elliprf, elliprj
 
 from ... import elliptic
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch

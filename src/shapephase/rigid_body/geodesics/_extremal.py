@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, Integers, Mask, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...inertia_tensor import ascending_moments
 from ._checks import check_entries
 

@@ -23,7 +23,7 @@ from scipy.optimize import brentq
 
 from ... import so3
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ...roots import safe_newton
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arrays import Array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ._momentum_flow import attitude_flow, exponential_derivative
 from .axisymmetric_cut import axisymmetric_metric

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arguments import inertia_argument, moments_argument
 from ...arrays import Array, common_batch, finite_array, real_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
 from ._conjugate_search import conjugate_times

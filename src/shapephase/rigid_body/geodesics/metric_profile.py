@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev
 from scipy.fft import dct
 
 from ...arrays import Array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import safe_newton
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from ... import elliptic
 from ...arguments import moments_argument
 from ...arrays import Array, common_shape, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
 from ._serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants

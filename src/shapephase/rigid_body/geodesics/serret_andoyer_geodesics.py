@@ -36,7 +36,7 @@ from scipy.special import elliprd, hyp2f1
 
 from ... import elliptic
 from ...arrays import Array, Mask, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 from ...roots import safe_newton
 from ._checks import check_entries

@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits

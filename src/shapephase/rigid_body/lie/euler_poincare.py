@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from .._flow import ascending_times, flow
 from .lie_algebra import LieAlgebra, Matrices, inertia_operator, linear_solution
 

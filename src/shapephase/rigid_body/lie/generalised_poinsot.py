@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import LieAlgebraError
 from .euler_poincare import EulerPoincareMotion, euler_poincare_rate
 from .lie_algebra import LieAlgebra, inertia_operator, linear_solution

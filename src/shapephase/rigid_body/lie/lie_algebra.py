@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import LieAlgebraError, ShapeError
 
 Matrices = NDArray[Any]

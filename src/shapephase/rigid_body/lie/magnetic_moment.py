@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ... import so3
 from ...arrays import Array, finite_array
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError
 
 

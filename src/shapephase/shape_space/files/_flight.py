@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import so3
 from ...body.body import Body
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ._base_columns import ESTIMATE
 from ._free_fall import FreeFall, free_fall

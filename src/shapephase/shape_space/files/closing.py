@@ -14,7 +14,7 @@ from ... import so3
 from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import TrajectoryError, unknown_name
 from ..connection import horizontal_lift
 from ..curves import CLOSED, PiecewisePolynomial

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ...arguments import check_object, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
-from ...cards import short_repr
+from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
 from ...provenance import provenance

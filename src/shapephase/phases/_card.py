@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import so3
 from ..card_pictures import bars_picture, sphere_picture
-from ..cards import Card, angle_text, error_text, momentum_text, numbers
+from ..display import Card, angle_text, error_text, momentum_text, numbers
 
 if TYPE_CHECKING:
     from .phase_split import PhaseSplit
