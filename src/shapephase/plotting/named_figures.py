@@ -110,6 +110,7 @@ def motion_figure(
     motion: Motion, kind: str | None = None, *, ax: Axes | None = None, gauge: Gauge = "horizontal"
 ) -> Axes:
     """One of `FIGURES` as axes: `Motion.plot`, which says the rest."""
+    check_object(motion, "Motion", "motion")
     named = kind or ("phases" if motion.momentum.any() else "attitude")
     axes = column_axes(_figure_of(named, motion).height) if ax is None else ax
     FIGURES[named].draw(axes, motion, getattr(motion.deformation.description, "path", None), gauge)

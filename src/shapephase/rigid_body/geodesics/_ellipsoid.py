@@ -36,7 +36,7 @@ class EllipsoidStretch:
     --------
     >>> from shapephase.rigid_body import geodesics
     >>> geodesics.ellipsoid(0.5).stretch
-    EllipsoidStretch(aspect=0.5, radius=1.0)
+    EllipsoidStretch(aspect=0.5, radius=1)
     """
 
     aspect: float
