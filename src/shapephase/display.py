@@ -143,7 +143,7 @@ def _value(value: Any) -> str:
             return f"[{', '.join(_number(entry) for entry in value)}]"
         return f"array{value.shape}"
     if isinstance(value, np.ndarray | np.generic):
-        return _number(value[()])
+        return _number(np.asarray(value).item())
     if isinstance(value, bool | int | float):
         return _number(value)
     if value is None:
