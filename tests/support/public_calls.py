@@ -34,8 +34,11 @@ GIVEN: dict[str, Any] = {
     "count": 2,
     "owner": "the body",
 }
-# They make objects, write files or need more than a few numbers, and are called by name below or elsewhere.
-MAKERS = ("fourier", "spline", "waypoints", "function", "save", "write_csv", "with_inertias", "sampler", "samplers")
+# They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
+MAKERS = (
+    "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_inertias", "sampler", "samplers", "plot",
+    "view", "to_dataframe",
+)  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
