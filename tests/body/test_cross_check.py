@@ -16,8 +16,8 @@ import shapephase as sp
 from shapephase.body import catalog
 from shapephase.body._cross_check import check_against_file, inertia_and_momentum
 from shapephase.body._link_tree import LinkTree, Mimic
-from shapephase.body._urdf import urdf_tree
-from shapephase.body._xml_text import xml_tree
+from shapephase.body.formats.urdf import urdf_tree
+from shapephase.body.formats.xml_text import xml_tree
 from shapephase.errors import ModelFileError, ShapePhaseError
 from support.bodies import BODIES, joint, link, random_shapes, urdf
 from support.independent import turn, urdf_file

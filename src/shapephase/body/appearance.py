@@ -19,12 +19,12 @@ from ..display import short_repr
 from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
 from ._drawing_limits import within_limits
-from ._mjcf import Placed, contents_of, settings_of, with_defaults
-from ._mjcf_geometry import placed_geom
-from ._urdf import rpy_matrix
-from ._xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
 from .body import Body, MovingPart
 from .catalog import example_folder
+from .formats.mjcf import Placed, contents_of, settings_of, with_defaults
+from .formats.mjcf_geometry import placed_geom
+from .formats.urdf import rpy_matrix
+from .formats.xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
 
 Colour = tuple[float, float, float, float]
 _Piece = tuple[Array, Integers, Colour | None]

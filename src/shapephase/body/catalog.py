@@ -22,11 +22,11 @@ from ..errors import (
 )
 from ._cross_check import check_against_file
 from ._link_tree import inertia_warnings, massless_warning
-from ._mjcf import mjcf_tree
 from ._model_tree import checked_model, model_of
-from ._urdf import urdf_tree
-from ._xml_text import quoted, read_file, xml_tree
 from .body import Body
+from .formats.mjcf import mjcf_tree
+from .formats.urdf import urdf_tree
+from .formats.xml_text import quoted, read_file, xml_tree
 
 _EXAMPLE = "example:"
 _CHILD_SECONDS = 20

@@ -13,10 +13,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import ModelFileError
-from ._link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, Mimic, from_the_root
-from ._xml_text import (
+from ...arrays import Array
+from ...errors import ModelFileError
+from .._link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, Mimic, from_the_root
+from .xml_text import (
     Node,
     child_of,
     known_attributes,

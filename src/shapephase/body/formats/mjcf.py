@@ -14,11 +14,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array
-from ..errors import ModelFileError
-from ._link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root
-from ._mjcf_geometry import ORIENTATIONS, Orientation, joined_inertia, solid_of
-from ._xml_text import Node, child_of, name_of, needed_child, number, quoted, vector
+from ...arrays import Array
+from ...errors import ModelFileError
+from .._link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root
+from .mjcf_geometry import ORIENTATIONS, Orientation, joined_inertia, solid_of
+from .xml_text import Node, child_of, name_of, needed_child, number, quoted, vector
 
 _WRITE_OUT = (
     "let MuJoCo write the model out: m = mujoco.MjModel.from_xml_path(file); mujoco.mj_saveLastXML('plain.xml', m), "

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
-from ._link_tree import LEAST_MASS, MOST_MASS
-from ._xml_text import Node, number, numbers, quoted, vector
+from ...arrays import Array
+from .._link_tree import LEAST_MASS, MOST_MASS
+from .xml_text import Node, number, numbers, quoted, vector
 
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 # How many numbers the size of each kind of geom has in MJCF.

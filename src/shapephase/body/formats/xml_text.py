@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from xml.parsers import expat
 
-from ..errors import InputFileNotFoundError, ModelFileError
+from ...errors import InputFileNotFoundError, ModelFileError
 
 _MOST_BYTES = 16 * 2**20
 """Size of a file [bytes]; the largest body of example-robot-data has a fifth of a MiB."""

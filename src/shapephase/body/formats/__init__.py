@@ -1,0 +1,1 @@
+"""Bodies in files: URDF and MJCF, read from their XML."""
