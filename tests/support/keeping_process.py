@@ -62,7 +62,7 @@ def called(home: str, function: str = "twice", limit: int | None = None) -> dict
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        from shapephase.integrator.fast._jit import kernel
+        from shapephase.integrator.fast.kernels.jit import kernel
 
         made = kernel({"twice": twice, "thrice": thrice}[function])
         value = made(7.0)

@@ -17,11 +17,9 @@ import numpy as np
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev, derivative_matrix
 from ._rotation_step import momentum_step, product, rest_step, tableau, turned
+from .fast.estimate_constants import TERMS
 from .interpolant import Interpolant
 
-# Terms of Taylor's series at each end; the polynomials have twice as many coefficients. With six the polynomials are a
-# hundred times nearer to the motion than the steps of most tolerances, and more terms only add rounding.
-TERMS = 6
 # From the first neglected Chebyshev coefficient to the largest error of a Hermite polynomial: x (1 - x) is at most a
 # fourth, and the leading coefficient of that Chebyshev polynomial is 2^(4 TERMS - 1).
 _ERROR_OF_COEFFICIENT = 2.0 ** (2 * TERMS - 1)

@@ -14,9 +14,10 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._dense_output import TERMS, convolved, direction_terms, end_channels, hermite_matrix, piece_channels, transported
+from ._dense_output import convolved, direction_terms, end_channels, hermite_matrix, piece_channels, transported
 from .fast import engine
 from .fast.curves import curve_terms
+from .fast.estimate_constants import TERMS
 from .lift import Lift
 from .stepped import SteppedRotation
 

@@ -72,6 +72,6 @@ def _make_private(folder: Path) -> None:
 def _fingerprint() -> str:
     """Of the source of all kernels: a function that was compiled does not know when one that it calls has changed."""
     whole = hashlib.sha256()
-    for file in sorted(_HERE.glob("*.py")):
+    for file in sorted(_HERE.rglob("*.py")):
         whole.update(file.read_bytes())
     return whole.hexdigest()[:16]

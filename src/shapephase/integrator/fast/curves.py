@@ -39,4 +39,4 @@ def warm() -> None:
 
 @lru_cache(maxsize=1)
 def _kernel() -> Any:
-    return import_module("._curve_kernel", __package__)
+    return import_module(".kernels.curve_kernel", __package__)

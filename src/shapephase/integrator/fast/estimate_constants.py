@@ -95,6 +95,12 @@ ROUNDING_OF_STEP = 2.0
 ROUNDING_OF_RADIAN = 1.0
 """Units: of each radian turned."""
 
+# ---- Polynomials of the dense output -------------------------------------------------------------------------------
+
+TERMS = 6
+"""Of Taylor's series at each end of a piece; the polynomials have twice as many coefficients. With six they are a
+hundred times nearer to the motion than the steps of most tolerances, and more terms only add rounding."""
+
 # ---- Columns of a table of panels' estimates: nine numbers a panel -------------------------------------------------
 INVERSE = 0
 """Error of I^-1 by its tail; that of I^-1 L_o follows in the next column."""

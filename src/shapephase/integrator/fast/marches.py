@@ -133,17 +133,17 @@ def derivatives(
 
 @lru_cache(maxsize=1)
 def _derivative_kernel() -> Any:
-    return import_module("._derivative_kernel", __package__)
+    return import_module(".kernels.derivative_kernel", __package__)
 
 
 @lru_cache(maxsize=1)
 def _kernels() -> Any:
-    return import_module("._march_kernel", __package__)
+    return import_module(".kernels.march_kernel", __package__)
 
 
 @lru_cache(maxsize=1)
 def _growth_kernel() -> Any:
-    return import_module("._growth_kernel", __package__)
+    return import_module(".kernels.growth_kernel", __package__)
 
 
 def warm() -> None:

@@ -148,4 +148,4 @@ def _tables(degrees: tuple[int, ...]) -> tuple[Array, Integers, Array, Integers]
 
 @lru_cache(maxsize=1)
 def _kernel() -> Any:
-    return import_module("._panel_kernel", __package__)
+    return import_module(".kernels.panel_kernel", __package__)

@@ -94,7 +94,7 @@ def _sampled(
 
 @lru_cache(maxsize=1)
 def _kernel() -> Any:
-    return import_module("._tree_kernel", __package__)
+    return import_module(".kernels.tree_kernel", __package__)
 
 
 class _OneLink:

@@ -47,4 +47,4 @@ def warm() -> None:
 
 @lru_cache(maxsize=1)
 def _kernel() -> Any:
-    return import_module("._variant_kernel", __package__)
+    return import_module(".kernels.variant_kernel", __package__)

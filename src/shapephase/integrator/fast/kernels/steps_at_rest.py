@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ._dormand_prince import (
+from .dormand_prince import (
     sum_1,
     sum_2,
     sum_3,
@@ -18,8 +18,8 @@ from ._dormand_prince import (
     sum_11,
     sum_b,
 )
-from ._jit import inline
-from ._stage_series import STRIDE
+from .jit import inline
+from .stage_series import STRIDE
 
 
 @inline

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ._dormand_prince import (
+from .dormand_prince import (
     sum_1,
     sum_2,
     sum_3,
@@ -22,8 +22,8 @@ from ._dormand_prince import (
     sum_11,
     sum_b,
 )
-from ._jit import inline
-from ._stage_series import STRIDE
+from .jit import inline
+from .stage_series import STRIDE
 
 _INNER_STAGES = 5, 8
 """At 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step."""

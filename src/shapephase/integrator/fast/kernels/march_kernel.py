@@ -10,11 +10,9 @@ import math
 
 import numpy as np
 
-from ._jit import inline, kernel, part
-from ._momentum_step import grown, momentum_step, product
-from ._rest_step import rest_step
-from ._stage_series import CHANNELS as _CHANNELS
-from ._stage_series import (
+from .jit import inline, kernel, part
+from .stage_series import CHANNELS as _CHANNELS
+from .stage_series import (
     SEGMENT,
     SIZE,
     basis_at,
@@ -24,7 +22,9 @@ from ._stage_series import (
     terms_that_differ,
     with_few_others,
 )
-from ._trigonometry import cos_sin
+from .steps_at_rest import rest_step
+from .steps_with_momentum import grown, momentum_step, product
+from .trigonometry import cos_sin
 
 LANES = 8
 _MAGNITUDE = 0

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ._jit import kernel, part
-from .estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
+from ..estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
+from .jit import kernel, part
 
 
 @part

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._dormand_prince import NODES, STAGES
-from ._jit import inline, part
+from .dormand_prince import NODES, STAGES
+from .jit import inline, part
 
 CHANNELS = 9
 SEGMENT = 16

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ._jit import inline
+from .jit import inline
 
 MOST_ANGLE = 1e5
 """[rad]; up to here the products with the first two parts of pi/2 are exact."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import inline
+from .jit import inline
 
 STAGES = 12
 NODES = np.array([
@@ -20,36 +20,43 @@ NODES = np.array([
 
 @inline
 def sum_1(s0):
+    """What stage 1 starts from: the earlier slopes by row 1 of the tableau."""
     return 0.05260015195876773 * s0
 
 
 @inline
 def sum_2(s0, s1):
+    """What stage 2 starts from: the earlier slopes by row 2 of the tableau."""
     return 0.0197250569845379 * s0 + 0.0591751709536137 * s1
 
 
 @inline
 def sum_3(s0, s2):
+    """What stage 3 starts from: the earlier slopes by row 3 of the tableau."""
     return 0.02958758547680685 * s0 + 0.08876275643042054 * s2
 
 
 @inline
 def sum_4(s0, s2, s3):
+    """What stage 4 starts from: the earlier slopes by row 4 of the tableau."""
     return 0.2413651341592667 * s0 - 0.8845494793282861 * s2 + 0.924834003261792 * s3
 
 
 @inline
 def sum_5(s0, s3, s4):
+    """What stage 5 starts from: the earlier slopes by row 5 of the tableau."""
     return 0.037037037037037035 * s0 + 0.17082860872947386 * s3 + 0.12546768756682242 * s4
 
 
 @inline
 def sum_6(s0, s3, s4, s5):
+    """What stage 6 starts from: the earlier slopes by row 6 of the tableau."""
     return 0.037109375 * s0 + 0.17025221101954405 * s3 + 0.06021653898045596 * s4 - 0.017578125 * s5
 
 
 @inline
 def sum_7(s0, s3, s4, s5, s6):
+    """What stage 7 starts from: the earlier slopes by row 7 of the tableau."""
     return (
         0.03709200011850479 * s0
         + 0.17038392571223998 * s3
@@ -61,6 +68,7 @@ def sum_7(s0, s3, s4, s5, s6):
 
 @inline
 def sum_8(s0, s3, s4, s5, s6, s7):
+    """What stage 8 starts from: the earlier slopes by row 8 of the tableau."""
     return (
         0.6241109587160757 * s0
         - 3.3608926294469414 * s3
@@ -73,6 +81,7 @@ def sum_8(s0, s3, s4, s5, s6, s7):
 
 @inline
 def sum_9(s0, s3, s4, s5, s6, s7, s8):
+    """What stage 9 starts from: the earlier slopes by row 9 of the tableau."""
     return (
         0.47766253643826434 * s0
         - 2.4881146199716677 * s3
@@ -86,6 +95,7 @@ def sum_9(s0, s3, s4, s5, s6, s7, s8):
 
 @inline
 def sum_10(s0, s3, s4, s5, s6, s7, s8, s9):
+    """What stage 10 starts from: the earlier slopes by row 10 of the tableau."""
     return (
         -0.9371424300859873 * s0
         + 5.186372428844064 * s3
@@ -100,6 +110,7 @@ def sum_10(s0, s3, s4, s5, s6, s7, s8, s9):
 
 @inline
 def sum_11(s0, s3, s4, s5, s6, s7, s8, s9, s10):
+    """What stage 11 starts from: the earlier slopes by row 11 of the tableau."""
     return (
         2.273310147516538 * s0
         - 10.53449546673725 * s3
@@ -115,6 +126,7 @@ def sum_11(s0, s3, s4, s5, s6, s7, s8, s9, s10):
 
 @inline
 def sum_b(s0, s5, s6, s7, s8, s9, s10, s11):
+    """What the step adds: the slopes of all stages by their weights."""
     return (
         0.054293734116568765 * s0
         + 4.450312892752409 * s5

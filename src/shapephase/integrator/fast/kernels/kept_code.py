@@ -19,9 +19,9 @@ import numba
 from numba.core.caching import FunctionCache
 from numba.core.serialize import dumps
 
-from ...errors import CompiledCodeWarning, InputFileNotFoundError, OutputFileError
-from ...files import write_whole
-from .cache_folder import OTHERS_MAY_WRITE
+from ....errors import CompiledCodeWarning, InputFileNotFoundError, OutputFileError
+from ....files import write_whole
+from ..cache_folder import OTHERS_MAY_WRITE
 
 # Of the key, in the name of a file [hexadecimal digits].
 _DIGITS = 16

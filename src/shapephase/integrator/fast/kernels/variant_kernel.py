@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ._jit import kernel
-from ._march_kernel import march_momenta
+from .jit import kernel
+from .march_kernel import march_momenta
 
 
 @kernel

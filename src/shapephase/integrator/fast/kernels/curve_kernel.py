@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._jit import kernel, part
+from ..estimate_constants import TERMS
+from .jit import kernel, part
 
-_TERMS = 6
-"""At each end, as many as `_dense_output.TERMS`."""
 _INVERSE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 """Where the entries of I^-1 stand among the channels."""
 _DRIFT = 6
@@ -37,14 +36,14 @@ def _product(a, b, order):
 @part
 def _directions(channels, side, step, magnitude, p, rates):
     """The terms of the momentum's direction, whose first ones are given, and of omega."""
-    for order in range(_TERMS):
+    for order in range(TERMS):
         for i in range(3):
             total = 0.0
             for k in range(order + 1):
                 for j in range(3):
                     total += channels[_INVERSE[i, j], order - k, side, step] * p[j, k]
             rates[i, order] = magnitude * total - channels[_DRIFT + i, order, side, step]
-        if order + 1 < _TERMS:
+        if order + 1 < TERMS:
             _next_cross(p, rates, order, p)
 
 
@@ -60,8 +59,8 @@ def curve_terms(channels, directions, corners, magnitudes, lifted, rules, integr
     integrals: (3, 2, B, M) of the dynamic phase and of the sliver, by each rule
     first_rates: (3, B, 2, M) of the gauge's omega at both ends
     """
-    p, rates, still, drift = np.empty((3, 6)), np.empty((3, 6)), np.zeros((3, 6)), np.empty((3, 6))
-    terms, turn, cosine = np.empty((2, 2 * _TERMS)), np.empty(_TERMS), np.empty(_TERMS)
+    p, rates, still, drift = np.empty((3, TERMS)), np.empty((3, TERMS)), np.zeros((3, TERMS)), np.empty((3, TERMS))
+    terms, turn, cosine = np.empty((2, 2 * TERMS)), np.empty(TERMS), np.empty(TERMS)
     for row in range(len(magnitudes)):
         for step in range(channels.shape[3]):
             for side in range(2):
@@ -69,15 +68,15 @@ def curve_terms(channels, directions, corners, magnitudes, lifted, rules, integr
                     p[i, 0], still[i, 0] = directions[i, row, side, step], corners[i, row, side, step]
                 _directions(channels, side, step, magnitudes[row], p, rates)
                 if lifted:
-                    for order in range(_TERMS):
+                    for order in range(TERMS):
                         for i in range(3):
                             drift[i, order] = -channels[_DRIFT + i, order, side, step]
                             rates[i, order] -= drift[i, order]
-                    for order in range(_TERMS - 1):
+                    for order in range(TERMS - 1):
                         _next_cross(still, drift, order, still)
                 for i in range(3):
                     first_rates[i, row, side, step] = rates[i, 0]
-                for order in range(_TERMS):
+                for order in range(TERMS):
                     along = _product(p, rates, order)
                     # The rate of the turn about the first corner, a quotient of series.
                     cosine[order] = _product(still, p, order) + (0.0 if order else 1.0)
@@ -85,10 +84,10 @@ def curve_terms(channels, directions, corners, magnitudes, lifted, rules, integr
                     for k in range(order):
                         turn[order] -= cosine[order - k] * turn[k]
                     turn[order] /= cosine[0]
-                    terms[0, side * _TERMS + order], terms[1, side * _TERMS + order] = along, along - turn[order]
+                    terms[0, side * TERMS + order], terms[1, side * TERMS + order] = along, along - turn[order]
             for rule in range(3):
                 for which in range(2):
                     total = 0.0
-                    for k in range(2 * _TERMS):
+                    for k in range(2 * TERMS):
                         total += rules[rule, k] * terms[which, k]
                     integrals[rule, which, row, step] = total

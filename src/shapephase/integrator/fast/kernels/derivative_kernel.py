@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from ._dormand_prince import STAGES
-from ._jit import inline, kernel
-from ._momentum_step import product, unscaled_step
-from ._stage_series import CHANNELS, SIZE, STRIDE
+from .dormand_prince import STAGES
+from .jit import inline, kernel
+from .stage_series import CHANNELS, SIZE, STRIDE
+from .steps_with_momentum import product, unscaled_step
 
 _CHANGE = 1e-60
 """Of the direction; its products with whatever grows stay far from the smallest and the largest numbers."""

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from ._jit import inline, kernel
-from ._trigonometry import MOST_ANGLE, cos_sin
+from .jit import inline, kernel
+from .trigonometry import MOST_ANGLE, cos_sin
 
 LANES = 8
 _FRAME = 24

@@ -13,8 +13,8 @@ from typing import Any
 from numba import njit
 from numba.core import config
 
-from ._kept_code import KeptFunction
-from .cache_folder import kernel_folder
+from ..cache_folder import kernel_folder
+from .kept_code import KeptFunction
 
 # Without the interpreter's lock; a division by zero gives infinity, as in NumPy, and needs no branch.
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}

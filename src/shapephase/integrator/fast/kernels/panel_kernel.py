@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from ._jit import kernel, part
-from .estimate_constants import (
+from ..estimate_constants import (
     AIM,
     AT_ROUNDING,
     CHANCE_DEGREES,
@@ -44,6 +43,7 @@ from .estimate_constants import (
     TINY,
     UNAVERAGED_PHASE,
 )
+from .jit import kernel, part
 
 _LOGARITHMS = tuple(math.log(share) for share in PARTS_OF_DISTANCE)
 _CHANNELS = 9

@@ -1,0 +1,1 @@
+"""What Numba compiles: the only modules that import it, themselves imported when they are first needed."""
