@@ -10,8 +10,9 @@ import pytest
 import shapephase as sp
 from shapephase import so3, sphere
 from shapephase.integrator import _dense_output
+from shapephase.integrator._dense_output import hermite_matrix
 from shapephase.integrator.curve_integrals import curve_integrals
-from shapephase.integrator.fast.estimate_constants import TERMS, hermite_matrix
+from shapephase.integrator.fast.estimate_constants import TERMS
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.sampling import FinishedSampler
 from shapephase.integrator.stepped import SteppedRotation

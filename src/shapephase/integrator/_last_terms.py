@@ -31,10 +31,12 @@ class Perturbed:
     ----------
     make : the coefficients, when they are needed
     hidden : attitude error of what they do not show, without amplification [rad]
+    differ : whether they are not the interpolant's own; else steps on them would show nothing
     """
 
     make: Callable[[], Array]
     hidden: float
+    differ: bool = True
 
     @cached_property
     def coefficients(self) -> Array:
@@ -46,9 +48,10 @@ class Perturbed:
         """With coefficients that are made already."""
         return cls(partial(np.asarray, coefficients), hidden)
 
-    def changes(self, coefficients: Array) -> bool:
-        """Whether any series is not what it was."""
-        return not np.array_equal(self.coefficients, coefficients)
+    @classmethod
+    def same(cls, coefficients: Array, hidden: float) -> Perturbed:
+        """With the interpolant's own coefficients: all that is missing is hidden."""
+        return cls(partial(np.asarray, coefficients), hidden, differ=False)
 
 
 def perturbed_series(coefficients: Array, degrees: Integers, widths: Array, momentum: float) -> Array:

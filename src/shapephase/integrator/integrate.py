@@ -217,8 +217,9 @@ class Integration:
             growth = min(1.0 + _EXPECTED_GROWTH * turn, _MOST_EXPECTED_GROWTH)
         perturbed = self._sampler.perturbed(self._largest)
         counts = expected * growth > _NEGLIGIBLE * self._tolerance
+        changed = perturbed.coefficients if counts and perturbed.differ else None
         steps = self._plan(interpolant, requirements)
-        record = self._take_steps(interpolant, perturbed.coefficients if counts else None, steps)
+        record = self._take_steps(interpolant, changed, steps)
         stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
         propagators = record.propagators if self._propagators is None else self._propagators
         little = _LITTLE_ROUNDING * self._tolerance

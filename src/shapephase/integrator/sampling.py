@@ -225,4 +225,4 @@ class FinishedSampler:
 
     def perturbed(self, momentum: float) -> Perturbed:  # noqa: ARG002
         """The same: its errors count elsewhere."""
-        return Perturbed.known(self._interpolant.coefficients, 0.0)
+        return Perturbed.same(self._interpolant.coefficients, 0.0)

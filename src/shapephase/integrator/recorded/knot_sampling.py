@@ -207,7 +207,7 @@ class KnotSampler:
 
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`: what is missing is known better than the last terms could tell."""
-        return Perturbed.known(self.interpolant().coefficients, self.error(momentum))
+        return Perturbed.same(self.interpolant().coefficients, self.error(momentum))
 
     # ---- Samples ----
 
