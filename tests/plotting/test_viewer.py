@@ -336,6 +336,15 @@ def test_every_shape_of_the_body_is_in_the_page_as_it_is(righting, cat_page):
     assert sum(len(node["shapes"]) for node in drawn) == 16
 
 
+def test_the_page_has_the_momentum_and_at_every_frame_the_attitude_of_its_motion(tumbling, tmp_path):
+    """Every frame against the motion at that time; SciPy reads the quaternions."""
+    motion_page(tumbling, tmp_path / "a.html", frames=41)
+    motion = page_data(tmp_path / "a.html")["motion"]
+    assert motion["momentum"] == [3.0, -2.0, 4.0]
+    expected = tumbling.attitude(np.linspace(0.0, tumbling.duration, 41))
+    np.testing.assert_allclose(Rotation.from_quat(motion["turns"].reshape(-1, 4)).as_matrix(), expected, atol=1e-6)
+
+
 def test_speed_and_frames(righting, tmp_path):
     motion_page(righting, tmp_path / "a.html", speed=0.1, frames=11)
     motion = page_data(tmp_path / "a.html")["motion"]
@@ -528,6 +537,63 @@ def test_the_page_opens_in_a_browser_without_a_network_and_moves(righting, cat_p
     wait_for(page, "page.clock.time > 0.1")
     assert [message for message in said if message[0] in ("error", "warning")] == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def vermilion(picture):
+    """Places (right, up) of what has the colour of the momentum's arrow, from the middle of all of it [px]."""
+    red, green, blue = np.moveaxis(picture, -1, 0)
+    rows, columns = np.nonzero((red - blue > 90) & (green > 0.3 * red) & (green < 0.62 * red))
+    return np.stack([columns - columns.mean(), rows.mean() - rows], axis=-1)
+
+
+def pointed(places):
+    """The direction of an arrow of pixels, by its long axis, towards its thick end."""
+    axis = np.linalg.svd(places, full_matrices=False)[2][0]
+    along, across = places @ axis, np.abs(places @ [-axis[1], axis[0]])
+    ends = [across[along < 0.72 * along.min()].mean(), across[along > 0.72 * along.max()].mean()]
+    return axis if ends[1] > ends[0] else -axis
+
+
+@pytest.mark.full
+def test_the_arrow_in_the_page_is_the_momentum_of_the_motion(tumbling, tmp_path, chromium):
+    """By the scripts' poses and by pixels of known views: seen from +X, right is Y and up is Z.
+
+    Only the arrow is shown where pixels are counted. In the body's frame it is R(t)^T L. Between two frames, h apart,
+    the attitude goes along the shortest arc, which is off by h^2/8 of the angular acceleration.
+    """
+    motion_page(tumbling, tmp_path / "a.html", frames=1201, trail="head")
+    page, said, _ = opened(chromium, tmp_path / "a.html")
+    momentum = tumbling.momentum
+    times = np.linspace(0.0, tumbling.duration, 8)
+    rates = tumbling.angular_velocity(np.linspace(0.0, tumbling.duration, 2001))
+    bend = np.abs(np.gradient(rates, tumbling.duration / 2000, axis=0)).max() * (tumbling.duration / 1200) ** 2
+    for t in times:
+        page.evaluate("t => page.clock.show(t)", float(t))
+        arrow, base = pose(page, "page.figure.momentum.pose"), pose(page, "page.figure.base")
+        np.testing.assert_allclose(so3.normalised(arrow[:3, 2]), so3.normalised(momentum), atol=1e-12)
+        np.testing.assert_allclose(arrow[:3, 3], 0.0, atol=1e-6)
+        np.testing.assert_allclose(base[:3, :3], tumbling.attitude(t), atol=bend + 1e-6)
+    page.evaluate("""() => {
+      const others = [...Object.keys(page.figure.groups), "trail", "inertial axes"].filter(name => name !== "momentum");
+      for (const group of others) page.figure.toggle(group, false);
+    }""")
+    views = {"front": [[0, 1, 0], [0, 0, 1]], "side": [[1, 0, 0], [0, 0, 1]], "top": [[1, 0, 0], [0, 1, 0]]}
+    for name, axes in views.items():
+        page.get_by_text(name, exact=True).click()
+        shown = pointed(vermilion(seen(page, float(times[3]))))
+        # In perspective an arrow whose tail is beside the middle leans by a degree or two.
+        assert shown @ so3.normalised(np.array(axes) @ momentum) > np.cos(np.radians(4.0)), name
+    page.get_by_text("body's frame").click()
+    for name, axes in views.items():
+        page.get_by_text(name, exact=True).click()
+        for t in times[[1, 6]]:
+            flat = np.array(axes) @ tumbling.attitude(t).T @ momentum
+            # Towards the eye it is too short.
+            if np.linalg.norm(flat) < 0.5 * np.linalg.norm(momentum):
+                continue
+            shown = pointed(vermilion(seen(page, float(t))))
+            assert shown @ so3.normalised(flat) > np.cos(np.radians(4.0)), (name, t)
+    assert [message for message in said if message[0] in ("error", "warning")] == []
 
 
 @pytest.mark.full
