@@ -152,11 +152,15 @@ def unit(vector: Scalars) -> list[Any]:
 
 
 def _combination(start: Scalars, weights: Array, slopes: list[list[Any]]) -> list[Any]:
-    total = list(start)
-    for weight, slope in zip(weights, slopes, strict=False):
-        if weight != 0.0:
-            total = [t + float(weight) * s for t, s in zip(total, slope, strict=True)]
-    return total
+    """The start and the weighted slopes, which are summed first: what is small is not rounded as what is large."""
+    pairs = [(float(weight), slope) for weight, slope in zip(weights, slopes, strict=False) if weight != 0.0]
+    if not pairs:
+        return list(start)
+    weight, slope = pairs[0]
+    total = [weight * s for s in slope]
+    for weight, slope in pairs[1:]:
+        total = [t + weight * s for t, s in zip(total, slope, strict=True)]
+    return [t + s for t, s in zip(start, total, strict=True)]
 
 
 def _dot(a: Scalars, b: Scalars) -> Any:
