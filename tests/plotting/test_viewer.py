@@ -597,6 +597,34 @@ def test_the_arrow_in_the_page_is_the_momentum_of_the_motion(tumbling, tmp_path,
 
 
 @pytest.mark.full
+def test_the_camera_goes_with_a_body_that_falls_far(tmp_path, chromium):
+    """It is seen as large at the end as at the start, in the same place; the floor below it is grey."""
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.0, 0.0, 3.0 * np.pi])
+    motion_page(motion, tmp_path / "a.html", velocity=[1.0, 0.0, 6.0], gravity=[0.0, 0.0, -9.81])
+    page, said, _ = opened(chromium, tmp_path / "a.html")
+    where = "page.scene.onScreen(page.figure.centrePlace, 520, 400)"
+
+    def blue():
+        picture = seen(page, page.evaluate("page.clock.time"))
+        return np.count_nonzero(picture[..., 2] - picture[..., 0] > 90)
+
+    page.evaluate("page.scene.draw()")
+    start, size = page.evaluate(where), blue()
+    page.evaluate("page.clock.show(page.clock.duration); page.scene.draw()")
+    np.testing.assert_allclose(page.evaluate(where), start, atol=1e-3)
+    assert size > 300
+    # Two whole turns later it lies as it lay.
+    assert blue() == pytest.approx(size, rel=0.05)
+    page.get_by_text("follow").click()
+    page.evaluate("page.scene.draw()")
+    assert blue() < 0.05 * size
+    picture = seen(page, 0.0)
+    grey = (np.ptp(picture, axis=-1) < 4) & (abs(picture[..., 0] - 199) < 12)
+    assert np.count_nonzero(grey) > 500
+    assert [message for message in said if message[0] in ("error", "warning")] == []
+
+
+@pytest.mark.full
 def test_shapes_are_closed_and_of_their_size(chromium, cat_page):
     """Volumes and bounds of the triangles that the page draws, by the theorem of Gauss, against closed forms."""
     page, _, _ = opened(chromium, cat_page)

@@ -12,6 +12,8 @@ const AXES_LENGTH = 0.5;
 // The inertial axes stand in the corner: their length and their distance from the edges [px].
 const CORNER_LENGTH = 28;
 const CORNER_PLACE = 48;
+// From this way of the centre of mass on, over the reach of the body, the camera goes with it unless told otherwise.
+const FAR = 6;
 
 class Figure3D {
   constructor(scene, data) {
@@ -19,6 +21,12 @@ class Figure3D {
     this.data = data;
     this.byHand = null;
     this.bodyFrame = false;
+    const start = Array.from(row(data.centre, 0, 3));
+    const ways = Array.from({length: data.centre.length / 3}, (_, k) => norm(plus(row(data.centre, k, 3), start, -1)));
+    this.start = start;
+    this.way = ways.reduce((most, way) => Math.max(most, way), 0) / data.reach;
+    this.travels = this.way > 0.1;
+    this.follows = this.way > FAR;
     this.groups = {body: [], ghost: [], "base axes": [], momentum: [], "centre of mass": [], floor: []};
     this.hidden = new Set();
     scene.up = data.up;
@@ -132,6 +140,8 @@ class Figure3D {
       const still = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...this.scene.camera.target, 1];
       const riding = [...base.slice(0, 12), ...centre, 1];
       this.scene.world = product(still, inverse(riding));
+    } else if (this.follows) {
+      this.scene.world = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...plus(this.start, centre, -1), 1];
     }
     this.scene.invalidate();
   }
@@ -207,6 +217,7 @@ class Figure3D {
 
   // Points that are to be seen at all times.
   extent() {
+    if (this.follows) return this.around(this.start);
     const points = [];
     for (let k = 0; k < this.data.extent.length / 3; k++) points.push(Array.from(row(this.data.extent, k, 3)));
     for (const frame of [0, Math.floor(0.5 * this.data.frames) - 1, this.data.frames - 2]) {
@@ -220,6 +231,13 @@ class Figure3D {
       const count = this.data.centre.length / 3;
       for (const k of [0, count - 1]) points.push(plus(Array.from(row(this.data.centre, k, 3)), tip));
     }
+    return points;
+  }
+
+  // All of the body and of its arrow about a centre of mass.
+  around(centre) {
+    const points = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].flatMap(axis => [1, -1].map(side => plus(centre, axis, side * this.data.reach)));
+    if (this.momentum) points.push(plus(centre, unit(this.data.momentum), 1.12 * MOMENTUM_LENGTH * this.data.reach));
     return points;
   }
 }

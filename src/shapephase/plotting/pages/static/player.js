@@ -12,8 +12,13 @@ function element(kind, attributes = {}, ...children) {
   return made;
 }
 
+// A number as text for people, with a minus as long as a plus.
+function typeset(number) {
+  return String(number).replaceAll("-", "−");
+}
+
 function shortNumber(value) {
-  return String(Number(value.toPrecision(3)));
+  return typeset(Number(value.toPrecision(3)));
 }
 
 // The bar of a clock, in a holder.
@@ -67,8 +72,16 @@ function sceneControls(holder, scene, figure) {
       figure.show(figure.place);
     }}), "body's frame");
   holder.append(frame);
+  if (figure.travels) {
+    holder.append(element("label", {title: "the camera goes with the centre of mass"},
+      element("input", {type: "checkbox", checked: figure.follows, onchange: event => {
+        figure.follows = event.target.checked;
+        figure.show(figure.place);
+        scene.fit(figure.extent());
+      }}), "follow"));
+  }
   const hues = {momentum: "#d55e00", ghost: "#9a9ea5", trail: "#0072b2", "inertial axes": "#737373",
-    "base axes": "#009e73", "centre of mass": "#1a1a1a", floor: "#c7c7c7"};
+    "base axes": "conic-gradient(#cc79a7 33%, #009e73 0 67%, #0072b2 0)", "centre of mass": "#1a1a1a", floor: "#c7c7c7"};
   for (const group of figure.shownGroups()) {
     const hue = element("span", {className: "hue"});
     hue.style.background = hues[group];
@@ -78,6 +91,11 @@ function sceneControls(holder, scene, figure) {
     }), hue, name));
   }
   look("oblique");
+}
+
+// A joint's coordinate for people.
+function jointValue({unit}, value) {
+  return typeset(unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} m`);
 }
 
 // Sliders of the joints: moved by hand, the body leaves its motion until it is let go.
@@ -95,7 +113,7 @@ function jointSliders(holder, figure, clock) {
       release.disabled = false;
       clock.changed();
     });
-    holder.append(element("label", {className: "joint"}, element("span", {textContent: joint.name}), slider, value));
+    holder.append(element("label", {className: "joint"}, element("span", {textContent: joint.name, title: joint.name}), slider, value));
     return {slider, value, joint};
   });
   const release = element("button", {textContent: "back to the motion", disabled: true, onclick: () => {
@@ -109,7 +127,7 @@ function jointSliders(holder, figure, clock) {
     const shape = figure.byHand ?? figure.shapeAt(clock.place());
     sliders.forEach(({slider, value, joint}, k) => {
       slider.value = shape[k];
-      value.textContent = joint.unit === "rad" ? `${(shape[k] * 180 / Math.PI).toFixed(1)}°` : `${shape[k].toFixed(4)} m`;
+      value.textContent = jointValue(joint, shape[k]);
     });
   });
 }

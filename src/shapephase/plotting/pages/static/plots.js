@@ -8,8 +8,8 @@ const CURVES = [
   ["#cc79a7", "4 2 2 2 2 2"], ["#56b4e9", "1 3"], ["#7f7f7f", "12 3 3 3"],
 ];
 // Of a plot in its own pixels: all of it, and the margins left, right, above, below.
-const SIZE = [460, 190];
-const MARGINS = [52, 10, 8, 24];
+const SIZE = [460, 206];
+const MARGINS = [52, 10, 8, 40];
 
 function drawn(parent, kind, attributes) {
   const made = parent.appendChild(document.createElementNS(SVG, kind));
@@ -33,7 +33,7 @@ class TimePlot {
     this.clock = clock;
     const figure = holder.appendChild(element("figure", {className: "plot"}));
     this.legend = figure.appendChild(element("figcaption"));
-    this.legend.append(element("b", {textContent: `${plot.title} [${plot.unit}] `}));
+    this.legend.append(element("b", {textContent: `${plot.title} [${plot.unit}]`}));
     this.svg = figure.appendChild(document.createElementNS(SVG, "svg"));
     this.svg.setAttribute("viewBox", `0 0 ${SIZE[0]} ${SIZE[1]}`);
     this.svg.setAttribute("role", "img");
@@ -61,7 +61,7 @@ class TimePlot {
 
   frame() {
     const [left, right, top, bottom] = [MARGINS[0], SIZE[0] - MARGINS[1], MARGINS[2], SIZE[1] - MARGINS[3]];
-    const number = value => String(Number(value.toPrecision(6)));
+    const number = value => typeset(Number(value.toPrecision(6)));
     for (const value of ticks(this.low, this.high)) {
       drawn(this.svg, "line", {x1: left, x2: right, y1: this.y(value), y2: this.y(value), stroke: value ? "#e4e4e4" : "#aaa"});
       drawn(this.svg, "text", {x: left - 5, y: this.y(value) + 4, "text-anchor": "end"}).textContent = number(value);
@@ -70,7 +70,7 @@ class TimePlot {
       drawn(this.svg, "line", {x1: this.x(value), x2: this.x(value), y1: bottom, y2: bottom + 4, stroke: "#888"});
       drawn(this.svg, "text", {x: this.x(value), y: bottom + 17, "text-anchor": "middle"}).textContent = number(value);
     }
-    drawn(this.svg, "text", {x: right, y: bottom - 5, "text-anchor": "end", class: "axis"}).textContent = "time [s]";
+    drawn(this.svg, "text", {x: 0.5 * (left + right), y: bottom + 33, "text-anchor": "middle"}).textContent = "time [s]";
     drawn(this.svg, "rect", {x: left, y: top, width: right - left, height: bottom - top, fill: "none", stroke: "#888"});
   }
 
@@ -82,10 +82,10 @@ class TimePlot {
       "stroke-dasharray": dashes});
     const dot = drawn(this.svg, "circle", {r: 3.4, fill: colour, stroke: "white"});
     const key = element("span", {className: "key"});
-    key.append(element("i", {className: dashes ? "line dashed" : "line"}), name);
-    key.firstChild.style.borderColor = colour;
+    const line = {x1: 0, x2: 32, y1: 5, y2: 5, stroke: colour, "stroke-width": 2, "stroke-dasharray": dashes};
+    drawn(drawn(key, "svg", {viewBox: "0 0 32 10", "aria-hidden": "true"}), "line", line);
     const value = element("output");
-    key.append(" ", value);
+    key.append(`${name} `, value);
     this.legend.append(key);
     return {dot, value, values};
   }
@@ -99,7 +99,7 @@ class TimePlot {
       const now = values[frame] + share * (values[frame + 1] - values[frame]);
       dot.setAttribute("cx", x);
       dot.setAttribute("cy", this.y(now));
-      value.textContent = (Math.round(now * 10) / 10 + 0).toFixed(1);
+      value.textContent = typeset((Math.round(now * 10) / 10 + 0).toFixed(1));
       return now;
     });
   }

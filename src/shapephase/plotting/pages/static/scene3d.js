@@ -29,7 +29,8 @@ void main() {
   vec3 key = normalize(vec3(0.45, 0.65, 0.85));
   float light = 0.50 + 0.14 * dot(n, up) + 0.42 * max(dot(n, key), 0.0);
   float gloss = 0.12 * pow(max(dot(n, normalize(key + eye)), 0.0), 40.0);
-  shown = vec4(mix(colour.rgb, colour.rgb * light + gloss, lit) * colour.a, colour.a);
+  vec3 hue = lit > 0.5 ? colour.rgb * light + gloss : colour.rgb;
+  shown = vec4(hue * colour.a, colour.a);
 }`;
 
 class Scene3D {
