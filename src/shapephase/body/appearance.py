@@ -21,6 +21,7 @@ from ..inertia_tensor import principal_axes, second_moment
 from ._drawing_limits import within_limits
 from .body import Body, MovingPart
 from .catalog import example_folder
+from .engines.formats import format_of
 from .formats.mjcf import Placed, contents_of, settings_of, with_defaults
 from .formats.mjcf_geometry import placed_geom
 from .formats.urdf import rpy_matrix
@@ -201,7 +202,8 @@ def _unchanged(body: Body, doubts: list[str]) -> Node | None:
     if hashlib.sha256(content).hexdigest() != body.sha256:
         doubts.append(f"{body.file} has changed since {body.name} was loaded from it; load it again to see it")
         return None
-    return xml_tree(content, str(body.file))
+    # What engines own is drawn as boxes: a file of measurements has no shapes, and meshes of bioMod are not read.
+    return xml_tree(content, str(body.file)) if format_of(content) is None else None
 
 
 def _part_box(part: MovingPart) -> Visual:

@@ -1,4 +1,4 @@
-"""Names to bodies: those we ship, those of example-robot-data, and any URDF or MJCF file."""
+"""Names to bodies: those we ship, those of example-robot-data, and files in all formats that are read."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ from ._cross_check import check_against_file
 from ._link_tree import inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
+from .engines.engine_tree import check_against_engine, engine_tree
+from .engines.formats import format_of
 from .formats.mjcf import mjcf_tree
 from .formats.urdf import urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
@@ -45,7 +47,8 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
 
     Parameters
     ----------
-    source : a path to a URDF or MJCF file; a name from `robot_names()` such as "cat"; "example:human", a body of the
+    source : a path to a URDF or MJCF file, a bioMod model (`shapephase[biomod]`), or a file of measurements for
+        Yeadon's human (`shapephase[yeadon]`); a name from `robot_names()` such as "cat"; "example:human", a body of the
         installed example-robot-data; or a `pinocchio.Model` whose root joint is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
@@ -58,7 +61,7 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     ModelFileError, UnphysicalInertiaError
         If the file cannot be used, or a link cannot exist; the message begins with file and line.
     MissingExtraError
-        For "example:..." without example-robot-data.
+        For "example:..." without example-robot-data, and for a format whose engine is not installed.
 
     Warns
     -----
@@ -78,7 +81,8 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     if isinstance(source, str | os.PathLike):
         path, installed = _path_of(os.fspath(source))
         content = read_file(path)
-        if isolate and not installed:
+        # An engine reads in a process of its own anyway.
+        if isolate and not installed and format_of(content) is None:
             _try_in_child(content, str(path), on_unphysical)
         try:
             body, doubts = _from_file(content, path, on_unphysical)
@@ -210,13 +214,18 @@ def load_from_input() -> None:
 
 
 def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:
-    where = str(path)
-    root = xml_tree(content, where)
-    tree = mjcf_tree(root) if root.tag == "mujoco" else urdf_tree(root)
+    where, poses = str(path), []
+    owned = format_of(content)
+    if owned is not None:
+        tree, poses = engine_tree(path, owned)
+    else:
+        root = xml_tree(content, where)
+        tree = mjcf_tree(root) if root.tag == "mujoco" else urdf_tree(root)
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.mimics)
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     check_against_file(body, tree, where)
+    check_against_engine(body, tree, poses, where)
     doubts += massless_warning(tree)
     found: list[tuple[type[Warning], str]] = [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
     if tree.notes:

@@ -18,8 +18,8 @@ def _spaced(value: Sequence[float]) -> str:
 BodyArgument = Annotated[
     str,
     Parameter(
-        help="The body: a URDF or MJCF file, a name from `shapephase robots`, or example:NAME of example-robot-data; "
-        "for example `cat`."
+        help="The body: a URDF, MJCF or bioMod file, measurements for Yeadon's human, a name from `shapephase robots`, "
+        "or example:NAME of example-robot-data; for example `cat`."
     ),
 ]
 MotionArgument = Annotated[

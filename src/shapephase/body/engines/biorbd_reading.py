@@ -1,0 +1,206 @@
+"""bioMod models of the acrobatics community, as biorbd (Michaud and Begon 2021) reads them.
+
+Segments, frames, masses and ranges come from biorbd; the text itself is looked at only for what biorbd passes over in
+silence. Coordinates of the root segment are the free base.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import biorbd
+import numpy as np
+
+from ...arrays import Array
+from .chain import Chain, UnusableModelError, locked_inertia
+
+_AXES = dict(zip("xyz", np.eye(3), strict=True))
+_WORDS = (
+    *("parent", "rt", "rtinmatrix", "translations", "rotations", "ranges", "rangesq", "rangesqdot", "rangesqddot"),
+    *("jointdampings", "mass", "com", "inertia", "mesh", "meshfile", "meshcolor", "meshscale", "meshrt"),
+    *("meshrtinmatrix", "patch", "externalforceindex", "forceplate"),
+)
+"""That a segment may have, in lower case, as biorbd 1.12 knows them."""
+_DROPPED = ("meshfile",)
+"""A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
+_NO_ROOT = ("root", "base")
+_MASSLESS = 1e-7
+"""[kg]; biorbd gives a segment without mass 1e-8 kg."""
+_EXACT = 1e-12
+"""Share of the largest terms by which the engine's numbers may differ from ours."""
+_FRAMES = 10.0
+"""Times what frames lack of being orthonormal: biorbd computes with them as they are."""
+_MOST_BYTES = 16 << 20
+"""Of a file; a full body with muscles has some hundred thousand."""
+
+
+def chain_of(path: str) -> Chain:
+    """Links and joints of a bioMod file, on its root segment."""
+    notes, starts = [], {}
+    model = _model(path, notes, starts)
+    chain = Chain(Path(path).stem, notes=notes)
+    segments = {model.segment(k).name().to_string(): k for k in range(model.nbSegment())}
+    base, dropped = _base(model, segments, starts)
+    for name in dropped:
+        notes.append(f"segment {name!r} has no mass: its coordinates are the free base's, as those of {base!r}")
+    lack = 0.0
+    for name, number in segments.items():
+        segment, line = model.segment(number), starts.get(name, 1)
+        if name in dropped:
+            continue
+        traits = segment.characteristics()
+        chain.add_link(name, traits.mass(), traits.CoM().to_array(), traits.inertia().to_array(), line)
+        if name == base:
+            continue
+        if segment.isRotationAQuaternion():
+            raise UnusableModelError(
+                f"segment {name!r} turns by a quaternion; joints of one axis are supported: write `rotations xyz`", line
+            )
+        frame = segment.localJCS().to_array()
+        turn, missing = _orthonormal(frame[:3, :3])
+        lack = max(lack, missing)
+        chain.add_joints(segment.parent().to_string(), name, frame[:3, 3], turn, _axes(segment, name))
+    if lack > _EXACT:
+        notes.append(f"frames are orthonormal to {lack:.1g} only: the nearest rotations are taken")
+    _add_poses(chain, model, segments, base, lack)
+    return chain
+
+
+def _model(path: str, notes: list[str], starts: dict[str, int]) -> Any:
+    """The model, without its meshes; lines at which segments begin go to `starts`."""
+    content = Path(path).read_bytes()
+    if len(content) > _MOST_BYTES:
+        raise UnusableModelError(f"it has {len(content) >> 20} MiB; up to {_MOST_BYTES >> 20} MiB are read")
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    kept = _looked_through(text, notes, starts)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "model.bioMod"
+        copy.write_text(kept, encoding="utf-8")
+        try:
+            return biorbd.Model(str(copy))
+        except Exception as error:
+            # The bindings turn what was thrown into whatever fits.
+            raise _refused(str(error), starts) from None
+
+
+def _refused(said: str, starts: dict[str, int]) -> UnusableModelError:
+    """What biorbd says, in one line, at the segment that it names."""
+    text = " ".join(said.split("Alternatively")[0].split())
+    named = re.search(r"Element: segment, named: (\S+)", " ".join(said.split()))
+    reason = re.sub(r'^Reading of file "[^"]*" failed with the following error: ', "", text)
+    segment = f"segment {named[1]!r}: " if named else ""
+    return UnusableModelError(f"{segment}biorbd does not accept it: {reason}", starts.get(named[1], 1) if named else 1)
+
+
+def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
+    """The text without meshes. Raises UnusableModelError for what biorbd would pass over."""
+    kept, segment, meshes, constraints = [], None, 0, 0
+    without_blocks = re.sub(r"/\*.*?\*/", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
+    for number, line in enumerate(without_blocks.splitlines(), 1):
+        words = line.split("//")[0].split()
+        word = words[0].lower() if words else ""
+        if word in _DROPPED:
+            meshes += 1
+            kept.append("")
+            continue
+        kept.append(line)
+        if word == "segment":
+            segment = words[1] if len(words) > 1 else ""
+            if segment in starts:
+                raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
+            starts[segment] = number
+        elif word == "endsegment":
+            segment = None
+        elif word in ("loopconstraint", "contact") and segment is None:
+            constraints += word == "loopconstraint"
+        elif segment is not None and word:
+            _check_word(words, word, segment, number)
+    if meshes:
+        notes.append(f"{meshes} mesh files are not read: they have no part in how the body turns")
+    if constraints:
+        notes.append(f"{constraints} loop constraints are ignored, every joint is free to move")
+    return "\n".join(kept) + "\n"
+
+
+def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
+    if re.match(r"[a-z]", word) and word not in _WORDS and len(words) > 1 and not word.startswith(("pi", "nan", "inf")):
+        near = difflib.get_close_matches(word, _WORDS, 1)
+        meant = f"; {near[0]!r} is near" if near else ""
+        raise UnusableModelError(f"segment {segment!r}: biorbd passes over the word {words[0]!r}{meant}", line)
+    if word in ("rotations", "translations") and len(words) > 2:
+        written, meant = " ".join(words), f"{words[0]} {''.join(words[1:])}"
+        raise UnusableModelError(
+            f"segment {segment!r}: of `{written}` biorbd reads {words[1]!r} alone; write `{meant}`", line
+        )
+
+
+def _base(model: Any, segments: dict[str, int], starts: dict[str, int]) -> tuple[str, list[str]]:
+    """The segment that is the free base, and those above it that have no mass."""
+    parents = {name: model.segment(k).parent().to_string() for name, k in segments.items()}
+    for name, parent in parents.items():
+        if parent not in segments and parent.lower() not in _NO_ROOT:
+            raise UnusableModelError(f"segment {name!r}: its parent {parent!r} does not exist", starts.get(name, 1))
+    roots = [name for name, parent in parents.items() if parent not in segments]
+    if len(roots) != 1:
+        listed = ", ".join(map(repr, roots[:20])) or "none"
+        raise UnusableModelError(f"one root segment is needed, got {listed}", starts.get(roots[1], 1) if roots else 1)
+    base, dropped = roots[0], []
+    while model.segment(segments[base]).characteristics().mass() <= _MASSLESS:
+        below = [name for name, parent in parents.items() if parent == base]
+        if len(below) != 1:
+            break
+        dropped.append(base)
+        base = below[0]
+    return base, dropped
+
+
+def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float]]]:
+    """Slides, then hinges, each moved by those before it."""
+    ranges = [[found.min(), found.max()] for found in segment.QRanges()]
+    kinds = [("prismatic", axis) for axis in segment.seqT().to_string()]
+    kinds += [("revolute", axis) for axis in segment.seqR().to_string()]
+    words = {"prismatic": "Trans", "revolute": "Rot"}
+    return [
+        (f"{name}_{words[kind]}{axis.upper()}", kind, _AXES[axis], limits)
+        for (kind, axis), limits in zip(kinds, ranges, strict=True)
+    ]
+
+
+def _orthonormal(matrix: Array) -> tuple[Array, float]:
+    """The nearest rotation, and how far the matrix is from it."""
+    left, values, right = np.linalg.svd(matrix)
+    turn = left @ right
+    if np.linalg.det(turn) < 0.0 or not np.abs(values - 1.0).max() < 1e-2:
+        raise UnusableModelError(f"the frame {matrix.tolist()} is no rotation")
+    return turn, float(np.abs(matrix - turn).max())
+
+
+def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, lack: float) -> None:
+    """What biorbd computes with the base at rest."""
+    names = [name.to_string() for name in model.nameDof()]
+    still = np.zeros(model.nbQ())
+    # The scalar parts of quaternions, which only a base can have here, come last.
+    still[model.nbQ() - model.nbQuat() :] = 1.0
+    tolerance = _EXACT + _FRAMES * lack
+    traits = [model.segment(k).characteristics() for k in segments.values()]
+    masses = np.array([part.mass() for part in traits])
+    offsets = np.array([part.CoM().to_array() for part in traits])
+    tensors = np.array([part.inertia().to_array() for part in traits])
+    for shape, rate in chain.random_shapes():
+        q, v = still.copy(), np.zeros(model.nbQdot())
+        for name, value in shape.items():
+            q[names.index(name)], v[names.index(name)] = value, rate[name]
+        frames = np.array([frame.to_array() for frame in model.allGlobalJCS(biorbd.GeneralizedCoordinates(q))])
+        turns = frames[:, :3, :3]
+        centres = frames[:, :3, 3] + (turns @ offsets[:, :, None])[:, :, 0]
+        inertia = locked_inertia(masses, centres, turns @ tensors @ np.swapaxes(turns, 1, 2))
+        momentum = model.angularMomentum(biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v), True)
+        root = turns[segments[base]]
+        chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum.to_array(), (tolerance, tolerance))

@@ -1,0 +1,134 @@
+"""What a reading process says of a body: links and joints of one axis as plain numbers, and how the engine sees it.
+
+This module and the readers beside it run in the child process, with the engine and NumPy alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Array
+
+POSES = 3
+"""Random shapes and rates at which the engine's inertia and momentum are compared with ours."""
+SEED = 20060518
+"""Any number: the random shapes are the same at every loading."""
+
+
+class UnusableModelError(Exception):
+    """The file cannot be used; the text says why. With a line where it is known."""
+
+    def __init__(self, message: str, line: int = 1) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+@dataclass
+class Chain:
+    """Links and joints on the way down from the root.
+
+    Attributes
+    ----------
+    links, joints : as the fields of `Link` and `Joint`, by name of the field
+    frames : names of links that are mere steps between the axes of one joint and the next
+    notes : what the file says and is not taken up
+    poses : what the engine gives at random shapes, as `add_pose` takes it
+    """
+
+    name: str
+    links: list[dict[str, Any]] = field(default_factory=list)
+    joints: list[dict[str, Any]] = field(default_factory=list)
+    frames: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    poses: list[dict[str, Any]] = field(default_factory=list)
+
+    def add_link(self, name: str, mass: float, centre: Array, inertia: Array, line: int = 1) -> None:
+        """With its centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2], in its axes."""
+        if any(link["name"] == name for link in self.links):
+            raise UnusableModelError(f"two links are named {name!r}; give each a name of its own", line)
+        entry = {"name": name, "mass": float(mass), "centre": np.ravel(centre).tolist(), "line": line}
+        self.links.append(entry | {"inertia": np.ravel(inertia).tolist()})
+
+    def add_joints(
+        self, parent: str, child: str, place: Array, turn: Array, axes: list[tuple[str, str, Array, list[float]]]
+    ) -> None:
+        """The joints between two links, each moved by the one before it.
+
+        place, turn : the first joint's axes in those of the parent (3,) [m], (3, 3)
+        axes : name, "revolute" or "prismatic", axis (3,), limits [rad or m]; none: the links are fixed to each other
+        """
+        if not axes:
+            self._join(f"{child}_fixed", "fixed", parent, child, place, turn, np.array([1.0, 0.0, 0.0]), None)
+        for number, (name, kind, axis, limits) in enumerate(axes):
+            last = number == len(axes) - 1
+            below = child if last else f"{child}__{name}"
+            if not last:
+                self.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
+                self.frames.append(below)
+            self._join(name, kind, parent, below, place, turn, axis, limits)
+            parent, place, turn = below, np.zeros(3), np.eye(3)
+
+    def _join(
+        self, name: str, kind: str, parent: str, child: str, place: Array, turn: Array, axis: Array, limits: Any
+    ) -> None:
+        self.joints.append({
+            "name": name,
+            "kind": kind,
+            "parent": parent,
+            "child": child,
+            "place": np.ravel(place).tolist(),
+            "turn": np.ravel(turn).tolist(),
+            "axis": np.ravel(axis).tolist(),
+            "limits": None if limits is None else [float(limits[0]), float(limits[1])],
+        })  # fmt: skip
+
+    def moving(self) -> list[str]:
+        """Names of the joints that move."""
+        return [joint["name"] for joint in self.joints if joint["kind"] != "fixed"]
+
+    def random_shapes(self) -> list[tuple[dict[str, float], dict[str, float]]]:
+        """Coordinates and rates by joint, within a radian or metre, and within the limits."""
+        random = np.random.default_rng(SEED)
+        limits = [joint["limits"] or (-1.0, 1.0) for joint in self.joints if joint["kind"] != "fixed"]
+        lower, upper = np.clip(np.array(limits).reshape(-1, 2), -1.0, 1.0).T
+        found = []
+        for _ in range(POSES):
+            shape = lower + (upper - lower) * random.uniform(size=len(lower))
+            rate = random.uniform(-1.0, 1.0, len(lower))
+            found.append((dict(zip(self.moving(), shape.tolist(), strict=True)),
+                          dict(zip(self.moving(), rate.tolist(), strict=True))))  # fmt: skip
+        return found
+
+    def add_pose(
+        self,
+        shape: dict[str, float],
+        rate: dict[str, float],
+        inertia: Array,
+        momentum: Array,
+        tolerance: tuple[float, float],
+    ) -> None:
+        """What the engine has at a shape: I (3, 3) [kg m^2] and L_o (3,) [kg m^2/s], axes of the root link.
+
+        tolerance : of both, as shares of their largest terms
+        """
+        self.poses.append({
+            "shape": shape,
+            "rate": rate,
+            "inertia": np.ravel(inertia).tolist(),
+            "momentum": np.ravel(momentum).tolist(),
+            "tolerance": list(tolerance),
+        })  # fmt: skip
+
+    def spoken(self) -> dict[str, Any]:
+        """All of it as JSON holds it."""
+        return self.__dict__
+
+
+def locked_inertia(masses: Array, centres: Array, tensors: Array) -> Array:
+    """About the common centre of mass, of parts (N,), (N, 3), (N, 3, 3) in the same axes: (3, 3)."""
+    apart = centres - masses @ centres / masses.sum()
+    squares = (apart**2).sum(axis=1)[:, None, None] * np.eye(3) - apart[:, :, None] * apart[:, None, :]
+    return np.asarray((tensors + masses[:, None, None] * squares).sum(axis=0))

@@ -1,0 +1,109 @@
+"""A body that an engine reads: asked in a process of its own, and compared with what the engine computes."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...child_process import run_alone
+from ...errors import MissingExtraError, ModelFileError
+from .._cross_check import inertia_and_momentum
+from .._link_tree import Joint, Link, LinkTree, from_the_root
+from ..body import Body
+from .formats import FORMATS
+from .reading import MEMORY, MISSING, NO_MEMORY, REFUSED
+
+_SECONDS = 60
+"""[s] for the imports and the file; it only ends what would never end."""
+
+
+def engine_tree(path: Path, name: str) -> tuple[LinkTree, list[dict[str, Any]]]:
+    """Links and joints of a file in a format that an engine owns, and what the engine has at some shapes.
+
+    Raises
+    ------
+    MissingExtraError
+        If the engine is not installed.
+    ModelFileError
+        If it does not accept the file, crashes on it or hangs.
+    """
+    known, where = FORMATS[name], str(path)
+    source = "from shapephase.body.engines.reading import read_in_this_process as read; read()"
+    try:
+        child = run_alone(source, (str(path.absolute()), name), b"", _SECONDS)
+    except subprocess.TimeoutExpired:
+        raise ModelFileError(f"{where}:1: {known.engine} took more than {_SECONDS} s and was stopped") from None
+    if child.returncode == MISSING:
+        raise MissingExtraError(
+            f"{where} is {known.title}, which {known.engine} reads: pip install 'shapephase[{known.extra}]'"
+        )
+    if child.returncode < 0:
+        raise ModelFileError(f"{where}:1: {known.engine} crashed on it, signal {-child.returncode}")
+    if child.returncode == NO_MEMORY:
+        raise ModelFileError(f"{where}:1: {known.engine} took more than {MEMORY >> 20} MiB and was stopped")
+    if child.returncode == REFUSED:
+        refused = json.loads(child.stdout)
+        raise ModelFileError(f"{where}:{refused['line']}: {refused['message']}")
+    if child.returncode:
+        said = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise ModelFileError(f"{where}:1: {known.engine} does not read it: {''.join(said) or 'it says nothing'}")
+    return _tree_of(json.loads(child.stdout), where)
+
+
+def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str, Any]]]:
+    links = {
+        entry["name"]: Link(
+            entry["name"], f"{where}:{entry['line']}", entry["mass"], np.array(entry["centre"]),
+            np.array(entry["inertia"]).reshape(3, 3),
+        )
+        for entry in said["links"]
+    }  # fmt: skip
+    joints = [
+        Joint(
+            name=entry["name"],
+            where=where,
+            kind=entry["kind"],
+            parent=entry["parent"],
+            child=entry["child"],
+            place=np.array(entry["place"]),
+            turn=np.array(entry["turn"]).reshape(3, 3),
+            axis=np.array(entry["axis"]),
+            after=np.zeros(3),
+            limits=(-np.inf, np.inf) if entry["limits"] is None else (entry["limits"][0], entry["limits"][1]),
+        )
+        for entry in said["joints"]
+    ]
+    first, ordered = from_the_root(links, joints, where)
+    # Parents before children, as every tree of links has them.
+    sorted_links = {name: links[name] for name in (first, *(joint.child for joint in ordered))}
+    notes = tuple(f"{where}:1: {note}" for note in said["notes"])
+    tree = LinkTree(said["name"], sorted_links, ordered, frames=frozenset(said["frames"]), notes=notes)
+    return tree, said["poses"]
+
+
+def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:
+    """Compare a body with what the engine that owns its format computes.
+
+    Raises
+    ------
+    ModelFileError
+        If inertia or momentum at a random shape and rate differ by more than rounding.
+    """
+    for pose in poses:
+        shape = np.array([pose["shape"][name] for name in body.joint_names])
+        rate = np.array([pose["rate"][name] for name in body.joint_names])
+        *_, extent, motion = inertia_and_momentum(tree, pose["shape"], pose["rate"])
+        found = body.locked_inertia(shape).ravel(), body.internal_momentum(shape, rate)
+        for what, got, scale, share in zip(
+            ("inertia", "momentum"), found, (extent, motion), pose["tolerance"], strict=True
+        ):
+            # A comparison that NaN fails.
+            if not np.all(np.abs(got - np.array(pose[what])) <= share * scale):
+                raise ModelFileError(
+                    f"{where}:1: the engine has another {what} at a random shape: {pose[what]} against {got.tolist()}; "
+                    "please report this file"
+                )

@@ -1,0 +1,43 @@
+"""What a reading process does: it limits itself, has an engine read a file, and writes plain numbers as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+
+from ...child_process import limit_this_process
+from .chain import UnusableModelError
+from .formats import FORMATS
+
+MISSING = 4
+"""Exit code where the engine is not installed."""
+REFUSED = 5
+"""Exit code where the file cannot be used; standard output says why."""
+NO_MEMORY = 3
+"""Exit code of a process that ran out of memory."""
+MEMORY = 1024 * 2**20
+"""[bytes] that reading a file may take beyond the imports."""
+
+
+def read_in_this_process() -> None:
+    """Read the file of the first argument in the format of the second, and end the process."""
+    path, name = sys.argv[1:3]
+    known = FORMATS[name]
+    if find_spec(known.engine) is None:
+        sys.exit(MISSING)
+    # Engines print what they have to say; standard output is for the answer alone.
+    answer, sys.stdout = sys.stdout, sys.stderr
+    reader = import_module(known.module, __package__)
+    limit_this_process(MEMORY)
+    try:
+        chain = reader.chain_of(path)
+    except MemoryError:
+        sys.exit(NO_MEMORY)
+    except UnusableModelError as error:
+        answer.write(json.dumps({"message": str(error), "line": error.line}))
+        answer.flush()
+        sys.exit(REFUSED)
+    answer.write(json.dumps(chain.spoken()))
+    answer.flush()

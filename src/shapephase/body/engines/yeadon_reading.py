@@ -1,0 +1,170 @@
+"""Yeadon's model of a human from ninety-five measurements, by the package yeadon (Dembia, Moore and Hubbard 2014).
+
+Mass, centre and inertia of its eleven segments come from the package; so do their poses, which are compared with ours.
+Its inertia of the whole human is not used: version 2.0.1 turns the segments' tensors the wrong way round.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+import yeadon
+
+from ...arrays import Array
+from .chain import Chain, UnusableModelError, locked_inertia
+
+_X = np.array([1.0, 0.0, 0.0])
+"""To the left, as the package has it; it turns forwards and back."""
+_Y = np.array([0.0, 1.0, 0.0])
+"""To the back."""
+_Z = np.array([0.0, 0.0, 1.0])
+"""Up, of a person who stands."""
+_ROOT = "P"
+_JOINTS = {
+    "T": ("P", (("PTsagittalFlexion", _X), ("PTbending", _Y))),
+    "C": ("T", (("TCsagittalSpinalFlexion", _X), ("TCspinalTorsion", _Z))),
+    "A1": ("C", (("CA1extension", _X), ("CA1adduction", _Y), ("CA1rotation", _Z))),
+    "A2": ("A1", (("A1A2extension", _X),)),
+    "B1": ("C", (("CB1extension", _X), ("CB1abduction", _Y), ("CB1rotation", _Z))),
+    "B2": ("B1", (("B1B2extension", _X),)),
+    "J1": ("P", (("PJ1extension", _X), ("PJ1adduction", _Y))),
+    "J2": ("J1", (("J1J2flexion", _X),)),
+    "K1": ("P", (("PK1extension", _X), ("PK1abduction", _Y))),
+    "K2": ("K1", (("K1K2flexion", _X),)),
+}
+"""Of each segment the one it hangs on, and the package's names of the turns between them, in their order."""
+_STEP = 0.02
+"""[rad] of the differences that give rates: the eighth power is at rounding."""
+_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+"""Of the differences over so many steps to both sides (Fornberg 1988)."""
+_EXACT = 1e-12
+"""Share of the largest terms that rounding leaves of an inertia."""
+_BY_DIFFERENCES = 1e-11
+"""The same of a momentum by differences."""
+_SLIP = 0.1
+"""By which a perimeter may miss what is possible for its width: tapes slip, and the package then takes a circle."""
+_MOST_BYTES = 1 << 20
+"""A file of measurements has three thousand."""
+
+
+def chain_of(path: str) -> Chain:
+    """Links and joints of a file of measurements, on the pelvis."""
+    notes: list[str] = []
+    human = _human(path, notes)
+    limits = dict(zip(human.CFGnames, human.CFGbounds, strict=True))
+    _configure(human, {})
+    parts = {part.label.split(":")[0]: part for part in human.segments}
+    chain = Chain(Path(path).stem, notes=notes)
+    for key in (_ROOT, *_JOINTS):
+        part = parts[key]
+        if not (math.isfinite(part.mass) and part.mass > 0.0):
+            raise UnusableModelError(f"segment {part.label!r} has a mass of {part.mass:g} kg")
+        chain.add_link(_link(part), part.mass, part.rel_center_of_mass, part.rel_inertia)
+    for key, (above, turns) in _JOINTS.items():
+        part, parent = parts[key], parts[above]
+        frame = np.asarray(parent.rot_mat).T
+        place, turn = frame @ (np.ravel(part.pos) - np.ravel(parent.pos)), frame @ np.asarray(part.rot_mat)
+        axes = [(name, "revolute", axis, list(limits[name])) for name, axis in turns]
+        chain.add_joints(_link(parent), _link(part), place, turn, axes)
+    for shape, rate in chain.random_shapes():
+        chain.add_pose(shape, rate, *_seen(human, shape, rate), (_EXACT, _BY_DIFFERENCES))
+    return chain
+
+
+def _human(path: str, notes: list[str]) -> Any:
+    content = Path(path).read_bytes()
+    if len(content) > _MOST_BYTES:
+        raise UnusableModelError(f"{len(content)} bytes are no file of ninety-five measurements")
+    _check_numbers(content)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings(record=True) as doubts:
+            warnings.simplefilter("always")
+            human = yeadon.Human(path)
+    except Exception as error:
+        # The package raises bare exceptions.
+        raise UnusableModelError(f"yeadon does not accept it: {' '.join(map(str, error.args))}") from None
+    for doubt in doubts:
+        if found := re.search(r"Stadium '(.*?)'.*this ratio is ([-+.\deE]+?)\.?$", str(doubt.message), re.DOTALL):
+            notes.append(_rounded(found[1], float(found[2])))
+    return human
+
+
+def _rounded(level: str, ratio: float) -> str:
+    """That a level was made a circle. Raises UnusableModelError where its numbers are no measurements of one cut."""
+    if not (1.0 - _SLIP) * 2.0 < ratio < (1.0 + _SLIP) * math.pi:
+        raise UnusableModelError(
+            f"level {level!r}: its perimeter is {ratio:.4g} times its width; of any cut it is from 2 to pi times"
+        )
+    return f"level {level!r} is taken for a circle: its perimeter is {ratio:.4g} times its width, not from 2 to pi"
+
+
+def _check_numbers(content: bytes) -> None:
+    """That every entry is a number that exists; the package multiplies what it gets."""
+    try:
+        read = yaml.safe_load(content.decode("utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        mark = getattr(error, "problem_mark", None)
+        line = mark.line + 1 if mark is not None else 1
+        raise UnusableModelError("it is no YAML file of measurements, `name: number` a line", line) from None
+    if not isinstance(read, dict):
+        raise UnusableModelError("it is no YAML file of measurements, `name: number` a line")
+    lines = content.decode("utf-8").splitlines()
+    for name, value in read.items():
+        plain = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+        if not plain or (value <= 0.0 and not (name == "totalmass" and value == -1)):
+            line = next((k for k, text in enumerate(lines, 1) if text.lstrip().startswith(f"{name}:")), 1)
+            raise UnusableModelError(f"{name}: a number above zero is needed, got {value!r}", line)
+    names = {*yeadon.Human.measnames, "measurementconversionfactor"}
+    missing, unknown = sorted(names - set(read)), sorted(map(str, set(read) - names - {"totalmass"}))
+    if missing or unknown:
+        lacks = f"lacks {', '.join(missing)}" if missing else ""
+        has = f"has {', '.join(unknown)}, which are no measurements" if unknown else ""
+        raise UnusableModelError(f"the file {' and '.join(text for text in (lacks, has) if text)}")
+
+
+def _link(part: Any) -> str:
+    """As the package calls it, without its key: 'A1: Left upper arm' -> 'left_upper_arm'."""
+    return part.label.split(":")[1].strip().lower().replace(" ", "_").replace("-", "_")
+
+
+def _configure(human: Any, turns: dict[str, float]) -> None:
+    human.set_CFG_dict({name: turns.get(name, 0.0) for name in human.CFGnames})
+
+
+def _placed(human: Any, turns: dict[str, float]) -> tuple[Array, Array]:
+    """Centres (N, 3) and axes (N, 3, 3) of the segments."""
+    _configure(human, turns)
+    return (
+        np.array([np.ravel(part.center_of_mass) for part in human.segments]),
+        np.array([part.rot_mat for part in human.segments]),
+    )
+
+
+def _seen(human: Any, shape: dict[str, float], rate: dict[str, float]) -> tuple[Array, Array]:
+    """Locked inertia and internal momentum from the package's poses, the pelvis at rest."""
+    masses = np.array([part.mass for part in human.segments])
+    tensors = np.array([part.rel_inertia for part in human.segments])
+    centres, turns = _placed(human, shape)
+    speeds, slopes = np.zeros_like(centres), np.zeros_like(turns)
+    for steps, weight in _WEIGHTS:
+        for side in (1.0, -1.0):
+            moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
+            there, turned = _placed(human, moved)
+            speeds += side * weight / _STEP * there
+            slopes += side * weight / _STEP * turned
+    spins = slopes @ np.swapaxes(turns, 1, 2)
+    omega = 0.5 * np.stack(
+        [spins[:, 2, 1] - spins[:, 1, 2], spins[:, 0, 2] - spins[:, 2, 0], spins[:, 1, 0] - spins[:, 0, 1]], axis=1
+    )
+    tensors = turns @ tensors @ np.swapaxes(turns, 1, 2)
+    apart = centres - masses @ centres / masses.sum()
+    momentum = (masses[:, None] * np.cross(apart, speeds)).sum(axis=0) + np.einsum("nij,nj->i", tensors, omega)
+    return locked_inertia(masses, centres, tensors), momentum

@@ -1,0 +1,246 @@
+"""Formats that other programs own: what the engine computes, a motion by it alone, and files that are refused."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import warnings
+
+import biorbd
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase.body.engines import engine_tree as asking
+from shapephase.body.engines.formats import format_of
+from shapephase.body.engines.reading import MISSING, NO_MEMORY
+from shapephase.errors import IgnoredElementWarning, MissingExtraError, ModelFileError
+from support.engine_files import ACROBAT, MASSLESS_ROOT, measured
+
+EPS = np.finfo(float).eps
+SIX_DIGITS = 5e-7
+"""What a frame written with six digits lacks of being orthonormal, at most."""
+
+
+def loaded(tmp_path, text, name="file.txt"):
+    path = tmp_path / name
+    path.write_text(text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IgnoredElementWarning)
+        return sp.load_body(path)
+
+
+# ---- bioMod --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def exact_acrobat():
+    """With the frame's numbers to sixteen digits, as biorbd and the library must then agree to rounding."""
+    cosine, sine = np.cos(0.2), np.sin(0.2)
+    return ACROBAT.replace("0.980067", repr(float(cosine))).replace("0.198669", repr(float(sine)))
+
+
+def test_an_acrobat_is_what_biorbd_has(tmp_path, exact_acrobat):
+    body = loaded(tmp_path, exact_acrobat)
+    assert body.joint_names == (
+        *("Thorax_RotX", "Thorax_RotZ", "RightArm_RotZ", "RightArm_RotY", "RightArm_RotX", "Slider_TransZ"),
+    )
+    assert body.link_names == ("Pelvis", "Thorax", "RightArm", "Slider", "Hand")
+    assert body.joint_units == ("rad",) * 5 + ("m",)
+    np.testing.assert_array_equal(body.joint_limits[:2], [[-0.5, 0.9], [-1.0, 1.0]])
+    np.testing.assert_allclose(body.mass, 57.25, rtol=4 * EPS)
+
+
+def test_a_floating_motion_is_that_of_biorbd(tmp_path, exact_acrobat):
+    """biorbd integrates its own equations of the free base; reconstruct has the same attitude in time."""
+    body = loaded(tmp_path, exact_acrobat)
+    path = tmp_path / "model.bioMod"
+    path.write_text(exact_acrobat.replace("\tmeshfile pelvis.bvh // not there\n", "").replace("-9.81", "0"))
+    model = biorbd.Model(str(path))
+    size = np.array([0.3, 0.4, 0.5, 0.4, 0.3, 0.1])[:, None]
+    loop = sp.ShapePath.fourier(0.1 * size[:, 0], np.hstack([size, 0.3 * size]), np.hstack([0.5 * size, size]), 1.0)
+    turns = 2.0 * np.pi * np.arange(1, 3)
+
+    def joints(t):
+        shapes, rates = loop.curve(np.array([t]))
+        waves = np.hstack([size, 0.3 * size]) * turns**2 * np.cos(turns * t)
+        waves = waves + np.hstack([0.5 * size, size]) * turns**2 * np.sin(turns * t)
+        return shapes[0], rates[0], -waves.sum(axis=1)
+
+    def equations(t, state):
+        shape, rate, bend = joints(t)
+        q, v = np.concatenate([state[:6], shape]), np.concatenate([state[6:], rate])
+        q, v = biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v)
+        return np.concatenate([state[6:], model.ForwardDynamicsFreeFloatingBase(q, v, bend).to_array()])
+
+    spin = np.array([0.0, 0.0, 0.0, 0.4, -0.3, 0.6])
+    times = np.linspace(0.0, 1.0, 6)
+    run = solve_ivp(equations, (0.0, 1.0), np.concatenate([np.zeros(6), spin]), "DOP853", times, rtol=1e-12, atol=1e-12)
+    shape, rate, _ = joints(0.0)
+    momentum = body.locked_inertia(shape) @ spin[3:] + body.internal_momentum(shape, rate)
+    motion = sp.reconstruct(sp.articulated(body, loop), momentum, tolerance=1e-11)
+    expected = Rotation.from_euler("XYZ", run.y[3:6].T).as_matrix()
+    np.testing.assert_allclose(motion.attitude(times), expected, rtol=0, atol=1e-9)
+
+
+def test_six_digits_of_a_frame_are_made_a_rotation(tmp_path, exact_acrobat):
+    (tmp_path / "a.bioMod").write_text(ACROBAT)
+    with pytest.warns(IgnoredElementWarning, match=r"orthonormal to \de-07 only.*|1 mesh files are not read"):
+        rounded = sp.load_body(tmp_path / "a.bioMod")
+    exact = loaded(tmp_path, exact_acrobat)
+    shape = np.array([0.2, -0.3, 0.5, 0.1, 0.7, 0.05])
+    apart = rounded.locked_inertia(shape) - exact.locked_inertia(shape)
+    scale = np.abs(exact.locked_inertia(shape)).max()
+    assert EPS * scale < np.abs(apart).max() < 10 * SIX_DIGITS * scale
+
+
+def test_a_base_without_mass_of_its_own(tmp_path):
+    """Coordinates spread over segments without mass are the base's: the same body."""
+    body, whole = loaded(tmp_path, MASSLESS_ROOT), loaded(tmp_path, ACROBAT)
+    assert (body.joint_names, body.link_names) == (whole.joint_names, whole.link_names)
+    shape = np.array([0.2, -0.3, 0.5, 0.1, 0.7, 0.05])
+    np.testing.assert_array_equal(body.locked_inertia(shape), whole.locked_inertia(shape))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("parent Thorax", "parent Torso", r":\d+: segment 'RightArm': its parent 'Torso' does not exist"),
+        ("mass 30", "mass nan", "no real body has mass nan"),
+        ("mass 30", "mass -30", "no real body has mass -30"),
+        ("com 0 0 0.2", "cm 0 0 0.2", r":\d+: segment 'Thorax': biorbd passes over the word 'cm'; 'com' is near"),
+        ("rotations	xz", "rotations x z", r"biorbd reads 'x' alone; write `rotations xz`"),
+        ("rotations	zyx", "rotations q", "turns by a quaternion; joints of one axis"),
+        ("segment Hand", "segment Slider", r":\d+: two segments are named 'Slider'"),
+        ("parent Slider", "", "one root segment is needed, got 'Pelvis', 'Hand'"),
+        (
+            "0 0.980067 -0.198669 0.02",
+            "0 2.980067 -0.198669 0.02",
+            r":\d\d: segment 'Thorax': biorbd does not accept it",
+        ),
+        ("RT 0.1 -0.2 0.3 xyz", "RT 0.1 -0.2 0.3 abc", "biorbd does not accept it"),
+    ],
+)
+def test_a_biomod_that_cannot_be_used(tmp_path, old, new, message):
+    assert old in ACROBAT
+    with pytest.raises(ModelFileError, match=message):
+        loaded(tmp_path, ACROBAT.replace(old, new, 1))
+
+
+# ---- Yeadon's human ------------------------------------------------------------------------------------------------
+
+SEEN = """
+import json, sys, numpy as np, yeadon
+human = yeadon.Human(sys.argv[1])
+turns = json.loads(sys.argv[2])
+human.set_CFG_dict({name: turns.get(name, 0.0) for name in human.CFGnames})
+inertia, centre = np.zeros((3, 3)), human.center_of_mass.ravel()
+for part in human.segments:
+    away = part.center_of_mass.ravel() - centre
+    inertia += part.rot_mat @ part.rel_inertia @ part.rot_mat.T
+    inertia += part.mass * (away @ away * np.eye(3) - np.outer(away, away))
+print(json.dumps([human.mass, centre.tolist(), inertia.tolist()]))
+"""
+
+
+def seen(path, turns):
+    command = [sys.executable, "-c", SEEN, str(path), json.dumps(turns)]
+    mass, centre, inertia = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    return mass, np.array(centre), np.array(inertia)
+
+
+def test_a_person_is_what_yeadon_measures(tmp_path, rng):
+    """Mass and centre are the package's, the inertia the sum of its segments' turned tensors."""
+    body = loaded(tmp_path, measured())
+    low, high = np.array(body.joint_limits).T
+    shape = low + (high - low) * rng.uniform(size=body.n_shape)
+    mass, centre, inertia = seen(tmp_path / "file.txt", dict(zip(body.joint_names, shape.tolist(), strict=True)))
+    np.testing.assert_allclose(body.mass, mass, rtol=20 * EPS)
+    np.testing.assert_allclose(body.centre_of_mass(shape), centre, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(body.locked_inertia(shape), inertia, rtol=0, atol=1e-14 * np.abs(inertia).max())
+    assert (body.n_shape, len(body.link_names)) == (18, 11)
+
+
+def test_the_next_person_is_not_lighter(tmp_path):
+    """The package keeps scaled densities for the whole process; each file is read in one of its own."""
+    masses = [loaded(tmp_path, measured(total)).mass for total in (70.0, 50.0, None)]
+    alone = seen(tmp_path / "file.txt", {})[0]
+    np.testing.assert_allclose(masses, [70.0, 50.0, alone], rtol=1e-13)
+
+
+def test_a_perimeter_that_is_a_little_too_long_makes_a_circle(tmp_path):
+    (tmp_path / "person.txt").write_text(measured(Ls3w=0.30))
+    with pytest.warns(IgnoredElementWarning, match="level 'Ls3: nipple' is taken for a circle: .* 3.167 times"):
+        assert sp.load_body(tmp_path / "person.txt").n_shape == 18
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (measured(Ls3w=-0.3), r":\d+: Ls3w: a number above zero is needed, got -0.3"),
+        (measured(Ls3w=".nan"), r":\d+: Ls3w: a number above zero is needed, got nan"),
+        (measured(Ls3w="wide"), r":\d+: Ls3w: a number above zero is needed, got 'wide'"),
+        (measured(Ls3w=None), "the file lacks Ls3w"),
+        (measured(Ls9w=0.3), "has Ls9w, which are no measurements"),
+        (measured(totalmass=0), r":\d+: totalmass: a number above zero is needed, got 0"),
+        (measured(Ls0w=3.0), "level 'Ls0: hip joint centre': its perimeter is 0.3167 times its width"),
+        (measured() + "a: [", r":\d+: it is no YAML file of measurements"),
+    ],
+)
+def test_measurements_that_cannot_be_used(tmp_path, text, message):
+    with pytest.raises(ModelFileError, match=message):
+        loaded(tmp_path, text)
+
+
+# ---- Both ----------------------------------------------------------------------------------------------------------
+
+
+def test_formats_are_told_by_content(tmp_path):
+    assert format_of(ACROBAT.encode()) == "biomod"
+    assert format_of(b"\xef\xbb\xbf// acrobat\n Version 3\n") == "biomod"
+    assert format_of(measured().encode()) == "yeadon"
+    assert format_of(b"<robot name='version 4'/>") is None
+    assert loaded(tmp_path, ACROBAT, "person.urdf").n_shape == 6
+
+
+@pytest.mark.parametrize(
+    ("ended", "error", "message"),
+    [
+        (MISSING, MissingExtraError, r"biorbd reads: pip install 'shapephase\[biomod\]'"),
+        (NO_MEMORY, ModelFileError, "biorbd took more than 1024 MiB and was stopped"),
+        (-11, ModelFileError, "biorbd crashed on it, signal 11"),
+        (1, ModelFileError, "biorbd does not read it: it broke"),
+    ],
+)
+def test_an_engine_that_fails(tmp_path, monkeypatch, ended, error, message):
+    ends = subprocess.CompletedProcess([], ended, b"", b"Traceback\nit broke\n")
+    monkeypatch.setattr(asking, "run_alone", lambda *_: ends)
+    with pytest.raises(error, match=message):
+        loaded(tmp_path, ACROBAT)
+
+
+def test_an_engine_that_hangs(tmp_path, monkeypatch):
+    def hangs(*_):
+        raise subprocess.TimeoutExpired("biorbd", 60.0)
+
+    monkeypatch.setattr(asking, "run_alone", hangs)
+    with pytest.raises(ModelFileError, match="took more than 60 s and was stopped"):
+        loaded(tmp_path, ACROBAT)
+
+
+def test_a_body_that_is_not_the_engines_is_not_handed_out(tmp_path, monkeypatch):
+    """What the engine computes is held against the body: a momentum of the wrong sign does not pass."""
+    real = asking.run_alone
+
+    def turned(*arguments):
+        done = real(*arguments)
+        said = json.loads(done.stdout)
+        said["poses"][-1]["momentum"] = [-value for value in said["poses"][-1]["momentum"]]
+        return subprocess.CompletedProcess([], 0, json.dumps(said).encode(), b"")
+
+    monkeypatch.setattr(asking, "run_alone", turned)
+    with pytest.raises(ModelFileError, match="the engine has another momentum at a random shape"):
+        loaded(tmp_path, ACROBAT)
