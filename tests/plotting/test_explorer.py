@@ -12,7 +12,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.plotting.explorer import explore_page
-from shapephase.plotting.pages.connection_series import least_perturbation_turns
+from shapephase.plotting.pages.plane_series import least_perturbation_turns
 from shapephase.shape_space.connection import holonomy, mechanical_connection
 from support.browser import opened
 
@@ -61,6 +61,31 @@ def test_a_circle_drawn_by_the_mouse_turns_the_body_as_its_file_says(cat, cat_pl
     base = np.reshape(page.evaluate("Array.from(page.figure.base)"), (4, 4)).T
     np.testing.assert_allclose(base[:3, :3], exact, atol=1e-5)
     np.testing.assert_allclose(base[:3, :3] @ cat.centre_of_mass(path.shape(0.0)) + base[:3, 3], 0.0, atol=1e-6)
+    # With angular momentum the page turns the body as the library does, which integrates another way, at every time.
+    chosen = page.evaluate("""() => {
+      page.components.forEach((input, n) => { input.value = [0.6, -0.3, 0.8][n] * page.plane.largest_momentum; });
+      page.components[0].dispatchEvent(new Event("input"));
+      return page.momentum;
+    }""")
+    assert np.linalg.norm(chosen) > 0.5 * page.evaluate("page.plane.largest_momentum")
+    motion = sp.reconstruct(sp.articulated(cat, path), chosen, tolerance=1e-11)
+    turn = np.array(page.evaluate("page.result.vector"))
+    stated = page.evaluate("page.result.bySteps + page.result.bySeries")
+    difference = so3.angle(Rotation.from_rotvec(turn).as_matrix() @ motion.final_attitude.T)
+    assert difference < stated < 1e-5
+    assert so3.angle(exact.T @ motion.final_attitude) > 0.5
+    for t in (0.25, 2.5, 4.0):
+        page.evaluate("t => page.clock.show(t)", t)
+        base = np.reshape(page.evaluate("Array.from(page.figure.base)"), (4, 4)).T
+        np.testing.assert_allclose(base[:3, :3], motion.attitude(t), atol=1e-5)
+    arrow = np.reshape(page.evaluate("Array.from(page.figure.momentum.pose)"), (4, 4)).T[:3, 2]
+    np.testing.assert_allclose(so3.normalised(arrow), so3.normalised(np.array(chosen)), atol=1e-12)
+    words = page.locator("#parts").inner_text()
+    assert "--momentum " + " ".join(f"{value:g}" for value in chosen) in words
+    split = sp.split(motion)
+    assert f"added {np.degrees(so3.angle(split.dynamical_rotation)):.2f}°" in words
+    page.get_by_text("no momentum", exact=True).click()
+    np.testing.assert_allclose(page.evaluate("page.result.vector"), page.evaluate("page.byShape.vector"), atol=0.0)
     assert [message for message in said if message[0] in ("error", "warning")] == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
 
@@ -71,9 +96,15 @@ def test_the_series_is_the_connection_to_its_error(cat, cat_plane, rng):
     shapes = np.zeros((200, cat.n_shape))
     shapes[:, places] = rng.uniform(*series.box.T, (200, 2))
     x = (2.0 * shapes[:, places] - series.box.sum(axis=1)) / np.ptp(series.box, axis=1)
-    shown = np.polynomial.chebyshev.chebval2d(x[:, 0], x[:, 1], series.coefficients)
+    inertia, momentum = (
+        np.moveaxis(np.polynomial.chebyshev.chebval2d(x[:, 0], x[:, 1], values), -1, 0)
+        for values in (series.inertia, series.momentum)
+    )
     exact = mechanical_connection(cat, shapes)[..., places]
-    assert np.linalg.norm(np.moveaxis(shown, -1, 0) - exact, axis=1).max() <= series.error < 1e-9
+    assert np.linalg.norm(np.linalg.solve(inertia, momentum) - exact, axis=1).max() <= series.error < 1e-9
+    assert np.linalg.norm(inertia - cat.locked_inertia(shapes), axis=(1, 2)).max() <= series.inertia_error < 1e-12
+    off = np.linalg.norm(momentum - cat.momentum_matrix(shapes)[..., places], axis=1)
+    assert off.max() <= series.momentum_error < 1e-12
 
 
 def test_the_frame_of_least_perturbation_is_calmer_than_the_base(cat_plane):
@@ -82,8 +113,7 @@ def test_the_frame_of_least_perturbation_is_calmer_than_the_base(cat_plane):
     first, second = (np.linspace(*(0.9 * ends), 61) for ends in series.box)
     turns = least_perturbation_turns(series, first, second)
     np.testing.assert_allclose(turns @ so3.transpose(turns), np.broadcast_to(np.eye(3), turns.shape), atol=1e-12)
-    x = [0.9 * np.linspace(-1.0, 1.0, 61)] * 2
-    base = np.moveaxis(np.polynomial.chebyshev.chebgrid2d(*x, series.coefficients), (0, 1), (-2, -1))
+    base = series.connection(first, second)
     calmed = turns @ base
     for k, values in enumerate((first, second)):
         slope = np.gradient(turns, values, axis=k) @ so3.transpose(turns)

@@ -23,6 +23,8 @@ def explore_command(
 ) -> Outcome | None:
     """Draw loops of two joints on a map of the curvature, and see what they turn the body by, in a browser or a file.
 
+    The body has no angular momentum, or one that is chosen by sliders.
+
     Parameters
     ----------
     joints

@@ -18,8 +18,8 @@ from ..errors import ShapeError
 from ..files import write_whole
 from ..shape_space.curvature_field import curvature_on_plane
 from ._moving_scene import shapes_by_link
-from .pages.connection_series import ConnectionSeries, connection_series, least_perturbation_turns
 from .pages.motion_data import body_data, frame_nodes
+from .pages.plane_series import PlaneSeries, least_perturbation_turns, plane_series
 from .pages.templates import SCENE_SCRIPTS, page_html
 from .pages.up_axis import up_axis
 
@@ -44,12 +44,13 @@ def explore_page(
     *,
     rest: ArrayLike | None = None,
     up: str | None = None,
-) -> ConnectionSeries:
+) -> PlaneSeries:
     """Write a page with the curvature of the connection over two joints, to draw closed loops on; it needs no network.
 
-    The page computes the turn of the body, at zero momentum, along the periodic cubic spline through the loop's points,
-    by ordered products of exponentials, and says how far it may be off: by the Chebyshev series of the connection that
-    it carries, and by its steps. The loop can be saved as a CSV file that `split` reads.
+    The page computes the turn of the body along the periodic cubic spline through the loop's points, by ordered
+    products of exponentials, without angular momentum or with one that is chosen by sliders. It says how far the turn
+    may be off: by the Chebyshev series of inertia and momentum that it carries, and by its steps. The loop can be saved
+    as a CSV file that `split` reads.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def explore_page(
 
 def explore_html(
     body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None, up: str | None = None
-) -> tuple[str, ConnectionSeries]:
+) -> tuple[str, PlaneSeries]:
     """The page that `explore_page` writes, as text, and its series: arguments and errors as there."""
     check_object(body, "Body", "body")
     if isinstance(joints, str) or len(joints) != 2 or joints[0] == joints[1]:
@@ -93,7 +94,7 @@ def explore_html(
     upwards = up_axis(up, body)
     shown = _map_box(body, places)
     margin = _MARGIN * (shown[:, 1:] - shown[:, :1])
-    series = connection_series(body, places, shown + margin * np.array([-1.0, 1.0]), still)
+    series = plane_series(body, places, shown + margin * np.array([-1.0, 1.0]), still)
     page = page_html(
         "explore.html",
         title=f"{body.name}: loops of {joints[0]} and {joints[1]}",
@@ -118,7 +119,7 @@ def _map_box(body: Body, places: tuple[int, int]) -> Array:
 
 
 def _plane_data(
-    body: Body, joints: Sequence[str], places: tuple[int, int], shown: Array, rest: Array, series: ConnectionSeries
+    body: Body, joints: Sequence[str], places: tuple[int, int], shown: Array, rest: Array, series: PlaneSeries
 ) -> dict[str, Any]:
     """The map, in base axes and in the frame of least perturbation, and the series."""
     across, along = (np.linspace(ends[0], ends[1], _MAP) for ends in shown)
@@ -130,15 +131,25 @@ def _plane_data(
         "rest": rest.tolist(),
         "shown": shown.tolist(),
         "box": series.box.tolist(),
-        "degree": len(series.coefficients) - 1,
-        "coefficients": np.ascontiguousarray(series.coefficients),
-        "error": series.error,
+        "degree": len(series.inertia) - 1,
+        # Of a symmetric tensor six entries: xx, yy, zz, yz, xz, xy.
+        "inertia": np.ascontiguousarray(series.inertia[..., [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]),
+        "momentum": np.ascontiguousarray(series.momentum),
+        "inertia_error": series.inertia_error,
+        "momentum_error": series.momentum_error,
+        "largest_momentum": _largest_momentum(series),
         "map": _MAP,
         "curvature": {
             "base axes": field.astype(np.float32),
             "least perturbation": so3.apply(turns, field).astype(np.float32),
         },
     }
+
+
+def _largest_momentum(series: PlaneSeries) -> float:
+    """Where the sliders of the momentum end: about one turn in a round of the loop, two digits [kg m^2/s]."""
+    mean = float(np.trace(series.inertia[0, 0])) / 3.0
+    return float(f"{2.0 * np.pi * mean / _DURATION:.1e}")
 
 
 def _still_motion(body: Body, places: tuple[int, int], shown: Array, rest: Array, up: Array) -> dict[str, Any]:
@@ -168,6 +179,7 @@ def _still_motion(body: Body, places: tuple[int, int], shown: Array, rest: Array
         "centre": still.copy(),
         "shapes": np.tile(rest, (_FRAMES, 1)).astype(np.float32),
         "momentum": [0.0, 0.0, 0.0],
+        "momentum_changes": True,
         "trail": None,
         "reach": reach,
         "extent": (0.8 * reach * np.concatenate([np.eye(3), -np.eye(3)])).astype(np.float32),

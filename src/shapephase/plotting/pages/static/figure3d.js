@@ -36,7 +36,7 @@ class Figure3D {
     this.ghosts = data.ghost ? data.nodes.map(node => this.solidsOf(node, GHOST_COLOUR)) : [];
     this.axes = AXIS_COLOURS.map(colour => this.into("base axes", scene.add(thin, colour)));
     this.magnitude = norm(data.momentum);
-    if (this.magnitude) this.momentum = this.into("momentum", scene.add(arrow, VERMILION));
+    if (this.magnitude || data.momentum_changes) this.momentum = this.into("momentum", scene.add(arrow, VERMILION));
     this.centre = this.into("centre of mass", scene.add(scene.upload(sphereMesh(0.022 * data.reach)), CENTRE_COLOUR));
     if (data.floor) this.into("floor", scene.add(scene.upload({positions: data.floor}, true), [0.78, 0.78, 0.78, 1]));
     scene.drawOver.push((pen, where) => this.drawOver(pen, where));
@@ -68,8 +68,15 @@ class Figure3D {
 
   toggle(group, visible) {
     if (visible) this.hidden.delete(group); else this.hidden.add(group);
-    for (const solid of this.groups[group] ?? []) solid.visible = visible;
+    for (const solid of this.groups[group] ?? []) solid.visible = visible && (group !== "momentum" || this.magnitude > 0);
     this.scene.invalidate();
+  }
+
+  // Another momentum; none is no arrow.
+  pointAlong(momentum) {
+    this.data.momentum = momentum;
+    this.magnitude = norm(momentum);
+    this.momentum.visible = this.magnitude > 0 && !this.hidden.has("momentum");
   }
 
   shapeAt({frame, share}) {
@@ -130,7 +137,7 @@ class Figure3D {
       const size = scaled(length, length, length);
       this.axes[k].pose = product(poseAlong(turned(base, axis), placeOf(base)), size);
     });
-    if (this.momentum) {
+    if (this.momentum && this.magnitude) {
       const long = MOMENTUM_LENGTH * this.data.reach;
       this.momentum.pose = product(poseAlong(this.data.momentum, centre), scaled(long, long, long));
     }
@@ -167,7 +174,7 @@ class Figure3D {
       }
     });
     if (!this.hidden.has("inertial axes")) this.drawInertialAxes(pen);
-    if (this.momentum && !this.hidden.has("momentum")) {
+    if (this.magnitude && !this.hidden.has("momentum")) {
       const tip = plus(this.centrePlace, unit(this.data.momentum), 1.09 * MOMENTUM_LENGTH * reach);
       label(pen, where(tip), `${Number(this.magnitude.toPrecision(3))} kg m²/s`, "#a04400");
     }
@@ -226,7 +233,7 @@ class Figure3D {
         points.push(moved(base, times(axis, 1.15 * AXES_LENGTH * this.data.reach)));
       }
     }
-    if (this.momentum) {
+    if (this.magnitude) {
       const tip = times(unit(this.data.momentum), 1.12 * MOMENTUM_LENGTH * this.data.reach);
       const count = this.data.centre.length / 3;
       for (const k of [0, count - 1]) points.push(plus(Array.from(row(this.data.centre, k, 3)), tip));
@@ -237,7 +244,7 @@ class Figure3D {
   // All of the body and of its arrow about a centre of mass.
   around(centre) {
     const points = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].flatMap(axis => [1, -1].map(side => plus(centre, axis, side * this.data.reach)));
-    if (this.momentum) points.push(plus(centre, unit(this.data.momentum), 1.12 * MOMENTUM_LENGTH * this.data.reach));
+    if (this.magnitude) points.push(plus(centre, unit(this.data.momentum), 1.12 * MOMENTUM_LENGTH * this.data.reach));
     return points;
   }
 }

@@ -83,7 +83,7 @@ class CurvatureMap {
         const at = [...this.plane.shown.map(([first]) => first)];
         at[n] = tick / factor;
         const [u, v] = this.pixel(at);
-        const text = String(Number(tick.toPrecision(6)));
+        const text = typeset(Number(tick.toPrecision(6)));
         if (n === 0) label(pen, [u, bottom + 12], text); else label(pen, [MAP_ROOM[0] - 6, v], text, "#333", "right");
       }
       const name = `${joint.name} [${joint.unit === "rad" ? "°" : "m"}]`;

@@ -1,8 +1,8 @@
-"""The connection over the plane of two joints as a Chebyshev series, and gauges in which its curvature is shown."""
+"""Inertia and momentum over the plane of two joints as Chebyshev series, and gauges in which curvature is shown."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,12 +10,12 @@ from ... import so3
 from ...arrays import Array
 from ...body.body import Body
 from ...chebyshev import chebyshev, nodes_on, values_to_coefficients
-from ...shape_space.connection import mechanical_connection
+from ...inertia_tensor import inverse_inertia
 
 # Degrees that are tried, along each joint.
 _DEGREES = (8, 12, 16, 24, 32, 48)
 # Largest difference from the connection at which a series is good [rad per unit of joint].
-_GOOD = 1e-9
+_GOOD = 1e-10
 # Points between the nodes at which a series is compared with the connection, along each joint.
 _CHECKED = 41
 # The largest difference may lie between them.
@@ -28,43 +28,74 @@ _GAUGE_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)
-class ConnectionSeries:
-    """A(r) for two joints, all others at rest: sum of coefficients[a, b] T_a(x) T_b(y).
+class PlaneSeries:
+    """Locked inertia and momentum matrix for two joints, all others at rest: sum of coefficients[a, b] T_a(x) T_b(y).
+
+    Both are entire functions of the angles, so that few terms are enough; the connection, their quotient, needs many.
 
     Attributes
     ----------
     box : (2, 2) lowest and highest of each joint [rad or m], where x and y are -1 and 1
-    coefficients : (n, n, 3, 2) base axes [rad per unit of joint]
-    error : largest difference from the connection that was found, doubled, and rounding [rad per unit of joint]
+    inertia : (n, n, 3, 3) coefficients, base axes [kg m^2]
+    momentum : (n, n, 3, 2) coefficients, base axes [kg m^2/s per unit of joint rate]
+    inertia_error, momentum_error : largest difference that was found (of a column of the momentum matrix), doubled, and
+        rounding, in those units
+    error : the same of the connection that follows [rad per unit of joint]
     """
 
     box: Array
-    coefficients: Array
+    inertia: Array
+    momentum: Array
+    inertia_error: float
+    momentum_error: float
     error: float
 
+    def connection(self, first: Array, second: Array) -> Array:
+        """A at all pairs of coordinates, I^-1 J of the series: (P,), (Q,) -> (P, Q, 3, 2)."""
+        terms = [
+            chebyshev(_local(values, ends), len(self.inertia))
+            for values, ends in zip((first, second), self.box, strict=True)
+        ]
+        inertia, momentum = (_summed(terms, values) for values in (self.inertia, self.momentum))
+        return np.asarray(np.linalg.solve(inertia, momentum), dtype=np.float64)
 
-def connection_series(body: Body, joints: tuple[int, int], box: Array, rest: Array) -> ConnectionSeries:
-    """A series of the degree that is needed, up to 48; its error says how good that is."""
+
+def plane_series(body: Body, joints: tuple[int, int], box: Array, rest: Array) -> PlaneSeries:
+    """A series of the degree that is needed, up to 48; its errors say how good that is."""
     between = [np.linspace(ends[0], ends[1], _CHECKED + 2)[1:-1] for ends in box]
-    exact = _connection(body, joints, between, rest)
+    exact = _sampled(body, joints, between, rest)
+    connection = inverse_inertia(exact[0]) @ exact[1]
+    weakest = float(np.linalg.eigvalsh(exact[0])[..., 0].min())
+    steepest = float(np.linalg.norm(connection, axis=-2).max())
     found = None
     for degree in _DEGREES:
         nodes = [nodes_on(box[k, :1], box[k, 1:], degree)[0] for k in range(2)]
         matrix = values_to_coefficients(degree)
-        coefficients = np.einsum("ap,bq,pqij->abij", matrix, matrix, _connection(body, joints, nodes, rest))
+        inertia, momentum = (
+            np.einsum("ap,bq,pqij->abij", matrix, matrix, values) for values in _sampled(body, joints, nodes, rest)
+        )
         terms = [chebyshev(_local(values, ends), degree + 1) for values, ends in zip(between, box, strict=True)]
-        shown = np.einsum("pa,qb,abij->pqij", *terms, coefficients)
-        rounding = _ROUNDING * degree**2 * float(np.abs(coefficients).sum(axis=(0, 1)).max())
-        error = _SAFETY * float(np.linalg.norm(shown - exact, axis=-2).max()) + rounding
-        if found is None or error < found.error:
-            found = ConnectionSeries(box=box, coefficients=coefficients, error=error)
-        if error <= _GOOD:
+        rounding = _rounding(inertia, degree), _rounding(momentum, degree)
+        tried = PlaneSeries(
+            box=box,
+            inertia=inertia,
+            momentum=momentum,
+            inertia_error=_largest_difference(_summed(terms, inertia), exact[0]) + rounding[0],
+            momentum_error=_largest_difference(_summed(terms, momentum), exact[1]) + rounding[1],
+            error=0.0,
+        )
+        # Rounding comes into the connection as any error of inertia and momentum does: by I^-1 (dJ - dI A).
+        carried = (rounding[1] + steepest * rounding[0]) / weakest
+        tried = replace(tried, error=_largest_difference(tried.connection(*between), connection) + carried)
+        if found is None or tried.error < found.error:
+            found = tried
+        if tried.error <= _GOOD:
             break
     assert found is not None
     return found
 
 
-def least_perturbation_turns(series: ConnectionSeries, first: Array, second: Array) -> Array:
+def least_perturbation_turns(series: PlaneSeries, first: Array, second: Array) -> Array:
     """Turns U(r) to the frame in which the connection is least, in the mean square over the box.
 
     A frame with axes d' = U d of what are d in base axes sees the connection U A_i + vee(d_i U U^T). U is made of turns
@@ -84,10 +115,8 @@ def least_perturbation_turns(series: ConnectionSeries, first: Array, second: Arr
     """
     count = 2 * _GAUGE_DEGREE + 3
     nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
-    degree = series.coefficients.shape[0]
-    terms = chebyshev(nodes, degree)
-    connection = np.einsum("pa,qb,abij->pqij", terms, terms, series.coefficients)
     half = 0.5 * (series.box[:, 1] - series.box[:, 0])
+    connection = series.connection(*(series.box.mean(axis=1)[:, None] + half[:, None] * nodes))
     inside, slopes = _basis(nodes)
     # Derivatives of all products of two polynomials by both joints, at all nodes.
     by_first = np.einsum("pa,qb->pqab", slopes, inside).reshape(count**2, -1)[:, 1:] / half[0]
@@ -127,12 +156,26 @@ def _basis(x: Array) -> tuple[Array, Array]:
     return chebyshev(x, _GAUGE_DEGREE + 1), np.asarray(slopes, dtype=np.float64)
 
 
-def _connection(body: Body, joints: tuple[int, int], places: list[Array], rest: Array) -> Array:
-    """At all pairs of coordinates: (P,), (Q,) -> (P, Q, 3, 2)."""
+def _sampled(body: Body, joints: tuple[int, int], places: list[Array], rest: Array) -> tuple[Array, Array]:
+    """Inertia and momentum matrix at all pairs of coordinates: (P,), (Q,) -> (P, Q, 3, 3), (P, Q, 3, 2)."""
     shapes = np.empty((len(places[0]), len(places[1]), body.n_shape))
     shapes[:] = rest
     shapes[:, :, joints[0]], shapes[:, :, joints[1]] = places[0][:, None], places[1]
-    return mechanical_connection(body, shapes)[..., list(joints)]
+    return body.locked_inertia(shapes), body.momentum_matrix(shapes)[..., list(joints)]
+
+
+def _summed(terms: list[Array], coefficients: Array) -> Array:
+    return np.einsum("pa,qb,abij->pqij", *terms, coefficients, optimize=True)
+
+
+def _largest_difference(shown: Array, exact: Array) -> float:
+    """Of columns, doubled; of a square matrix of all of it, which bounds its columns together."""
+    axes = (-2, -1) if exact.shape[-1] == 3 else (-2,)
+    return _SAFETY * float(np.sqrt(np.sum((shown - exact) ** 2, axis=axes)).max())
+
+
+def _rounding(coefficients: Array, degree: int) -> float:
+    return _ROUNDING * degree**2 * float(np.abs(coefficients).sum(axis=(0, 1)).max())
 
 
 def _local(values: Array, ends: Array) -> Array:
