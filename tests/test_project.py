@@ -1,40 +1,50 @@
 """The project itself: what a wheel and an editable install find, how fast it imports, what the README says."""
 
+import datetime
+import os
 import re
 import subprocess
 import sys
 import tomllib
 import zipfile
-from operator import attrgetter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import shapephase as sp
+from shapephase.cli.main import main
 
 ROOT = Path(__file__).parents[1]
 COUNT = "import shapephase as sp; b = [sp.load_body(n) for n in sp.robot_names()]; print(len(b), sp.__file__)"
 
 
-def test_a_wheel_holds_the_bodies(tmp_path):
+def test_a_wheel_made_of_the_sdist_works_in_another_folder(tmp_path):
+    built = [sys.executable, "-m", "hatchling", "build", "--target", "sdist", "--directory", str(tmp_path)]
+    subprocess.run(built, check=True, capture_output=True, cwd=ROOT)
+    (sdist,) = tmp_path.glob("shapephase-*.tar.gz")
     built = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
-    subprocess.run([*built, "--wheel-dir", str(tmp_path), str(ROOT)], check=True, capture_output=True)
+    subprocess.run([*built, "--wheel-dir", str(tmp_path), str(sdist)], check=True, capture_output=True, cwd=tmp_path)
     (wheel,) = tmp_path.glob("shapephase-*.whl")
+    assert wheel.name.split("-")[1] == sp.__version__
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
         names = archive.namelist()
     assert {f"shapephase/robots/{n}.urdf" for n in sp.robot_names()} <= set(names)
+    sources = {f"{path.relative_to(ROOT / 'src')}" for path in (ROOT / "src").rglob("*.py*") if path.suffix != ".pyc"}
+    assert sources <= set(names)
     assert wheel.stat().st_size < 1_200_000
-    code = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r}); {COUNT}"
-    said = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    # Python's path begins with the wheel: whatever else is installed, the checkout included, comes after it.
+    outside = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(tmp_path / "site")}, "check": True}
+    said = subprocess.run([sys.executable, "-c", COUNT], capture_output=True, text=True, **outside).stdout
     count, where = said.split(maxsplit=1)
     assert int(count) == len(sp.robot_names()) >= 5
     assert str(tmp_path) in where
     # The README's Python, in a folder that has nothing of the checkout.
     block, output = _readme_s_python()
-    (empty := tmp_path / "empty").mkdir()
-    code = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r})\n{block}"
-    ran = subprocess.run([sys.executable, "-c", code], cwd=empty, check=True, capture_output=True, text=True)
+    (tmp_path / "empty").mkdir()
+    outside["cwd"] = tmp_path / "empty"
+    ran = subprocess.run([sys.executable, "-c", block], capture_output=True, text=True, **outside)
     assert ran.stdout == output
 
 
@@ -56,37 +66,82 @@ def test_importing_brings_nothing_heavy():
     assert said.strip() == "[]"
 
 
+def _readme() -> str:
+    return (ROOT / "README.md").read_text(encoding="utf-8")
+
+
 def _readme_s_python() -> tuple[str, str]:
     """Its code, and what it prints."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    ((block, output),) = re.findall(r"```python\n(.*?)```\n\n```text\n(.*?)```", text, re.DOTALL)
+    ((block, output),) = re.findall(r"```python\n(.*?)```\n\nIt prints:\n\n```text\n(.*?)```", _readme(), re.DOTALL)
     return block, output
 
 
 def test_the_readme_s_python_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     block, output = _readme_s_python()
+    assert len(block.splitlines()) <= 10
     exec(compile(block, "README.md", "exec"), {})
     assert capsys.readouterr().out == output
-    assert (tmp_path / "fall.npz").exists()
-    assert len((tmp_path / "fall.csv").read_text().splitlines()) == 202
+    assert len((tmp_path / "attitudes.csv").read_text().splitlines()) == 202
 
 
-def test_the_readme_s_names_exist():
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    (table,) = re.findall(r"^\| question \| names \|\n(.*?)\n\n", text, re.MULTILINE | re.DOTALL)
-    names = [name for row in table.splitlines()[1:] for name in re.findall(r"`([\w.]+)`", row.split("|")[2])]
-    assert len(names) > 30
-    # In a list, later names are from where the first one is.
-    places = (sp, sp.optimal_control)
-    for name in names:
-        assert any(hasattr(place, name) for place in places) or attrgetter(name.removeprefix("sp."))(sp)
+def test_the_readme_s_recording_is_split_as_it_says(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    ((sample, command, table),) = re.findall(
+        r"```csv\n(.*?)```\n\n`shapephase (split [^`]*)`[^`]*```text\n(.*?)```", _readme(), re.DOTALL
+    )
+    (tmp_path / "arms.csv").write_text(sample)
+    main(command.split())
+    # The estimates are rounding, which differs between processors.
+    estimates = re.compile(r" \d\.\de-\d\d ")
+    printed = estimates.sub("", capsys.readouterr().out)
+    assert printed.startswith(estimates.sub("", table))
+
+
+def test_the_readme_s_links_lead_to_files_from_anywhere():
+    """The package index shows the page without the repository around it."""
+    pages = f"{_project()['urls']['Repository']}/"
+    pictures = f"{pages.replace('github.com', 'raw.githubusercontent.com')}main/"
+    targets = re.findall(r"\]\(\s*([^)\s]+)\s*\)", _readme())
+    assert len(targets) > 10
+    for target in targets:
+        inside = target.removeprefix(pictures).removeprefix(f"{pages}blob/main/").removeprefix(f"{pages}tree/main/")
+        assert inside != target, f"not in the repository: {target}"
+        assert (ROOT / inside).exists(), target
 
 
 def test_the_readme_begins_with_the_two_commands():
-    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    blocks = re.findall(r"```sh\n(.*?)```", _readme(), re.DOTALL)
     assert len(blocks) >= 2
     assert all(len(block.strip().splitlines()) == 1 for block in blocks[:2])
+
+
+def _project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def test_the_version_stands_once_and_is_repeated_rightly():
+    """In `__init__.py`, which the wheel reads; the newest release of the changelog has the citation's date."""
+    assert _project()["dynamic"] == ["version"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    said = dict(re.findall(r"^(version|date-released): \"?([^\"\n]*)", citation, re.MULTILINE))
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    headings = re.findall(r"^## (.*)$", changes, re.MULTILINE)
+    assert headings[-1] == "Names that moved"
+    releases = [heading for heading in headings[:-1] if heading != "Unreleased"]
+    assert "Unreleased" not in headings[1:]
+    assert releases[0] == f"{said['version']} ({said['date-released']})"
+    dates = [datetime.date.fromisoformat(re.fullmatch(r"[\w.]+ \((.*)\)", release)[1]) for release in releases]
+    assert dates == sorted(dates, reverse=True)
+    recipe = (ROOT / "conda-recipe" / "recipe.yaml").read_text(encoding="utf-8")
+    assert said["version"] == re.search(r"^  version: \"(.*)\"$", recipe, re.MULTILINE)[1] == sp.__version__
+
+
+def test_the_citation_has_the_three_source_works_with_years():
+    listed = re.findall(r"family-names: (\w+)|^    year: (\d+)$", (ROOT / "CITATION.cff").read_text(), re.MULTILINE)
+    words = [name or year for name, year in listed]
+    assert words[:8] == ["Cabrera", "2007", "Bonnard", "Cots", "Shcherbakova", "2013", "Marsden", "Ratiu"]
+    assert words[8] == "1999"
 
 
 @pytest.mark.parametrize("name", sp.robot_names())

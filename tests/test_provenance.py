@@ -5,7 +5,6 @@ import hashlib
 import html
 import json
 import re
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +32,7 @@ def checked(found, take, command):
     assert found["command"] == command
     date = datetime.datetime.fromisoformat(found["date"])
     assert date.utcoffset() == datetime.timedelta(0)
-    assert found["versions"]["shapephase"] == version("shapephase")
+    assert found["versions"]["shapephase"] == sp.__version__
     assert found["versions"]["numpy"] == np.__version__
     body = sp.load_body("diver")
     assert found["joints"] == list(body.joint_names)

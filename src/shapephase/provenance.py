@@ -12,8 +12,11 @@ from contextvars import ContextVar
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from . import __version__
+
 _COMMAND: ContextVar[str | None] = ContextVar("command line", default=None)
-_PACKAGES = ("shapephase", "numpy", "scipy", "pin")
+_PACKAGES = ("numpy", "scipy", "pin")
+"""That a result stands on."""
 _EPOCH = "SOURCE_DATE_EPOCH"
 """Variable of the environment with the date that is to be said, in seconds since 1970: for files that do not change."""
 
@@ -42,7 +45,11 @@ def provenance(made_from: Mapping[str, Any] | None = None) -> dict[str, Any]:
     return {
         "date": _date(),
         "command": _COMMAND.get(),
-        "versions": {**{name: _version(name) for name in _PACKAGES}, "python": platform.python_version()},
+        "versions": {
+            "shapephase": __version__,
+            **{name: _version(name) for name in _PACKAGES},
+            "python": platform.python_version(),
+        },
         **({} if made_from is None else made_from),
     }
 

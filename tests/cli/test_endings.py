@@ -261,11 +261,11 @@ run()
 # ---- Exit codes -----------------------------------------------------------------------------------------------------
 
 
-def test_the_readme_and_the_help_list_every_exit_code(capfd):
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+def test_the_documentation_and_the_help_list_every_exit_code(capfd):
+    page = (ROOT / "docs" / "howto" / "command_line.md").read_text(encoding="utf-8")
     _, help_text, _ = ended(capfd, "--help")
     for code, meaning in MEANINGS.items():
-        assert f"| {code.value} | {meaning} |" in readme
+        assert f"| {code.value} | {meaning} |" in page
         assert f"{code.value}: {meaning}" in " ".join(help_text.split())
     assert set(MEANINGS) == set(ExitCode)
 

@@ -43,7 +43,7 @@ MEANINGS = {
     ExitCode.STOPPED: "stopped by Ctrl-C; of plan, the best so far is written",
     ExitCode.BROKEN_PIPE: "what reads the output wants no more of it",
 }
-"""One line for each code, in the help and in the README."""
+"""One line for each code, in the help and in docs/howto/command_line.md."""
 
 
 def exit_code_list() -> str:

@@ -12,10 +12,10 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 
+from .. import __version__
 from ..errors import OutputFileError, ShapePhaseError
 from ..integrator.fast.switch import begin_command
 from ..provenance import command_line, provenance
@@ -102,7 +102,7 @@ def _ran(tokens: list[str], *, as_json: bool) -> int:
         return ExitCode.DONE
     # The recording is part of the result already.
     made_from = {name: value for name, value in outcome.made_from.items() if name != "recording"}
-    data, text = {"shapephase": version("shapephase"), **outcome.data, "warnings": messages}, outcome.text
+    data, text = {"shapephase": __version__, **outcome.data, "warnings": messages}, outcome.text
     data["provenance"] = provenance(made_from)
     if outcome.with_verdict:
         many = "1 warning" if len(messages) == 1 else f"{len(messages)} warnings"

@@ -6,13 +6,12 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .. import so3
+from .. import __version__, so3
 from ..arrays import Array
 from ..chebyshev import nodes_on, values_to_coefficients
 from ..deformation.deformation import Deformation, sampled_deformation
@@ -64,7 +63,7 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
     interpolant, deformation = record.solution.interpolant, record.deformation
     header = {
         "format": _FORMAT,
-        "shapephase": version("shapephase"),
+        "shapephase": __version__,
         "numpy": np.__version__,
         "deformation": deformation.label,
         "sha256": dict(deformation.inputs),
