@@ -33,6 +33,7 @@ RTOL = 1e-12
 _GAUSS_POINTS = 14
 # Each gains more than a digit.
 _MOST_ITERATIONS = 60
+_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 
 # A momentum for each body [kg m^2/s] that turns it by about a turn in the two seconds of `random_loop`.
 BODIES = {
@@ -125,6 +126,33 @@ def hat(v: ArrayLike) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def cross(a: ArrayLike, b: ArrayLike) -> Array:
+    """The product of two vectors (3,): for equations of motion, where `np.cross` takes ten times as long."""
+    a1, a2, a3 = np.asarray(a).tolist()
+    b1, b2, b3 = np.asarray(b).tolist()
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+
+
+def to_base(quat_xyzw: ArrayLike, vector: ArrayLike) -> Array:
+    """R^T v of a unit quaternion: v + w t + t x q with t = 2 v x q."""
+    x, y, z, w = np.asarray(quat_xyzw).tolist()
+    a, b, c = np.asarray(vector).tolist()
+    p, q, r = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    return np.array([a + w * p + q * z - r * y, b + w * q + r * x - p * z, c + w * r + p * y - q * x])
+
+
+def quaternion_rate(quat_xyzw: ArrayLike, omega: ArrayLike) -> list[float]:
+    """q' of R' = R hat(omega)."""
+    x, y, z, w = np.asarray(quat_xyzw).tolist()
+    i, j, k = np.asarray(omega).tolist()
+    return [
+        0.5 * (w * i + y * k - z * j),
+        0.5 * (w * j + z * i - x * k),
+        0.5 * (w * k + x * j - y * i),
+        -0.5 * (x * i + y * j + z * k),
+    ]
+
+
 def turn(axis: ArrayLike, angle: float) -> Array:
     """The rotation by `angle` about `axis` (Rodrigues), of any length."""
     unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
@@ -159,16 +187,22 @@ def urdf_file(name: str) -> Path:
 # ---- Pinocchio: momentum conserved at the true attitude -------------------------------------------------------------
 
 
+@lru_cache(maxsize=16)
+def free_flyer_model(name: str) -> pin.Model:
+    return pin.buildModelFromUrdf(str(urdf_file(name)), pin.JointModelFreeFlyer())
+
+
 class FreeFloating:
     """A Pinocchio model with a free-flyer, and its momentum at any attitude."""
 
     def __init__(self, name: str, joint_names: Sequence[str]) -> None:
-        self.model = pin.buildModelFromUrdf(str(urdf_file(name)), pin.JointModelFreeFlyer())
+        self.model = free_flyer_model(name)
         self.data = self.model.createData()
         joints = [self.model.joints[self.model.getJointId(joint)] for joint in joint_names]
         self.position = np.array([joint.idx_q for joint in joints])
         self.velocity = np.array([joint.idx_v for joint in joints])
         self.endless = np.array([joint.nq == 2 for joint in joints])
+        self._q, self._v = np.zeros(self.model.nq), np.zeros(self.model.nv)
 
     def rates(self, quat_xyzw: Array, shape: Array, rate: Array, momentum: Array) -> tuple[Array, Array]:
         """I^-1 Pi and I^-1 L_o, base axes [rad/s], from the momentum map at this attitude."""
@@ -177,18 +211,22 @@ class FreeFloating:
         solved = np.linalg.solve(self.data.Ag[3:, 3:6], both)
         return solved[:, 0], solved[:, 1]
 
-    def inverse_and_drift(self, shape: Array, rate: Array) -> tuple[Array, Array]:
-        """I^-1 and I^-1 L_o, base axes, which do not depend on the attitude."""
-        self._move(np.array([0.0, 0.0, 0.0, 1.0]), shape, rate)
-        inverse = np.linalg.inv(self.data.Ag[3:, 3:6])
-        return inverse, inverse @ self.data.hg.angular
+    def inverses_and_drifts(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
+        """I^-1 and I^-1 L_o, base axes, which do not depend on the attitude: (N, 3, 3), (N, 3)."""
+        inertia, internal = np.empty((len(shapes), 3, 3)), np.empty((len(shapes), 3, 1))
+        for row, (shape, rate) in enumerate(zip(shapes, rates, strict=True)):
+            self._move(_NO_TURN, shape, rate)
+            inertia[row], internal[row, :, 0] = self.data.Ag[3:, 3:6], self.data.hg.angular
+        inverses = np.linalg.inv(inertia)
+        return inverses, (inverses @ internal)[:, :, 0]
 
     def _move(self, quat_xyzw: Array, shape: Array, rate: Array) -> None:
-        q = np.zeros(self.model.nq)
+        q, v = self._q, self._v
         q[3:7] = quat_xyzw
-        q[self.position] = np.where(self.endless, np.cos(shape), shape)
-        q[self.position[self.endless] + 1] = np.sin(shape[self.endless])
-        v = np.zeros(self.model.nv)
+        q[self.position] = shape
+        if self.endless.any():
+            q[self.position[self.endless]] = np.cos(shape[self.endless])
+            q[self.position[self.endless] + 1] = np.sin(shape[self.endless])
         v[self.velocity] = rate
         pin.ccrba(self.model, self.data, q, v)
 
@@ -228,16 +266,15 @@ def pinocchio_motion(
     tangent = tangent / (np.linalg.norm(tangent) or 1.0)
 
     def slope(t: float, y: Array) -> Array:
-        quat, lift, in_base, in_lift = y[:4] / np.linalg.norm(y[:4]), y[4:13].reshape(3, 3), y[13:16], y[16:19]
+        quat, lift, in_base, in_lift = y[:4] / norm(y[:4]), y[4:13].reshape(3, 3), y[13:16], y[16:19]
         by_momentum, by_shape = body.rates(quat, joints.shape(t), joints.rate(t), spatial)
         omega = by_momentum - by_shape
-        u = Rotation.from_quat(quat).as_matrix().T @ axis
-        u_rate = np.cross(u, omega)
-        v, v_rate = lift @ u, lift @ np.cross(u, by_momentum)
+        u = to_base(quat, axis)
+        u_rate = cross(u, omega)
+        v, v_rate = lift @ u, lift @ cross(u, by_momentum)
         return np.concatenate(
             [
-                0.5 * (y[3] * omega + np.cross(y[:3], omega)),
-                [-0.5 * y[:3] @ omega],
+                quaternion_rate(y[:4], omega),
                 (-lift @ hat(by_shape)).ravel(),
                 -(in_base @ u_rate) * u,
                 -(in_lift @ v_rate) * v,
@@ -319,11 +356,12 @@ def _collocated(
     primitives = legint(np.eye(_GAUSS_POINTS), lbnd=-1.0)
     values_to_series = np.linalg.inv(legvander(gauss, _GAUSS_POINTS - 1))
     integrals = legval(np.append(gauss, 1.0), primitives).T @ values_to_series
+    seen = _seen_from_base(momentum)
     quat = Rotation.from_matrix(attitude).as_quat()
     quats = [quat]
     for left, right in pairwise(times):
         shapes, speeds = at(np.linspace(left, right, 5)[1:-1])
-        around = [body.inverse_and_drift(shape, speed) for shape, speed in zip(shapes, speeds)]
+        around = zip(*body.inverses_and_drifts(shapes, speeds), strict=True)
         fastest = max(norm(inverse, 2) * norm(momentum) + norm(drift) for inverse, drift in around)
         # A panel turns the body by one radian at most, or a little more.
         count = parts * max(2, int(np.ceil((right - left) * fastest)))
@@ -331,35 +369,52 @@ def _collocated(
         half = 0.5 * (right - left) / count
         nodes = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * gauss).ravel()
         shapes, speeds = at(nodes)
-        sampled = [body.inverse_and_drift(shape, speed) for shape, speed in zip(shapes, speeds)]
-        inverses = np.array([inverse for inverse, _ in sampled]).reshape(count, _GAUSS_POINTS, 3, 3)
-        drifts = np.array([drift for _, drift in sampled]).reshape(count, _GAUSS_POINTS, 3)
-        for inverse, drift in zip(inverses, drifts):
+        inverses, drifts = body.inverses_and_drifts(shapes, speeds)
+        # I^-1 R^T mu of the products of the quaternion's parts, and half of I^-1 L_o, both times half a panel.
+        turning = (half * seen @ inverses.transpose(0, 2, 1)).reshape(count, _GAUSS_POINTS, 16, 3)
+        drifting = half * drifts.reshape(count, _GAUSS_POINTS, 1, 3)
+        for by_momentum, by_shape in zip(turning, drifting, strict=True):
             stages = np.repeat(quat[None], _GAUSS_POINTS, axis=0)
             for _ in range(_MOST_ITERATIONS):
-                slopes = half * _quaternion_rate(stages, inverse, drift, momentum)
-                moved = quat + integrals[:-1] @ slopes
+                moved = quat + integrals[:-1] @ _turned(stages, by_momentum, by_shape)
                 change = np.abs(moved - stages).max()
                 stages = moved
                 if change < 4e-16:
                     break
-            quat = quat + integrals[-1] @ (half * _quaternion_rate(stages, inverse, drift, momentum))
+            quat = quat + integrals[-1] @ _turned(stages, by_momentum, by_shape)
             quat = quat / norm(quat)
         quats.append(quat)
     return Rotation.from_quat(np.array(quats)).as_matrix()
 
 
-def _quaternion_rate(quats: Array, inverse: Array, drift: Array, momentum: Array) -> Array:
-    """q' of R' = R hat(omega), omega = I^-1 R^T mu - I^-1 L_o, xyzw: (s, 4), (s, 3, 3), (s, 3) -> (s, 4)."""
-    x, y, z, w = quats.T
+def _turned(quats: Array, by_momentum: Array, by_shape: Array) -> Array:
+    """q omega / 2, with omega = I^-1 R^T mu - I^-1 L_o from the products of the parts of q: (s, 4) -> (s, 4)."""
+    products = (quats[:, :, None] * quats[:, None, :]).reshape(-1, 1, 16)
+    omega = products @ by_momentum - by_shape
+    return (quats[:, :, None] * omega).reshape(-1, 12) @ _HALF_PRODUCT
+
+
+def _seen_from_base(momentum: Array) -> Array:
+    """R^T mu as a form in the products of the parts of a quaternion xyzw: (16, 3)."""
     a, b, c = momentum
-    # R^T mu by the quaternion: t = 2 mu x v, R^T mu = mu + w t + t x v.
-    p, q, r = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
-    seen = np.stack([a + w * p + q * z - r * y, b + w * q + r * x - p * z, c + w * r + p * y - q * x], axis=1)
-    i, j, k = ((inverse @ seen[:, :, None])[:, :, 0] - drift).T
-    return 0.5 * np.stack(
-        [w * i + y * k - z * j, w * j + z * i - x * k, w * k + x * j - y * i, -(x * i + y * j + z * k)], axis=1
-    )
+    form = np.zeros((3, 4, 4))
+    # conj(q) mu q by its parts; the form is symmetric, so each mixed product has half of its coefficient.
+    form[0] = [[a, b, c, 0.0], [b, -a, 0.0, -c], [c, 0.0, -a, b], [0.0, -c, b, a]]
+    form[1] = [[-b, a, 0.0, c], [a, b, c, 0.0], [0.0, c, -b, -a], [c, 0.0, -a, b]]
+    form[2] = [[-c, 0.0, a, -b], [0.0, -c, b, a], [a, b, c, 0.0], [-b, a, 0.0, c]]
+    return form.reshape(3, 16).T
+
+
+# q omega / 2 of the products of q's parts and omega's: (12, 4).
+_HALF_PRODUCT = np.zeros((4, 3, 4))
+for _part, _axis, _result, _sign in (
+    *((3, k, k, 1.0) for k in range(3)),
+    *((k, k, 3, -1.0) for k in range(3)),
+    *((k, (k + 1) % 3, (k + 2) % 3, 1.0) for k in range(3)),
+    *((k, (k + 2) % 3, (k + 1) % 3, -1.0) for k in range(3)),
+):
+    _HALF_PRODUCT[_part, _axis, _result] = 0.5 * _sign
+_HALF_PRODUCT = _HALF_PRODUCT.reshape(12, 4)
 
 
 # ---- MuJoCo: forces and accelerations, no conservation law ----------------------------------------------------------
@@ -410,19 +465,28 @@ class MujocoBody:
         joints = [self.model.joint(joint) for joint in joint_names]
         self.position = np.array([int(np.ravel(joint.qposadr)[0]) for joint in joints])
         self.velocity = np.array([int(np.ravel(joint.dofadr)[0]) for joint in joints])
+        self._base_axes = np.eye(6, self.model.nv)
         assert len(joint_names) == self.model.nv - 6
 
     def place(self, position: Array, attitude: Array, shape: Array) -> None:
         """Set the configuration and compute all that depends on it alone."""
+        self.put(position, Rotation.from_matrix(attitude).as_quat(), shape)
+
+    def put(self, position: Array, quat_xyzw: Array, shape: Array) -> None:
+        """The same, by a quaternion of length 1."""
         qpos = self.data.qpos
         qpos[:3] = position
-        qpos[3:7] = np.roll(Rotation.from_matrix(attitude).as_quat(), 1)
+        qpos[3] = quat_xyzw[3]
+        qpos[4:7] = quat_xyzw[:3]
         qpos[self.position] = shape
         self.mujoco.mj_fwdPosition(self.model, self.data)
 
     def move(self, velocity: Array, omega: Array, rate: Array) -> None:
         """Set the velocity and compute all that depends on it."""
-        self.data.qvel[:] = self.full([*velocity, *omega], rate)
+        qvel = self.data.qvel
+        qvel[:3] = velocity
+        qvel[3:6] = omega
+        qvel[self.velocity] = rate
         self.mujoco.mj_fwdVelocity(self.model, self.data)
 
     def full(self, base: ArrayLike, joints: ArrayLike) -> Array:
@@ -437,7 +501,7 @@ class MujocoBody:
         return result
 
     def base_mass(self) -> Array:
-        return np.array([self.mass_times(row)[:6] for row in np.eye(6, self.model.nv)])
+        return np.array([self.mass_times(row)[:6] for row in self._base_axes])
 
     def momentum_about_centre(self) -> Array:
         """Angular momentum about the centre of mass, world axes, as MuJoCo sums it over the links."""
@@ -482,15 +546,13 @@ def mujoco_motion(
 
     def slope(t: float, y: Array) -> Array:
         quat = y[3:7]
-        body.place(y[:3], Rotation.from_quat(quat).as_matrix(), loop.shape(t))
+        body.put(y[:3], quat / norm(quat), loop.shape(t))
         body.move(y[7:10], y[10:13], loop.rate(t))
         force = body.data.qfrc_bias + body.mass_times(body.full(np.zeros(6), loop.acceleration(t)))
-        omega = y[10:13]
         return np.concatenate(
             [
                 y[7:10],
-                0.5 * (quat[3] * omega + np.cross(quat[:3], omega)),
-                [-0.5 * quat[:3] @ omega],
+                quaternion_rate(quat, y[10:13]),
                 np.linalg.solve(body.base_mass(), -force[:6]),
             ]
         )
