@@ -21,6 +21,7 @@ from shapephase.bounds._phase_bounds import (
 from shapephase.bounds.all_bounds import Bound, bounds
 from shapephase.bounds.energy import energy_along, homoclinic_energy
 from shapephase.bounds.regimes import crown_region, regime_certificate
+from support.independent import cross
 from support.random_deformations import KINDS, random_case
 
 QUICK, FULL = 20, 2000
@@ -38,7 +39,7 @@ def raw_momentum(moments, start, times):
     """Euler's equations with moments in time, by SciPy alone."""
 
     def rate(t, pi):
-        return np.cross(pi, pi / np.array([float(m) for m in moments(t)]))
+        return cross(pi, pi / np.array([float(m) for m in moments(t)]))
 
     flow = solve_ivp(rate, (times[0], times[-1]), start, t_eval=times, rtol=1e-12, atol=1e-13, method="DOP853")
     return flow.y.T

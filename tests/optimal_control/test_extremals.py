@@ -27,6 +27,7 @@ from shapephase.optimal_control import (
     wong_residual,
 )
 from support.bodies import joint, link, random_loop, urdf
+from support.independent import cross
 from support.long_runs import full_but
 
 X = np.array([1.0, 0.0, 0.0])
@@ -137,7 +138,7 @@ def test_hamiltons_equations_by_finite_differences(cat, kind):
         # H is quadratic in momenta: differences of any step are exact.
         by_momentum = slopes(lambda x: energy(shape, x, moment), momentum, 0.1)
         by_moment = slopes(lambda x: energy(shape, momentum, x), moment, 0.1)
-        return np.concatenate([by_momentum, -by_shape, np.cross(moment, by_moment)])
+        return np.concatenate([by_momentum, -by_shape, cross(moment, by_moment)])
 
     momentum = metric_of(cat, START, kind) @ RATE + sp.mechanical_connection(cat, START).T @ charge
     truth = solve_ivp(

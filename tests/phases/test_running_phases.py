@@ -20,16 +20,19 @@ import shapephase as sp
 from shapephase.deformation.gauge import link_gauge, mean_body_gauge
 from shapephase.errors import AccuracyNotReached, GaugeError, ShapeError, TrajectoryError, UnknownNameError
 from shapephase.phases.phases import arc_phases, dynamic_phase_from_energy, parallel_transport, running_phases
+from support import independent
 from support.independent import (
     BODIES,
     FreeFloating,
     apart,
     body_of,
+    cross,
     geodesic_turn,
     hat,
     random_loop,
     random_rotation,
     random_vector,
+    to_base,
     turn,
     wrapped,
 )
@@ -75,7 +78,7 @@ def truth_of(name, loop, momentum, attitude, times, references, given=turning, r
         by_momentum, by_shape = body.rates(quat, loop.shape(t), loop.rate(t), momentum)
         omega = by_momentum - by_shape
         rates = [quaternion_rate(y[:4], omega), (-lift @ hat(by_shape)).ravel()]
-        u = Rotation.from_quat(quat).as_matrix().T @ axis
+        u = to_base(quat, axis)
         for row, gauge in enumerate(gauges):
             if gauge == "base":
                 frame, spin = np.eye(3), np.zeros(3)
@@ -86,8 +89,9 @@ def truth_of(name, loop, momentum, attitude, times, references, given=turning, r
             v, seen = frame @ u, frame @ (omega - spin)
             along = v @ seen
             reference = references[gauge]
-            area = reference @ np.cross(v, np.cross(v, seen)) / (1.0 + reference @ v)
-            rolling = np.cross(np.cross(v, seen), v)
+            around = cross(v, seen)
+            area = reference @ cross(v, around) / (1.0 + reference @ v)
+            rolling = cross(around, v)
             rates += [quaternion_rate(y[13 + 6 * row : 17 + 6 * row], rolling), [along, area]]
         return np.concatenate(rates)
 
@@ -114,8 +118,7 @@ def truth_of(name, loop, momentum, attitude, times, references, given=turning, r
 
 def quaternion_rate(quat, omega):
     # Pulled back to unit length, so that the integration does not drift off.
-    rate = 0.5 * np.append(quat[3] * omega + np.cross(quat[:3], omega), -quat[:3] @ omega)
-    return rate + quat * (1.0 - quat @ quat)
+    return independent.quaternion_rate(quat, omega) + quat * (1.0 - quat @ quat)
 
 
 def turns_about(axis, angles):

@@ -14,6 +14,7 @@ from shapephase import so3, sphere
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError
 from shapephase.rigid_body._momentum_orbit import separatrix_solid_angle
 from shapephase.rigid_body.euler_top import EulerTop
+from support.independent import cross
 from support.long_runs import full_but
 
 MOMENTS = np.array([1.0, 2.0, 3.0])
@@ -25,8 +26,8 @@ def integrated(inertia, body, times, start=None):
 
     def rate(_, y):
         omega, vector, scalar = inverse @ y[:3], y[3:6], y[6]
-        turn = 0.5 * (scalar * omega + np.cross(vector, omega))
-        return np.concatenate([np.cross(y[:3], omega), turn, [-0.5 * vector @ omega]])
+        turn = 0.5 * (scalar * omega + cross(vector, omega))
+        return np.concatenate([cross(y[:3], omega), turn, [-0.5 * vector @ omega]])
 
     start = np.array([0.0, 0.0, 0.0, 1.0]) if start is None else so3.quat_from_matrix(start)
     y = np.concatenate([body, start])

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from shapephase import so3
 from shapephase.rigid_body.euler_top import EulerTop
+from support.independent import cross
 from support.long_runs import full_but
 from support.places import DATA
 
@@ -94,8 +95,8 @@ def test_the_reference_solves_the_equations(name):
         def slope(_, state, moments=moments, size=SIZE[row]):
             rate = size * state[:3] / moments
             x, w = state[3:6], state[6]
-            turn = 0.5 * np.append(w * rate + np.cross(x, rate), -x @ rate)
-            return np.concatenate([np.cross(state[:3], rate), turn])
+            turn = 0.5 * np.append(w * rate + cross(x, rate), -x @ rate)
+            return np.concatenate([cross(state[:3], rate), turn])
 
         for place in (0, 1, 4):
             begin = np.concatenate([start, [0.0, 0.0, 0.0, 1.0]])

@@ -11,12 +11,13 @@ from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError
 from shapephase.rigid_body._half_twist import half_twist, half_twist_from_tilt, twist_defect
 from shapephase.rigid_body.stability import steady_rotations
+from support.independent import cross
 
 
 def with_attitude(moments):
     def rates(_, y):
         omega = y[:3] / moments
-        return np.concatenate([np.cross(y[:3], omega), (y[3:].reshape(3, 3) @ so3.hat(omega)).ravel()])
+        return np.concatenate([cross(y[:3], omega), (y[3:].reshape(3, 3) @ so3.hat(omega)).ravel()])
 
     return rates
 

@@ -20,6 +20,7 @@ from shapephase.rigid_body.lagrange_top import (
     sleeping_top,
     stability_chart,
 )
+from support.independent import cross
 
 UP = np.array([0.0, 0.0, 1.0])
 EPS = float(np.finfo(float).eps)
@@ -34,7 +35,7 @@ def random_top(rng):
 def raw_motion(top, momentum, gamma, times):
     def rates(_, y):
         omega = np.linalg.solve(top.inertia, y[:3])
-        return np.concatenate([np.cross(y[:3], omega) + top.mgl * np.cross(y[3:], top.chi), np.cross(y[3:], omega)])
+        return np.concatenate([cross(y[:3], omega) + top.mgl * cross(y[3:], top.chi), cross(y[3:], omega)])
 
     start = np.concatenate([momentum, gamma])
     run = solve_ivp(rates, (0.0, times[-1]), start, method="DOP853", rtol=1e-13, atol=1e-14, t_eval=times)

@@ -23,6 +23,7 @@ from shapephase.rigid_body.lie._nambu_pair import (
     structure_constants,
 )
 from shapephase.rigid_body.pendulum import rigid_body_pendulum
+from support.independent import cross
 from support.long_runs import full_but
 
 ASCENDING = np.array([1.0, 2.0, 3.0])
@@ -39,7 +40,7 @@ def euler(moments, momentum):
 
 
 def integrated(moments, momentum, times):
-    solution = solve_ivp(lambda _, y: euler(moments, y), (0.0, times[-1]), momentum, t_eval=times, **TOLERANCES)
+    solution = solve_ivp(lambda _, y: cross(y, y / moments), (0.0, times[-1]), momentum, t_eval=times, **TOLERANCES)
     return solution.y.T
 
 

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from shapephase.errors import ShapeError
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.poinsot import Closure, Poinsot, cones
+from support.independent import cross
 from support.long_runs import full_but
 
 TILT = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
@@ -73,8 +74,8 @@ def integrated(name):
     def slope(_, state):
         q, momentum = state[:4], state[4:]
         rate = inverse @ momentum
-        vector = 0.5 * (q[3] * rate + np.cross(q[:3], rate))
-        return np.concatenate([vector, [-0.5 * q[:3] @ rate], np.cross(momentum, rate)])
+        vector = 0.5 * (q[3] * rate + cross(q[:3], rate))
+        return np.concatenate([vector, [-0.5 * q[:3] @ rate], cross(momentum, rate)])
 
     times = np.linspace(0.0, span(top), 241)
     start = np.concatenate([Rotation.from_matrix(top.initial_attitude).as_quat(), body])

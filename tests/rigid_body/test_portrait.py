@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from shapephase.errors import ShapeError
 from shapephase.rigid_body.portrait import equilibria, heteroclinics, inverse_difference, polhodes
+from support.independent import cross
 
 ORDERS = [*itertools.permutations((1.0, 2.0, 3.0)), (2.4, 0.7, 2.5), (1.0, 1.1, 9.0)]
 
@@ -84,7 +85,9 @@ def test_a_solution_runs_along_the_heteroclinic_g8(moments):
     for curve in heteroclinics(moments, 5):
         assert abs(curve[2, middle]) < 1e-15
         for end, until in ((curve[-1], end_time), (curve[0], -end_time)):
-            solved = solve_ivp(lambda _, n: slope(moments, n), (0.0, until), curve[2], "DOP853", rtol=1e-12, atol=1e-14)
+            solved = solve_ivp(
+                lambda _, n: cross(n, n / np.array(moments)), (0.0, until), curve[2], "DOP853", rtol=1e-12, atol=1e-14
+            )
             nearest = np.linalg.norm(solved.y.T - end, axis=-1).min()
             assert nearest < 1e-2
             normal = np.cross(curve[1], curve[2])
@@ -119,7 +122,9 @@ def test_a_polhode_is_an_orbit_g8(moments):
     """Integrated from one of its points, Euler's equations stay on the curve and come round."""
     level = 0.3 * 0.5 / max(moments) + 0.7 * 0.5 / np.sort(moments)[1]
     curve = polhodes(moments, level, 20001)[0, 1]
-    solved = solve_ivp(lambda _, n: slope(moments, n), (0.0, 40.0), curve[77], "DOP853", rtol=1e-12, atol=1e-14)
+    solved = solve_ivp(
+        lambda _, n: cross(n, n / np.array(moments)), (0.0, 40.0), curve[77], "DOP853", rtol=1e-12, atol=1e-14
+    )
     apart = [np.linalg.norm(curve - n, axis=-1).min() for n in solved.y.T]
     assert max(apart) < 5e-4
     reached = np.linalg.norm(solved.y.T[:, None] - curve[None, ::400], axis=-1).min(axis=0)

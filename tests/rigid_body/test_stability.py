@@ -12,6 +12,7 @@ from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.stability import steady_rotation, steady_rotations
+from support.independent import cross
 
 INTERMEDIATE = 1
 
@@ -41,13 +42,13 @@ def at(expression, symbol, value):
 
 
 def raw_rates(moments):
-    return lambda _, x: np.cross(x, x / moments)
+    return lambda _, x: cross(x, x / moments)
 
 
 def with_attitude(moments):
     def rates(_, y):
         omega = y[:3] / moments
-        return np.concatenate([np.cross(y[:3], omega), (y[3:].reshape(3, 3) @ so3.hat(omega)).ravel()])
+        return np.concatenate([cross(y[:3], omega), (y[3:].reshape(3, 3) @ so3.hat(omega)).ravel()])
 
     return rates
 

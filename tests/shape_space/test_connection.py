@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.errors import OpenPathError, ShapeError, SingularInertiaError, TrajectoryError
 from support.bodies import joint, link, random_loop, random_shapes, urdf
+from support.independent import hat
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -30,7 +31,7 @@ def lift(body, path, start, end):
 
     def slope(t, u):
         omega = -sp.mechanical_connection(body, path.shape(t)) @ path.rate(t)
-        return (u.reshape(3, 3) @ np.cross(np.eye(3), omega)).ravel()
+        return (u.reshape(3, 3) @ hat(omega)).ravel()
 
     u = np.eye(3).ravel()
     edges = [start, *(b for b in path.breaks if start < b < end), end]

@@ -67,6 +67,7 @@ from shapephase.rigid_body.lie.magnetic_moment import (
     magnetic_precession,
     magnetic_precession_rate,
 )
+from support.independent import cross
 
 ALGEBRAS = [so3(), so(4), sl2r(), se2(), se3(), su2(), heisenberg()]
 each_algebra = pytest.mark.parametrize("algebra", ALGEBRAS, ids=lambda a: a.name)
@@ -272,7 +273,7 @@ def test_bracket_is_the_rate_of_functions_along_a_motion_g1(algebra, rng):
 def test_motion_is_that_of_the_raw_equations_g1():
     times, start = np.linspace(0.0, 20.0, 41), np.array([0.3, 1.2, -0.8])
     raw = solve_ivp(
-        lambda _, p: np.cross(p, np.linalg.solve(INERTIA, p)), (0, 20), start, "DOP853", times, rtol=1e-13, atol=1e-14
+        lambda _, p: cross(p, np.linalg.solve(INERTIA, p)), (0, 20), start, "DOP853", times, rtol=1e-13, atol=1e-14
     )
     np.testing.assert_allclose(
         lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), start, times),
@@ -540,7 +541,7 @@ def test_spatial_momentum_is_turned_and_constant_g3(particles, rng):
     def slope(_, y):
         spin = y[:3]
         turned = y[3:].reshape(3, 3) @ rotations.hat(spin)
-        return np.concatenate([np.linalg.solve(inertia, np.cross(inertia @ spin, spin)), turned.ravel()])
+        return np.concatenate([np.linalg.solve(inertia, cross(inertia @ spin, spin)), turned.ravel()])
 
     times = np.linspace(0.0, 5.0, 11)
     run = solve_ivp(slope, (0, 5), [*omega[0], *np.eye(3).ravel()], "DOP853", times, rtol=1e-13, atol=1e-14)
@@ -666,7 +667,7 @@ def test_flow_on_c2_covers_the_rigid_body_with_its_attitude_g6(rng):
 
     def slope(_, y):
         omega = np.linalg.solve(INERTIA, y[:3])
-        return np.concatenate([np.cross(y[:3], omega), (y[3:].reshape(3, 3) @ rotations.hat(omega)).ravel()])
+        return np.concatenate([cross(y[:3], omega), (y[3:].reshape(3, 3) @ rotations.hat(omega)).ravel()])
 
     run = solve_ivp(slope, (0, 12), [*start, *np.eye(3).ravel()], "DOP853", times, rtol=1e-13, atol=1e-14)
     np.testing.assert_allclose(cayley_klein_momentum(path), run.y[:3].T, atol=1e-11, rtol=0)
@@ -711,7 +712,7 @@ def test_precession_is_hamiltonian_with_energy_m_dot_b_k3(rng):
 
 def test_closed_form_solves_the_equation_k3(rng):
     moment, field, times = rng.normal(size=3), rng.normal(size=3), np.linspace(0.0, 8.0, 17)
-    run = solve_ivp(lambda _, m: np.cross(m, field), (0, 8), moment, "DOP853", times, rtol=1e-13, atol=1e-14)
+    run = solve_ivp(lambda _, m: cross(m, field), (0, 8), moment, "DOP853", times, rtol=1e-13, atol=1e-14)
     np.testing.assert_allclose(magnetic_precession(moment, field, times), run.y.T, atol=1e-12, rtol=0)
     assert magnetic_precession(np.ones((4, 3)), field, times).shape == (4, 17, 3)
     np.testing.assert_allclose(lie_poisson_motion(lambda m: 0 * m + field, moment, times), run.y.T, atol=1e-12, rtol=0)
@@ -781,7 +782,7 @@ def test_energy_balance_along_a_motion_k4():
     energy = kinetic_energy(INERTIA, motion)
     assert energy[0] - energy[-1] == pytest.approx(weights @ dissipated_power(INERTIA, motion[1:-1], 0.6), abs=1e-12)
     raw = solve_ivp(
-        lambda _, p: np.cross(p, w := np.linalg.solve(INERTIA, p)) + 0.6 * (p * (p @ w) - w * (p @ p)),
+        lambda _, p: cross(p, w := np.linalg.solve(INERTIA, p)) + 0.6 * (p * (p @ w) - w * (p @ p)),
         (0, 2), [0.5, -1.0, 1.3], "DOP853", times, rtol=1e-13, atol=1e-14,
     )  # fmt: skip
     np.testing.assert_allclose(motion, raw.y.T, atol=1e-12, rtol=0)
