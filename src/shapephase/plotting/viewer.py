@@ -17,22 +17,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_object
-from ..errors import ShapeError, VisualWarning
+from ..errors import VisualWarning
 from ..files import write_whole
 from ..reconstruction.reconstruction import Motion
 from ._letters import printable
 from ._moving_scene import MovingScene, moving_scene
 from .pages.motion_data import motion_data
+from .pages.playing import frame_count, playing_speed
 from .pages.templates import SCENE_SCRIPTS, page_html
 from .pages.up_axis import up_axis
 
-# Seconds that a motion is played in, unless a speed is given: long enough to follow it, not so long as to tire.
-_MIN_PLAYING = 4.0
-_MAX_PLAYING = 20.0
-# Frames in a second of playing [1/s]: smooth to the eye.
-_FRAME_RATE = 30
-# Frames of a page, unless their number is given: keeps its file below some megabytes.
-_MAX_FRAMES = 3000
 # Ports after the given one that are tried when that is in use.
 _PORTS = 100
 # Height of a motion in a notebook [px].
@@ -133,15 +127,15 @@ def scene_and_data(
 ) -> tuple[MovingScene, dict[str, Any]]:
     """A motion as a scene, and as the data of a page; arguments, errors and warnings as `motion_page`."""
     check_object(motion, "Motion", "motion")
-    playing_speed = _playing_speed(motion, speed)
+    rate = playing_speed(motion.duration, speed)
     up_axis(up, None)
-    scene = _scene(motion, playing_speed, frames, trail, fall)
+    scene = _scene(motion, rate, frames, trail, fall)
     if up is None and scene.falls:
         gravity = np.asarray(fall["gravity"], dtype=float)
         upwards = -gravity / np.linalg.norm(gravity)
     else:
         upwards = up_axis(up, scene.body)
-    return scene, motion_data(scene, speed=playing_speed, ghost=ghost, up=upwards)
+    return scene, motion_data(scene, speed=rate, ghost=ghost, up=upwards)
 
 
 def view(
@@ -285,22 +279,13 @@ def _show_in_cell(page: str) -> None:
     display(HTML(f"<div>{frame}</div>"))
 
 
-def _playing_speed(motion: Motion, speed: float | None) -> float:
-    """Seconds of motion in a second of playing: as given, or by default. Raises ShapeError."""
-    if speed is None:
-        return motion.duration / min(max(motion.duration, _MIN_PLAYING), _MAX_PLAYING)
-    if not (isinstance(speed, int | float | np.floating | np.integer) and 0.0 < speed < math.inf):
-        raise ShapeError(f"speed: seconds of motion in a second of playing, above 0, are needed, got {speed!r}")
-    return float(speed)
-
-
 def _scene(
     motion: Motion, speed: float, frames: int | None, trail: str | None, fall: Mapping[str, ArrayLike]
 ) -> MovingScene:
     """The scene with the given number of frames, or as many as the speed needs."""
     if frames is not None:
         return moving_scene(motion, frames, trail=trail, **fall)
-    count = min(max(math.ceil(_FRAME_RATE * motion.duration / speed), 2), _MAX_FRAMES) + 1
+    count = frame_count(motion.duration, speed)
     scene = moving_scene(motion, count, trail=trail, **fall)
     if scene.largest_turn > 0.5 * math.pi:
         warnings.warn(

@@ -81,7 +81,8 @@ function sceneControls(holder, scene, figure) {
       }}), "follow"));
   }
   const hues = {momentum: "#d55e00", ghost: "#9a9ea5", trail: "#0072b2", "inertial axes": "#737373",
-    "base axes": "conic-gradient(#cc79a7 33%, #009e73 0 67%, #0072b2 0)", "centre of mass": "#1a1a1a", floor: "#c7c7c7"};
+    "base axes": "conic-gradient(#cc79a7 33%, #009e73 0 67%, #0072b2 0)", "centre of mass": "#1a1a1a", floor: "#c7c7c7", herpolhode: "#e69f00", polhode: "#0072b2",
+    "angular velocity": "#009e73", "invariable plane": "#9ea3ab"};
   for (const group of figure.shownGroups()) {
     const hue = element("span", {className: "hue"});
     hue.style.background = hues[group];
@@ -132,11 +133,12 @@ function jointSliders(holder, figure, clock) {
   });
 }
 
-// A motion in the page's elements `scene`, `bar`, `show` and, if there is one, `joints`.
-function playMotion(data) {
+// A motion in the page's elements `scene`, `bar`, `show` and, if there is one, `joints`; `add` adds to its figure.
+function playMotion(data, add = () => {}) {
   const clock = new Clock(data.duration, data.frames, data.speed);
   const scene = new Scene3D(document.getElementById("scene"));
   const figure = new Figure3D(scene, data);
+  add(figure);
   clock.onChange(() => figure.show(clock.place()));
   clockBar(document.getElementById("bar"), clock);
   sceneControls(document.getElementById("show"), scene, figure);

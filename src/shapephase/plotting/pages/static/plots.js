@@ -53,6 +53,8 @@ class TimePlot {
       for (const value of values) { low = Math.min(low, value); high = Math.max(high, value); }
     }
     if (high - low < 1e-9) [low, high] = [low - 1, high + 1];
+    // Digits of a value beside a name: three of the range, and one at least.
+    this.digits = Math.min(6, Math.max(1, 2 - Math.floor(Math.log10(high - low))));
     const room = 0.04 * (high - low);
     [this.low, this.high] = [low - room, high + room];
     this.x = t => MARGINS[0] + (SIZE[0] - MARGINS[0] - MARGINS[1]) * t / this.clock.duration;
@@ -99,7 +101,8 @@ class TimePlot {
       const now = values[frame] + share * (values[frame + 1] - values[frame]);
       dot.setAttribute("cx", x);
       dot.setAttribute("cy", this.y(now));
-      value.textContent = typeset((Math.round(now * 10) / 10 + 0).toFixed(1));
+      const scale = 10 ** this.digits;
+      value.textContent = typeset((Math.round(now * scale) / scale + 0).toFixed(this.digits));
       return now;
     });
   }
