@@ -10,6 +10,7 @@ processes of one thread; times are processor time, ratios medians of the turns' 
 Ours runs without Numba ("plain") and, where it is installed, with it ("fast"). `--against SRC` names the `src` folder
 of another checkout, which runs in the same turns, interpreted and compiled. SHAPEPHASE_FAST=0 leaves out what is fast.
 Then what follows a reconstruction, many momenta and bodies at once, threads, and recorded motions.
+`--keep` writes what is printed to benchmarks/results.txt, too, which `python -m benchmarks.page` puts on its page.
 """
 
 from __future__ import annotations
@@ -20,16 +21,21 @@ for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_pool, "1")
 
 import argparse
+import contextlib
+import io
+import sys
 import tempfile
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from .cases import Case, numbered_case
 from .contestant import Contestant, Setting, WorkloadFailed
 from .extended import Truth, angles_between, exact_path
+from .page import RESULTS, circumstances
 from .peer import FLAGS, NoPeer, Peer
 from .workloads import TOLERANCE
 
@@ -65,12 +71,39 @@ Entries = dict[tuple[str, str, str], Entry]
 def main() -> None:
     """Print the tables."""
     asked = _arguments()
-    numbers = list(_QUICK_CASES if asked.quick else range(17))
+    kept = io.StringIO()
+    with contextlib.redirect_stdout(Both(sys.stdout, kept)):
+        print("\n".join(circumstances()), flush=True)
+        measured(list(_QUICK_CASES if asked.quick else range(17)), asked.against, quick=asked.quick)
+    if asked.keep:
+        RESULTS.write_text(kept.getvalue(), encoding="utf-8")
+
+
+class Both(io.TextIOBase):
+    """What is written goes to two streams."""
+
+    def __init__(self, first: TextIO, second: TextIO) -> None:
+        self._streams = (first, second)
+
+    def write(self, text: str, /) -> int:
+        """Write to both."""
+        for stream in self._streams:
+            stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush both."""
+        for stream in self._streams:
+            stream.flush()
+
+
+def measured(numbers: list[int], against: Path | None, *, quick: bool) -> None:
+    """Print all tables."""
     with tempfile.TemporaryDirectory() as folder:
-        contestants = started(asked.against, folder)
+        contestants = started(against, folder)
         try:
-            print_cases(contestants, numbers, turns=5 if asked.quick else 9)
-            print_workloads(contestants, numbers, quick=asked.quick)
+            print_cases(contestants, numbers, turns=5 if quick else 9)
+            print_workloads(contestants, numbers, quick=quick)
         finally:
             for contestant in contestants:
                 contestant.close()
@@ -80,6 +113,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks")
     parser.add_argument("--quick", action="store_true", help="five cases and fewer turns, in about a minute")
     parser.add_argument("--against", type=Path, metavar="SRC", help="the src folder of another checkout")
+    parser.add_argument("--keep", action="store_true", help="write what is printed to benchmarks/results.txt, too")
     return parser.parse_args()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 
 import numpy as np
@@ -11,6 +12,7 @@ from benchmarks.cases import as_function, numbered_case
 from benchmarks.contestant import Contestant, Setting, WorkloadFailed
 from benchmarks.estimates import judged, judged_all, read_runs, summary
 from benchmarks.extended import CONSTANT, HARMONIC, Segment, Terms, TooLong, Truth, angles_between, exact_path
+from benchmarks.page import PAGE, RESULTS, circumstances, section, with_results
 from benchmarks.peer import NoPeer, Peer
 
 import shapephase as sp
@@ -115,3 +117,32 @@ def test_a_contestant_reconstructs_in_its_own_process_what_is_reconstructed_here
             contestant("no_such_thing")
     finally:
         contestant.close()
+
+
+# ---- The page -------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_has_the_results_that_were_kept():
+    results = RESULTS.read_text(encoding="utf-8")
+    page = PAGE.read_text(encoding="utf-8")
+    assert with_results(page, results) == page
+    assert re.search(r"^Measured on 20\d\d-\d\d-\d\d on .+, with shapephase [\d.]+, Python 3\.", page, re.MULTILINE)
+    # The table, from the rows of the cases: the first ratio of fast, its medians by the kind of path.
+    ratios: dict[str, list[float]] = {"loop": [], "move": [], "samples": [], "": []}
+    for line in results.splitlines():
+        if found := re.match(r"(.{38})known .*?(\d+\.\d\d) +\d+\.\d\d +\d+$", line):
+            for kind in ratios:
+                ratios[kind] += [float(found[2])] * (kind in found[1])
+    assert len(ratios[""]) == 17
+    medians = [f"{np.median(values):.1f}" for values in ratios.values()]
+    (row,) = re.findall(r"^\| with `\[fast\]` \|(.*)\|$", page, re.MULTILINE)
+    assert [cell.split()[0] for cell in row.split("|")] == medians
+
+
+def test_circumstances_are_said_as_the_page_reads_them():
+    said = circumstances()
+    assert [line.split(":")[0] for line in said] == ["date", "machine", "versions"]
+    kept = RESULTS.read_text(encoding="utf-8").splitlines()
+    assert (
+        section("\n".join([*said, *kept[3:]])).splitlines()[0].endswith(f"with {said[2].removeprefix('versions: ')}.")
+    )
