@@ -16,6 +16,7 @@ from . import (
     shape_space,
     so3,
     sphere,
+    study,
 )
 from .body.body import Body
 from .body.catalog import load_body, robot_names
@@ -170,6 +171,7 @@ __all__ = [
     "split",
     "stokes_holonomy",
     "stroboscopic_map",
+    "study",
     "uncertainty",
     "view",
     "write_shape_path",

@@ -313,6 +313,48 @@ class ResultFileError(ShapePhaseError, ValueError):
     """
 
 
+class StudyError(ShapePhaseError, ValueError):
+    """A study that cannot be computed as it is described: its file, its axes, its outputs.
+
+    Remedy: the message names the entry and what it may be; nothing was computed.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.study.Study("cat", "cat_righting", {"momentum_z": []})
+    ... except sp.errors.StudyError as error:
+    ...     print(error)
+    over.momentum_z: a grid needs one value or more
+    """
+
+
+class StudyStoreError(StudyError, ResultFileError):
+    """A store that a study cannot write to: it is another study's, is in use, or was not made by this library.
+
+    Remedy: another place for the new store, or `resume=True` with the study that began it.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.study.open_study("nowhere.zarr")
+    ... except sp.errors.StudyStoreError as error:
+    ...     print(error)
+    nowhere.zarr: there is no store of a study
+    """
+
+
+class SchedulerLostError(ShapePhaseError, ConnectionError):
+    """The scheduler of a cluster cannot be reached, or is gone; what was stored is kept.
+
+    Remedy: start it again, and run the study with `resume=True`.
+
+    Examples
+    --------
+    >>> issubclass(sp.errors.SchedulerLostError, ConnectionError)
+    True
+    """
+
+
 class CompilerError(ShapePhaseError, RuntimeError):
     """The steps could not be compiled.
 

@@ -1,0 +1,187 @@
+"""Bodies and motions as recipes: names, files and functions, from which any process makes the same objects."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import inspect
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import examples
+from ..arguments import inertia_argument, positive_argument
+from ..arrays import Array, finite_array, lock_arrays
+from ..body.body import Body
+from ..body.catalog import load_body
+from ..display import short_repr
+from ..errors import InputFileNotFoundError, ShapeError, StudyError, unknown_name
+from ..examples.scenarios import MOTIONS
+from ..shape_space.files.read import read_shape_path
+from ..shape_space.shape_path import ShapePath
+
+_LONGEST_SHOWN = 80
+_NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """A body that keeps its shape, as a study takes it.
+
+    Attributes
+    ----------
+    inertia : (3, 3) [kg m^2]
+    duration : of its motion [s]
+
+    Examples
+    --------
+    >>> over = {"momentum": sp.study.Directions(1.0)}
+    >>> sp.study.Study(sp.study.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0), over=over, draws=1_000_000).cases
+    1000000
+    """
+
+    inertia: ArrayLike
+    duration: float
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Check what came. Raises ShapeError, SingularInertiaError, TrajectoryError."""
+        tensor = inertia_argument(finite_array(self.inertia, "inertia", (3, 3))[None])[0]
+        object.__setattr__(self, "inertia", tensor)
+        object.__setattr__(self, "duration", positive_argument(self.duration))
+        lock_arrays(self)
+
+
+BodySource = str | os.PathLike[str] | RigidBody
+MotionSource = str | os.PathLike[str] | Callable[..., ShapePath]
+
+
+def made_path(source: MotionSource, body: Body, parameters: Mapping[str, float]) -> ShapePath:
+    """The path of a recipe; of a file it is read for this body."""
+    if is_file(source):
+        return read_shape_path(os.fspath(source), body)  # type: ignore[arg-type]
+    path = motion_function(source)(**parameters)
+    if not isinstance(path, ShapePath):
+        raise StudyError(f"motion: the function gives a ShapePath, this gave a {type(path).__name__}")
+    return path
+
+
+def is_file(source: Any) -> bool:
+    """Whether a motion is that of a file."""
+    return isinstance(source, str | os.PathLike) and os.path.isfile(source)
+
+
+def motion_function(source: MotionSource) -> Callable[..., ShapePath]:
+    """The function that makes a path of named numbers: given itself, as "module:function", or by a name of the library.
+
+    Raises UnknownNameError, InputFileNotFoundError, StudyError.
+    """
+    if callable(source):
+        return source
+    name = os.fspath(source)
+    if ":" in name:
+        return imported(name, "motion")
+    if name in examples.__all__ and inspect.isfunction(found := getattr(examples, name)):
+        return found
+    if name in MOTIONS:
+        return MOTIONS[name].path
+    if Path(name).suffix:
+        raise InputFileNotFoundError(f"{name[:_LONGEST_SHOWN]}: there is no such file")
+    raise unknown_name("motion (no such file either)", name[:_LONGEST_SHOWN], MOTIONS)
+
+
+def imported(name: str, what: str) -> Callable[..., Any]:
+    """A function by "module:function". Raises StudyError."""
+    module, _, attribute = name.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except Exception as error:
+        raise StudyError(f"{what}: {name[:_LONGEST_SHOWN]!r} cannot be imported ({error})") from None
+    if not callable(found):
+        raise StudyError(f"{what}: {name[:_LONGEST_SHOWN]!r} is no function")
+    return found
+
+
+def parameter_names(source: MotionSource) -> tuple[str, ...]:
+    """What a motion's function can be given; nothing for a file."""
+    if is_file(source):
+        return ()
+    return tuple(inspect.signature(motion_function(source)).parameters)
+
+
+def unset_parameters(source: MotionSource, given: Iterable[str]) -> list[str]:
+    """What it has to be given, and is not."""
+    if is_file(source):
+        return []
+    parameters = inspect.signature(motion_function(source)).parameters.values()
+    needed = [one.name for one in parameters if one.default is one.empty and one.kind in _NAMED]
+    return [name for name in needed if name not in set(given)]
+
+
+def fingerprint(source: Any) -> str | None:
+    """SHA-256 of what a recipe is made of: a file, a body of the library, the text of a function; None: only a name."""
+    if isinstance(source, RigidBody):
+        return None
+    if callable(source):
+        return hashlib.sha256(_code(source)).hexdigest()
+    if os.path.isfile(source):
+        return hashlib.sha256(Path(source).read_bytes()).hexdigest()
+    if ":" in os.fspath(source) and not os.fspath(source).startswith("example:"):
+        return hashlib.sha256(_code(imported(os.fspath(source), "function"))).hexdigest()
+    return None
+
+
+def body_fingerprint(source: BodySource) -> str | None:
+    """The same of a body, which is looked for. Raises UnknownNameError, InputFileNotFoundError."""
+    if isinstance(source, RigidBody) or os.path.isfile(source):
+        return fingerprint(source)
+    return load_body(source).sha256
+
+
+def described(source: Any) -> Any:
+    """A recipe as JSON can hold it."""
+    if isinstance(source, RigidBody):
+        return {"inertia": np.asarray(source.inertia).tolist(), "duration": source.duration}
+    if isinstance(source, partial):
+        return {"function": described(source.func), "args": list(source.args), "keywords": source.keywords}
+    if callable(source):
+        return f"{source.__module__}:{getattr(source, '__qualname__', type(source).__name__)}"
+    return os.fspath(source)
+
+
+def inertia_factors(body: Body) -> tuple[Array, Array, Array, Array]:
+    """Masses, centres, inertias and radii of gyration of the moving parts: (k,), (k, 3), (k, 3, 3), (k,)."""
+    parts = body.moving_parts
+    masses = np.array([part.mass for part in parts])
+    tensors = np.array([part.inertia for part in parts])
+    traces = np.trace(tensors, axis1=1, axis2=2)
+    gyration = np.sqrt(np.divide(0.5 * traces, masses, out=np.zeros_like(masses), where=masses > 0.0))
+    return masses, np.array([part.centre for part in parts]), tensors, gyration
+
+
+def part_number(body: Body, link: str) -> int:
+    """Which moving part a link begins. Raises UnknownNameError."""
+    leads = [part.links[0] for part in body.moving_parts]
+    if link not in leads:
+        raise unknown_name(f"moving part of {body.name}", link, leads)
+    return leads.index(link)
+
+
+def _code(function: Any) -> bytes:
+    """The text of a function, or what stands for it."""
+    while isinstance(function, partial):
+        function = function.func
+    try:
+        return inspect.getsource(function).encode()
+    except (OSError, TypeError):
+        code = getattr(function, "__code__", None)
+        if code is None:
+            raise ShapeError(f"{function!r}: a function with a text of its own is needed") from None
+        return code.co_code
