@@ -457,6 +457,12 @@ ODD_FILES = {
     ),
     "NPZ without times": ("m.npz", npz_bytes(shapes=[[0.0]], joint_names=["a"]), E, ["'time' is missing"]),
     "NPZ, complex": ("m.npz", npz_bytes(**GOOD_ARRAYS | {"shapes": np.ones((3, 2), complex)}), E, ["complex128"]),
+    "NPZ, true and false": (
+        "m.npz",
+        npz_bytes(**GOOD_ARRAYS | {"shapes": np.ones((3, 2), bool)}),
+        E,
+        ["shapes: numbers are needed, got an array of true and false"],
+    ),
     "NPZ, text": ("m.npz", npz_bytes(**GOOD_ARRAYS | {"time": ["a", "b", "c"]}), E, ["time", "real numbers"]),
     "NPZ, one axis": ("m.npz", npz_bytes(**GOOD_ARRAYS | {"shapes": [1.0, 2.0, 3.0]}), E, ["shapes", "(3,)"]),
     "NPZ, three axes": ("m.npz", npz_bytes(**GOOD_ARRAYS | {"shapes": np.ones((1, 3, 2))}), E, ["2 axes are needed"]),
@@ -554,6 +560,12 @@ ODD_FILES = {
     "MATLAB, no times": ("m.mat", mat({LEFT: [0.0, 1.0], RIGHT: [0.0, 1.0]}), E, ["no column `time`", "timestep"]),
     "MATLAB, several lengths": ("m.mat", mat({"time": [0.0, 1.0], LEFT: [0.0, 1.0, 2.0]}), E, ["different lengths"]),
     "MATLAB, complex": ("m.mat", mat({"time": [0.0, 1.0], LEFT: [1j, 1.0], RIGHT: [0.0, 1.0]}), E, ["complex"]),
+    "MATLAB, true and false beside what is complex": (
+        "m.mat",
+        mat({"z": 1j, "s": {"time": [0.0, 1.0], LEFT: [True, False], RIGHT: [0.0, 1.0]}}),
+        E,
+        [f"column '{LEFT}': 'True' is no finite number"],
+    ),
     "MATLAB, two structures": ("m.mat", mat({"a": {"t": [0.0, 1.0]}, "b": {"t": [0.0, 1.0]}}), E, ["topic=: a, b"]),
     "MATLAB, names of others": (
         "m.mat",

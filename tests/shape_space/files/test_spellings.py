@@ -563,3 +563,43 @@ def test_what_opensim_has_more_is_told(tmp_path):
         f"{LIMITED}_beta": f"coupled to {LIMITED}",
     }
     assert set(record["units"].values()) == {"deg", "m"}
+
+
+@pytest.mark.parametrize("kind", ["mat", "matlab_73", "hdf5"])
+@pytest.mark.parametrize("column", [JOINTS[0], "time"])
+def test_true_and_false_are_no_numbers_where_numbers_are_meant(kind, column, tmp_path):
+    file = truths_written(kind, column, tmp_path)
+    with pytest.raises(TrajectoryError, match=f"column '{column}': 'True' is no finite number"):
+        sp.read_shape_path(file, BODY)
+
+
+@pytest.mark.parametrize("kind", ["mat", "matlab_73", "hdf5"])
+def test_true_and_false_that_are_not_used_do_not_disturb(kind, tmp_path):
+    file = truths_written(kind, "contact", tmp_path)
+    with pytest.raises(UnknownNameError, match="contact"):
+        sp.read_shape_path(file, BODY)
+    path = sp.read_shape_path(file, BODY, names={"contact": None})
+    assert np.array_equal(path.shape(TIMES), SHAPES)
+
+
+def truths_written(kind, column, folder):
+    """A recording one of whose columns is true and false in turn; MATLAB 7.3 has them as bytes, with an attribute."""
+    import h5py
+    import scipy.io
+
+    columns = {"time": TIMES} | {name: SHAPES[:, k] for k, name in enumerate(JOINTS)}
+    columns[column] = np.arange(COUNT) % 2 == 0
+    file = folder / ("m.h5" if kind == "hdf5" else "m.mat")
+    if kind == "mat":
+        scipy.io.savemat(file, columns)
+        return file
+    with h5py.File(file, "w", userblock_size=512 if kind == "matlab_73" else 0) as book:
+        for name, values in columns.items():
+            is_truth = values.dtype == bool
+            book[name] = values.astype(np.uint8)[None] if is_truth and kind == "matlab_73" else values
+            if kind == "matlab_73":
+                book[name].attrs["MATLAB_class"] = np.bytes_("logical" if is_truth else "double")
+    if kind == "matlab_73":
+        with open(file, "r+b") as stream:
+            stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    return file

@@ -73,6 +73,8 @@ def _numbers(values: Any) -> tuple[Array, dict[int, str], bool]:
         return _seconds(array), {}, True
     if array.dtype.kind in "fiu":
         return np.ascontiguousarray(array, dtype=np.float64), {}, False
+    if array.dtype.kind == "b":
+        return np.full(len(array), np.nan), dict(enumerate(map(str, array[:_MOST_FAULTS].tolist()))), False
     entries = array.tolist()
     dates = _dates(entries)
     if dates is not None:

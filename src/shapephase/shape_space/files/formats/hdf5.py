@@ -133,6 +133,8 @@ def _dataset(item: Any, file: Any, *, matlab: bool) -> Any:
         return [entry.decode() for entry in entries] if all(isinstance(entry, bytes) for entry in entries) else None
     if value.dtype.kind == "S":
         return [entry.decode() for entry in value.ravel().tolist()]
+    if made_of == b"logical":
+        value = value.astype(bool)
     return value.T if matlab else value
 
 

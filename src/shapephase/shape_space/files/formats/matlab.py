@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import threading
+import warnings
 import zlib
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,8 @@ from .parser_process import table_apart
 
 _DEEPEST = 4
 """Structures inside each other that are read."""
+_WARNINGS = threading.Lock()
+"""What Python warns of is set for all threads at once."""
 _SMALL = 2**22
 """Arrays in a file, unpacked [bytes], that are read in this process."""
 _PLAIN = (
@@ -61,7 +65,7 @@ def read_arrays_of(where: Path, data: bytes, chosen: str | None = None) -> Table
             raise TrajectoryError(f"{where}: {values:.3g} values, up to {MOST_VALUES} are read; write fewer samples")
         objects = [name for name, _, kind in listed if kind in ("opaque", "object", "function", "unknown")]
         readable = [name for name, _, kind in listed if name not in objects]
-        loaded = scipy.io.loadmat(io.BytesIO(data), variable_names=readable, simplify_cells=True)
+        loaded = _loaded(data, readable)
     except ShapePhaseError:
         raise
     except Exception as error:  # a damaged file fails inside SciPy in many ways
@@ -75,6 +79,25 @@ def read_arrays_of(where: Path, data: bytes, chosen: str | None = None) -> Table
         )
     entries = {name: _plain(value, 0) for name, value in loaded.items() if not name.startswith("__")}
     return arrays_table(str(where), "MATLAB", entries, chosen)
+
+
+def _loaded(data: bytes, names: list[str]) -> dict[str, Any]:
+    """Some of the variables; what is true or false there, which SciPy alone reads as ones and zeros, is so here."""
+    import scipy.io
+
+    with _WARNINGS, warnings.catch_warnings(record=True) as raised:
+        warnings.simplefilter("always", np.exceptions.ComplexWarning)
+        typed = scipy.io.loadmat(io.BytesIO(data), variable_names=names, simplify_cells=True, mat_dtype=True)
+    if not any(issubclass(warning.category, np.exceptions.ComplexWarning) for warning in raised):
+        return typed
+    # On the way to these types imaginary parts were dropped.
+    return _with_truths(scipy.io.loadmat(io.BytesIO(data), variable_names=names, simplify_cells=True), typed)
+
+
+def _with_truths(plain: Any, typed: Any) -> Any:
+    if isinstance(plain, dict):
+        return {name: _with_truths(value, typed[name]) for name, value in plain.items()}
+    return typed if np.asarray(typed).dtype.kind == "b" else plain
 
 
 def _may_be_large(data: bytes) -> bool:

@@ -127,6 +127,8 @@ def _table(
 
 
 def _array(value: Any, where: Path, name: str, trailing: tuple[int | None, ...], unit: str = "") -> Array:
+    if np.asarray(value).dtype.kind == "b":
+        raise TrajectoryError(f"{where}: {name}: numbers are needed, got an array of true and false")
     array = finite_array(value, f"{where}: {name}", trailing, unit=unit)
     if trailing and array.ndim != len(trailing):
         raise TrajectoryError(f"{where}: {name}: {len(trailing)} axes are needed, got shape {array.shape}")

@@ -101,16 +101,14 @@ def _base_columns(entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
 def _vector(where: str, name: str, value: Any) -> Any:
     """A vector of two entries or more, a matrix of one row or column among them; None for anything else.
 
-    Of true and false it is one of ones and zeros, so that it is not left out in silence. Raises TrajectoryError for one
-    of complex numbers.
+    Raises TrajectoryError for one of complex numbers. Those of true and false are kept as they are: where one is used,
+    the table says that these are no numbers.
     """
     if not isinstance(value, np.ndarray) or value.size < 2 or value.size != max(value.shape, default=0):
         return None
     if value.dtype.kind == "c":
         raise TrajectoryError(f"{where}: {name} holds complex numbers; write its real part alone")
-    if value.dtype.kind == "b":
-        return value.ravel().astype(np.float64)
-    return value.ravel() if value.dtype.kind in "fiumM" else None
+    return value.ravel() if value.dtype.kind in "bfiumM" else None
 
 
 def _are_texts(value: Any) -> bool:
