@@ -427,16 +427,10 @@ def test_a_fault_of_ours_is_one_line_too(capfd, monkeypatch):
     assert "please report it" in said
 
 
-def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path, monkeypatch):
-    from shapephase.optimal_control import planning
-    from shapephase.optimal_control.plan_options import Search
-
-    monkeypatch.setattr(
-        "shapephase.optimal_control.plan_options.Search", lambda **options: Search(iterations=12, pieces=20, **options)
-    )
-    assert planning.Search is Search
+def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path):
     out = tmp_path / "plan.csv"
-    code, printed, said = ended(capfd, "plan", "cat_two_halves", "--rotate", "170", "--out", out, "--json")
+    small = ("--pieces", "20", "--iterations", "12")
+    code, printed, said = ended(capfd, "plan", "cat_two_halves", "--rotate", "170", *small, "--out", out, "--json")
     data = json.loads(printed)
     assert code == ExitCode.NOT_FOUND, said
     assert data["status"] != "found"
@@ -446,6 +440,9 @@ def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path, monkey
 
 
 # ---- What is said ---------------------------------------------------------------------------------------------------
+
+
+COUNTS = ("--starts", "--seed", "--order", "--pieces", "--iterations")
 
 
 def options_of(text):
@@ -482,7 +479,13 @@ def test_every_option_has_a_sentence_and_an_example(name, wide_pages):
         assert re.search(r"[.;] .*|[.]$", words), words
         if option not in ("--quiet", "--verbose", "--help", "--version"):
             assert "for example" in words.lower(), words
-        if re.search(r"\b(FLOAT|INT)\b", words) and option not in ("--starts", "--seed", "--order"):
+        if re.search(r"\b(FLOAT|INT)\b", words) and option not in (
+            "--starts",
+            "--seed",
+            "--order",
+            "--pieces",
+            "--iterations",
+        ):
             assert re.search(r"\bin (rad|s|1/s|kg|degrees|sqrt)|[Tt]urns|without unit|Seconds|sqrt\(kg\)", words), words
 
 

@@ -41,6 +41,8 @@ def plan_command(
     cost: str = "kinetic",
     starts: int = 1,
     seed: int = 0,
+    pieces: int | None = None,
+    iterations: int = 300,
     out: Path | None = None,
     html: ReportFile = None,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
@@ -71,6 +73,11 @@ def plan_command(
         Searches from different guesses, of which the cheapest plan is kept; for example `--starts 4`.
     seed
         Of the random guesses, a whole number; for example `--seed 7`.
+    pieces
+        Of the spline that the motion is, six or more; without it as many as suit the number of joints, from 20 to 160.
+        Few are quick to try. For example `--pieces 12`.
+    iterations
+        The most that the solver takes for each start; for example `--iterations 1000`.
     out
         Write the joint motion to this CSV file; without it none is written. For example `--out plan.csv`.
     """
@@ -106,7 +113,7 @@ def plan_command(
                     momentum=momentum,
                     duration=duration,
                     cost=cost,
-                    search=Search(starts=starts, seed=seed),
+                    search=Search(starts=starts, seed=seed, pieces=pieces, iterations=iterations),
                     iteration_callback=search.report,
                 )
             except PlanNotFound as failure:

@@ -17,6 +17,12 @@ METHODS = ("collocation", "reduced")
 
 # Pieces of the spline: with fewer, not-a-knot ends leave too few control points for a loop.
 _LEAST_PIECES = 6
+# A plan of three joints takes half a MiB for each piece, and no path needs so many.
+_MOST_PIECES = 2000
+# The guesses of all starts are kept at once.
+_MOST_STARTS = 1000
+# What the solver's own counter holds.
+_MOST_ITERATIONS = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +142,9 @@ class Search:
         (not for the cost "time"). On equal splines both come to the same costs within 1.5 %, of the cat in 14 and 11 s;
         the first leaves a KKT residual of 1e-9, the second of some 1e-6, and for the astronaut it may need more than
         300 iterations: so the first is the default
-    starts : local searches from different guesses, of which the cheapest plan is returned
+    starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000
     seed : of the random guesses; the same seed gives the same plan
-    pieces : of the spline, six or more; None: 160 for up to four free joints and the costs "kinetic" and "rate",
+    pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
         else 40 for up to eight, 20 for more
     iterations : the most that the solver may take for each start
 
@@ -147,7 +153,7 @@ class Search:
     UnknownNameError
         For another method.
     ShapeError
-        For counts that are not whole numbers, or too small.
+        For counts that are not whole numbers, too small or too large.
 
     Examples
     --------
@@ -168,10 +174,10 @@ class Search:
         if self.method not in METHODS:
             raise unknown_name("method", self.method, METHODS)
         if self.pieces is not None:
-            _check_count(self.pieces, "pieces", _LEAST_PIECES)
-        _check_count(self.starts, "starts", 1)
+            _check_count(self.pieces, "pieces", _LEAST_PIECES, _MOST_PIECES)
+        _check_count(self.starts, "starts", 1, _MOST_STARTS)
         _check_count(self.seed, "seed", 0)
-        _check_count(self.iterations, "iterations", 1)
+        _check_count(self.iterations, "iterations", 1, _MOST_ITERATIONS)
 
 
 def goal_argument(value: Any) -> Goal:
@@ -196,9 +202,11 @@ def _unit_pair(pointing: ArrayLike) -> Array:
     return pair / lengths[:, None]
 
 
-def _check_count(value: Any, name: str, least: int) -> None:
+def _check_count(value: Any, name: str, least: int, most: int | None = None) -> None:
     if not isinstance(value, int | np.integer) or value < least:
         raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {value!r}")
+    if most is not None and value > most:
+        raise ShapeError(f"{name}: a whole number, up to {most}, is needed, got {value!r}")
 
 
 def _read_only(array: Array) -> Array:
