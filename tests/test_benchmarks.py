@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -17,10 +15,8 @@ from benchmarks.peer import NoPeer, Peer
 
 import shapephase as sp
 from shapephase.examples.scenarios import cat_righting
+from support.compiler import needs_compiler
 from support.long_runs import full_but
-
-NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
-needs_compiler = pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
 
 
 @pytest.mark.full

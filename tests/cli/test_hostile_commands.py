@@ -31,7 +31,7 @@ def worker():
 
 
 def asked(worker: Worker, folder, *arguments: str) -> dict:
-    (answer,) = worker.ask({"command": [*map(str, arguments), "--json"], "folder": str(folder)})
+    (answer,) = worker.outcomes({"command": [*map(str, arguments), "--json"], "folder": str(folder)})
     assert answer["outcome"].startswith("exit "), answer
     assert "Traceback" not in answer["message"] + answer["printed"], answer
     assert answer["memory"] < MOST_MEMORY

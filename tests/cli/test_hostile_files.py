@@ -11,6 +11,7 @@ import re
 import pytest
 
 from shapephase.body import catalog
+from support.asked_process import ProcessEnded
 from support.hostile_files import GOOD, GOOD_MJCF, Case, cases
 from support.loading_process import Worker
 
@@ -40,7 +41,7 @@ def test_there_are_enough_of_them():
 def test_a_hostile_or_odd_file(case: Case, worker: Worker, tmp_path):
     path = tmp_path / case.file
     path.write_bytes(case.content())
-    (answer,) = worker.ask({"path": str(path), "options": dict(case.options)})
+    (answer,) = worker.outcomes({"path": str(path), "options": dict(case.options)})
     if case.said is None:
         assert answer["outcome"] == "loads", answer["message"]
         assert bool(answer["message"]) == (case.warned is not None), answer["message"]
@@ -60,7 +61,7 @@ def test_hostile_files_with_warnings_about_nothing_else(worker: Worker, tmp_path
     """The two good files give no warning, and what they are is known."""
     for text, name in ((GOOD, "good.urdf"), (GOOD_MJCF, "good.xml")):
         (tmp_path / name).write_text(text)
-        (answer,) = worker.ask({"path": str(tmp_path / name)})
+        (answer,) = worker.outcomes({"path": str(tmp_path / name)})
         assert answer["message"] == ""
         assert answer["mass"] == pytest.approx(4.5 if name == "good.urdf" else answer["mass"], rel=1e-15)
 
@@ -71,7 +72,8 @@ def test_the_worker_tells_a_crash_from_a_hang():
     try:
         worker.process.kill()
         worker.process.wait()
-        assert worker._line(1.0)["outcome"] == "died"
+        with pytest.raises(ProcessEnded, match="ended with -9"):
+            worker.answer(1.0)
     finally:
         worker.stop()
 
@@ -95,7 +97,7 @@ def damage(worker, folder, name, first, count):
     for start in range(first, first + count, BATCH):
         stop = min(start + BATCH, first + count)
         request = {"path": str(path), "base": str(base), "seeds": [start, stop]}
-        for number, answer in enumerate(worker.ask(request, stop - start), start):
+        for number, answer in enumerate(worker.outcomes(request, stop - start), start):
             here = f"{name}, seed {number}: {answer['message'][:500]}"
             if answer["outcome"] == "loads":
                 loaded += 1

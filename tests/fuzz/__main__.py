@@ -33,9 +33,12 @@ def main() -> int:
     with tempfile.TemporaryDirectory(dir="/dev/shm" if os.path.isdir("/dev/shm") else None) as folder:
         process = LimitedProcess(Path(folder), long=True)
         try:
-            if asked.processes:
-                find = searched(process, "command", asked.processes, start, tally, by_command_line=True, shrink=False)
-                _note(find, "process", faulty, asked.finds)
+            # A find ends a round, and the rest of the trials follow.
+            while (left := asked.processes - tally.trials) > 0:
+                find = searched(process, "command", left, start, tally, by_command_line=True, shrink=False)
+                _note(find, f"process{start}", faulty, asked.finds)
+                print(f"{tally.trials} of {asked.processes} processes", flush=True)
+                start += 1
             while tally.trials < asked.trials + asked.processes and time.monotonic() < end:
                 rounds = min(10, max(1, (asked.trials - tally.trials) // _ROUND))
                 for grammar in asked.only:

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from support.odd_values import ODD_NUMBERS
+
 from .pieces import (
     BODY,
     JOINTS,
@@ -29,7 +31,6 @@ from .pieces import (
 )
 from .text_motions import joint_labels, options, samples
 
-_ODD_VALUES = (np.nan, np.inf, -np.inf, 1e7, 1e300, 5e-324, -1e308)
 _TYPES = ("f4", ">f8", "f2", "i4", "u1", "i8", "c16", "?", "S8", "U4", "M8[s]", "m8[ms]", "g")
 _HEADERS = (
     "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }",
@@ -62,7 +63,7 @@ def _arrays(chance: Random) -> tuple[list[str], np.ndarray, np.ndarray]:
     times, rows = samples(chance, len(labels))
     values = np.array(rows, dtype=float).reshape(len(rows), len(labels))
     if values.size and rarely(chance, 15):
-        values.flat[chance.randrange(values.size)] = chance.choice(_ODD_VALUES)
+        values.flat[chance.randrange(values.size)] = chance.choice(ODD_NUMBERS)
     return labels, np.array(times, dtype=float), values
 
 
@@ -437,7 +438,7 @@ def record(chance: Random) -> Trial:
             case 2 if arrays[name].dtype.kind == "f" and arrays[name].size:
                 arrays[name] = np.array(arrays[name])
                 arrays[name].flat[chance.randrange(arrays[name].size)] = chance.choice(
-                    (*_ODD_VALUES, amount(chance), 0.0)
+                    (*ODD_NUMBERS, amount(chance), 0.0)
                 )
             case 3:
                 arrays[name] = _odd_array(chance, arrays[name])

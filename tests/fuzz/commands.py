@@ -5,32 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from random import Random
 
+from support.odd_values import ODD_WORDS
+
 from .bodies import mjcf, urdf
 from .pieces import BODY, ODD_NAMES, Trial, odd_one, rarely
 from .text_motions import delimited, number_text, opensim
 
 _GOOD_MOTION = "time,hip,wrist,boom\n0,0,0,0\n0.25,0.2,0.1,0.05\n0.5,0.3,0.3,0.1\n0.75,0.1,0.2,0.02\n1,0,0,0\n"
-_ODD_VALUES = (
-    "",
-    "-",
-    "--",
-    "nan",
-    "inf",
-    "-1",
-    "0",
-    "1e400",
-    "1e-320",
-    "1e308",
-    "x",
-    "x" * 300,
-    "\u202e",
-    "a=b",
-    "[",
-    "1,2,3",
-    "@",
-    "%s",
-    "\n",
-)
+_ODD_VALUES = (*ODD_WORDS, "-", "x", "a=b", "[", "1,2,3", "@", "%s", "\n")
+_SMALL_SEARCH = ("--pieces", "8", "--iterations", "5")
+"""What a plan may take of the processor grows with these; the search of a whole one has no end of its own."""
 
 
 def _number(chance: Random, usual: str) -> str:
@@ -95,6 +79,7 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
     "view": _RECORDING
     | _FLIGHT
     | {"--trail": lambda c: [c.choice(("hand", "none", ""))], "--speed": lambda c: [_number(c, "1")]},
+    "explore": {"--up": lambda c: [c.choice(("y", "-z", "", "w"))]},
     "orbits": _RECORDING | _GAUGE | _TOLERANCE,
     "plan": {
         "--rotate": lambda c: [_number(c, "5")],
@@ -108,6 +93,8 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--cost": lambda c: [c.choice(("kinetic", "rate", "time", "x"))],
         "--starts": lambda c: [_number(c, "1")],
         "--seed": lambda c: [_number(c, "1")],
+        "--pieces": lambda c: [_number(c, "6")],
+        "--iterations": lambda c: [_number(c, "3")],
         "--out": lambda c: _file(c, "out.csv"),
     },
     "conjugate": {"--momenta": _three, "--order": lambda c: [_number(c, "2")], "--out": lambda c: _file(c, "out.svg")},
@@ -115,7 +102,7 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
     "doctor": {},
     "": {},
 }
-"""Command -> option -> its values."""
+"""Command -> option -> its values; `compile` takes nothing in, and longer than an input may."""
 
 
 def _word(chance: Random) -> str:
@@ -130,10 +117,12 @@ def command(chance: Random, only: str | None = None) -> Trial:
     weights = {"check": 12, "split": 6, "conjugate": 4}
     name = chance.choice([name for name in names for _ in range(weights.get(name, 1))])
     files: dict[str, bytes] = {}
+    # A plan for the 23 joints of the cat takes longer to write down than any input may.
+    known = ("cat_two_halves",) if name == "plan" else ("cat", "diver")
     body = odd_one(
         chance,
         "body.urdf",
-        ("cat", "diver", "nobody", "", "example:none", "body.xml", "folder", "motion.csv", "x" * 5000),
+        (*known, "nobody", "", "example:none", "body.xml", "folder", "motion.csv", "x" * 5000),
         8,
     )
     made = mjcf(chance) if body == "body.xml" else urdf(chance)
@@ -141,7 +130,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
     motion = odd_one(
         chance, "motion.csv", ("circle", "cat_righting", "-", "none", "no.csv", "", ".csv", "body.urdf", "a.bvh"), 10
     )
-    if name != "plan":
+    if name not in ("plan", "explore"):
         fuzzed = opensim(chance) if rarely(chance, 4) else delimited(chance)
         use = rarely(chance, 2) and motion == "motion.csv"
         files["motion.csv"] = _GOOD_MOTION.encode()
@@ -160,7 +149,9 @@ def command(chance: Random, only: str | None = None) -> Trial:
         "doctor": [],
         "": [],
     }.get(name, [body, motion])
-    if name == "view":
+    if name == "explore":
+        words = [body, "--joints", "hip", odd_one(chance, "wrist", ("hip", "boom", *ODD_NAMES), 3)]
+    if name in ("view", "explore"):
         words += ["--html", "page.html"]
     if name == "plot" and not rarely(chance, 5):
         words += ["--out", "out.png"]
@@ -173,6 +164,8 @@ def command(chance: Random, only: str | None = None) -> Trial:
         words.insert(chance.randrange(len(words) + 1), _word(chance))
     if words and rarely(chance, 12):
         words.pop(chance.randrange(len(words)))
+    if name == "plan":
+        words += [word for k, word in enumerate(_SMALL_SEARCH) if _SMALL_SEARCH[k - k % 2] not in words]
     arguments = [word.replace("\x00", "") for word in ([name] if name else []) + words]
     if not rarely(chance, 4):
         arguments.append("--json")

@@ -13,7 +13,6 @@ import os
 import resource
 import shutil
 import signal
-import subprocess
 import sys
 import traceback
 import warnings
@@ -23,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from fuzz.pieces import BODY, Trial
+from support.asked_process import Answers, AskedProcess, requests
 
 SECONDS = 10
 """Processor time of one input [s]; the limit of the kernel, in whole seconds."""
@@ -51,54 +51,31 @@ _OF_MEMORY = (
 _BODY = "small.urdf"
 
 
-class LimitedProcess:
+class LimitedProcess(AskedProcess):
     """The process, from outside."""
 
     def __init__(self, folder: Path, *, long: bool) -> None:
         """Start it; `long`: for so many inputs that it is worth while to import everything beforehand."""
-        self.folder = folder
+        self._folder = folder
         (folder / _BODY).write_text(BODY)
-        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment = {
-            **os.environ,
-            "OPENBLAS_NUM_THREADS": "1",
-            "OMP_NUM_THREADS": "1",
-            "SHAPEPHASE_FAST": "0",
-            "PYTHONPATH": path,
-            "COLUMNS": "200",
-            "MPLBACKEND": "agg",
-        }
-        command = [sys.executable, "-m", "fuzz.limited_process", *(["long"] if long else [])]
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment, cwd=folder, text=True
-        )
-        self._answer()
+        fixed = {"OMP_NUM_THREADS": "1", "SHAPEPHASE_FAST": "0", "COLUMNS": "200", "MPLBACKEND": "agg"}
+        super().__init__("-m", "fuzz.limited_process", *(["long"] if long else []), folder=folder, **fixed)
+        self.answer()
 
     def tried(self, trial: Trial, *, by_command_line: bool = False) -> dict[str, Any]:
         """What became of an input: "outcome", "message", "faults", "seconds" [s of processor], "memory" [bytes]."""
-        place = self.folder / "trial"
+        place = self._folder / "trial"
         shutil.rmtree(place, ignore_errors=True)
         (place / "folder").mkdir(parents=True)
         for name, content in trial.files.items():
             (place / name).write_bytes(content)
-        request = {
-            "kind": "process" if by_command_line else trial.kind,
-            "folder": str(place),
-            "main": trial.main,
-            "options": dict(trial.options),
-            "arguments": list(trial.arguments),
-        }
-        assert self._process.stdin is not None
-        print(json.dumps(request), file=self._process.stdin, flush=True)
-        return self._answer()
-
-    def stop(self) -> None:
-        self._process.kill()
-        self._process.communicate()
-
-    def _answer(self) -> dict[str, Any]:
-        assert self._process.stdout is not None
-        return json.loads(self._process.stdout.readline())
+        return self.ask(
+            kind="process" if by_command_line else trial.kind,
+            folder=place,
+            main=trial.main,
+            options=dict(trial.options),
+            arguments=list(trial.arguments),
+        )
 
 
 def _limit(room: int) -> None:
@@ -203,9 +180,6 @@ def _command_alone(request: dict[str, Any], room: int) -> tuple[dict[str, Any], 
     said = (place / "stderr.txt").read_text(encoding="utf-8", errors="backslashreplace")
     answer = {"outcome": f"exit {code}", "message": said[-500:], "faults": []}
     answer |= {"seconds": used.ru_utime + used.ru_stime, "memory": used.ru_maxrss * 1024}
-    if code == -signal.SIGXCPU and request["arguments"][:1] == ["plan"]:
-        # A search that goes on as long as it finds better plans; whoever waits may end it by Ctrl-C.
-        return answer | {"outcome": "searching", "seconds": 0.0}, 0
     if code >= 0:
         answer["faults"] += list(_command_faults(request, answer["outcome"], place))
     return answer, code
@@ -407,8 +381,7 @@ _TRIALS = {
 
 
 def _work() -> None:
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+    answers = Answers()
     import shapephase.cli.main
     import shapephase.reconstruction.reconstruction
     import shapephase.shape_space.files.read  # noqa: F401
@@ -419,14 +392,14 @@ def _work() -> None:
     gc.freeze()
     gc.disable()
     child = _Child(_room() + _ROOM)
-    print(json.dumps({"ready": True}), file=answers, flush=True)
-    for line in sys.stdin:
-        answer = _watched(json.loads(line), child)
+    answers.say({"ready": True})
+    for request in requests():
+        answer = _watched(request, child)
         if answer["faults"] or child.tries >= _TRIES:
             with contextlib.suppress(OSError, ChildProcessError):
                 child.stop()
             child = _Child(_room() + _ROOM)
-        print(json.dumps(answer), file=answers, flush=True)
+        answers.say(answer)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import shutil
 
 import numpy as np
 import pytest
@@ -14,9 +13,9 @@ from shapephase.errors import ShapeError, SingularInertiaError
 from shapephase.integrator._spectral_error import Channels
 from shapephase.integrator.fast.tree import tree_channels, tree_inertia_and_momentum
 from support.bodies import joint, link, random_loop, random_shapes, urdf
+from support.compiler import needs_compiler
 
 pytestmark = pytest.mark.usefixtures("fast")
-needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="the extended precision is compiled C")
 
 
 @needs_compiler

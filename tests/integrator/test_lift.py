@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import pickle
-import shutil
 
 import numpy as np
 import pytest
@@ -13,11 +11,10 @@ from benchmarks.extended import Truth, angles_between
 import shapephase as sp
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.sampling import FinishedSampler
+from support.compiler import needs_compiler
 from support.independent import BODIES, apart, body_of, random_loop, random_vector
 from support.long_runs import full_but
 
-NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
-needs_compiler = pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
 TOLERANCES = (1e-5, 1e-8, 1e-11)
 
 

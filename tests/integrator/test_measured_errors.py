@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-
 import numpy as np
 import pytest
 
@@ -17,10 +15,10 @@ from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._spectral_error import Channels
 from shapephase.integrator._step_control import StepRequirements, even_steps
 from shapephase.integrator.interpolant import Interpolant
+from support.compiler import needs_compiler
 from support.independent import random_rotation
 
 EPS = np.finfo(float).eps
-needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="the extended precision is compiled C")
 
 
 def about_one_axis(coefficients: np.ndarray, edges: np.ndarray) -> Interpolant:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import pickle
-import shutil
 import tracemalloc
 from dataclasses import replace
 
@@ -23,9 +21,8 @@ from shapephase.integrator.recorded.knot_path import KnotPath
 from shapephase.integrator.recorded.knot_sampling import KnotSampler
 from shapephase.integrator.recorded.polynomial_fit import fit_nodes, polynomial_fit
 from shapephase.shape_space.body_path import recorded_pieces
+from support.compiler import needs_compiler
 from support.independent import apart
-
-NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
 
 
 def loop_of(body: sp.Body, rows: int, seed: int = 3) -> sp.ShapePath:
@@ -217,7 +214,7 @@ def test_a_single_wrong_sample_between_the_check_points_is_seen(monkeypatch: pyt
 @pytest.mark.parametrize(
     ("search", "numbers"), [(8, (0, 9)), pytest.param(2000, (0, 6, 9, 10), marks=pytest.mark.full)]
 )
-@pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
+@needs_compiler
 def test_no_recording_is_off_by_more_than_its_estimate(
     search: int, numbers: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ):

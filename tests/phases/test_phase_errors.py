@@ -6,8 +6,6 @@ closed form of the free rigid body.
 
 from __future__ import annotations
 
-import os
-import shutil
 from dataclasses import fields, replace
 
 import numpy as np
@@ -24,10 +22,9 @@ from shapephase.integrator.sampling import FinishedSampler
 from shapephase.integrator.stepped import SteppedRotation
 from shapephase.phases import arc_phases, running_phases
 from shapephase.phases._momentum_curve import momentum_curve
+from support.compiler import needs_compiler
 from support.independent import BODIES, apart, body_of, random_loop, random_vector
 
-NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
-needs_compiler = pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
 GAUGES = ("base", "horizontal", "principal")
 NAMES = ("cat", "satellite", "cat_two_halves")
 EPS = float(np.finfo(float).eps)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import shutil
 from functools import cache
 
 import numpy as np
@@ -18,9 +17,9 @@ from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaErr
 from shapephase.integrator.fast import engine
 from shapephase.integrator.variants import rotations
 from support.bodies import joint, link, urdf
+from support.compiler import needs_compiler
 from support.long_runs import full_but
 
-needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="the extended precision is compiled C")
 CAT = 2
 DIVER = 9
 SPLINE = 14

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,6 +13,7 @@ from benchmarks.hostile_paths import KINDS, SMOOTH, hostile_path, judged
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
 from shapephase.integrator.resolved import ResolvedPath
+from support.compiler import needs_compiler
 from support.long_runs import full_but
 
 AMPLITUDE = np.array([0.8, -0.5, 0.6])
@@ -319,10 +318,8 @@ def test_a_black_box_costs_no_more_of_the_body_than_before():
 
 # ---- Hostile paths -------------------------------------------------------------------------------------------------
 
-NO_COMPILER = shutil.which(os.environ.get("CC", "cc").split()[0]) is None
 
-
-@pytest.mark.skipif(NO_COMPILER, reason="the truth in extended precision needs a C compiler")
+@needs_compiler
 @pytest.mark.parametrize("runs", full_but([2, 6], 2))
 @pytest.mark.parametrize("kind", KINDS)
 def test_nothing_wider_than_the_promise_is_silently_wrong(kind: str, runs: int):

@@ -7,40 +7,13 @@ import random
 import re
 import xml.etree.ElementTree as ElementTree
 
+from support.odd_values import ODD_WORDS
+
 NASTY = (
-    *(
-        "nan",
-        "inf",
-        "-1",
-        "0",
-        "1e400",
-        "1e-320",
-        "1e308",
-        "",
-        " ",
-        "1,5",
-        "0x10",
-        "--",
-        "1 2 3",
-        "0 0 0",
-        "1e5",
-        "1e-9",
-    ),
-    *(
-        "base",
-        "fixed",
-        "revolute",
-        "continuous",
-        "prismatic",
-        "floating",
-        "universe",
-        "root_joint",
-        "${x}",
-        "\u202e",
-        "&",
-        "x" * 300,
-    ),
+    *ODD_WORDS,
+    *("0 0 0", "base", "fixed", "revolute", "continuous", "prismatic", "floating", "universe", "root_joint"),
 )
+"""Also names and kinds that mean something elsewhere in a file."""
 
 
 def mutated(text: bytes, seed: int) -> bytes:

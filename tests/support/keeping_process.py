@@ -10,41 +10,21 @@ import os
 import random
 import resource
 import signal
-import subprocess
 import sys
 import time
 import warnings
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
+from support.asked_process import Answers, AskedProcess, requests
 
-class KeepingProcess:
-    """The process, seen from the tests."""
+
+class KeepingProcess(AskedProcess):
+    """The process, seen from the tests; it is asked for the arguments of `at_once` or `killed`."""
 
     def __init__(self, **environment: str) -> None:
-        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-        self.process = subprocess.Popen(
-            [sys.executable, __file__],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path, **environment},
-        )
-
-    def ask(self, **request: Any) -> dict[str, Any]:
-        """The answer to a request: the arguments of `at_once` or `killed`."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write(json.dumps(request, default=str) + "\n")
-        self.process.stdin.flush()
-        return json.loads(self.process.stdout.readline())
-
-    def stop(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout):
-            if stream is not None:
-                stream.close()
+        super().__init__(__file__, **environment)
 
 
 def twice(x: float) -> float:
@@ -55,19 +35,34 @@ def thrice(x: float) -> float:
     return 3.0 * x
 
 
-def called(home: str, function: str = "twice", limit: int | None = None) -> dict[str, Any]:
-    """Compile or load the function, and call it; whether it was found, and what was warned of."""
+def called(home: str, function: str = "twice", limit: int | None = None, moment: int | None = None) -> dict[str, Any]:
+    """Compile or load the function, and call it; whether it was found, and what was warned of.
+
+    Of all the moments in which files are written, so many are counted; at the one asked for the process kills itself.
+    """
+    from shapephase import files
+    from shapephase.integrator.fast.kernels.jit import kernel
+
     os.environ["XDG_CACHE_HOME"] = home
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    moments = 0
+
+    def watch(frame: FrameType, *_: object) -> None:
+        nonlocal moments
+        if frame.f_code.co_filename == files.__file__:
+            if moments == moment:
+                os.kill(os.getpid(), signal.SIGKILL)
+            moments += 1
+
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        from shapephase.integrator.fast.kernels.jit import kernel
-
         made = kernel({"twice": twice, "thrice": thrice}[function])
+        sys.setprofile(watch)
         value = made(7.0)
+        sys.setprofile(None)
     found = bool(sum(made.stats.cache_hits.values()))
-    return {"value": value, "found": found, "said": [str(one.message) for one in said]}
+    return {"value": value, "found": found, "said": [str(one.message) for one in said], "moments": moments}
 
 
 def _in_child(**request: Any) -> tuple[int, int]:
@@ -97,40 +92,45 @@ def at_once(count: int, **request: Any) -> list[dict[str, Any]]:
 
 
 def killed(home: str, trials: int, seed: int) -> dict[str, Any]:
-    """Kill a process at random times, from its start to after its end, with nothing kept yet; look what it left."""
+    """Kill a process with nothing kept yet, and look what it left.
+
+    So many die at random times, from the start to after the end, and so many at moments of writing, spread evenly from
+    the first to the last; `kept` says how many of the latter had a file already.
+    """
     chance = random.Random(seed)
     start = time.monotonic()
-    at_once(1, home=home)
+    (whole,) = at_once(1, home=home)
     longest = 1.3 * (time.monotonic() - start)
-    wrong = kept = littered = 0
+    moments = [round(k * (whole["moments"] - 1) / (trials - 1)) for k in range(trials)]
+    found = {"trials": 0, "wrong": 0, "kept": 0, "littered": 0}
     folder = next(Path(home).glob("shapephase/kernels-*/*"))
-    for _ in range(trials):
+    for moment in [None] * trials + moments:
         for file in folder.iterdir():
             file.unlink()
-        child, receiving = _in_child(home=home)
-        time.sleep(chance.uniform(0.0, longest))
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+        child, receiving = _in_child(home=home, moment=moment)
+        if moment is None:
+            time.sleep(chance.uniform(0.0, longest))
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
         os.close(receiving)
+        assert moment is None or status == signal.SIGKILL
         left = [file.name for file in folder.iterdir()]
-        kept += any(name.endswith(".nbc") for name in left)
-        littered += any(name.endswith(".part") for name in left)
+        found["trials"] += 1
+        found["kept"] += moment is not None and any(name.endswith(".nbc") for name in left)
+        found["littered"] += any(name.endswith(".part") for name in left)
         (after,) = at_once(1, home=home)
-        wrong += after.get("value") != 14.0 or len(list(folder.iterdir())) != 1
-    return {"trials": trials, "wrong": wrong, "kept": kept, "littered": littered}
+        found["wrong"] += after.get("value") != 14.0 or len(list(folder.iterdir())) != 1
+    return found
 
 
 def work() -> None:
-    from numba import njit
+    import numba
 
     # What Numba prepares once for all functions.
-    njit(twice)(1.0)
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    for line in sys.stdin:
-        request = json.loads(line)
-        answer = killed(**request) if "trials" in request else {"all": at_once(**request)}
-        print(json.dumps(answer), file=answers, flush=True)
+    numba.njit(twice)(1.0)
+    answers = Answers()
+    for request in requests():
+        answers.say(killed(**request) if "trials" in request else {"all": at_once(**request)})
 
 
 if __name__ == "__main__":

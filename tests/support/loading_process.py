@@ -6,10 +6,7 @@ crash, a hang or a hunger for memory is seen from outside and tells which file d
 
 from __future__ import annotations
 
-import json
 import os
-import selectors
-import subprocess
 import sys
 import traceback
 import warnings
@@ -17,6 +14,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
 
+from support.asked_process import Answers, AskedProcess, ProcessEnded, requests
 from support.damaged_files import mutated
 from support.reference_load import Effort, TooMuchWork
 
@@ -26,60 +24,28 @@ MOST_MEMORY = 2**30
 """What loading one file may take [bytes]: three times what the largest body takes."""
 
 
-class Worker:
+class Worker(AskedProcess):
     """A process that loads files, started anew after a crash."""
 
     def __init__(self, memory: int = MOST_MEMORY) -> None:
-        self.memory = memory
-        self.start()
+        super().__init__(__file__, str(memory), silent=True)
 
     def start(self) -> None:
-        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-        environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": path}
-        self.process = subprocess.Popen(
-            [sys.executable, __file__, str(self.memory)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env=environment,
-        )
-        self.rest = b""
-        assert self._line(HANG_SECONDS) == {"ready": True}
+        super().start()
+        assert self.answer(HANG_SECONDS) == {"ready": True}
 
-    def ask(self, request: dict[str, Any], answers: int = 1) -> list[dict[str, Any]]:
+    def outcomes(self, request: dict[str, Any], answers: int = 1) -> list[dict[str, Any]]:
         """The answers to a request; what stops the process is the last one."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps(request).encode() + b"\n")
-        self.process.stdin.flush()
-        found = []
-        for _ in range(answers):
-            found.append(self._line(HANG_SECONDS))
-            if found[-1]["outcome"] in ("hang", "died"):
-                self.stop()
-                self.start()
-                break
+        self.send(request)
+        found: list[dict[str, Any]] = []
+        try:
+            while len(found) < answers:
+                found.append(self.answer(HANG_SECONDS))
+        except (ProcessEnded, TimeoutError) as end:
+            found.append({"outcome": "died" if isinstance(end, ProcessEnded) else "hang", "message": str(end)})
+            self.stop()
+            self.start()
         return found
-
-    def stop(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout):
-            if stream is not None:
-                stream.close()
-
-    def _line(self, seconds: float) -> dict[str, Any]:
-        assert self.process.stdout is not None
-        with selectors.DefaultSelector() as selector:
-            selector.register(self.process.stdout, selectors.EVENT_READ)
-            while b"\n" not in self.rest:
-                if not selector.select(seconds):
-                    return {"outcome": "hang", "message": f"no answer in {seconds} s"}
-                piece = os.read(self.process.stdout.fileno(), 65536)
-                if not piece:
-                    return {"outcome": "died", "message": f"the process ended with {self.process.wait()}"}
-                self.rest += piece
-        line, self.rest = self.rest.split(b"\n", 1)
-        return json.loads(line)
 
 
 def outcome_of(path: str, **options: str) -> dict[str, Any]:
@@ -156,8 +122,7 @@ def commanded(arguments: list[str], folder: str) -> dict[str, Any]:
 def work(memory: int) -> None:
     import resource
 
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
+    answers = Answers()
     # What the commands import late, once for all the processes that are forked from this one.
     import shapephase.cli.main
     import shapephase.cli.motion
@@ -166,19 +131,15 @@ def work(memory: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 
-    def say(answer: dict[str, Any]) -> None:
-        print(json.dumps(answer), file=answers, flush=True)
-
     effort = Effort()
-    say({"ready": True})
-    for line in sys.stdin:
-        request = json.loads(line)
+    answers.say({"ready": True})
+    for request in requests():
         if "command" in request:
-            say(commanded(request["command"], request["folder"]))
+            answers.say(commanded(request["command"], request["folder"]))
             continue
         path = request["path"]
         if "seeds" not in request:
-            say(weighed_outcome(effort, path, **request.get("options", {})))
+            answers.say(weighed_outcome(effort, path, **request.get("options", {})))
             continue
         good = Path(request["base"]).read_bytes()
         for seed in range(*request["seeds"]):
@@ -186,7 +147,7 @@ def work(memory: int) -> None:
             answer = weighed_outcome(effort, path, on_unphysical="warn" if seed % 2 else "error")
             if answer["outcome"] == "loads" and path.endswith(".urdf"):
                 answer["written"] = written_mass(path)
-            say({"seed": seed, **answer})
+            answers.say({"seed": seed, **answer})
 
 
 if __name__ == "__main__":

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import os
 import random
 import resource
 import signal
-import subprocess
 import sys
 import time
 import traceback
@@ -21,6 +19,8 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from support.asked_process import Answers, AskedProcess, requests
 
 AS_NOBODY = 65534
 CAT = ("cat", "cat_righting", "--momentum", "0", "0")
@@ -48,35 +48,13 @@ WRITERS = (*COMMANDS, *FUNCTIONS)
 _WRITING = 0.02
 
 
-class WritingProcess:
-    """The process, seen from the tests."""
+class WritingProcess(AskedProcess):
+    """The process, seen from the tests; it is asked for the arguments of `_wrote` or `_killed`."""
 
     def __init__(self, *writers: str) -> None:
-        path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
         # Two writes of the same are the same bytes.
-        fixed = {"SOURCE_DATE_EPOCH": "0", "OPENBLAS_NUM_THREADS": "1", "PYTHONHASHSEED": "0", "SHAPEPHASE_FAST": "0"}
-        self.process = subprocess.Popen(
-            [sys.executable, __file__, *writers],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**os.environ, **fixed, "PYTHONPATH": path},
-        )
-
-    def ask(self, **request: Any) -> dict[str, Any]:
-        """The answer to a request: the arguments of `_wrote` or `_killed`."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write(json.dumps(request, default=str) + "\n")
-        self.process.stdin.flush()
-        return json.loads(self.process.stdout.readline())
-
-    def stop(self) -> None:
-        self.process.kill()
-        self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout):
-            if stream is not None:
-                stream.close()
+        fixed = {"SOURCE_DATE_EPOCH": "0", "PYTHONHASHSEED": "0", "SHAPEPHASE_FAST": "0"}
+        super().__init__(__file__, *writers, **fixed)
 
 
 def is_whole(content: bytes, writer: str) -> bool:
@@ -297,12 +275,9 @@ def _import_for(writer: str) -> None:
 def work(writers: list[str]) -> None:
     for writer in writers:
         _import_for(writer)
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    for line in sys.stdin:
-        request = json.loads(line)
-        answer = _killed(**request) if "trials" in request else _wrote(**request)
-        print(json.dumps(answer), file=answers, flush=True)
+    answers = Answers()
+    for request in requests():
+        answers.say(_killed(**request) if "trials" in request else _wrote(**request))
 
 
 if __name__ == "__main__":
