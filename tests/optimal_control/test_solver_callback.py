@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import signal
+import time
+
 import casadi
 import numpy as np
 import pytest
 
-from shapephase.optimal_control._solver_callback import BestIterate, ipopt_callback
+from shapephase.optimal_control._solver_callback import BestIterate, heard_interrupts, ipopt_callback
 
 
 def test_the_cheapest_of_the_nearly_feasible_is_kept():
@@ -37,3 +41,31 @@ def test_an_iterate_is_reported_with_its_largest_violation():
         assert reported[-1][1:] == (7.0, pytest.approx(expected, abs=1e-15))
     assert int(casadi.DM(stop)) == 1
     assert best.stopped
+
+
+class Interrupted:
+    """An argument in the middle of whose conversion Ctrl-C is pressed."""
+
+    def __init__(self):
+        self.presses = 0
+
+    @property
+    def tocsc(self):
+        self.presses += 1
+        if self.presses == 1:
+            signal.raise_signal(signal.SIGINT)
+        raise AttributeError
+
+
+def test_ctrl_c_while_casadi_asks_what_an_argument_is_comes_a_moment_later():
+    argument = Interrupted()
+
+    def converted():
+        with contextlib.suppress(NotImplementedError):
+            casadi.sin(argument)
+        time.sleep(30.0)
+
+    with pytest.raises(KeyboardInterrupt), heard_interrupts():
+        converted()
+    assert argument.presses
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -1,8 +1,13 @@
-"""Solvers observed from iteration to iteration: progress is reported, the best iterate is kept, a stop is passed on."""
+"""Solvers observed: progress is reported, the best iterate is kept, a stop is passed on, and Ctrl-C is not lost."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -14,6 +19,10 @@ IterationCallback = Callable[[int, float, float], bool]
 
 # Constraint violation, scaled, up to which iterates are compared by cost: the Newton corrections remove this much.
 _FEASIBLE = 1e-3
+# In its module `casadi.py`, what CasADi calls to see what an argument is, such as `DM_from_array`.
+_ASKS = "_from_"
+# Until Ctrl-C is tried again [s]: many times what such a question takes.
+_LATER = 1e-3
 
 
 class BestIterate:
@@ -76,3 +85,39 @@ def ipopt_callback(best: BestIterate, unknowns: int, low: Array, high: Array) ->
                 return [1]
 
     return Report()
+
+
+@contextmanager
+def heard_interrupts() -> Iterator[None]:
+    """Ctrl-C is not lost while CasADi asks in Python what an argument is, and takes any exception for a no.
+
+    There it comes a moment later; elsewhere nothing is changed.
+    """
+    before: Any = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+
+    def handler(number: int, frame: FrameType | None) -> None:
+        if _is_asked(frame):
+            again = threading.Timer(_LATER, os.kill, (os.getpid(), signal.SIGINT))
+            again.daemon = True
+            again.start()
+        else:
+            before(number, frame)
+
+    signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _is_asked(frame: FrameType | None) -> bool:
+    """Whether Python is in a question of CasADi, or in what that calls."""
+    while frame is not None:
+        code = frame.f_code
+        if _ASKS in code.co_name and os.path.basename(code.co_filename) == "casadi.py":
+            return True
+        frame = frame.f_back
+    return False

@@ -18,7 +18,7 @@ from ._guesses import PLACES, Guess, guess_of, guesses
 from ._path_cost import path_cost
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
-from ._solver_callback import IterationCallback
+from ._solver_callback import IterationCallback, heard_interrupts
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
 from .plan import Plan, Progress, Start
@@ -126,16 +126,17 @@ def plan_reorientation(
         limits=limits,
     )
     began = time.perf_counter()
-    basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
-    program = CollocationProgram(task, basis) if chosen.method == "collocation" else ReducedProgram(task, basis)
-    reporter = _ProgressReporter(iteration_callback)
-    starting_points = _starting_points(task, basis, chosen, reporter)
     attempts: list[_Attempt] = []
-    for guess in starting_points:
-        if reporter.stopped and attempts:
-            break
-        report = reporter.solver_callback("search", len(attempts) + 1, len(starting_points))
-        attempts.append(_local_search(task, basis, program, guess, int(chosen.iterations), report))
+    with heard_interrupts():
+        basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
+        program = CollocationProgram(task, basis) if chosen.method == "collocation" else ReducedProgram(task, basis)
+        reporter = _ProgressReporter(iteration_callback)
+        starting_points = _starting_points(task, basis, chosen, reporter)
+        for guess in starting_points:
+            if reporter.stopped and attempts:
+                break
+            report = reporter.solver_callback("search", len(attempts) + 1, len(starting_points))
+            attempts.append(_local_search(task, basis, program, guess, int(chosen.iterations), report))
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
