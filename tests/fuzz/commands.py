@@ -78,7 +78,11 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
     "plot": _RECORDING | _FLIGHT | _GAUGE | {"--out": lambda c: _file(c, "out.png")},
     "view": _RECORDING
     | _FLIGHT
-    | {"--trail": lambda c: [c.choice(("hand", "none", ""))], "--speed": lambda c: [_number(c, "1")]},
+    | {
+        "--trail": lambda c: [c.choice(("hand", "none", ""))],
+        "--speed": lambda c: [_number(c, "1")],
+        "--video": lambda c: [c.choice(("film.webm", "", "no/such/film.gif"))],
+    },
     "explore": {"--up": lambda c: [c.choice(("y", "-z", "", "w"))]},
     "orbits": _RECORDING | _GAUGE | _TOLERANCE,
     "plan": {

@@ -9,7 +9,18 @@ from .outcome import Outcome
 
 _PACKAGES = (
     ("shapephase", "numpy", "scipy", "pin", "casadi", "cyclopts", "rich"),
-    ("matplotlib", "trimesh", "pycollada", "example-robot-data", "rosbags", "pyyaml", "numba"),
+    (
+        "matplotlib",
+        "trimesh",
+        "pycollada",
+        "playwright",
+        "pillow",
+        "imageio-ffmpeg",
+        "example-robot-data",
+        "rosbags",
+        "pyyaml",
+        "numba",
+    ),
 )
 """What is needed, and what may be there."""
 _FEATURES = ("WITH_URDFDOM", "WITH_COLLISION", "WITH_OPENMP", "WITH_SDFORMAT", "WITH_CPPAD")
@@ -33,6 +44,7 @@ def doctor_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
         "machine_code": _machine_code(),
         "cache": _cache(),
         "browser": _browser(),
+        "film_browser": _film_browser(),
     }
     width = max(len(name) for names in _PACKAGES for name in names)
     lines = [f"{'system':<{width}}  {data['system']}", f"{'python':<{width}}  {data['python']}"]
@@ -40,7 +52,10 @@ def doctor_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
         lines += [f"{name:<{width}}  {found or 'not installed'}" for name, found in data[kind].items()]
     words = {True: "yes", False: "no"}
     lines += [f"{f'pin {name}':<{width}}  {words[has]}" for name, has in data["pinocchio_features"].items()]
-    lines += [f"{name:<{width}}  {data[name] or 'none'}" for name in ("compiler", "machine_code", "cache", "browser")]
+    lines += [
+        f"{name:<{width}}  {data[name] or 'none'}"
+        for name in ("compiler", "machine_code", "cache", "browser", "film_browser")
+    ]
     return Outcome("\n".join(lines), data)
 
 
@@ -105,3 +120,14 @@ def _browser() -> str | None:
 
     named = os.environ.get("BROWSER")
     return named or next((path for name in _BROWSERS if (path := shutil.which(name))), None)
+
+
+def _film_browser() -> str | None:
+    """The Chromium that would draw a film."""
+    from ..errors import MissingExtraError
+    from ..plotting.pages.video import chromium
+
+    try:
+        return chromium()
+    except MissingExtraError:
+        return None

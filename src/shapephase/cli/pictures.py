@@ -31,6 +31,7 @@ def view_command(
     *,
     flight: FlightOptions = AT_REST,
     html: Path | None = None,
+    video: Path | None = None,
     trail: str | None = None,
     speed: float | None = None,
     up: UpAxis = None,
@@ -44,6 +45,9 @@ def view_command(
     html
         Write the animation to this HTML file, and serve nothing; without it a browser is opened. For example
         `--html fall.html`.
+    video
+        Write a film to this GIF or MP4 file, or six pictures side by side to this PNG file, and serve nothing; without
+        it none is written. A Chromium draws it (`pip install 'shapephase[video]'`). For example `--video fall.gif`.
     trail
         The link that leaves a trail; without it none does. For example `--trail head`.
     speed
@@ -51,7 +55,8 @@ def view_command(
         `--speed 0.1` for slow motion.
     """
     from ..plotting.pages.up_axis import up_axis
-    from ..plotting.viewer import motion_page, view
+    from ..plotting.pages.video import VIDEO_ENDINGS, check_video
+    from ..plotting.viewer import FILM_SIZE, motion_page, motion_video, view
     from . import motion as motions
     from .recording_text import recording_data
 
@@ -59,14 +64,23 @@ def view_command(
     if speed is not None and not 0.0 < speed < math.inf:
         raise ShapeError(f"--speed: seconds of motion in a second of playing, above 0, are needed, got {speed:g}")
     aside = check_writable(html, "--html", ".html")
+    aside = check_writable(video, "--video", *VIDEO_ENDINGS) or aside
+    if video is not None:
+        check_video(video, FILM_SIZE)
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail)
-        if html is not None:
+        if html is not None or video is not None:
             work.begin("recording the animation")
-            motion_page(flown.motion, html, trail=trail, speed=speed, up=up)
-            say_written(html)
-            data = {"html": str(html)} | recording_data(flown.recorded)
+            if html is not None:
+                motion_page(flown.motion, html, trail=trail, speed=speed, up=up)
+                say_written(html)
+            if video is not None:
+                motion_video(flown.motion, video, trail=trail, speed=speed, up=up)
+                say_written(video)
+            files = {"html": html, "video": video}
+            data = {name: str(file) for name, file in files.items() if file is not None}
+            data |= recording_data(flown.recorded)
             return Outcome("", data, aside=aside, made_from=flown.motion.deformation.made_from)
     live = view(flown.motion, trail=trail, speed=speed, up=up, notebook=False)
     if live is not None:

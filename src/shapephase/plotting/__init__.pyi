@@ -11,7 +11,7 @@ from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polho
 from .regime_plots import plot_bounds, plot_crown
 from .report import write_report
 from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
-from .viewer import LiveView, motion_html, motion_page, view
+from .viewer import LiveView, motion_html, motion_page, motion_video, view
 
 __all__ = [
     "FIGURES",
@@ -23,6 +23,7 @@ __all__ = [
     "figure_image",
     "motion_html",
     "motion_page",
+    "motion_video",
     "moving_scene",
     "plot_attitude",
     "plot_bounds",

@@ -26,7 +26,10 @@ from .pages.motion_data import motion_data
 from .pages.playing import frame_count, playing_speed
 from .pages.templates import SCENE_SCRIPTS, page_html
 from .pages.up_axis import up_axis
+from .pages.video import check_video, frame_times, write_video
 
+FILM_SIZE = (640, 480)
+"""Width and height of a frame of a film, unless they are given [px]."""
 # Ports after the given one that are tried when that is in use.
 _PORTS = 100
 # Height of a motion in a notebook [px].
@@ -113,6 +116,54 @@ def motion_html(
         data={"motion": data},
         with_joints=bool(data["joints"]),
     )
+
+
+def motion_video(
+    motion: Motion,
+    path: str | os.PathLike[str],
+    *,
+    size: tuple[int, int] = FILM_SIZE,
+    speed: float | None = None,
+    trail: str | None = None,
+    ghost: bool = True,
+    up: str | None = None,
+    **fall: ArrayLike,
+) -> None:
+    """Write a motion as a film, or as a strip of six pictures, drawn as `motion_page` draws it.
+
+    A Chromium without a window draws the frames; it is looked for as `shapephase doctor` says, or named in the
+    environment variable CHROMIUM. A GIF is made by Pillow alone.
+
+    Parameters
+    ----------
+    path : of the file, .gif (25 frames a second), .mp4 (30) or .png (the strip); written whole or not at all
+    size : width and height of a frame [px], even numbers
+    speed : seconds of motion in a second of film; None: 1, or such that the film takes from 4 to 20 s
+    trail, ghost, up, fall : as in `motion_page`
+
+    Raises
+    ------
+    MissingExtraError
+        Without Playwright and Pillow, for .mp4 imageio-ffmpeg (pip install 'shapephase[video]'), or a Chromium.
+    OutputFileError
+        If the browser or ffmpeg fails, or the file cannot be written.
+    ShapeError, UnknownNameError
+        As `motion_page`, for a size that is none, and for another ending.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> try:
+    ...     sp.plotting.motion_video(motion, "film.webm")
+    ... except sp.errors.UnknownNameError as error:
+    ...     print(error)
+    unknown kind of film '.webm'. Valid: .gif, .mp4, .png
+    """
+    check_object(motion, "Motion", "motion")
+    ending = check_video(path, size)
+    rate = playing_speed(motion.duration, speed)
+    page = motion_html(motion, speed=rate, frames=None, trail=trail, ghost=ghost, up=up, **fall)
+    write_video(page, path, frame_times(ending, motion.duration, rate), size)
 
 
 def scene_and_data(
