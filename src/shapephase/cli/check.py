@@ -18,14 +18,13 @@ def check_command(
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Check a body, and a joint motion for it: what was read, what is unlikely of it, and whether it can be used."""
-    from ..body.catalog import load_body
     from ..body.plausibility import implausible
     from ..shape_space.summaries import body_summary, path_summary
-    from .motion import joint_motion
+    from .motion import body_argument, joint_motion
     from .recording_text import recording_data, recording_lines
     from .text import body_lines, path_data, path_lines, plain, record_data
 
-    loaded = load_body(body, isolate=True)
+    loaded = body_argument(body)
     for doubt in implausible(loaded):
         warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)

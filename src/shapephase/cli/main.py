@@ -32,6 +32,7 @@ from .pictures import plot_command, view_command
 from .plan import plan_command
 from .split import split_command
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
+from .usage import usage_message
 
 app = App(
     name="shapephase",
@@ -122,7 +123,7 @@ def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
     try:
         return app(tokens, exit_on_error=False, print_error=False)
     except CycloptsError as error:
-        return _Failure(message=one_line(error), code=ExitCode.USAGE, kind="usage")
+        return _Failure(message=usage_message(error, app), code=ExitCode.USAGE, kind="usage")
     except ShapePhaseError as error:
         # Such an import may also have become a missing extra.
         if was_pressed():

@@ -36,6 +36,8 @@ _SAMPLES_A_BREAK = 5
 DEFAULT_TOLERANCE = 1e-9
 """Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
 
+# Endings of files that hold motions, and never bodies.
+_OF_MOTIONS = (".csv", ".tsv", ".mot", ".sto", ".npz", ".npy", ".mat", ".parquet", ".xlsx", ".c3d", ".bag", ".mcap")
 # Characters of a name that an error repeats.
 _LONGEST_SHOWN = 80
 
@@ -76,7 +78,7 @@ def flight(
     start = so3.quat_argument(options.attitude, "attitude")
     goal = tolerance_argument(tolerance)
     momentum = finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
-    loaded = load_body(body, isolate=True)
+    loaded = body_argument(body)
     for link in (gauge_link(gauge), trail):
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
@@ -103,6 +105,16 @@ def flight(
     return Flight(motion=fitted.motion, body=loaded, path=path, recorded=recorded, fitted=fitted)
 
 
+def body_argument(body: str) -> Body:
+    """The body that a command names. Raises what `load_body` raises, and ShapeError for what is rather a motion."""
+    is_file = os.path.isfile(body)
+    if (body in MOTIONS and not is_file) or (is_file and Path(body).suffix.lower() in _OF_MOTIONS):
+        raise ShapeError(
+            f"{body[:_LONGEST_SHOWN]} is a motion; the body comes before it, as in `shapephase split cat cat_righting`"
+        )
+    return load_body(body, isolate=True)
+
+
 def joint_motion(
     motion: str, body: Body, recording: RecordingOptions = AS_RECORDED
 ) -> tuple[ShapePath, RecordedMotion | None]:
@@ -112,7 +124,12 @@ def joint_motion(
             if getattr(recording, field.name) != field.default:
                 option = f"--{field.name.replace('_', '-')}"
                 raise ShapeError(f"{option} is for recorded motions; {motion} is a motion of the library")
-        return named_motion(motion), None
+        path, owner = named_motion(motion), MOTIONS[motion].body
+        if not set(path.joint_names or ()) <= set(body.joint_names):
+            fitting = [name for name, known in MOTIONS.items() if known.body == body.name]
+            hint = f"; of {body.name} there is {', '.join(fitting)}" if fitting else ""
+            raise ShapeError(f"{motion} is a motion of {owner}, whose joints {body.name} does not have{hint}")
+        return path, None
     if motion.startswith("-") and motion != _STANDARD_INPUT and not os.path.exists(motion):
         raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):

@@ -45,7 +45,6 @@ def orbits_command(
 
     from .. import so3
     from ..arguments import magnitude_argument, tolerance_argument
-    from ..body.catalog import load_body
     from ..deformation.deformation import articulated
     from ..deformation.frames import gauge_link
     from ..deformation.gauge import named_gauge
@@ -54,7 +53,7 @@ def orbits_command(
     from ..phases.return_map import fixed_points
     from ..phases.split_text import rotation_line
     from ..reconstruction.reconstruction import reconstruct
-    from .motion import joint_motion
+    from .motion import body_argument, joint_motion
     from .recording_text import recording_data, recording_lines
     from .text import orbit_data, orbit_lines
 
@@ -63,7 +62,7 @@ def orbits_command(
     link = gauge_link(gauge)
     with steps(3) as work:
         work.begin("loading")
-        loaded = load_body(body, isolate=True)
+        loaded = body_argument(body)
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
         path, recorded = joint_motion(motion, loaded, recording)
