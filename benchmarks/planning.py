@@ -45,9 +45,9 @@ def main() -> None:
     for alpha, beta in RIGHTINGS:
         theirs = kane_scher(np.radians(alpha), np.radians(beta))
         cost, target = path_cost(body, theirs), sp.holonomy(body, theirs, 1e-11)
-        plan = plan_reorientation(body, target, start=theirs.shape(0.0))
+        plan = plan_reorientation(body, target, start=theirs.shape(0.0), rates_at_ends="free")
         print(f"{alpha:6d}{cost:16.7f}{plan.cost:12.7f}{1.0 - plan.cost / cost:8.2%}")
-    straight = plan_reorientation(body, so3.exp(TURNS[0][1]))
+    straight = plan_reorientation(body, so3.exp(TURNS[0][1]), rates_at_ends="free")
     print(f"from the straight posture, half a turn about the long axis: {straight.cost:.7f}")
 
 
@@ -57,7 +57,8 @@ def print_row(name: str, turn: np.ndarray, aim: float, method: str, pieces: int 
     body = sp.load_body(name)
     begin = time.process_time()
     try:
-        plan = plan_reorientation(body, so3.exp(turn), search=Search(method=method, pieces=pieces, iterations=500))
+        search = Search(method=method, pieces=pieces, iterations=500)
+        plan = plan_reorientation(body, so3.exp(turn), rates_at_ends="free", search=search)
     except PlanNotFound as failure:
         print(
             f"{name:16}{degrees:>18}{method:>13}{pieces or 'default':>7}{time.process_time() - begin:8.1f}{aim:5.0f}"

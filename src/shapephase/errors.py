@@ -491,6 +491,18 @@ class UndeclaredBreakWarning(TrajectoryWarning):
     """
 
 
+class UnstatedLimitWarning(UserWarning):
+    """A body's file states no limit of a joint's rate, so that a plan may move it at any rate.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("ignore", sp.errors.UnstatedLimitWarning)  # any rate will do
+    >>> sp.errors.UnstatedLimitWarning.__name__
+    'UnstatedLimitWarning'
+    """
+
+
 def unknown_name(
     kind: str, name: str, valid: Iterable[str], error: type[UnknownNameError] = UnknownNameError
 ) -> UnknownNameError:

@@ -308,7 +308,7 @@ def test_the_reduced_form_has_no_time_to_choose():
         (HALF_TURN, {"start": [0.0, 4.0]}, ShapeError, "start"),
         (HALF_TURN, {"end": "anywhere"}, UnknownNameError, "free"),
         (HALF_TURN, {"cost": "speed"}, UnknownNameError, "kinetic"),
-        (HALF_TURN, {"cost": "time"}, TrajectoryError, "rate_limits"),
+        (HALF_TURN, {"cost": "time", "limits": Limits(rate_limits=None)}, TrajectoryError, "rate_limits"),
         (HALF_TURN, {"joints": ["tail"]}, UnknownNameError, "waist_pitch"),
         (HALF_TURN, {"joints": []}, TrajectoryError, "joints"),
         (HALF_TURN, {"symmetric": {"waist_yaw": ("waist_yaw", 1.0)}}, TrajectoryError, "symmetric"),
@@ -328,7 +328,9 @@ def test_what_makes_no_sense_is_refused(target, changes, error, match):
 def test_the_residual_of_the_reduced_method_knows_its_limits():
     """With limits that bind: none is left of the conditions of optimality, and the other method costs the same."""
     task, basis = task_of("kinetic"), SplineBasis(12)
-    task = replace(task, lower=np.full(3, -1.0), upper=np.full(3, 1.0))
+    task = replace(
+        task, lower=np.full(3, -1.0), upper=np.full(3, 1.0), rates_at_ends="free", rate_limit=np.full(3, np.inf)
+    )
     guess = guesses(task, basis, 0, 1)[0]
     turn = task.turn_to_goal(guess.motion.final_attitude)
     found, other = (

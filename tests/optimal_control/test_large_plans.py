@@ -26,14 +26,15 @@ from shapephase.optimal_control._hamiltonian import integrated
 from support.independent import apart, mujoco_motion, pinocchio_motion
 
 X, Y, Z = np.eye(3)
+FREE = {"rates_at_ends": "free"}
 SKEW = so3.exp(np.array([0.9, 0.5, -0.3]))
 # Body, turn [rad], cost, other arguments; the legs and elbows of the neutral astronaut are at their limits.
 LARGE = {
     "cat rate": ("cat", np.radians(60.0) * X, "rate", {}),
     "cat kinetic": ("cat", np.radians(8.0) * X, "kinetic", {}),
-    "satellite": ("satellite", np.radians(5.0) * Y, "rate", {"limits": Limits(joint_limits=False)}),
-    "astronaut": ("astronaut", np.radians(60.0) * Z, "rate", {"limits": Limits(joint_limits=False)}),
-    "human": ("example:human", np.radians(60.0) * X, "rate", {"limits": Limits(joint_limits=False)}),
+    "satellite": ("satellite", np.radians(5.0) * Y, "rate", {"limits": Limits(joint_limits=False, rate_limits=None)}),
+    "astronaut": ("astronaut", np.radians(60.0) * Z, "rate", {"limits": Limits(joint_limits=False, rate_limits=None)}),
+    "human": ("example:human", np.radians(60.0) * X, "rate", {"limits": Limits(joint_limits=False, rate_limits=None)}),
 }
 
 
@@ -45,7 +46,7 @@ def two_halves():
 @pytest.fixture(scope="module")
 def skew(two_halves):
     """The plan of a skew turn on a few pieces, and its extremal."""
-    plan = plan_reorientation(two_halves, SKEW, search=Search(pieces=12))
+    plan = plan_reorientation(two_halves, SKEW, search=Search(pieces=12), **FREE)
     return plan, shoot(two_halves, plan.path, SKEW)
 
 
@@ -155,7 +156,8 @@ def test_extremals_of_many_joints(case, rng):
     name, turn, cost, options = LARGE[case]
     body, target = sp.load_body(name), so3.exp(turn)
     plans = [
-        plan_reorientation(body, target, cost=cost, search=Search(pieces=pieces), **options) for pieces in (20, 40)
+        plan_reorientation(body, target, cost=cost, search=Search(pieces=pieces), **FREE, **options)
+        for pieces in (20, 40)
     ]
     if not options:
         assert all(within_limits(body, plan.path) for plan in plans)
@@ -177,7 +179,7 @@ def test_extremals_of_many_joints(case, rng):
 @pytest.mark.full
 def test_more_pieces_obey_wongs_equations_to_the_fourth_digit():
     body = sp.load_body("cat")
-    plan = plan_reorientation(body, so3.exp(np.radians(60.0) * X), cost="rate", search=Search(pieces=80))
+    plan = plan_reorientation(body, so3.exp(np.radians(60.0) * X), cost="rate", search=Search(pieces=80), **FREE)
     assert within_limits(body, plan.path)
     assert wong_residual(body, plan.path, metric="rate").residual < 1e-4
 
@@ -186,7 +188,9 @@ def test_more_pieces_obey_wongs_equations_to_the_fourth_digit():
 def test_an_extremal_of_light_joints_that_whirl():
     """In the kinetic metric the astronaut's shoulders and ankles go far for little: whole steps lead astray."""
     body, target = sp.load_body("astronaut"), so3.exp(np.radians(5.0) * Y)
-    plan = plan_reorientation(body, target, limits=Limits(joint_limits=False), search=Search(pieces=20))
+    plan = plan_reorientation(
+        body, target, limits=Limits(joint_limits=False, rate_limits=None), search=Search(pieces=20), **FREE
+    )
     motion = shoot(body, plan.path, target)
     truth = pinocchio_motion("astronaut", body.joint_names, motion.path, np.zeros(3))
     assert apart(truth.attitude[-1], target) < 1e-8

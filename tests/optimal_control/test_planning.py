@@ -8,13 +8,21 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
+from scipy.interpolate import BSpline
 from scipy.optimize import least_squares
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.errors import AccuracyNotReached, PlanNotFound, ShapeError, UnknownNameError
+from shapephase.errors import (
+    AccuracyNotReached,
+    PlanNotFound,
+    ShapeError,
+    TrajectoryError,
+    UnknownNameError,
+    UnstatedLimitWarning,
+)
 from shapephase.examples.scenarios import kane_scher
 from shapephase.optimal_control import (
     Goal,
@@ -28,6 +36,7 @@ from shapephase.optimal_control import (
     wong_residual,
 )
 from shapephase.optimal_control.planning import _within_limits
+from shapephase.optimal_control.task import reorientation
 from support.bodies import joint, link, urdf
 from support.independent import apart, pinocchio_motion
 from support.long_runs import full_but
@@ -36,6 +45,8 @@ from support.long_runs import full_but
 pytestmark = pytest.mark.usefixtures("compiled")
 HALF_TURN = so3.exp(np.array([np.pi, 0.0, 0.0]))
 AXIS = [[0.0, 0.0, 2.0], [0.0, 0.0, -1.0]]
+# As the theory of optimal loops has it.
+FREE = {"rates_at_ends": "free", "limits": Limits(rate_limits=None)}
 RIGHTINGS = [(0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222), (60, 77.132402)]
 CASES = {
     "kinetic": (HALF_TURN, {}),
@@ -49,6 +60,8 @@ CASES = {
         {"momentum": [0.001, 0.0, 0.002], "cost": "time", "limits": Limits(rate_limits=20.0)},
     ),
     "free end": (HALF_TURN, {"end": "free"}),
+    "free rates": (HALF_TURN, FREE),
+    "periodic": (HALF_TURN, {"rates_at_ends": "periodic"}),
     "another end": (HALF_TURN, {"start": [0.2, 0.0, 0.0], "end": [0.0, 0.3, -0.1]}),
     "axis": (Goal(pointing=AXIS), {}),
     "two joints": (HALF_TURN, {"joints": ["waist_pitch", "waist_yaw"], "start": [0.0, 0.0, 0.2]}),
@@ -109,14 +122,25 @@ def test_a_plan_reaches_its_goal_within_its_limits(name):
     lower, upper = body.joint_limits.T
     assert np.all((shapes >= lower) & (shapes <= upper))
     rate_limits = options.get("limits", Limits()).rate_limits
+    if isinstance(rate_limits, str):
+        rate_limits = body.rate_limits
     assert rate_limits is None or np.all(np.abs(rates) <= rate_limits * (1.0 + 1e-6))
+    at_ends = options.get("rates_at_ends", "zero")
+    if at_ends == "zero":
+        assert_allclose(rates[[0, -1]], 0.0, atol=1e-8)
+    else:
+        assert np.abs(rates[[0, -1]]).max() > 0.1
+    if at_ends == "periodic":
+        assert_allclose(rates[0], rates[-1], atol=1e-8)
     start = np.asarray(options.get("start", np.zeros(3)))
     assert_allclose(shapes[0], start, atol=1e-12)
     end = options.get("end", start)
     if not isinstance(end, str):
         assert_allclose(shapes[-1], end, atol=1e-12)
     if name == "acceleration":
-        assert_allclose(rates[[0, -1]], 0.0, atol=1e-8)
+        ends = np.array([0.0, 1.0])
+        bends = (plan.path.rate(np.abs(ends - 1e-6)) - plan.path.rate(ends)) / 1e-6
+        assert np.abs(bends).max() < 1e-3 * np.abs(rates).max()
     if name == "two joints":
         assert_allclose(shapes[:, 2], 0.2, atol=1e-12)
     if name == "coupled":
@@ -146,7 +170,7 @@ def test_no_dearer_than_kane_and_scher(alpha, beta):
     body = sp.load_body("cat_two_halves")
     theirs = kane_scher(np.radians(alpha), np.radians(beta))
     target = sp.holonomy(body, theirs, 1e-11)
-    plan = plan_reorientation(body, target, start=theirs.shape(0.0))
+    plan = plan_reorientation(body, target, start=theirs.shape(0.0), **FREE)
     assert plan.cost <= path_cost(body, theirs) * (1.0 + 1e-6)
     if alpha == 0:
         # Bent without a lean theirs is the best: a circle of the curvature's symmetry.
@@ -156,8 +180,8 @@ def test_no_dearer_than_kane_and_scher(alpha, beta):
 @pytest.mark.full
 def test_twenty_starts_find_nothing_better():
     body = sp.load_body("cat_two_halves")
-    one = plan_reorientation(body, HALF_TURN)
-    many = plan_reorientation(body, HALF_TURN, search=Search(starts=20, seed=3))
+    one = plan_reorientation(body, HALF_TURN, **FREE)
+    many = plan_reorientation(body, HALF_TURN, search=Search(starts=20, seed=3), **FREE)
     assert len(many.starts) == 20
     assert one.cost <= 1.01 * many.cost
     assert many.cost <= one.cost * (1.0 + 1e-9)
@@ -188,34 +212,66 @@ def test_small_turns_are_isoperimetric_circles(degrees):
     root = np.linalg.inv(np.linalg.cholesky(metric))
     sigma = np.linalg.norm(root @ sp.curvature(body, np.zeros(3))[..., 0] @ root.T, 2)
     theta = np.radians(degrees)
-    plan = plan_reorientation(body, so3.exp(np.array([theta, 0.0, 0.0])), duration=0.7, search=Search(pieces=20))
+    plan = plan_reorientation(
+        body, so3.exp(np.array([theta, 0.0, 0.0])), duration=0.7, search=Search(pieces=20), **FREE
+    )
     assert plan.cost * 0.7 * sigma / (2.0 * np.pi * theta) == pytest.approx(1.0, abs=0.0045 * degrees + 5e-6)
 
 
 def test_a_rotor_in_closed_form(load_urdf):
-    """The wheel goes 9 times as far as the body turns back; without limits evenly, from rest to rest by a cubic."""
+    """The wheel goes 9 times as far as the body turns back, evenly where nothing else is asked for."""
     body = rotor(load_urdf)
     turn, period = 1.2, 2.0
     target, way = so3.exp(np.array([0.0, 0.0, turn])), -9.0 * turn
-    common = {"end": "free", "duration": period}
+    common = {"end": "free", "duration": period, **FREE}
     plan = plan_reorientation(body, target, **common)
     times = np.linspace(0.0, period, 17)
     assert_allclose(plan.path.shape(times)[:, 0], way * times / period, atol=1e-8)
     assert plan.cost == pytest.approx(0.5 * (0.5 - 0.5**2 / 4.5) * way**2 / period, rel=1e-12)
     by_rate = plan_reorientation(body, target, cost="rate", **common)
     assert by_rate.cost == pytest.approx(0.5 * way**2 / period, rel=1e-12)
-    x = times / period
-    smooth = plan_reorientation(body, target, cost="acceleration", **common)
-    assert_allclose(smooth.path.shape(times)[:, 0], 0.5 * way * x**2 * (3.0 - x), atol=1e-7)
-    assert smooth.cost == pytest.approx(1.5 * way**2 / period**3, rel=1e-10)
-    rested = plan_reorientation(body, target, cost="acceleration", end=[way], duration=period)
-    assert_allclose(rested.path.shape(times)[:, 0], way * x**2 * (3.0 - 2.0 * x), atol=1e-7)
-    assert rested.cost == pytest.approx(6.0 * way**2 / period**3, rel=1e-10)
-    for one in (plan, by_rate, smooth, rested):
+    for one in (plan, by_rate):
         assert one.starts[0].cost == pytest.approx(one.cost, rel=1e-9), "the program counts as the quadrature does"
-    fast = plan_reorientation(body, target, cost="time", limits=Limits(rate_limits=4.0), end="free", duration=5.0)
+    limits = Limits(rate_limits=4.0)
+    common = {"end": "free", "duration": 5.0, "rates_at_ends": "free"}
+    fast = plan_reorientation(body, target, cost="time", limits=limits, **common)
     assert fast.path.duration == pytest.approx(abs(way) / 4.0, rel=1e-9)
     assert fast.cost == fast.path.duration
+
+
+@pytest.mark.parametrize(("cost", "end"), [("rate", "free"), ("acceleration", "free"), ("acceleration", "given")])
+def test_a_rotor_from_rest_to_rest(load_urdf, cost, end):
+    """The best control points of a spline at rest at its ends are linear equations; nothing beats the cubic.
+
+    The integral of half the squared acceleration from rest to rest is at least 6 way^2/T^3, that of the rate at least
+    way^2/2T; a spline that also begins without acceleration comes nearer the more pieces it has.
+    """
+    body, turn, period = rotor(load_urdf), 1.2, 2.0
+    target, way = so3.exp(np.array([0.0, 0.0, turn])), -9.0 * turn
+    order, still, least = {"rate": (1, 2, 0.5 * way**2 / period), "acceleration": (2, 3, 6.0 * way**2 / period**3)}[
+        cost
+    ]
+    limits, costs = Limits(rate_limits=None), []
+    for pieces in (12, 24):
+        plan = plan_reorientation(
+            *(body, target), cost=cost, duration=period, limits=limits, search=Search(pieces=pieces),
+            end="free" if end == "free" else [way],
+        )  # fmt: skip
+        ends = np.array([0.0, period])
+        assert np.abs(plan.path.rate(ends)).max() < 1e-9 * abs(way)
+        knots = np.concatenate([np.zeros(4), np.linspace(0.0, 1.0, pieces + 1)[2:-2], np.ones(4)])
+        places, weights = np.polynomial.legendre.leggauss(6)
+        ends = np.unique(knots)
+        places = (0.5 * (ends[1:] + ends[:-1])[:, None] + 0.5 * np.diff(ends)[:, None] * places).ravel()
+        weights = (0.5 * np.diff(ends)[:, None] * weights).ravel()
+        slopes = BSpline(knots, np.eye(pieces + 1), 3).derivative(order)(places)
+        gram = slopes.T @ (weights[:, None] * slopes)
+        points = np.concatenate([np.zeros(pieces + 1 - still), np.full(still, way)])
+        inner = slice(still, pieces + 1 - still)
+        points[inner] = np.linalg.solve(gram[inner, inner], -gram[inner] @ points)
+        assert plan.cost == pytest.approx(0.5 * points @ gram @ points / period ** (2 * order - 1), rel=1e-9)
+        costs.append(plan.cost / least)
+    assert 1.0 < costs[1] < costs[0] < 2.5
 
 
 @pytest.mark.full
@@ -228,7 +284,7 @@ def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
     body = planar_chain(load_urdf)
     period = 1.0
     turn = so3.exp(np.array([0.0, 0.0, 0.35]))
-    plan = plan_reorientation(body, turn, duration=period, search=Search(pieces=240))
+    plan = plan_reorientation(body, turn, duration=period, search=Search(pieces=240), **FREE)
     known = symbolic_body(body)
     metric, by_shape = known.shape_metric, known.derivative("shape_metric")
 
@@ -272,7 +328,7 @@ def test_windings_need_a_momentum_at_right_angles(goal, momentum, match):
 def test_a_closed_loop_of_one_joint_turns_nothing(method, iterations, pieces, load_urdf):
     body, target = rotor(load_urdf), so3.exp(np.array([0.0, 0.0, 0.4]))
     with pytest.raises(PlanNotFound, match="no motion of the joints of body was found") as failure:
-        plan_reorientation(body, target, search=Search(method=method, iterations=iterations, pieces=pieces))
+        plan_reorientation(body, target, search=Search(method=method, iterations=iterations, pieces=pieces), **FREE)
     assert isinstance(failure.value, ArithmeticError)
     best = failure.value.best
     assert best.iterations <= iterations
@@ -302,13 +358,17 @@ def test_too_short_a_time(cost, load_urdf):
 def test_an_axis_that_no_joint_turns(load_urdf):
     with pytest.raises(PlanNotFound):
         plan_reorientation(
-            rotor(load_urdf), so3.exp(np.array([0.3, 0.0, 0.0])), end="free", search=Search(iterations=60, pieces=20)
+            rotor(load_urdf),
+            so3.exp(np.array([0.3, 0.0, 0.0])),
+            end="free",
+            search=Search(iterations=60, pieces=20),
+            **FREE,
         )
 
 
 def test_the_same_seed_gives_the_same_plan():
     body = sp.load_body("cat_two_halves")
-    search = Search(seed=7, starts=2, pieces=6)
+    search = Search(seed=7, starts=2, pieces=10)
     first, second = (plan_reorientation(body, HALF_TURN, search=search) for _ in range(2))
     assert np.array_equal(first.coefficients, second.coefficients)
     assert [start.cost for start in first.starts] == [start.cost for start in second.starts]
@@ -361,16 +421,46 @@ def test_a_goal_that_makes_no_sense_is_refused(options, match):
         ({"rate_limits": [-1.0, 1.0, 1.0]}, "rate_limits"),
         ({"rate_limits": np.ones((2, 2))}, "rate_limits"),
         ({"joint_limits": 1}, "True"),
+        ({"rate_limits": "bodies"}, "body"),
     ],
 )
 def test_limits_that_make_no_sense_are_refused(options, match):
-    with pytest.raises(ShapeError, match=match):
+    with pytest.raises((ShapeError, UnknownNameError), match=match):
         Limits(**options)
 
 
 def test_rate_limits_of_another_body_are_refused():
     with pytest.raises(ShapeError, match="each of the 3 joints"):
         plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, limits=Limits(rate_limits=[1.0, 2.0]))
+
+
+def test_rates_that_no_file_states_are_told(load_urdf):
+    """And those that it states hold: of the shipped body 20 rad/s, of a wheel without a limit none."""
+    with pytest.warns(UnstatedLimitWarning, match="body states no rate limit for spin: they may move at any rate"):
+        plan = plan_reorientation(
+            rotor(load_urdf), so3.exp(np.array([0.0, 0.0, 0.1])), end="free", cost="rate", search=Search(pieces=10)
+        )
+    assert plan.rates_at_ends == "zero"
+    task = reorientation(sp.load_body("cat_two_halves"), HALF_TURN)
+    assert_array_equal(task.rate_limit, [20.0, 20.0, 20.0])
+
+
+@pytest.mark.parametrize("rates", ["still", "periodic"])
+def test_rates_at_ends_that_make_no_sense_are_refused(rates):
+    with pytest.raises((UnknownNameError, TrajectoryError), match=r"zero, periodic, free|is for loops"):
+        plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, end="free", rates_at_ends=rates)
+
+
+def test_too_fast_for_the_joints_says_how_much_time_to_give(load_urdf):
+    with pytest.raises(PlanNotFound, match=r"joints are at their rate limits: give more than 1 s \(cost='time'"):
+        plan_reorientation(
+            rotor(load_urdf),
+            so3.exp(np.array([0.0, 0.0, 1.2])),
+            end="free",
+            cost="rate",
+            limits=Limits(rate_limits=4.0),
+            search=Search(iterations=40, pieces=10),
+        )
 
 
 def test_an_axis_to_be_pointed_needs_a_goal():
@@ -419,11 +509,11 @@ def test_the_cost_of_another_kind_is_refused():
 
 
 @pytest.mark.parametrize("cost", full_but(["kinetic", "rate"], "kinetic"))
-def test_a_plan_from_default_arguments_is_an_extremal(cost):
+def test_a_plan_with_free_rates_is_an_extremal(cost):
     """Wong's equations hold, shooting finds the same optimum, and no conjugate time comes before its end, where the
     kernel has the dimension of the symmetries that fix start and target: one, the optima come in circles."""
     body, target = sp.load_body("cat_two_halves"), so3.exp(np.array([np.pi, 0.0, 0.0]))
-    plan = plan_reorientation(body, target, cost=cost)
+    plan = plan_reorientation(body, target, cost=cost, **FREE)
     assert wong_residual(body, plan.path, metric=cost).residual < 1e-4
     found = shoot(body, plan.path, target, metric=cost)
     assert found.cost == pytest.approx(plan.cost, rel=1e-6)

@@ -13,6 +13,8 @@ from ._model_tree import mimic_map, moving_joints
 
 # Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
 _BASE = 6
+# [rad/s or m/s]; what is stated above stands for no limit.
+_NO_RATE_LIMIT = 1e30
 
 
 class JointMap:
@@ -23,6 +25,7 @@ class JointMap:
     names : tuple of the independent joints
     continuous : (n,) True for a joint that turns without end
     limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
+    rate_limits : (n,) the largest rates [rad/s or m/s], infinite where none is stated
     units : "rad" or "m" for each joint
     """
 
@@ -45,8 +48,19 @@ class JointMap:
         self.limits = limits[self._configuration_index[independent]].reshape(-1, 2)
         self.limits[self.continuous] = [-np.inf, np.inf]
         self.limits.setflags(write=False)
+        self.rate_limits = self._slowest(np.array(model.velocityLimit)[[kind.idx_v for kind in kinds]])
         sliding = [kind.shortname().startswith("JointModelP") for kind in kinds]
         self.units = tuple("m" if sliding[i] else "rad" for i in independent)
+
+    def _slowest(self, stated: Array) -> Array:
+        """Of each independent joint, so that its followers keep theirs, too; a limit of zero says nothing: (n,)."""
+        stated = np.where((stated > 0.0) & (stated < _NO_RATE_LIMIT), stated, np.inf)
+        factors = np.abs(self._map)
+        each = np.full(factors.shape, np.inf)
+        np.divide(stated[:, None], factors, out=each, where=factors > 0.0)
+        least = each.min(axis=0, initial=np.inf)
+        least.setflags(write=False)
+        return least
 
     def configurations(self, shapes: Array) -> Array:
         """Pinocchio's configurations with the base at the origin: (N, n) -> (N, nq)."""

@@ -39,6 +39,8 @@ def plan_command(
     somersaults: float | None = None,
     half_twists: float | None = None,
     cost: str = "kinetic",
+    rates_at_ends: str = "zero",
+    rate_limit: float | None = None,
     starts: int = 1,
     seed: int = 0,
     pieces: int | None = None,
@@ -69,6 +71,12 @@ def plan_command(
         `--half-twists 2`.
     cost
         What is made least: kinetic, rate, acceleration or time; for example `--cost rate`.
+    rates_at_ends
+        Of the joints: zero (from rest to rest), periodic (the same at both ends, for gaits) or free; for example
+        `--rates-at-ends free`.
+    rate_limit
+        The largest rate of every joint, in rad/s or m/s; without it those that the body's file states. For example
+        `--rate-limit 3`.
     starts
         Searches from different guesses, of which the cheapest plan is kept; for example `--starts 4`.
     seed
@@ -85,7 +93,7 @@ def plan_command(
 
     from .. import so3
     from ..body.catalog import load_body
-    from ..optimal_control.plan_options import Goal, Search
+    from ..optimal_control.plan_options import Goal, Limits, Search
     from ..optimal_control.planning import plan_reorientation
     from ..phases.phases import split
     from ..shape_space.files.read import write_shape_path
@@ -113,6 +121,8 @@ def plan_command(
                     momentum=momentum,
                     duration=duration,
                     cost=cost,
+                    rates_at_ends=rates_at_ends,
+                    limits=None if rate_limit is None else Limits(rate_limits=rate_limit),
                     search=Search(starts=starts, seed=seed, pieces=pieces, iterations=iterations),
                     iteration_callback=search.report,
                 )
@@ -164,7 +174,8 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
             "",
             rotation_line("turned", found.motion.final_attitude),
             f"{'off the goal':24}{found.goal_error:16.2e} rad",
-            f"{'cost':24}{found.cost:16.9g}   {found.cost_name}",
+            f"{'cost':24}{found.cost:16.9g}   {found.cost_unit} ({found.cost_name})",
+            f"{'rates at the ends':24}{found.rates_at_ends:>16}",
             f"{'KKT residual':24}{found.kkt_residual:16.2e}",
             f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
         ]
@@ -182,6 +193,8 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
         "miss_rad": found.goal_error,
         "cost": found.cost,
         "cost_name": found.cost_name,
+        "cost_unit": found.cost_unit,
+        "rates_at_ends": found.rates_at_ends,
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
     }

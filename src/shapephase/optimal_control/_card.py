@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 def plan_card(self: Plan) -> Card:
     """What turns by how much at which cost, how far off the goal, and how it was found; with its joints in time."""
-    units = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "time": "s"}
     converged = sum(start.converged for start in self.starts)
     rows = [
         ("duration", numbers(self.path.duration, "s")),
         ("momentum", momentum_text(self.motion.momentum)),
         ("turned", angle_text(angle(self.motion.final_attitude))),
         ("off the goal", f"{self.goal_error:.1e} rad"),
-        ("cost", f"{numbers(self.cost, units.get(self.cost_name, ''))} ({self.cost_name})"),
+        ("cost", f"{numbers(self.cost, self.cost_unit)} ({self.cost_name})"),
+        ("rates at the ends", self.rates_at_ends),
         ("found by", f"{self.method}, {self.iterations} iterations, {self.seconds:.3g} s"),
         ("starts", f"{len(self.starts)}, {converged} of them converged"),
         ("KKT residual", f"{self.kkt_residual:.1e}"),

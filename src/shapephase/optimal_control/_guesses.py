@@ -182,9 +182,11 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
     control = basis.fitted(np.clip(curve, task.lower, task.upper), PLACES)
-    if task.rest_to_rest:
-        control[1] = control[0]
-        control[-2] = control[-1]
+    equal = task.equal_points
+    control[:equal], control[-equal:] = control[0], control[-1]
+    if task.rates_at_ends == "periodic":
+        half = 0.5 * (control[1] - control[0] + control[-1] - control[-2])
+        control[1], control[-2] = control[0] + half, control[-1] - half
     control = np.clip(control, task.lower, task.upper)
     path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
     try:

@@ -165,11 +165,12 @@ def _corrected(
     rates = basis.matrix(places, 1)
     gram = (rates * weights[:, None]).T @ rates + np.eye(basis.dimension)
     inverse = np.kron(np.linalg.inv(gram), np.eye(task.dimension))
-    rows, right = slopes, turn
+    conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
+    rows, right = np.concatenate([slopes, conditions]), np.concatenate([turn, np.zeros(len(conditions))])
     if task.cost != "time":
         held = _held_rates(task, basis, control, duration)
         rows = np.concatenate([rows, held])
-        right = np.concatenate([turn, np.zeros(len(held))])
+        right = np.concatenate([right, np.zeros(len(held))])
     # The least change in the metric's norm: with C C^T its inverse, the shortest x of rows C x = right.
     root = np.linalg.cholesky(inverse[np.ix_(free, free)])
     change = np.zeros(control.size)
@@ -183,11 +184,18 @@ def _corrected(
 def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
     """(k, m) which control points may move: not those of the ends."""
     free = np.tile(task.movable, (basis.dimension, 1))
-    fixed = [0, 1] if task.rest_to_rest else [0]
+    fixed = list(range(task.equal_points))
     free[fixed] = False
     if task.end is not None:
         free[[basis.dimension - 1 - place for place in fixed]] = False
     return free
+
+
+def end_conditions(task: Reorientation, basis: SplineBasis) -> Array:
+    """Rows (j, k) that are zero on the control points of each coordinate, beside those that are fixed."""
+    return basis.end_conditions(
+        task.equal_points, end_moves=task.end is None, periodic=task.rates_at_ends == "periodic"
+    )
 
 
 def _free(task: Reorientation, basis: SplineBasis, control: Array) -> Mask:

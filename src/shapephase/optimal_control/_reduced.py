@@ -15,7 +15,7 @@ from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._guesses import start_metric
-from ._polish import end_derivative, movable_points
+from ._polish import end_conditions, end_derivative, movable_points
 from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
 from .collocation import NlpSolution
@@ -181,6 +181,11 @@ class _ScaledProblem:
         self._constraints: list[dict[str, Any]] = [
             {"type": "eq", "fun": lambda x: self.end(x)[0], "jac": lambda x: self.end(x)[1]}
         ]
+        every = np.kron(end_conditions(task, basis), np.eye(task.dimension))
+        self._end_conditions = every[:, self._free.ravel()] * self._unit
+        if len(every):
+            fixed = np.asarray(every @ np.where(self._free, 0.0, guess).ravel(), dtype=np.float64)
+            self._constraints.append(_linear_equations(self._end_conditions, fixed))
         if self.limits_rates:
             self._constraints.append(_within_rates(task, basis, guess, self._free, self._unit, duration))
         # SciPy evaluates the constraint and its derivative separately at the same x: the last result is kept.
@@ -210,6 +215,7 @@ class _ScaledProblem:
         """Violation of the Karush-Kuhn-Tucker conditions, rate limits left out, and of the goal."""
         missing, slopes = self.end(x)
         gradient = self.cost(x)[1]
+        slopes = np.concatenate([slopes, self._end_conditions])
         below, above = x <= self._low + _ACTIVE, x >= self._high - _ACTIVE
         inside = ~(below | above)
         gradient -= np.linalg.lstsq(slopes[:, inside].T, gradient[inside], rcond=None)[0] @ slopes
@@ -248,6 +254,11 @@ def _inverse_right_jacobian(turn: Array) -> Array:
     half = 0.5 * angle
     share = (1.0 - half / np.tan(half)) / angle**2 if angle > _SMALL_TURN else 1.0 / 12.0
     return np.eye(3) - 0.5 * cross.T + share * cross @ cross
+
+
+def _linear_equations(rows: Array, fixed: Array) -> dict[str, Any]:
+    """Equations that are linear in the scaled unknowns: rows @ x + fixed = 0."""
+    return {"type": "eq", "fun": lambda x: rows @ x + fixed, "jac": lambda _: rows}
 
 
 def _within_rates(

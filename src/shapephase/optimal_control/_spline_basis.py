@@ -56,6 +56,26 @@ class SplineBasis:
         spread = self.knots[_DEGREE + 1 : -1] - self.knots[1 : -_DEGREE - 1]
         return _DEGREE / spread[:, None] * np.diff(np.eye(self.dimension), axis=0)
 
+    def end_conditions(self, equal: int, *, end_moves: bool, periodic: bool) -> Array:
+        """Rows whose products with the control points are zero: (j, k).
+
+        Parameters
+        ----------
+        equal : how many control points at the end are the same; counts only where the last of them moves
+        end_moves : whether the end is free
+        periodic : whether the rates at both ends are the same
+        """
+        rows = []
+        if end_moves:
+            for place in range(1, equal):
+                row = np.zeros(self.dimension)
+                row[[-1 - place, -1]] = [1.0, -1.0]
+                rows.append(row)
+        if periodic:
+            difference = self.rate_control[0] - self.rate_control[-1]
+            rows.append(difference / np.abs(difference).max())
+        return np.array(rows).reshape(-1, self.dimension)
+
     def fitted(self, values: Array, places: Array) -> Array:
         """Control points of the spline with the ends of a curve and nearest to its values: (N, m) -> (k, m)."""
         weights = self.matrix(places)

@@ -12,6 +12,7 @@ from .. import so3
 from ..arrays import Array
 from ._gauss import gauss_tableau
 from ._node_functions import node_functions
+from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
 from .task import Reorientation
@@ -161,11 +162,13 @@ class CollocationProgram:
         rates = sparse.kron(basis.rate_control, sparse.eye(task.dimension).tocsr()[limited])
         rate_limits = np.tile(task.rate_limit[limited], basis.dimension - 1)[:, None]
         no_quaternions = sparse.csr_matrix((rates.shape[0], quaternions.shape[1]))
+        conditions = sparse.kron(end_conditions(task, basis), sparse.eye(task.dimension)).tocsr()
         linear = sparse.vstack(
             [
                 sparse.hstack([no_control, quaternions]),
                 sparse.hstack([rates, -rate_limits, no_quaternions]),
                 sparse.hstack([rates, rate_limits, no_quaternions]),
+                sparse.hstack([conditions, sparse.csr_matrix((conditions.shape[0], 1 + quaternions.shape[1]))]),
             ]
         )
         turning = sparse.vstack(
@@ -175,11 +178,15 @@ class CollocationProgram:
             ]
         )
         turning = sparse.vstack(
-            [sparse.kron(turning, sparse.eye(4)), sparse.csr_matrix((2 * rates.shape[0], 4 * count))]
+            [
+                sparse.kron(turning, sparse.eye(4)),
+                sparse.csr_matrix((2 * rates.shape[0] + conditions.shape[0], 4 * count)),
+            ]
         )
         equal, zero = np.zeros(4 * (count + pieces)), np.zeros(rates.shape[0])
         unbounded = np.full(rates.shape[0], np.inf)
-        low, high = np.concatenate([equal, -unbounded, zero]), np.concatenate([equal, zero, unbounded])
+        met = np.zeros(conditions.shape[0])
+        low, high = np.concatenate([equal, -unbounded, zero, met]), np.concatenate([equal, zero, unbounded, met])
         return _sparse(linear), _sparse(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
@@ -279,10 +286,10 @@ class CollocationProgram:
             control[0] = task.start
             if task.end is not None:
                 control[-1] = task.end
-            if task.rest_to_rest:
-                control[1] = control[0]
-                if task.end is not None:
-                    control[-2] = control[-1]
+            equal = task.equal_points
+            control[:equal] = control[0]
+            if task.end is not None:
+                control[-equal:] = control[-1]
             duration = _SHORTEST * task.duration if task.cost == "time" and free < 0.0 else task.duration
             inner, ends = np.full(4 * len(self.places), free), np.full((basis.pieces + 1, 4), free)
             ends[0] = [0.0, 0.0, 0.0, 1.0]

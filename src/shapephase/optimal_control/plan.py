@@ -11,6 +11,9 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._card import plan_card
 
+COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "time": "s"}
+"""Of each cost; metres stand for radians where joints slide."""
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -85,6 +88,7 @@ class Plan:
         unchanged with `read_shape_path(..., close=False)`
     motion : its reconstruction, to 1e-10 rad: independent of how the plan was found
     cost_name : "kinetic", "rate", "acceleration" or "time"
+    rates_at_ends : of the joints, "zero", "periodic" or "free"
     cost : of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
     transcription_gap : the same before the Newton corrections: the error of the discretisation [rad]
@@ -109,6 +113,7 @@ class Plan:
     path: ShapePath
     motion: Motion
     cost_name: str
+    rates_at_ends: str
     cost: float
     goal_error: float
     transcription_gap: float
@@ -119,6 +124,11 @@ class Plan:
     iterations: int
     seconds: float
     starts: tuple[Start, ...]
+
+    @property
+    def cost_unit(self) -> str:
+        """Of `cost`."""
+        return COST_UNITS[self.cost_name]
 
     __repr__, _repr_html_ = card_text, card_html
     _card = plan_card

@@ -14,6 +14,7 @@ from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 
 METHODS = ("collocation", "reduced")
+RATES_AT_ENDS = ("zero", "periodic", "free")
 
 # Pieces of the spline: with fewer, not-a-knot ends leave too few control points for a loop.
 _LEAST_PIECES = 6
@@ -99,11 +100,12 @@ class Limits:
     Attributes
     ----------
     joint_limits : whether the joints stay within the body's own limits
-    rate_limits : the largest rate of every joint, or one for each, (n,) [rad/s or m/s]; None: no limit
+    rate_limits : the largest rate of every joint, or one for each, (n,) [rad/s or m/s]; "body": those that the body's
+        file states, joints of which it states none being as fast as they like; None: no limit
 
     Raises
     ------
-    ShapeError
+    ShapeError, UnknownNameError
         For rates that are not finite, not above 0, or neither a number nor a vector.
 
     Examples
@@ -113,7 +115,7 @@ class Limits:
     """
 
     joint_limits: bool = True
-    rate_limits: ArrayLike | None = None
+    rate_limits: ArrayLike | str | None = "body"
 
     __repr__ = short_repr
 
@@ -122,6 +124,12 @@ class Limits:
         if not isinstance(self.joint_limits, bool | np.bool_):
             raise ShapeError(f"joint_limits: True or False is needed, got {self.joint_limits!r}")
         if self.rate_limits is None:
+            return
+        if isinstance(self.rate_limits, str):
+            if self.rate_limits != "body":
+                raise unknown_name(
+                    "value of rate_limits", self.rate_limits, ("body", "a number, or one for each joint")
+                )
             return
         rates = finite_array(self.rate_limits, "rate_limits", unit="rad/s or m/s")
         if rates.ndim > 1 or np.any(rates <= 0.0):

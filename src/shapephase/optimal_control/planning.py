@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
-from ..errors import PlanNotFound, ShapePhaseError
+from ..errors import PlanNotFound, ShapePhaseError, UnstatedLimitWarning
 from ._guesses import PLACES, Guess, guess_of, guesses
 from ._path_cost import path_cost
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
@@ -30,7 +31,8 @@ _FEW_JOINTS = 4
 # Many free joints: the symbolic Hessian of a node dominates, so the spline is coarse and no coarse search comes first.
 _MANY_JOINTS = 8
 # Pieces of the spline for few joints: paths of so many obey Wong's equations to 1e-4. For the acceleration cost they
-# would lose digits, as second derivatives of the basis grow with the square of the pieces.
+# would lose digits, as second derivatives of the basis grow with the square of the pieces; and from rest the joints
+# start within a piece, which is to be no shorter than a machine can do.
 _PIECES_OF_FEW = 160
 # Pieces up to `_MANY_JOINTS`, and beyond.
 _PIECES = 40
@@ -43,6 +45,10 @@ _WINDING_TOLERANCE = 0.1
 _WINDING_SAMPLES = 50
 # Pieces of the coarse search that ranks the guesses: enough for a loop to bend, a fraction of the cost of the fine one.
 _COARSE_PIECES = 10
+# Of a rate limit: what counts as being at it, where no plan was found.
+_NEARLY = 0.9
+# Joints that a warning names.
+_MOST_NAMED = 8
 # The fewest guesses that it ranks, so that a single start is the best of several.
 _COARSE_GUESSES = 8
 # The most iterations for each: a guess that needs more is not a good start.
@@ -60,6 +66,7 @@ def plan_reorientation(
     start: ArrayLike | None = None,
     end: Any = None,
     cost: str = "kinetic",
+    rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
     limits: Limits | None = None,
@@ -81,10 +88,13 @@ def plan_reorientation(
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
         joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
         other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
-        of 1/2 |r''|^2, from rest, and to rest where the end is given; "time", the duration, under `rate_limits`
+        of 1/2 |r''|^2; "time", the duration, under rate limits
+    rates_at_ends : of the joints; "zero": from rest to rest, for the cost "acceleration" without acceleration at the
+        ends, too; "periodic": the same at both ends, for gaits; "free": any, as the theory of optimal loops has it: the
+        body would have to be set in motion before the start, and stopped after the end
     joints : names of those that may move, the others are held at the start; None: all
     symmetric : joints that follow others: name -> (name of the leader, factor)
-    limits : of positions and rates; None: `Limits()`, the body's own joint limits and any rate
+    limits : of positions and rates; None: `Limits()`, those of the body's file
     search : method, starts, resolution; None: `Search()`
     iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
         there: with the cheapest plan of the starts that had ended, or else PlanNotFound with the best so far.
@@ -97,6 +107,11 @@ def plan_reorientation(
     PlanNotFound
         If no start came to a local optimum that reaches the goal, or `iteration_callback` stopped the search; it
         carries the best attempt.
+
+    Warns
+    -----
+    UnstatedLimitWarning
+        If the body's file states no rate limit for a joint that moves, and `limits` none either.
 
     Notes
     -----
@@ -121,10 +136,12 @@ def plan_reorientation(
         start=start,
         end=end,
         cost=cost,
+        rates_at_ends=rates_at_ends,
         joints=joints,
         symmetric=symmetric,
         limits=limits,
     )
+    _warn_of_unstated_rates(task, limits)
     began = time.perf_counter()
     attempts: list[_Attempt] = []
     with heard_interrupts():
@@ -143,6 +160,20 @@ def plan_reorientation(
     if best is None or plan is None or not best.report.converged:
         raise PlanNotFound(_failure_message(task, attempts, best, reporter.stopped), plan)
     return plan
+
+
+def _warn_of_unstated_rates(task: Reorientation, limits: Limits | None) -> None:
+    rates = Limits().rate_limits if limits is None else limits.rate_limits
+    moves = np.abs(task.coupling).sum(axis=1) > 0.0
+    names = [name for name, unstated in zip(task.body.joint_names, np.isinf(task.body.rate_limits) & moves) if unstated]
+    if isinstance(rates, str) and names:
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        warnings.warn(
+            f"{task.body.name} states no rate limit for {', '.join(names[:_MOST_NAMED])}{more}: they may move at any "
+            "rate; give limits=Limits(rate_limits=...), or None for no limits",
+            UnstatedLimitWarning,
+            stacklevel=3,
+        )
 
 
 class _ProgressReporter:
@@ -198,7 +229,7 @@ class _Attempt:
 
 
 def _default_pieces(task: Reorientation) -> int:
-    if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate"):
+    if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
         return _PIECES_OF_FEW
     return _PIECES if task.dimension <= _MANY_JOINTS else _PIECES_OF_MANY
 
@@ -314,6 +345,7 @@ def _plan(
         path=best.polished.path,
         motion=best.polished.motion,
         cost_name=task.cost,
+        rates_at_ends=task.rates_at_ends,
         cost=best.cost,
         goal_error=best.polished.goal_error,
         transcription_gap=best.polished.first_goal_error,
@@ -344,7 +376,16 @@ def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _A
         outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
     if stopped:
         return f"the search for a motion of the joints of {name} was stopped on request ({summary}); {outcome}"
-    return (
-        f"no motion of the joints of {name} was found that turns it to the goal ({summary}); {outcome}; "
-        "loosen the limits, or give more time, iterations or starts"
+    fast = best is not None and best.polished is not None and _share_of_rate_limits(task, best.polished) > _NEARLY
+    way_out = (
+        f"joints are at their rate limits: give more than {task.duration:.6g} s (cost='time' finds the least)"
+        if fast and task.cost != "time"
+        else "loosen the limits, or give more time, iterations or starts"
     )
+    return f"no motion of the joints of {name} was found that turns it to the goal ({summary}); {outcome}; {way_out}"
+
+
+def _share_of_rate_limits(task: Reorientation, polished: PolishedPath) -> float:
+    """How much of the limit the fastest rate takes up."""
+    rates = np.abs(np.diff(polished.control, axis=0)).max(axis=0) * (len(polished.control) - 1) / polished.duration
+    return float((rates / task.rate_limit).max(initial=0.0))

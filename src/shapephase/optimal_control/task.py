@@ -14,7 +14,7 @@ from ..arguments import positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, TrajectoryError, unknown_name
-from .plan_options import Goal, Limits, goal_argument
+from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "time")
 
@@ -25,6 +25,8 @@ _FARTHEST = 1e3
 _COUPLING_TOLERANCE = 1e-9
 # By how much an end posture may lie beyond a joint limit [rad or m]: rounding of degrees or of a file's digits.
 _LIMIT_TOLERANCE = 1e-9
+# Joints that an error names.
+_MOST_NAMED = 8
 # Cosine of the angle between momentum and twist axis that still counts as a right angle: rounding of the user's axes.
 _RIGHT_ANGLE_TOLERANCE = 1e-9
 
@@ -46,6 +48,7 @@ class Reorientation:
     cost : one of `COSTS`
     lower, upper : (m,) limits of the coordinates [rad or m]
     rate_limit : (m,) limits of their rates [rad/s or m/s], infinite where there are none
+    rates_at_ends : one of `RATES_AT_ENDS`
     coupling, offset : (n, m) and (n,), each joint from the coordinates
     """
 
@@ -62,6 +65,7 @@ class Reorientation:
     lower: Array
     upper: Array
     rate_limit: Array
+    rates_at_ends: str
     coupling: Array
     offset: Array
 
@@ -75,9 +79,11 @@ class Reorientation:
         return self.coupling.shape[1]
 
     @property
-    def rest_to_rest(self) -> bool:
-        """Whether the joints are at rest at both ends: only the cost "acceleration" requires it."""
-        return self.cost == "acceleration"
+    def equal_points(self) -> int:
+        """How many control points at either end are the same: two without a rate, three without acceleration either."""
+        if self.rates_at_ends != "zero":
+            return 1
+        return 3 if self.cost == "acceleration" else 2
 
     @property
     def movable(self) -> Mask:
@@ -137,6 +143,7 @@ def reorientation(
     start: ArrayLike | None = None,
     end: Any = None,
     cost: str = "kinetic",
+    rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
     limits: Limits | None = None,
@@ -150,6 +157,8 @@ def reorientation(
     """
     if cost not in COSTS:
         raise unknown_name("cost", cost, COSTS)
+    if rates_at_ends not in RATES_AT_ENDS:
+        raise unknown_name("value of rates_at_ends", rates_at_ends, RATES_AT_ENDS)
     if not body.n_shape:
         raise ShapeError(f"{body.name} has no joints: nothing can turn it but its momentum")
     checked_goal, within = goal_argument(goal), Limits() if limits is None else limits
@@ -157,9 +166,15 @@ def reorientation(
     windings, winding_axes = _windings(checked_goal, mu)
     bounds = body.joint_limits if within.joint_limits else np.full((body.n_shape, 2), (-np.inf, np.inf))
     first, last = _end_postures(body, bounds, start, end)
+    if rates_at_ends == "periodic" and (last is None or not np.array_equal(first, last)):
+        raise TrajectoryError("rates_at_ends='periodic' is for loops: leave end out, or give the shape of the start")
     rates = _rate_limits(body, within.rate_limits)
     if cost == "time" and not np.isfinite(rates).all():
-        raise TrajectoryError("cost='time' needs rate_limits for every joint: without them there is no least time")
+        unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(rates)][:_MOST_NAMED])
+        raise TrajectoryError(
+            "cost='time' needs rate_limits for every joint: without them there is no least time, and there is none for "
+            f"{unstated}; give limits=Limits(rate_limits=...)"
+        )
     moving = set(range(body.n_shape)) if joints is None else {body.joint_index(name) for name in joints}
     fixed_joints = sorted(set(range(body.n_shape)) - moving)
     coupling, leaders, factors = _coupling(body, symmetric or {}, fixed_joints)
@@ -183,6 +198,7 @@ def reorientation(
         lower=lower,
         upper=upper,
         rate_limit=rate_limit,
+        rates_at_ends=rates_at_ends,
         coupling=coupling,
         offset=offset,
     )
@@ -251,10 +267,12 @@ def _check_limits(body: Body, shape: Array, bounds: Array, name: str) -> None:
         )
 
 
-def _rate_limits(body: Body, rate_limits: ArrayLike | None) -> Array:
+def _rate_limits(body: Body, rate_limits: ArrayLike | str | None) -> Array:
     """One for each joint, infinite where there are none: (n,)."""
     if rate_limits is None:
         return np.full(body.n_shape, np.inf)
+    if isinstance(rate_limits, str):
+        return body.rate_limits
     rates = np.asarray(rate_limits)
     if rates.shape not in ((), (body.n_shape,)):
         raise ShapeError(

@@ -177,10 +177,15 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
             if math.hypot(*axis) < 1e-9:
                 raise written.fault(owner, f"the axis {axis} points nowhere; give it a length")
         parts += f'<axis xyz="{_text(axis)}"/>'
+    fastest = 0.0
+    if kind != "fixed" and (limit := child_of(node, "limit", owner)) is not None:
+        fastest = abs(number(limit, "velocity", owner, default="0", most=math.inf))
     if kind in ("revolute", "prismatic"):
         limits = _limits(node, kind, owner)
-        # Effort and velocity are for motors; Pinocchio insists on them, this library has no use for them.
-        parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="0" velocity="0"/>'
+        # Effort is for motors; Pinocchio insists on it, this library has no use for it.
+        parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="0" velocity="{fastest!r}"/>'
+    elif kind == "continuous" and fastest:
+        parts += f'<limit effort="0" velocity="{fastest!r}"/>'
     reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
