@@ -292,7 +292,9 @@ def pinocchio_motion(
             slope, (left, right), y, "DOP853", rtol=RTOL, atol=1e-14, max_step=(right - left) / 4, dense_output=True
         )
         assert run.success, run.message
-        values[inside] = run.sol(wanted[inside]).T
+        # Between two breaks there may be none.
+        if inside.any():
+            values[inside] = run.sol(wanted[inside]).T
         y = run.y[:, -1]
     end = Rotation.from_quat(y[:4]).as_matrix()
     lift = y[4:13].reshape(3, 3)
