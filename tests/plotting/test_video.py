@@ -99,8 +99,8 @@ def test_what_lacks_is_named(turning, tmp_path, monkeypatch):
         with pytest.raises(UnknownNameError, match="kind of film"):
             motion_video(turning, tmp_path / name)
     for size in ((640, 481), (640,), (0, 480), (640.0, 480), (10_000, 480)):
-        with pytest.raises(ShapeError, match="size"):
-            motion_video(turning, old, size=size)
+        with pytest.raises(ShapeError, match="pixels"):
+            motion_video(turning, old, pixels=size)
     with monkeypatch.context() as changed:
         changed.setenv("CHROMIUM", "no-such-browser")
         with pytest.raises(MissingExtraError, match="'no-such-browser', which is no program"):
@@ -142,11 +142,11 @@ def test_the_cat_of_a_film_starts_on_its_back_and_ends_on_its_feet(righting, tmp
         video.chromium()
     except MissingExtraError as error:
         pytest.skip(str(error))
-    motion_video(righting, tmp_path / "cat.png", size=(320, 240))
+    motion_video(righting, tmp_path / "cat.png", pixels=(320, 240))
     with Image.open(tmp_path / "cat.png") as picture:
         strip = np.asarray(picture, dtype=int)
     assert strip.shape == (240, 6 * 320, 3)
-    motion_video(righting, tmp_path / "cat.gif", size=(320, 240), speed=0.5)
+    motion_video(righting, tmp_path / "cat.gif", pixels=(320, 240), speed=0.5)
     with Image.open(tmp_path / "cat.gif") as film:
         assert (film.n_frames, film.size) == (26, (320, 240))
         film.seek(25)
@@ -164,4 +164,4 @@ def test_the_cat_of_a_film_starts_on_its_back_and_ends_on_its_feet(righting, tmp
 
 
 async def in_a_loop(motion, file):
-    motion_video(motion, file, size=(64, 64))
+    motion_video(motion, file, pixels=(64, 64))

@@ -122,7 +122,7 @@ def motion_video(
     motion: Motion,
     path: str | os.PathLike[str],
     *,
-    size: tuple[int, int] = FILM_SIZE,
+    pixels: tuple[int, int] = FILM_SIZE,
     speed: float | None = None,
     trail: str | None = None,
     ghost: bool = True,
@@ -137,7 +137,7 @@ def motion_video(
     Parameters
     ----------
     path : of the file, .gif (25 frames a second), .mp4 (30) or .png (the strip); written whole or not at all
-    size : width and height of a frame [px], even numbers
+    pixels : width and height of a frame [px], even numbers
     speed : seconds of motion in a second of film; None: 1, or such that the film takes from 4 to 20 s
     trail, ghost, up, fall : as in `motion_page`
 
@@ -148,7 +148,7 @@ def motion_video(
     OutputFileError
         If the browser or ffmpeg fails, or the file cannot be written.
     ShapeError, UnknownNameError
-        As `motion_page`, for a size that is none, and for another ending.
+        As `motion_page`, for pixels that are none, and for another ending.
 
     Examples
     --------
@@ -160,10 +160,10 @@ def motion_video(
     unknown kind of film '.webm'. Valid: .gif, .mp4, .png
     """
     check_object(motion, "Motion", "motion")
-    ending = check_video(path, size)
+    ending = check_video(path, pixels)
     rate = playing_speed(motion.duration, speed)
     page = motion_html(motion, speed=rate, frames=None, trail=trail, ghost=ghost, up=up, **fall)
-    write_video(page, path, frame_times(ending, motion.duration, rate), size)
+    write_video(page, path, frame_times(ending, motion.duration, rate), pixels)
 
 
 def scene_and_data(

@@ -41,10 +41,11 @@ _NEVER = 180_000.0
 # Between two looks whether the page is there [ms].
 _LOOK = 50.0
 # Of a film [px]: MP4 wants even numbers.
-_SMALLEST, _LARGEST = 64, 4096
+_SMALLEST = 64
+_LARGEST = 4096
 
 
-def check_video(path: str | os.PathLike[str], size: Sequence[int]) -> str:
+def check_video(path: str | os.PathLike[str], pixels: Sequence[int]) -> str:
     """The ending of a film's file, after a look at what is needed to make it.
 
     Raises
@@ -52,16 +53,16 @@ def check_video(path: str | os.PathLike[str], size: Sequence[int]) -> str:
     UnknownNameError
         For another ending than .gif, .mp4 or .png.
     ShapeError
-        For a size that is not two even numbers from 64 to 4096.
+        For pixels that are not two even numbers from 64 to 4096.
     MissingExtraError
         Without Playwright, Pillow, for .mp4 imageio-ffmpeg (pip install 'shapephase[video]'), or a Chromium.
     """
     ending = Path(path).suffix.lower()
     if ending not in VIDEO_ENDINGS:
         raise unknown_name("kind of film", ending or str(path), VIDEO_ENDINGS)
-    whole = len(size) == 2 and all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in size)
-    if not whole or not all(_SMALLEST <= n <= _LARGEST and n % 2 == 0 for n in size):
-        raise ShapeError(f"size: two even numbers from {_SMALLEST} to {_LARGEST} are needed, got {size!r} px")
+    whole = len(pixels) == 2 and all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in pixels)
+    if not whole or not all(_SMALLEST <= n <= _LARGEST and n % 2 == 0 for n in pixels):
+        raise ShapeError(f"pixels: two even numbers from {_SMALLEST} to {_LARGEST} are needed, got {pixels!r}")
     try:
         import PIL  # noqa: F401
         import playwright  # noqa: F401
@@ -102,7 +103,7 @@ def frame_times(ending: str, duration: float, speed: float) -> Array:
     return np.linspace(0.0, duration, max(2, round(_RATES[ending] * duration / speed) + 1))
 
 
-def write_video(page: str, path: str | os.PathLike[str], times: Array, size: tuple[int, int]) -> None:
+def write_video(page: str, path: str | os.PathLike[str], times: Array, pixels: tuple[int, int]) -> None:
     """Draw a page of a motion at these times, and write the film; whole or not at all.
 
     Raises
@@ -112,7 +113,7 @@ def write_video(page: str, path: str | os.PathLike[str], times: Array, size: tup
     """
     ending = Path(path).suffix.lower()
     write = {".gif": _gif, ".mp4": _mp4, ".png": _strip}[ending]
-    found = _outside_a_loop(lambda: write(_frames(page, times, size, os.fspath(path)), len(times)))
+    found = _outside_a_loop(lambda: write(_frames(page, times, pixels, os.fspath(path)), len(times)))
     write_whole(path, lambda stream: stream.write(found))
 
 
@@ -126,7 +127,7 @@ def _outside_a_loop(work: Callable[[], bytes]) -> bytes:
         return pool.submit(work).result()
 
 
-def _frames(page: str, times: Array, size: tuple[int, int], path: str) -> Iterator[Any]:
+def _frames(page: str, times: Array, pixels: tuple[int, int], path: str) -> Iterator[Any]:
     """Pictures of the page, one for each time, as Pillow has them."""
     from PIL import Image
     from playwright.sync_api import Error, sync_playwright
@@ -139,7 +140,7 @@ def _frames(page: str, times: Array, size: tuple[int, int], path: str) -> Iterat
         try:
             with sync_playwright() as driver:
                 browser = driver.chromium.launch(executable_path=chromium(), args=flags)
-                context = browser.new_context(offline=True, viewport={"width": size[0], "height": size[1]})
+                context = browser.new_context(offline=True, viewport={"width": pixels[0], "height": pixels[1]})
                 context.set_default_timeout(_NEVER)
                 shown = context.new_page()
                 shown.goto(file.as_uri())
