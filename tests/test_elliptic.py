@@ -72,7 +72,7 @@ def test_the_argument_of_sn_and_cn(m1):
             elliptic.argument_of(sine, cosine, m1)
 
 
-@pytest.mark.parametrize("m1", [1.0, 0.5, 1e-3, 1e-8, 1e-18, 1e-30])
+@pytest.mark.parametrize("m1", full_but([1.0, 0.5, 1e-3, 1e-8, 1e-18, 1e-30], 1.0, 1e-3, 1e-30))
 def test_pi_without_its_even_growth(m1):
     quarter = float(elliptic.complete_k(m1))
     for n in (-1e-12, -1e-3, -0.9, -1.0, -30.0, -1e6):
@@ -175,7 +175,7 @@ def test_third_kind_of_random_arguments(rng, count):
             assert off(value, mpmath.ellippi(mp(given[0]), mp(given[1]), 1 - mp(given[2]))) < 1e-14
 
 
-@pytest.mark.parametrize("m1", [0.9, 1e-3, 1e-15, 1e-30])
+@pytest.mark.parametrize("m1", full_but([0.9, 1e-3, 1e-15, 1e-30], 0.9, 1e-30))
 def test_third_kind_along_the_argument(m1):
     """The amplitude at 100 digits, whatever m1."""
     quarter = elliptic.complete_k(m1)

@@ -321,7 +321,7 @@ def newtonian(shape, orbit, momentum, duration, times):
 
 
 @pytest.mark.parametrize("shape", full_but([still, breathing], breathing))
-@pytest.mark.parametrize("momentum", [(0.4, -0.3, 0.9), (0.02, 0.01, -0.03)])
+@pytest.mark.parametrize("momentum", [pytest.param((0.4, -0.3, 0.9), marks=pytest.mark.full), (0.02, 0.01, -0.03)])
 def test_the_estimate_is_what_the_full_simulation_shows_a16(shape, momentum):
     """The orbit decouples to (size/r)^2, the attitude leaves the free motion by the estimate, to its first order."""
     duration = 30.0

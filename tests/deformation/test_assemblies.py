@@ -317,8 +317,8 @@ def test_repeated_and_unlike_loops():
 
 
 def test_quick_loops_beside_slow_ones_are_not_missed():
-    """Sixteen swings beside half a one: the motion is that of the functions, stepped by DOP853."""
-    quick = sp.ShapePath.fourier([0.3, 1.0, 0.2], np.full((3, 1), 0.3), [[0.1], [-0.2], [0.3]], 0.125).repeated(16)
+    """Eight swings beside half a one: the motion is that of the functions, stepped by DOP853."""
+    quick = sp.ShapePath.fourier([0.3, 1.0, 0.2], np.full((3, 1), 0.3), [[0.1], [-0.2], [0.3]], 0.25).repeated(8)
     slow = sp.ShapePath.waypoints([0.0, DURATION], [[0.5], [1.5]])
     made = assembly(HULL_PART, [moving_mass(20.0, quick), boom(8.0, 4.0, ROOT, AXIS, slow)])
     ends = [sp.reconstruct(made, [3.0, -5.0, 8.0], tolerance=1e-7, method=m).final_attitude for m in ("auto", "dop853")]

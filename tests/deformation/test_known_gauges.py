@@ -25,6 +25,7 @@ from shapephase.deformation.gauge import link_gauge, mean_body_gauge
 from shapephase.errors import AccuracyNotReached, GaugeError, ShapeError, UnknownNameError
 from support.bodies import joint, link, random_loop, random_shapes, urdf
 from support.independent import BODIES, apart, body_of, random_rotation, random_vector, urdf_file
+from support.long_runs import full_but
 
 Array = NDArray[np.float64]
 LENGTH = 3.0
@@ -712,7 +713,7 @@ def frames_of(loop):
     return seen
 
 
-@pytest.mark.parametrize("name", [*CASES, "particles"])
+@pytest.mark.parametrize("name", full_but([*CASES, "particles"], "satellite", "contraption", "particles"))
 def test_the_energy_is_quadratic_in_the_rate(name):
     """T = w.Iw/2 + L_o.w + T_0 (Cabrera's equation 4, the half restored), in every frame; least where L vanishes."""
     loop = everything()[name]
@@ -731,7 +732,7 @@ def test_the_energy_is_quadratic_in_the_rate(name):
         )
 
 
-@pytest.mark.parametrize("name", [*CASES, "particles"])
+@pytest.mark.parametrize("name", full_but([*CASES, "particles"], "satellite", "contraption", "particles"))
 def test_the_energy_is_the_same_from_every_frame(name):
     """omega_here = U (omega - omega_U), U differentiated here: one body, one energy."""
     loop = everything()[name]
@@ -742,7 +743,7 @@ def test_the_energy_is_the_same_from_every_frame(name):
         np.testing.assert_allclose(seen.kinetic_energy(INNER, here), want, rtol=1e-10, err_msg=kind)
 
 
-@pytest.mark.parametrize("name", [*CASES, "particles"])
+@pytest.mark.parametrize("name", full_but([*CASES, "particles"], "satellite", "contraption", "particles"))
 def test_the_dynamic_phase_from_energies(name):
     """Cabrera's remark 3.7: theta_D = integral of (2T - 2T_0 + L_o.I^-1 L_o - I^-1 L_o.Pi) dt over |Pi|, any frame."""
     loop = everything()[name]

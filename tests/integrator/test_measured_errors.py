@@ -17,6 +17,7 @@ from shapephase.integrator._step_control import StepRequirements, even_steps
 from shapephase.integrator.interpolant import Interpolant
 from support.compiler import needs_compiler
 from support.independent import random_rotation
+from support.long_runs import full_but
 
 EPS = np.finfo(float).eps
 
@@ -151,7 +152,7 @@ def test_equal_samples_of_a_loop_are_one_coefficient(oscillations: float, tolera
 
 
 @needs_compiler
-@pytest.mark.parametrize("number", [269, 379, 719])
+@pytest.mark.parametrize("number", full_but([269, 379, 719], 379, 719))
 def test_rounding_does_not_add_up_over_loops(number: int):
     """The satellite, fifteen to twenty times one loop: errors of 2e-13 once stood beside estimates of 6e-14."""
     from benchmarks.estimates import judged

@@ -23,6 +23,7 @@ from shapephase.integrator.recorded.polynomial_fit import fit_nodes, polynomial_
 from shapephase.shape_space.body_path import recorded_pieces
 from support.compiler import needs_compiler
 from support.independent import apart
+from support.long_runs import full_but
 
 
 def loop_of(body: sp.Body, rows: int, seed: int = 3) -> sp.ShapePath:
@@ -179,7 +180,7 @@ def test_a_recorded_deformation_travels_without_what_was_found_out():
     np.testing.assert_array_equal(again.final_attitude, motion.final_attitude)
 
 
-@pytest.mark.parametrize("momentum", [0.0, 1.0])
+@pytest.mark.parametrize("momentum", full_but([0.0, 1.0], 1.0))
 def test_panels_span_the_knots_of_a_dense_recording(momentum: float):
     """A loop recorded in 10,000 rows takes few panels, and its attitudes are those along every single interval."""
     body = sp.load_body("cat_two_halves")

@@ -67,7 +67,7 @@ def hard_truth(name: str, seed: int, kind: str) -> sp.Motion:
         return sp.reconstruct(deformation, momentum, tolerance=1e-9)
 
 
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-5, 1e-6, 1e-7, 1e-9])
+@pytest.mark.parametrize("tolerance", full_but([1e-4, 1e-5, 1e-6, 1e-7, 1e-9], 1e-5, 1e-9))
 def test_true_errors_are_within_the_estimates(tolerance: float):
     """At times between the steps."""
     broken = []
@@ -109,7 +109,9 @@ def test_steps_so_long_that_they_overflow_are_made_shorter():
             assert apart(motion.attitude(TIMES), true) <= motion.error_estimate + 1e-8
 
 
-@pytest.mark.parametrize("name", ["cat", "cat_two_halves", "satellite", "astronaut"])
+@pytest.mark.parametrize(
+    "name", full_but(["cat", "cat_two_halves", "satellite", "astronaut"], "cat_two_halves", "satellite")
+)
 def test_twelve_digits_are_reached_and_true(name: str):
     body, loop = body_of(name), random_loop(1, body_of(name).n_shape)
     momentum, attitude = random_vector(3, BODIES[name]), random_rotation(4)
@@ -199,7 +201,7 @@ def test_a_declared_kink_costs_nothing(power: int, size: float):
 
 
 @pytest.mark.parametrize("power", [1, 2, 3])
-@pytest.mark.parametrize("where", [0.7123, 1.0, 0.5, 1.999])
+@pytest.mark.parametrize("where", full_but([0.7123, 1.0, 0.5, 1.999], 0.7123, 1.999))
 @pytest.mark.parametrize("size", [0.0, 0.02])
 def test_an_undeclared_kink_is_located_and_becomes_a_break(power: int, where: float, size: float):
     momentum = random_vector(1, size)

@@ -70,7 +70,7 @@ CASES = {
         {"symmetric": {"waist_roll": ("waist_pitch", -0.5)}, "end": "free"},
     ),
 }
-QUICK = ("axis", "momentum")
+QUICK = ("momentum",)
 LARGE = [
     ("cat", np.array([np.pi, 0.0, 0.0])),
     *(("astronaut", axis * np.pi / 2) for axis in np.eye(3)),
@@ -336,10 +336,7 @@ def test_a_closed_loop_of_one_joint_turns_nothing(method, iterations, pieces, lo
     assert not best.starts[0].converged
 
 
-@pytest.mark.parametrize(
-    "cost",
-    ["kinetic", "time"],
-)
+@pytest.mark.parametrize("cost", full_but(["kinetic", "time"], "time"))
 def test_too_short_a_time(cost, load_urdf):
     """The wheel needs 2.7 s at 4 rad/s."""
     with pytest.raises(PlanNotFound) as failure:
@@ -575,7 +572,7 @@ class OutOfPatience(Exception):
     """Raised by the callback."""
 
 
-@pytest.mark.parametrize("error", [OutOfPatience, KeyboardInterrupt])
+@pytest.mark.parametrize("error", full_but([OutOfPatience, KeyboardInterrupt], OutOfPatience))
 def test_what_the_callback_raises_comes_through(error):
     def callback(now):
         if now.iteration == 2:

@@ -6,6 +6,7 @@ import tracemalloc
 from dataclasses import replace
 from functools import lru_cache
 from importlib import import_module
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from support.independent import (
     random_vector,
     turn,
 )
+from support.long_runs import full_but
 
 TIMES = np.linspace(0.0, 2.0, 41)
 
@@ -105,8 +107,14 @@ def true_attitude(name: str) -> np.ndarray:
     return pinocchio_motion(name, body.joint_names, loop, momentum, attitude, TIMES).attitude
 
 
-@pytest.mark.parametrize("name", ["example:human", "cat", "satellite"])
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    full_but(
+        product(["example:human", "cat", "satellite"], [1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12]),
+        *(("example:human", 1e-6), ("example:human", 1e-11)),
+        *(("cat", 1e-4), ("cat", 1e-9), ("cat", 1e-12), ("satellite", 1e-8), ("satellite", 1e-10)),
+    ),
+)
 def test_true_error_is_within_the_estimate_and_that_within_the_tolerance(name: str, tolerance: float):
     body, loop = body_of(name), random_loop(1, body_of(name).n_shape)
     momentum, attitude = random_vector(3, BODIES[name]), random_rotation(4)

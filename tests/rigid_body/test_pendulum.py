@@ -770,7 +770,7 @@ def test_andoyer_equations_are_eulers_for_moments_in_any_order(order):
     assert np.abs((ahead[2] - behind[2]) / (2.0 * h) - p_rate).max() < 1e-11
 
 
-@pytest.mark.parametrize("order", full_but(ORDERS, [0, 1, 2], [2, 0, 1]), ids=str)
+@pytest.mark.parametrize("order", full_but(ORDERS, [2, 0, 1]), ids=str)
 def test_closed_solution_for_y_n12(order):
     moments = np.array([3.0, 2.0, 1.0])[order]
     pendulum = andoyer_pendulum(moments)
