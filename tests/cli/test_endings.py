@@ -35,7 +35,7 @@ COMMANDS = {
     "orbits": ("orbits", "cat", "cat_righting", "0.02"),
     "doctor": ("doctor",),
 }
-ALL_COMMANDS = (*COMMANDS, "plan", "view", "explore", "plot", "compile")
+ALL_COMMANDS = (*COMMANDS, "plan", "view", "explore", "plot", "compile", "sweep")
 
 
 def ran(*arguments, **options):

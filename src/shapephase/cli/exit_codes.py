@@ -9,7 +9,9 @@ from ..errors import (
     ModelFileError,
     OutputFileError,
     PlanNotFound,
+    SchedulerLostError,
     ShapePhaseError,
+    StudyError,
     TrajectoryError,
 )
 
@@ -25,6 +27,8 @@ class ExitCode(enum.IntEnum):
     NUMERICS = 5
     OUTPUT = 6
     NOT_FOUND = 7
+    STUDY = 8
+    CLUSTER = 9
     STOPPED = 130
     """By Ctrl-C: 128 and the number of the signal, as shells have it."""
     BROKEN_PIPE = 141
@@ -40,6 +44,8 @@ MEANINGS = {
     ExitCode.NUMERICS: "numerics: singular inertia, accuracy not reached",
     ExitCode.OUTPUT: "output that cannot be written",
     ExitCode.NOT_FOUND: "a search that found nothing; the best try is written",
+    ExitCode.STUDY: "a study's file, or the store of another study",
+    ExitCode.CLUSTER: "a cluster that cannot be reached, or not any more; what is stored is kept",
     ExitCode.STOPPED: "stopped by Ctrl-C; of plan, the best so far is written",
     ExitCode.BROKEN_PIPE: "what reads the output wants no more of it",
 }
@@ -55,6 +61,10 @@ def exit_code_of(error: ShapePhaseError) -> ExitCode:
     """The code for an error of the library."""
     if isinstance(error, OutputFileError):
         return ExitCode.OUTPUT
+    if isinstance(error, StudyError):
+        return ExitCode.STUDY
+    if isinstance(error, SchedulerLostError):
+        return ExitCode.CLUSTER
     if isinstance(error, PlanNotFound):
         return ExitCode.NOT_FOUND
     if isinstance(error, TrajectoryError):

@@ -31,6 +31,7 @@ from .outcome import Outcome
 from .pictures import plot_command, view_command
 from .plan import plan_command
 from .split import split_command
+from .sweep import sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
 from .usage import usage_message
 
@@ -50,6 +51,7 @@ app.command(plan_command, name="plan")
 app.command(conjugate_command, name="conjugate")
 app.command(check_command, name="check")
 app.command(orbits_command, name="orbits")
+app.command(sweep_app)
 app.command(robots_command, name="robots")
 app.command(compile_command, name="compile")
 app.command(doctor_command, name="doctor")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, lock_arrays
+from ..body.body import Body
 from ..deformation.deformation import articulated
 from ..display import short_repr
 from ..errors import ShapeError
@@ -19,6 +21,7 @@ from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
+from ..shape_space.shape_path import ShapePath
 from ._error_sources import Inputs, by_relative_errors, drawn_bodies, inputs_of
 from ._fit_answers import fit_by_inertias, fit_by_samples
 from .inertia_errors import InertiaErrors
@@ -156,6 +159,7 @@ def sampled_uncertainty(
     start: RecordedMomentum | ArrayLike | None = None,
     draws: int = 400,
     seed: int = 0,
+    executor: Executor | None = None,
 ) -> Uncertainty:
     """The same as `uncertainty` by drawing errors and reconstructing each motion anew: a check of the first order.
 
@@ -167,6 +171,8 @@ def sampled_uncertainty(
         move a fit to first order
     draws : how many, two or more
     seed : of the random numbers
+    executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that reconstructs the
+        motions; None: one after the other, here. Results do not depend on it
 
     Notes
     -----
@@ -203,15 +209,24 @@ def sampled_uncertainty(
     starts, momenta = motion.initial_attitude @ so3.exp(changes[:, :3]), motion.momentum + changes[:, 3:]
     middle = split(motion)
     turns, phases = np.empty((len(_ROTATIONS), draws, 3)), np.empty((draws, len(_PHASES)))
-    for row in range(draws):
-        deformation = articulated(bodies[row], paths[row])
-        drawn = reconstruct(deformation, momenta[row], starts[row], tolerance=motion.tolerance)
-        parts = split(drawn)
-        for which, name in enumerate(_ROTATIONS):
-            turns[which, row] = so3.log(_rotation(drawn, parts, name) @ _rotation(motion, middle, name).T)
-        phases[row] = [getattr(parts, name) for name in _PHASES]
+    compute = map if executor is None else executor.map
+    expected = [_rotation(motion, middle, name) for name in _ROTATIONS]
+    one_draw = partial(_results_of_draw, motion.tolerance)
+    for row, (rotations, angles) in enumerate(compute(one_draw, bodies, paths, momenta, starts)):
+        for which, (rotation, usual) in enumerate(zip(rotations, expected, strict=True)):
+            turns[which, row] = so3.log(rotation @ usual.T)
+        phases[row] = angles
     covariances = [np.cov(one, rowvar=False) for one in turns]
     return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), np.cov(changes, rowvar=False), draws=draws)
+
+
+def _results_of_draw(
+    tolerance: float, body: Body, path: ShapePath, momentum: Array, start: Array
+) -> tuple[list[Array], list[Array]]:
+    """Rotations and phases of one motion, which may be computed in another process."""
+    drawn = reconstruct(articulated(body, path), momentum, start, tolerance=tolerance)
+    parts = split(drawn)
+    return [_rotation(drawn, parts, name) for name in _ROTATIONS], [getattr(parts, name) for name in _PHASES]
 
 
 class _Cause(NamedTuple):

@@ -1,10 +1,13 @@
 from ._recipes import RigidBody
 from .case import Case
+from .connection import connected
 from .distributions import Choice, Directions, LogNormal, Normal, Rotations, Uniform
+from .export import export_study
 from .outputs import OUTPUTS, Output
 from .progress import StudyProgress
 from .store import STATUS, StudyStore, open_study
 from .study import Study
+from .study_file import read_study
 
 __all__ = [
     "OUTPUTS",
@@ -21,5 +24,8 @@ __all__ = [
     "StudyProgress",
     "StudyStore",
     "Uniform",
+    "connected",
+    "export_study",
     "open_study",
+    "read_study",
 ]

@@ -1,0 +1,160 @@
+"""`shapephase sweep`: a study of very many cases from a file, what its store holds, and the store in other formats."""
+
+from __future__ import annotations
+
+import math
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from ..errors import ShapeError
+from ..run_progress import RunProgress
+from .options import AS_TEXT, PrintOptions
+from .outcome import Outcome, check_writable
+from .progress import steps
+from .terminal import Verbosity, say, say_written
+
+if TYPE_CHECKING:
+    from ..study.progress import StudyProgress
+    from ..study.store import StudyStore
+
+sweep_app = App(name="sweep", help_format="markdown")
+# [s] From there on remaining time is said in minutes, and in hours.
+_MINUTES = 120.0
+_HOURS = 7200.0
+
+
+@sweep_app.default
+def sweep_command(
+    study: str,
+    /,
+    *,
+    store: Annotated[
+        str,
+        Parameter(help="The folder of results, a new one without --resume; for example `--store out.zarr`."),
+    ],
+    scheduler: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Compute on the cluster of this Dask scheduler; without it on this machine. For example "
+            "`--scheduler tcp://10.0.0.1:8786`.",
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        Parameter(
+            show_default=False,
+            help="Processes of this machine, without unit; else one for each processor. For example `--workers 4`.",
+        ),
+    ] = None,
+    resume: Annotated[
+        bool, Parameter(negative="", help="Go on with a store that is there; for example `--resume`.")
+    ] = False,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """Compute the cases of a study in a TOML file, on all processors or on a cluster, into a Zarr store.
+
+    Ctrl-C leaves a store that goes on with --resume.
+
+    Parameters
+    ----------
+    study
+        The file, as of `shapephase.study.read_study`; for example `study.toml`.
+    """
+    from ..study.connection import connected
+    from ..study.store import open_study
+    from ..study.study_file import read_study
+
+    if workers is not None and (scheduler is not None or workers < 1):
+        raise ShapeError(f"--workers: a whole number above 0, and no --scheduler beside it, is needed, got {workers}")
+    read = read_study(study)
+    try:
+        with steps(1) as work, nullcontext() if scheduler is None else connected(scheduler) as client:
+            work.begin(f"computing {read.cases} cases")
+
+            def watch(now: StudyProgress) -> None:
+                said = progress_line(now)
+                say(f"shapephase: {said}", Verbosity.VERBOSE)
+                work.watch(RunProgress(now.done / now.cases, said))
+
+            filled = read.run(store, client, workers=workers, resume=resume, progress=watch)
+    except KeyboardInterrupt:
+        if Path(store).exists():
+            kept = open_study(store)
+            done = kept.cases - kept.counts()["missing"]
+            say(f"shapephase: {done} of {kept.cases} cases are stored; --resume goes on")
+        raise
+    return _report(filled)
+
+
+@sweep_app.command(name="status")
+def status_command(store: str, /, *, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
+    """Say what the store of a study holds.
+
+    Parameters
+    ----------
+    store
+        The folder; for example `out.zarr`.
+    """
+    from ..study.store import open_study
+
+    return _report(open_study(store))
+
+
+@sweep_app.command(name="export")
+def export_command(
+    store: str,
+    /,
+    *,
+    out: Annotated[
+        Path,
+        Parameter(help="Write a table (.parquet, .csv) or arrays (.nc) to this file; for example `--out out.nc`."),
+    ],
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """Write what the store of a study holds to a NetCDF, Parquet or CSV file.
+
+    Parameters
+    ----------
+    store
+        The folder; for example `out.zarr`.
+    """
+    from ..study.export import export_study
+    from ..study.store import open_study
+
+    check_writable(out, "--out", ".nc", ".parquet", ".csv")
+    export_study(open_study(store), out)
+    say_written(out)
+    return Outcome("", {"file": str(out)})
+
+
+def progress_line(now: StudyProgress) -> str:
+    """For example "1200 of 20000 cases, 3 failed, 57.1/s, 5 min left"."""
+    failed = f", {now.failed} failed" if now.failed else ""
+    return f"{now.done} of {now.cases} cases{failed}, {now.rate:.3g}/s, {_time(now.remaining)} left"
+
+
+def _time(seconds: float) -> str:
+    if not math.isfinite(seconds):
+        return "unknown time"
+    if seconds < _MINUTES:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < _HOURS else f"{seconds / 3600.0:.1f} h"
+
+
+def _report(store: StudyStore) -> Outcome:
+    counts, errors = store.counts(), store.errors()
+    lines = [f"{store.path}: {store.cases} cases"]
+    lines += [f"  {name.replace('_', ' '):<10} {count}" for name, count in counts.items() if count]
+    lines += [f"  case {index}: {name}: {text}" for index, name, text in errors]
+    data: dict[str, Any] = {
+        "store": str(store.path),
+        "cases": store.cases,
+        "counts": counts,
+        "study_hash": store.attributes["study_hash"],
+        "errors": [{"case": index, "name": name, "text": text} for index, name, text in errors],
+    }
+    return Outcome("\n".join(lines), data)

@@ -1,0 +1,41 @@
+"""The way to a scheduler of Dask."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+from ..errors import MissingExtraError, SchedulerLostError
+
+# [s] A scheduler that has not answered by then will not.
+_PATIENCE = 20.0
+
+
+@contextlib.contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """A client of the scheduler at this address.
+
+    Raises
+    ------
+    SchedulerLostError
+        If it does not answer.
+    MissingExtraError
+        Without Dask.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise MissingExtraError("a cluster needs Dask; install it with: pip install 'shapephase[study]'") from None
+    # What it says of lost connections is said by one error.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SchedulerLostError(f"there is no scheduler at {address!r:.80} ({type(error).__name__})") from None
+    try:
+        yield client
+    finally:
+        with contextlib.suppress(Exception):
+            client.close(timeout=1.0)
