@@ -123,7 +123,7 @@ def test_check_is_a_card_and_a_verdict(capsys, tmp_path):
         "wheel_spin        continuous        none        none rad",
     ):
         assert said in text
-    assert "no: boom_extension ends 1.8 from its start" in text
+    assert "no: boom_extension ends 1.8 m from its start" in text
     assert text.endswith("verdict: no fault found\n")
     (tmp_path / "swing.csv").write_text(
         "time,left_shoulder_abduction,right_shoulder_abduction,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,4,1,0,0,0,1\n2,0,0,0,0,0,1\n"

@@ -62,7 +62,10 @@ def error_bar_lines(
     if found is None:
         if recorded is None:
             return []
-        return [f"{'± above':24}of the computation alone; the recording's noise is not stated (--joint-noise 0.3deg)"]
+        return [
+            "",
+            f"{'± above':24}of the computation alone; the recording's noise is not stated (--joint-noise 0.3deg)",
+        ]
     lines = ["", "error bars: one standard deviation of what the inputs leave open, to first order"]
     lines.append(_rotation_line("total rotation", result.total_rotation, found.total_angle, found.total_rotation))
     name = "  shape holonomy" if result.is_loop else "  shape lift (open)"
@@ -74,6 +77,8 @@ def error_bar_lines(
             ("  geometric phase", result.geometric_phase, found.solid_angle),
         ):
             lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
+    elif result.has_phase:
+        lines.append("phases: their bars are computed in the horizontal gauge (--gauge horizontal)")
     of_base_alone = recorded is not None and recorded.flight is not None and recorded.smoothing is None
     if of_base_alone and options.joint_noise is None:
         lines.append(

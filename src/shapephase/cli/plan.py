@@ -176,10 +176,14 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
             f"{'off the goal':24}{found.goal_error:16.2e} rad",
             f"{'cost':24}{found.cost:16.9g}   {found.cost_unit} ({found.cost_name})",
             f"{'rates at the ends':24}{found.rates_at_ends:>16}",
-            f"{'KKT residual':24}{found.kkt_residual:16.2e}",
-            f"{'iterations':24}{found.iterations:16d}   {found.seconds:.1f} s, {len(found.starts)} start(s)",
+            f"{'off the minimum':24}{found.kkt_residual:16.2e}       (residual of the conditions of a minimum, scaled)",
+            f"{'iterations':24}{found.iterations:16d}       (in {found.seconds:.1f} s, {_searches(len(found.starts))})",
         ]
     )
+
+
+def _searches(count: int) -> str:
+    return "one search" if count == 1 else f"{count} searches"
 
 
 def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict[str, object]:
@@ -197,6 +201,8 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
         "rates_at_ends": found.rates_at_ends,
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
+        "seconds": found.seconds,
+        "searches": len(found.starts),
     }
 
 

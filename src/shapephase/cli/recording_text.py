@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
         *_unit_lines(record),
         *_column_lines(body, record),
         *_base_lines(record),
-        *_change_lines(record, recorded),
+        *_change_lines(body, record, recorded),
     ]
     return ["", *lines] if lines else []
 
@@ -155,7 +156,19 @@ def _base_lines(record: Any) -> list[str]:
     return lines
 
 
-def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
+def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
+    """The noise of joints that turn, and of those that slide."""
+    found = []
+    for unit in ("rad", "m"):
+        own = {name: level for name, level in smoothed.items() if body.joint_units[body.joint_index(name)] == unit}
+        levels = sorted((level, name) for name, level in own.items() if level > 0.0)
+        if levels:
+            ends = dict.fromkeys(_value(body, name, level) for level, name in (levels[0], levels[-1]))
+            found.append(" to ".join(ends))
+    return " and ".join(found)
+
+
+def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str]:
     """What makes the path another than the samples."""
     lines = []
     if record["trim"] is not None:
@@ -164,9 +177,7 @@ def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
             f"to {record['last_time']:.9g} {record['time_unit']}"
         )
     if record["smooth"] is not None:
-        levels = sorted(set(record["smooth"].values()) - {0.0})
-        said = f"{levels[0]:.6g}" if len(levels) == 1 else f"{levels[0]:.6g} to {levels[-1]:.6g}"
-        lines.append(f"{'smoothed':24}noise {said} rad or m, rms")
+        lines.append(f"{'smoothed':24}for noise of {_levels(body, record['smooth'])}, rms")
     if recorded.smoothing is not None:
         lines += _smoothing_lines(recorded.smoothing)
     if recorded.closing is not None:
@@ -176,7 +187,8 @@ def _change_lines(record: Any, recorded: RecordedMotion) -> list[str]:
     if recorded.residual.any():
         joint = int(np.argmax(recorded.residual))
         names = recorded.path.joint_names or ()
-        lines.append(f"{'off the samples':24}{recorded.residual[joint]:.3g} rms at most, {names[joint]}")
+        off = _value(body, names[joint], recorded.residual[joint])
+        lines.append(f"{'off the samples':24}{off} rms at most, {names[joint]}")
     return lines
 
 

@@ -58,10 +58,11 @@ def split_command(
 
     from ..phases.phases import running_phases, split
     from ..phases.split_text import split_lines
+    from ..shape_space.body_path import path_gap
     from . import motion as motions
     from .error_bar_text import error_bar_data, error_bar_lines, error_bars
     from .recording_text import fit_data, fit_lines, recording_data, recording_lines
-    from .text import recorded_base_text, split_data, split_heading
+    from .text import gap_text, recorded_base_text, split_data, split_heading
 
     aside = check_writable(out, "--out", ".npz")
     aside = check_writable(phases, "--phases", ".csv") or aside
@@ -94,7 +95,8 @@ def split_command(
                 shape_path=flown.path,
                 title=title,
                 up=up,
-                error_bars=error_bar_lines(result, bars),
+                error_bars=error_bar_lines(result, bars, flown.recorded, errors),
+                recording=recording_lines(flown.body, flown.recorded),
                 begin=work.begin,
             )
             say_written(html)
@@ -102,8 +104,11 @@ def split_command(
         lines, data = recorded_base_text(flown.motion, flown.recorded)
     else:
         lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
+    names = flown.body.joint_names
+    gap = path_gap(flown.body, flown.path.matched(names, flown.body.name))
+    open_by = "" if result.is_loop else f"{gap_text(flown.body, gap)} from its start"
     text = [
-        *split_lines(result, split_heading(flown.body, motion, flown.motion)),
+        *split_lines(result, split_heading(flown.body, motion, flown.motion), open_by),
         *error_bar_lines(result, bars, flown.recorded, errors),
         *lines,
         *recording_lines(flown.body, flown.recorded),

@@ -46,17 +46,19 @@ def orbit_lines(
     body: Body, motion_name: str, gauge: str, found: FixedPoints, starts: Array, splits: list[PhaseSplit]
 ) -> list[str]:
     """Closed orbits and their phases for people."""
-    certain = "all: their indices sum to 2" if found.complete else f"perhaps not all: indices sum to {found.index_sum}"
+    certain = "these are all: their indices sum to 2"
+    if not found.complete:
+        certain = f"these are perhaps not all: their indices sum to {found.index_sum}, those of all to 2"
     lines = [
         f"{body.name} along {motion_name}, momentum {found.magnitude:g} kg m^2/s, {gauge} gauge: "
         f"{len(splits)} closed orbits, attitudes to {found.tolerance:g} rad",
         certain,
         "",
-        f"{'momentum at the start (base axes)':>36}{'index':>7}{'Montgomery [deg]':>20}{'dynamic':>14}{'geometric':>14}"
-        "  stability",
+        f"{'direction at the start (base axes)':>36}{'index':>7}{'Montgomery [deg]':>20}"
+        f"{'dynamic':>14}{'geometric':>14}  stability",
     ]
     for direction, index, kind, result in zip(starts, found.index, found.stability, splits, strict=True):
-        place = " ".join(f"{v:11.7f}" for v in direction)
+        place = " ".join(f"{v + 0.0:11.7f}" for v in np.round(direction, _DIRECTION_DIGITS))
         first, second, third = np.degrees([result.montgomery_phase, result.dynamic_phase, result.geometric_phase])
         lines.append(f"{place:>36}{index:+7d}{first:20.6f}{second:14.6f}{third:14.6f}  {kind}")
     return lines
@@ -115,9 +117,11 @@ def _part_lines(summary: BodySummary) -> list[str]:
 
 def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMotion | None) -> list[str]:
     """The summary of a joint motion for people."""
-    worst = int(np.argmax(np.abs(summary.gap))) if len(summary.gap) else 0
-    closes = "yes" if summary.is_loop else f"no: {body.joint_names[worst]} ends {summary.gap[worst]:.6g} from its start"
-    lines = [f"{name}: {summary.duration:g} s, {summary.breaks} breaks", f"{'closes':24}{closes}"]
+    closes = "yes" if summary.is_loop else f"no: {gap_text(body, summary.gap)} from its start"
+    lines = [
+        f"{name}: {summary.duration:g} s, {_pieces(summary.breaks - 1)}",
+        f"{'closes':24}{closes}",
+    ]
     if recorded is not None:
         lines.insert(1, f"{'recorded':24}{len(recorded.times)} samples, {recorded.format}")
         if recorded.base_attitude is not None:
@@ -125,6 +129,18 @@ def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMo
     for title, names in (("beyond their limits", summary.joints_beyond_limits), ("at rest", summary.still_joints)):
         lines += [f"{title:24}{', '.join(names)}"] if names else []
     return lines
+
+
+def _pieces(count: int) -> str:
+    return "smooth throughout" if count == 1 else f"{count} smooth pieces"
+
+
+def gap_text(body: Body, gap: Array) -> str:
+    """The joint that ends farthest from its start, and how far: (n,) [rad or m]."""
+    worst = int(np.argmax(np.abs(gap)))
+    unit, off = body.joint_units[worst], float(gap[worst])
+    turned = f" ({math.degrees(off):.4g} deg)" if unit == "rad" else ""
+    return f"{body.joint_names[worst]} ends {off:.6g} {unit}{turned}"
 
 
 def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
@@ -150,6 +166,8 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
     return [text], {"recorded_base_difference_rad": angle, "recorded_base_difference_time_s": when}
 
 
+# After the point of a direction.
+_DIRECTION_DIGITS = 7
 _PATH_KEYS = {"joints_beyond_limits": "beyond", "still_joints": "resting"}
 """JSON keys that are shorter than the names of the fields."""
 

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 CLOSED_GAP = math.radians(1.0)
 """[rad] of the momentum, from which on a result says what closes it."""
+DEGREE_DIGITS = 6
+"""After the point of an angle in degrees, or fewer: no more than its error leaves."""
+RADIAN_DIGITS = 9
+"""The same of one in radians."""
 # Digits after the point of an axis.
 _AXIS_DIGITS = 6
 # [rad] A smaller turn has no axis worth showing.
@@ -26,12 +30,13 @@ _WIDTH = 88
 _ROW = "{:24}{:16.6f}{:16.6f}{:16.6f}"
 
 
-def split_lines(result: PhaseSplit, heading: str = "") -> list[str]:
-    """The table of a split; angles in degrees first, then in radians.
+def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> list[str]:
+    """The table of a split; angles in degrees first, then in radians, with no more digits than their errors leave.
 
     Parameters
     ----------
     heading : the first line; without it what moved, for how long, with which momentum
+    shape_gap : how far the shape is from its start in the end, with a unit; without it the number alone
     """
     about = result.about
     if about.momentum.ndim > 1:
@@ -59,15 +64,16 @@ def split_lines(result: PhaseSplit, heading: str = "") -> list[str]:
             *closing,
             rotation_line("tilt", result.tilt, errors.tilt),
             _phase_line("momentum gap", result.momentum_gap, errors.momentum_gap),
-            f"{'residual':24}{result.residual:16.2e} rad   (phase by formula against attitude)",
+            f"{'residual':24}{result.residual:16.2e} rad   (the phase by its formula, less that of the attitude)",
         ]
     else:
         lines.append("no angular momentum: the shape alone turns the body, there is no Montgomery phase")
     if not result.is_loop:
-        lines.append(f"{'shape gap':24}{result.shape_gap:16.6g}       (the shape does not return: no holonomy)")
+        gap = shape_gap or f"{result.shape_gap:.6g}, of the joint that ends farthest off (rad or m)"
+        lines.append(f"{'shape gap':24}{gap}: the shape does not return, there is no holonomy")
     lines += [
         f"{'error estimate':24}{about.error_estimate:16.2e} rad   (of the attitude, at all times)",
-        f"{'evaluations':24}{about.evaluations:16d}",
+        f"{'evaluations':24}{about.evaluations:16d}       (of the body, each at one time)",
     ]
     said = closing_text(result)
     return [*lines, *(["", *textwrap.wrap(said, _WIDTH)] if said else [])]
@@ -94,6 +100,22 @@ def degrees_text(angle: float, *, sign: bool = False) -> str:
     return f"{math.degrees(angle):{'+' if sign else ''}.4f} deg ({angle:{'+' if sign else ''}.6f} rad)"
 
 
+def digits_left(error: float, most: int) -> int:
+    """Digits after the point that an error leaves to a number, `most` at most: the last is below its half.
+
+    Of an error of 3e-4 there are four, and none of one above one.
+    """
+    if not error > 0.0:
+        return most
+    return int(np.clip(1 - math.ceil(math.log10(error)), 0, most)) if math.isfinite(error) else 0
+
+
+def _aligned(value: float, error: float, most: int) -> str:
+    """A number with the digits that its error leaves, and spaces instead of the others."""
+    digits = digits_left(error, most)
+    return f"{value:.{digits}f}" + " " * (most - digits + (digits == 0))
+
+
 def rotation_line(name: str, rotation: Array, error: Array | None = None) -> str:
     """Angle and axis of a rotation, with the angle by which it may be off [rad] where that is known.
 
@@ -108,11 +130,13 @@ def rotation_line(name: str, rotation: Array, error: Array | None = None) -> str
     axis = ""
     if turn >= _NO_TURN and digits:
         axis = "   (" + " ".join(f"{v + 0.0:9.{digits}f}" for v in np.round(vector / turn, digits)) + ")"
-    return f"{name:24} {np.degrees(turn):15.6f}{column}{axis}"
+    angle = _aligned(math.degrees(turn), 0.0 if error is None else math.degrees(float(error)), DEGREE_DIGITS)
+    return f"{name:24}{angle:>16}{column}{axis}"
 
 
 def _phase_line(name: str, phase: Array, error: Array) -> str:
-    return f"{name:24}{np.degrees(phase):16.6f}{float(error):11.1e}{phase:20.9f}"
+    in_degrees = _aligned(math.degrees(phase), math.degrees(float(error)), DEGREE_DIGITS)
+    return f"{name:24}{in_degrees:>16}{float(error):11.1e}{_aligned(float(phase), float(error), RADIAN_DIGITS):>20}"
 
 
 def _batch_lines(result: PhaseSplit, heading: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..phases.phases import PhaseSplit
+from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
 from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
@@ -27,8 +28,6 @@ CONVENTIONS = (
 _NO_TURN = 1e-12
 # [rad or m] A limit beyond this is none: some models write the largest number there is.
 _NO_LIMIT = 1e6
-# [rad] One degree: a smaller gap of the momentum is not worth a sentence.
-_GAP = np.pi / 180.0
 
 Row = tuple[str, str, str]
 
@@ -62,13 +61,24 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
         "direction went round (the geometric phase)."
     )
     gap = float(result.momentum_gap)
-    if gap > _GAP:
+    if gap > CLOSED_GAP:
         closing = f"{np.degrees(float(result.closing_phase)):.2f}°"
         words.append(
             f"There the momentum's direction ended {np.degrees(gap):.2f}° from where it began. The great circle back "
             f"to the start closes its curve, and adds {closing} of the geometric phase; beside the phase, the body is "
             f"tilted by {_turn(result.tilt)}."
         )
+    return words
+
+
+def accuracy(motion: Motion, error_bars: Sequence[str]) -> str:
+    """How far all that may be off, in sentences."""
+    words = (
+        f"As computed, the attitude is off by {float(motion.error_estimate):.1e} rad at most, at all times: an "
+        "estimate, not a bound."
+    )
+    if error_bars:
+        words += " What the inputs leave open is far more, and stands under error bars."
     return words
 
 
@@ -83,16 +93,16 @@ def split_rows(result: PhaseSplit) -> list[Row]:
     if not result.has_phase:
         words = "none: there is no angular momentum, the body turns by its shape alone"
         return [*rows, ("Montgomery phase", "", words)]
-    area = float(result.solid_angle)
+    area = f"{float(result.solid_angle):.{digits_left(float(errors.geometric_phase), RADIAN_DIGITS)}f}"
     closing = []
-    if float(result.momentum_gap) > _GAP:
+    if float(result.momentum_gap) > CLOSED_GAP:
         remark = "of the geometric phase, by the great circle that closes the momentum's curve"
         closing.append(_phase("Closing arc", result.closing_phase, errors.closing_phase, remark))
     return [
         *rows,
         _phase("Montgomery phase", result.montgomery_phase, errors.montgomery_phase, f"{result.gauge} gauge"),
         _phase("Dynamic phase", result.dynamic_phase, errors.dynamic_phase, ""),
-        _phase("Geometric phase", result.geometric_phase, errors.geometric_phase, f"solid angle {area:.9f} sr"),
+        _phase("Geometric phase", result.geometric_phase, errors.geometric_phase, f"solid angle {area} sr"),
         *closing,
         _rotation("Tilt", result.tilt, errors.tilt),
         _phase("Momentum gap", result.momentum_gap, errors.momentum_gap, "between its directions at start and end"),
@@ -145,8 +155,10 @@ def input_rows(motion: Motion, gauge: str, body: Body | None) -> list[Row]:
 def _origin_rows(made_from: Mapping[str, Any]) -> list[Row]:
     """The joints, the recording and what was done to it, and when, how and by what all was computed."""
     found = provenance()
+    record = dict(made_from.get("recording", {}))
     rows = [("Joints", "", ", ".join(made_from.get("joints", ())))] if made_from.get("joints") else []
-    for name, value in made_from.get("recording", {}).items():
+    rows += [("File, joints", "", str(record.pop("file")))] if "file" in record else []
+    for name, value in record.items():
         if value not in (None, {}, []):
             rows.append((f"Recording, {name.replace('_', ' ')}", "", _plain_text(value)))
     versions = ", ".join(f"{name} {number}" for name, number in found["versions"].items())
@@ -177,12 +189,21 @@ def _rotation(name: str, rotation: Array, error: Array) -> Row:
     axis = ""
     if angle >= _NO_TURN:
         axis = "about (" + ", ".join(f"{x:.6f}" for x in np.round(vector / angle, 6) + 0.0) + ")"
-    return name, f"{np.degrees(angle):.6f}°", f"{angle:.9f} ± {float(error):.1e} rad {axis}".strip()
+    degrees, radians = _with_error(angle, error)
+    return name, degrees, f"{radians} {axis}".strip()
 
 
 def _phase(name: str, phase: Array, error: Array, remark: str) -> Row:
-    radians = f"{float(phase):.9f} ± {float(error):.1e} rad"
-    return name, f"{float(np.degrees(phase)):.6f}°", f"{radians}; {remark}" if remark else radians
+    degrees, radians = _with_error(float(phase), error)
+    return name, degrees, f"{radians}; {remark}" if remark else radians
+
+
+def _with_error(angle: float, error: Array) -> tuple[str, str]:
+    """An angle in degrees, and in radians with its error; with the digits that this leaves."""
+    off = float(error)
+    in_degrees = digits_left(float(np.degrees(off)), DEGREE_DIGITS)
+    in_radians = digits_left(off, RADIAN_DIGITS)
+    return f"{np.degrees(angle):.{in_degrees}f}°", f"{angle:.{in_radians}f} ± {off:.1e} rad"
 
 
 def _amount(value: float, unit: str) -> str:

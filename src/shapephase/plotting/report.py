@@ -6,13 +6,13 @@ import base64
 import os
 from collections.abc import Callable, Sequence
 
-from ..arguments import check_object
+from ..arguments import check_file_name, check_object
 from ..files import write_whole
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._letters import printable
-from ._report_text import CONVENTIONS, input_rows, joint_rows, lead, part_rows, split_rows, story
+from ._report_text import CONVENTIONS, accuracy, input_rows, joint_rows, lead, part_rows, split_rows, story
 from .named_figures import FIGURES, figure_image
 from .pages.report_data import report_data
 from .pages.templates import SCENE_SCRIPTS, page_html
@@ -29,6 +29,7 @@ def write_report(
     trail: str | None = None,
     up: str | None = None,
     error_bars: Sequence[str] = (),
+    recording: Sequence[str] = (),
     begin: Callable[[str], object] = lambda _: None,
 ) -> None:
     """Write a motion and its split as one HTML file that opens offline; whole or not at all.
@@ -45,6 +46,7 @@ def write_report(
     trail : a link whose origin leaves a trail in the animation
     up : as in `motion_page`
     error_bars : lines about how far the numbers may be off by what the inputs leave open, as `split` prints them
+    recording : lines about what was read of a recording and done to it, as `split` prints them
     begin : called with a few words before each longer step
 
     Raises
@@ -64,6 +66,9 @@ def write_report(
     """
     check_object(motion, "Motion", "motion")
     check_object(result, "PhaseSplit", "result")
+    check_file_name(path, "path")
+    if shape_path is not None:
+        check_object(shape_path, "ShapePath", "shape_path")
     begin("recording the animation")
     scene, data = scene_and_data(motion, speed=None, frames=None, trail=trail, ghost=True, up=up, fall={})
     beside = report_data(motion, scene.times, result.gauge, scene.body, scene.shapes)
@@ -81,11 +86,12 @@ def write_report(
         styles=("page", "report_page"),
         data={"motion": data, **beside},
         lead=lead(motion),
-        story=story(motion, result, scene.body),
+        story=[*story(motion, result, scene.body), accuracy(motion, error_bars)],
         gauge=result.gauge,
         with_sphere=bool(result.has_phase),
         split_rows=split_rows(result),
         error_bars=[line for line in error_bars if line],
+        recording=[line for line in recording if line],
         figures=figures,
         joints=joint_rows(scene.body, shape_path) if scene.body is not None and shape_path is not None else (),
         parts=part_rows(scene.body) if scene.body is not None else (),
