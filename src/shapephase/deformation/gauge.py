@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object
 from ..arrays import Array
+from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import SteppedRotation, stepped_rotation
@@ -30,6 +31,7 @@ from .frames import (
     Frames,
     GivenFrames,
     frames_argument,
+    gauge_link,
     integrated_frames,
     link_frames,
     mean_body_frames,
@@ -170,6 +172,7 @@ def named_gauge(deformation: Deformation, name: str) -> Deformation:
     0.000000000
     """
     check_object(deformation, "Deformation", "deformation")
+    gauge_link(name)
     if name == "base":
         return deformation
     if name == "horizontal":
@@ -203,6 +206,8 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
 class _HorizontalFrames:
     description: Description
     lift: SteppedRotation
+
+    __repr__ = short_repr
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         inertia, momentum = self.description.sample(times)
@@ -263,6 +268,8 @@ class _Gauged:
     frames: Frames
     turning: GivenFrames | None
     breaks: Array
+
+    __repr__ = short_repr
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         inertia, momentum = self.original.sample(times)
