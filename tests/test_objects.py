@@ -29,7 +29,7 @@ MOMENTUM = (0.01, 0.02, 0.03)
 INNER = ("deformation.frames", "shape_space.body_path", "plotting.plot_style", "optimal_control.task",
          "optimal_control.symbolic", "body.appearance", "examples.slow_deformation.first_loop",
          "shape_space.connection.connection_slopes", "plotting.pages", "shape_space.path_samples",
-         "phases.split_text", "body.engines")  # fmt: skip
+         "phases.split_text", "body.engines", "shape_space.unit_doubts")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Collection, Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +20,7 @@ from .errors import (
     unknown_name,
 )
 from .inertia_tensor import inverse_inertia
+from .letters import article, what_came
 
 TIGHTEST_TOLERANCE = 1e-13
 """[rad]; a few hundred roundings, below which no attitude of many steps can be promised."""
@@ -69,6 +72,15 @@ _WAYS = {
         "PosixPath": "read it with load_motion(file)",
     },
     "PhaseSplit": {"": "make it with split(motion)", "Motion": "make it with split(motion)"},
+    "EnergyBounds": {"": "make it with bounds.energy_bounds(deformation, momentum)"},
+    "RegimeCertificate": {"": "make it with bounds.regime_certificate(deformation, momentum)"},
+    "KeplerOrbit": {"": "make it with bounds.KeplerOrbit.from_state(...) or from_elements(...)"},
+    "FixedPoints": {"": "make it with fixed_points(deformation, magnitude)"},
+    "CrownRegion": {"": "make it with bounds.crown_region(deformation, momentum)"},
+    "EulerTop": {"": "make it with EulerTop(inertia, momentum)"},
+    "Extremal": {"": "make it with optimal_control.extremal(...)"},
+    "SurfaceOfRevolution": {"": "make it with geodesics.spheroid(...) or surface_of_metric(...)"},
+    "InertiaErrors": {"": "make it with InertiaErrors(masses=0.05), for example"},
 }
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
@@ -79,13 +91,64 @@ def check_object(value: object, kind: str, name: str) -> None:
     if any(parent.__name__ == kind for parent in type(value).__mro__):
         return
     came = type(value).__name__
-    given = f"the class {value.__name__} itself" if isinstance(value, type) else f"{_article(came)} {came}"
-    ways = _WAYS[kind]
-    raise WrongObjectError(f"{name}: {_article(kind)} {kind} is needed, got {given}; {ways.get(came, ways[''])}")
+    shown = what_came(value) if isinstance(value, type) else f"{article(came)} {came}"
+    ways = _WAYS.get(kind, {"": f"make it with {kind}(...)"})
+    raise WrongObjectError(f"{name}: {article(kind)} {kind} is needed, got {shown}; {ways.get(came, ways[''])}")
 
 
-def _article(name: str) -> str:
-    return "an" if name[:1].lower() in "aeiou" else "a"
+def check_function(value: object, name: str, what: str) -> None:
+    """Raise WrongObjectError where an argument cannot be called; `what` says in words what is needed."""
+    if not callable(value) or isinstance(value, type):
+        raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
+
+
+def check_choice(value: object, kind: str, choices: Collection[str]) -> None:
+    """Raise UnknownNameError where an argument is none of some words; `kind` says of what."""
+    if not isinstance(value, str) or value not in choices:
+        # Whatever came is shown, and whatever it is.
+        raise unknown_name(kind, value, choices)  # type: ignore[arg-type]
+
+
+def check_flag(value: object, name: str, *, allow_none: bool = False) -> None:
+    """Raise ShapeError where an argument is not True or False (or None, where that is allowed)."""
+    if not isinstance(value, bool | np.bool_) and not (allow_none and value is None):
+        choices = "True, False or None" if allow_none else "True or False"
+        raise ShapeError(f"{name}: {choices} is needed, got {what_came(value)}")
+
+
+def check_pair(value: object, name: str, what: str) -> None:
+    """Raise ShapeError where an argument is no two things; `what` says in words which."""
+    if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
+        raise ShapeError(f"{name}: {what} are needed, got {what_came(value)}")
+
+
+def check_file_name(value: object, name: str) -> None:
+    """Raise WrongObjectError where an argument is no name of a file."""
+    if not isinstance(value, str | os.PathLike):
+        raise WrongObjectError(f"{name}: the name of a file is needed, got {what_came(value)}")
+
+
+def names_argument(value: object, name: str, what: str) -> tuple[str, ...]:
+    """A user's names, as a tuple. Raises ShapeError for one text alone, and for what holds no texts."""
+    names = None if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
+    if names is None or not all(isinstance(one, str) for one in names):
+        raise ShapeError(f"{name}: {what} are needed, got {what_came(value)}")
+    return names
+
+
+def whole_argument(value: object, name: str, least: int) -> int:
+    """A whole number of a user, `least` or more. Raises ShapeError."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {what_came(value)}")
+    return int(value)
+
+
+def number_argument(value: ArrayLike, name: str, unit: str = "") -> float:
+    """One finite number of a user. Raises ShapeError."""
+    number = finite_array(value, name, unit=unit)
+    if number.ndim:
+        raise ShapeError(f"{name}: one number{f' [{unit}]' if unit else ''} is needed, got shape {number.shape}")
+    return float(number)
 
 
 def times_argument(t: ArrayLike, duration: float) -> Array:
@@ -104,7 +167,7 @@ def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
     if inner.ndim != 1:
         raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
     if np.any((inner < 0.0) | (inner > duration)):
-        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {inner}")
+        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {what_came(inner)}")
     return np.unique(np.concatenate([[0.0], inner, [duration]]))
 
 
@@ -112,9 +175,11 @@ def positive_argument(value: float, name: str = "duration", unit: str = "a time 
     """A user's number, checked to be above 0 and no size that overflows. Raises TrajectoryError, ShapeError."""
     number = finite_array(value, name)
     if number.ndim or number <= 0.0:
-        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value!r}")
+        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {what_came(value)}")
     if not LEAST_SIZE <= number <= LARGEST_SIZE:
-        raise TrajectoryError(f"{name}: {unit} from {LEAST_SIZE:g} to {LARGEST_SIZE:g} is needed, got {value!r}")
+        raise TrajectoryError(
+            f"{name}: {unit} from {LEAST_SIZE:g} to {LARGEST_SIZE:g} is needed, got {what_came(value)}"
+        )
     return float(number)
 
 
@@ -135,7 +200,8 @@ def tolerance_argument(tolerance: float) -> float:
     goal = finite_array(tolerance, "tolerance", unit="rad")
     if goal.ndim or not TIGHTEST_TOLERANCE <= goal <= LOOSEST_TOLERANCE:
         raise ShapeError(
-            f"tolerance: a number from {TIGHTEST_TOLERANCE:g} to {LOOSEST_TOLERANCE:g} rad is needed, got {tolerance!r}"
+            f"tolerance: a number from {TIGHTEST_TOLERANCE:g} to {LOOSEST_TOLERANCE:g} rad is needed, got "
+            f"{what_came(tolerance)}"
         )
     return float(goal)
 
@@ -163,7 +229,7 @@ def threads_argument(threads: int | None) -> int | None:
     if threads is None:
         return None
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
-        raise ShapeError(f"threads: a whole number above 0 or None is needed, got {threads!r}")
+        raise ShapeError(f"threads: a whole number above 0 or None is needed, got {what_came(threads)}")
     return int(threads)
 
 
@@ -190,7 +256,8 @@ def moments_argument(moments: ArrayLike) -> Array:
         raise ShapeError(f"moments: expected three principal moments (3,), got {values.shape}")
     if not values.min() > _LEAST_MOMENT_RATIO * values.max():
         raise ShapeError(
-            f"moments: three positive principal moments, the least above 1e-12 of the largest, are needed; got {values}"
+            "moments: three positive principal moments, the least above 1e-12 of the largest, are needed; got "
+            f"{what_came(values)}"
         )
     return values.copy()
 
@@ -212,8 +279,7 @@ def inverse_inertia_argument(inertia: ArrayLike) -> Array:
 
 def on_unphysical_argument(value: str) -> str:
     """One of "allow", "warn" and "error". Raises UnknownNameError."""
-    if value not in ON_UNPHYSICAL:
-        raise unknown_name("value of on_unphysical", value, ON_UNPHYSICAL)
+    check_choice(value, "value of on_unphysical", ON_UNPHYSICAL)
     return value
 
 
@@ -222,7 +288,7 @@ def magnitude_argument(magnitude: float, *, allow_zero: bool = False) -> float:
     number = finite_array(magnitude, "magnitude", unit="kg m^2/s")
     if number.ndim or number < 0.0 or (number == 0.0 and not allow_zero):
         allowed = "0 or more" if allow_zero else "above 0"
-        raise ShapeError(f"magnitude: a number {allowed} kg m^2/s is needed, got {magnitude!r}")
+        raise ShapeError(f"magnitude: a number {allowed} kg m^2/s is needed, got {what_came(magnitude)}")
     return float(number)
 
 
@@ -232,7 +298,8 @@ def magnitudes_argument(magnitudes: ArrayLike) -> Array:
     steps = np.diff(values)
     if values.ndim != 1 or not len(values) or values.min() < 0.0 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ShapeError(
-            f"magnitudes: numbers of 0 or more kg m^2/s, all growing or all falling, are needed, got {magnitudes!r}"
+            "magnitudes: numbers of 0 or more kg m^2/s, all growing or all falling, are needed, got "
+            f"{what_came(magnitudes)}"
         )
     return values
 
@@ -291,7 +358,7 @@ def interval_argument(interval: tuple[float, float] | None, duration: float) -> 
     try:
         start, end = (float(time) for time in interval)
     except (TypeError, ValueError):
-        raise ShapeError(f"interval: two times, start and end [s], are needed, got {interval!r}") from None
+        raise ShapeError(f"interval: two times, start and end [s], are needed, got {what_came(interval)}") from None
     if not 0.0 <= start < end <= duration * (1.0 + 1e-12):
         raise ShapeError(f"interval: 0 <= start < end <= {duration:.9g} s is needed, got ({start:.9g}, {end:.9g})")
     return start, min(end, duration)

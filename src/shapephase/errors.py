@@ -10,6 +10,8 @@ import difflib
 from collections.abc import Iterable
 from pickle import PicklingError
 
+from .letters import what_came
+
 
 class ShapePhaseError(Exception):
     """Root of every error raised on purpose by this library.
@@ -514,7 +516,8 @@ def unknown_name(
     unknown gauge 'bass'. Did you mean 'base'? Valid: base, principal
     """
     choices = [str(v) for v in valid]
-    near = difflib.get_close_matches(str(name), choices, n=1)
+    near = difflib.get_close_matches(name, choices, n=1) if isinstance(name, str) else []
     hint = f" Did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(choices) if choices else "none"
-    return error(f"unknown {kind} {name!r}.{hint} Valid: {listed}")
+    shown = repr(name) if isinstance(name, str) else f"(a name is needed): {what_came(name)}"
+    return error(f"unknown {kind} {shown}.{hint} Valid: {listed}")

@@ -13,7 +13,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import RunStopped
+from .errors import RunStopped, WrongObjectError
+from .letters import what_came
 
 LOOKING = "looking at the path"
 SAMPLING = "sampling the body"
@@ -93,6 +94,8 @@ def watched(callback: Callable[[RunProgress], Any] | None) -> Iterator[None]:
     if callback is None:
         yield
         return
+    if not callable(callback) or isinstance(callback, type):
+        raise WrongObjectError(f"progress: a function of a RunProgress is needed, got {what_came(callback)}")
     watcher = _Watcher(callback)
     token = _WATCHER.set(watcher)
     try:

@@ -177,7 +177,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     UnphysicalInertiaError
         For what is not finite, a negative mass, or (unless `on_unphysical` is "warn") a negative moment.
     """
-    if on_unphysical not in ("error", "warn"):
+    if not isinstance(on_unphysical, str) or on_unphysical not in ("error", "warn"):
         raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
     links = list(links)
     for link in links:

@@ -14,6 +14,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ..arguments import check_object, number_argument
 from ..arrays import Array, Integers
 from ..display import short_repr
 from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
@@ -121,6 +122,7 @@ def visuals(body: Body) -> tuple[Visual, ...]:
     >>> len(sp.body.visuals(cat)), sp.body.visuals(cat)[0].kind
     (3, 'cylinder')
     """
+    check_object(body, "Body", "body")
     found, doubts = drawn_shapes(body)
     shown = {shape.link for shape in found}
     boxes = [_part_box(part) for part in body.moving_parts if part.mass > 0.0 and shown.isdisjoint(part.links)]
@@ -166,6 +168,7 @@ def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
     >>> print(size.round(6))  # 12 (4 + 1)/12 and so on
     [1.       1.414214 1.732051]
     """
+    mass = number_argument(mass, "mass", "kg")
     moments, axes = principal_axes(second_moment(inertia))
     return np.sqrt(12.0 * np.maximum(moments, 0.0) / mass), axes
 

@@ -19,6 +19,7 @@ from ..arrays import Array, check_reach, common_batch, finite_array
 from ..display import card_html
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
+from ..letters import what_came
 from ._card import body_card
 from ._changed_body import changed_body
 from ._given_inertias import Given, given_inertias
@@ -115,7 +116,7 @@ class Body:
             If a name is not one of `joint_names`.
         """
         if joints is not None and not isinstance(joints, Mapping):
-            raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {joints!r}")
+            raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {what_came(joints)}")
         shape = np.zeros(self.n_shape)
         for name, value in (joints or {}).items():
             coordinate = finite_array(value, f"joint {name}")
@@ -393,7 +394,7 @@ class Body:
         return whole[:, :, :3], whole[:, :, 3:], slope[:, :, :3], slope[:, :, 3:]
 
     def _link_frame(self, link: str) -> int:
-        if link not in self.link_names:
+        if not isinstance(link, str) or link not in self.link_names:
             raise unknown_name(f"link of {self.name}", link, self.link_names)
         return self._model.getFrameId(link, pin.FrameType.BODY)
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..arguments import check_flag
 from ..child_process import limit_this_process, run_alone
 from ..errors import (
     IgnoredElementWarning,
@@ -76,7 +77,8 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     >>> cat.name, round(cat.mass, 6), cat.n_shape
     ('cat', 4.0, 23)
     """
-    if on_unphysical not in ("error", "warn"):
+    check_flag(isolate, "isolate")
+    if not isinstance(on_unphysical, str) or on_unphysical not in ("error", "warn"):
         raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
     if isinstance(source, str | os.PathLike):
         path, installed = _path_of(os.fspath(source))

@@ -10,6 +10,8 @@ from typing import overload
 import numpy as np
 
 from ..arrays import Array, Integers, lock_arrays, read_only
+from ..errors import ShapeError
+from ..letters import what_came
 from ._changed_body import changed_body
 from .body import Body
 from .inertial_regressor import inertial_regressor
@@ -64,6 +66,8 @@ class BodyFamily(Sequence[Body]):
         """One of the bodies, made when it is asked for, or a family of those of a slice."""
         if isinstance(index, slice):
             return self.some(index)
+        if not isinstance(index, int | np.integer):
+            raise ShapeError(f"a body of a family is family[0], family[1] ..., got family[{what_came(index)}]")
         return changed_body(self.body, self.masses[index], self.centres[index], self.tensors[index])
 
     def some(self, rows: slice | Integers) -> BodyFamily:

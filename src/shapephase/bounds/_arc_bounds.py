@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
+from ..letters import what_came
 from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound
 from .regimes import Regime, RegimeCertificate
@@ -115,6 +117,7 @@ def arc_length_bounds(bounds: EnergyBounds) -> ArcLengthBounds:
     >>> found.by_energy <= found.by_drift <= found.general
     True
     """
+    check_object(bounds, "EnergyBounds", "bounds")
     known, magnitude = bounds.enclosure, bounds.magnitude
     low, high = bounds.quotients
     bottom, top = known.eigenvalues
@@ -159,8 +162,8 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
     0.750000 rad/s
     """
     values, pi = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
-    if isinstance(axis, bool) or axis not in (0, 1, 2):
-        raise ShapeError(f"axis: 0, 1 or 2 is needed, got {axis!r}")
+    if isinstance(axis, bool) or not isinstance(axis, int | np.integer) or axis not in (0, 1, 2):
+        raise ShapeError(f"axis: 0, 1 or 2 is needed, got {what_came(axis)}")
     if np.any(values <= 0.0):
         raise ShapeError(f"moments: all must be above 0 [kg m^2], got {values.min():.6g}")
     second, third = (axis + 1) % 3, (axis + 2) % 3
@@ -193,6 +196,7 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     >>> sp.bounds.azimuth_bounds(certificate).monotone
     True
     """
+    check_object(certificate, "RegimeCertificate", "certificate")
     if not certificate.certain:
         raise ShapeError(f"certificate: a certain axis is needed, but {certificate.why}")
     bounds, axis = certificate.bounds, certificate.axis
@@ -230,6 +234,7 @@ def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
     >>> print(f"{found.by_latitude:.4f}, {found.by_inertia:.4f}, {found.by_azimuth:.4f} <= {top.period:.4f} s")
     0.3469, 4.1629, 4.1749 <= 7.2522 s
     """
+    check_object(certificate, "RegimeCertificate", "certificate")
     known = certificate.bounds.enclosure
     azimuth = azimuth_bounds(certificate) if certificate.certain else None
     # Where the azimuth may stop or turn back, Pi may be back at its start without having gone round the axis.

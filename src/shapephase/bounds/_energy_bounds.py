@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import body_momentum_argument
+from ..arguments import body_momentum_argument, check_object, number_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
@@ -121,6 +121,8 @@ def energy_bounds(
     >>> print(f"{found.lower.min():.6f} to {found.upper.max():.6f} J")
     0.500000 to 0.500000 J
     """
+    check_object(deformation, "Deformation", "deformation")
+    resolution = number_argument(resolution, "resolution")
     body = body_momentum_argument(momentum, attitude)
     magnitude = float(np.linalg.norm(body))
     known = enclosure(deformation, interval, magnitude=magnitude, resolution=resolution)

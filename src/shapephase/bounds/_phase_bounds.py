@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..arguments import check_object
 from ..display import short_repr
 from ..errors import ShapeError
 from ._arc_bounds import azimuth_bounds
@@ -66,6 +67,7 @@ def dynamic_phase_bounds(bounds: EnergyBounds) -> PhaseBounds:
     >>> print(f"{phase.lower:.6f} to {phase.upper:.6f} rad")  # 2 E t/l = 1.5
     1.500000 to 1.500000 rad
     """
+    check_object(bounds, "EnergyBounds", "bounds")
     if not bounds.magnitude:
         return PhaseBounds(lower=0.0, upper=0.0)
     known = bounds.enclosure
@@ -88,6 +90,7 @@ def dynamic_phase_bounds_by_extremes(bounds: EnergyBounds) -> PhaseBounds:
     >>> print(f"{phase.lower:.6f} to {phase.upper:.6f} rad")
     1.500000 to 1.500000 rad
     """
+    check_object(bounds, "EnergyBounds", "bounds")
     if not bounds.magnitude:
         return PhaseBounds(lower=0.0, upper=0.0)
     known = bounds.enclosure
@@ -140,6 +143,7 @@ def loop_phase_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     >>> phase.lower <= top.montgomery_phase <= phase.upper
     True
     """
+    check_object(certificate, "RegimeCertificate", "certificate")
     dynamic, area = dynamic_phase_bounds(certificate.bounds), solid_angle_bounds(certificate)
     return PhaseBounds(lower=dynamic.lower - area.upper, upper=dynamic.upper - area.lower)
 

@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, times_argument
+from ..arguments import check_object, number_argument, times_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
 
@@ -184,7 +185,7 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
     1.0
     """
     check_object(deformation, "Deformation", "deformation")
-    norm = float(finite_array(magnitude, "magnitude"))
+    norm = number_argument(magnitude, "magnitude")
     times = times_argument(t, deformation.duration)
     middle = np.linalg.eigvalsh(deformation.inertia(times))[..., 1]
     return np.asarray(0.5 * norm * norm / middle, dtype=np.float64)[()]
@@ -211,8 +212,8 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     """
     check_object(deformation, "Deformation", "deformation")
     if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:
-        raise ShapeError(f"count: a whole number of 2 or more is needed, got {count!r}")
-    inertia = deformation.inertia(float(finite_array(t, "t", unit="s")))
+        raise ShapeError(f"count: a whole number of 2 or more is needed, got {what_came(count)}")
+    inertia = deformation.inertia(number_argument(t, "t", "s"))
     top = EulerTop(inertia, momentum)
     orbit = top.orbit
     directions = np.broadcast_to(orbit.direction, (count, 3))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, positive_argument, vector_argument
+from ..arguments import check_object, number_argument, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
@@ -268,7 +268,7 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     1.000000000000
     """
     mean = finite_array(mean_anomaly, "mean_anomaly", unit="rad")
-    e = float(finite_array(eccentricity, "eccentricity"))
+    e = number_argument(eccentricity, "eccentricity")
     if e < 0.0:
         raise ShapeError(f"eccentricity: 0 or more is needed, got {e}")
     _refuse_parabola(1.0 - e)
@@ -371,6 +371,7 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
     1.8e-06 N m
     """
     check_object(motion, "Motion", "motion")
+    check_object(orbit, "KeplerOrbit", "orbit")
     if motion.batch:
         raise ShapeError(f"one motion is needed, this is a batch of {motion.batch}; reconstruct one of them")
     allowed = motion.tolerance if tolerance is None else positive_argument(tolerance, "tolerance", "an angle in rad")

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object, on_unphysical_argument, positive_argument, vector_argument
 from ..arrays import Array, finite_array
-from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError
+from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError, WrongObjectError
 from ..inertia_tensor import second_moment
+from ..letters import what_came
 from ..shape_space.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
 from ..shape_space.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
@@ -296,6 +297,11 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     >>> print(whole.inertia([0.0, 2.0])[:, 2, 2])  # reduced mass of 75 kg at 2 m: 300 more
     [500. 800.]
     """
+    check_object(spacecraft, "RigidPart", "spacecraft")
+    if not isinstance(parts, Sequence) or not all(hasattr(part, "path") and hasattr(part, "mass") for part in parts):
+        raise WrongObjectError(
+            f"parts: several by moving_mass, boom or rigid_part are needed in a list, got {what_came(parts)}"
+        )
     everything = (spacecraft, *parts)
     paths = [part.path for part in everything if part.path is not None]
     lengths = [path.duration for path in paths] + ([] if duration is None else [positive_argument(duration)])

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import (
     breaks_argument,
+    check_function,
     check_object,
     inertia_argument,
     on_unphysical_argument,
@@ -26,10 +27,12 @@ from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.sampling import Sampler, Samplers
+from ..letters import what_came
 from ..shape_space.body_path import path_gap
 from ..shape_space.family_variants import FamilyVariants
 from ..shape_space.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
+from ..shape_space.unit_doubts import followed_by
 from ._card import deformation_card
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from .descriptions import (
@@ -275,6 +278,11 @@ def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | Defor
     UnknownNameError, TrajectoryError
         If the path has other joints than the body.
 
+    Warns
+    -----
+    TrajectoryWarning
+        Where the angles of the path look like degrees, by the limits of the joints.
+
     Examples
     --------
     >>> cat = sp.load_body("cat_two_halves")
@@ -284,10 +292,10 @@ def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | Defor
     """
     if isinstance(body, BodyFamily):
         check_object(path, "ShapePath", "path")
-        return DeformationFamily(body, path.matched(body.body.joint_names, body.body.name))
+        return DeformationFamily(body, followed_by(body.body, path))
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    route = path.matched(body.joint_names, body.name)
+    route = followed_by(body, path)
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
     description = ArticulatedDescription(body, route)
@@ -366,6 +374,9 @@ def prescribed(
     >>> print(f"{sp.so3.angle(motion.final_attitude):.9f} = log 2")
     0.693147181 = log 2
     """
+    check_function(inertia, "inertia", "a function of times that gives inertia tensors")
+    if internal_momentum is not None:
+        check_function(internal_momentum, "internal_momentum", "a function of times that gives angular momenta")
     length = positive_argument(duration)
     edges = breaks_argument(breaks, length)
     description = PrescribedDescription(inertia, internal_momentum, edges)
@@ -421,7 +432,7 @@ def particles(
     """
     weights = finite_array(masses, "masses", (None,), unit="kg").copy()
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
-        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {weights}")
+        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {what_came(weights)}")
     if callable(positions):
         if duration is None:
             raise ShapeError("positions given by a function need a duration [s]")
@@ -432,7 +443,7 @@ def particles(
         path = _sampled_positions(positions, weights)
         length = path.duration
         if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
-            raise ShapeError(f"duration: the samples last {length:.9g} s, got {duration!r}; leave it out")
+            raise ShapeError(f"duration: the samples last {length:.9g} s, got {what_came(duration)}; leave it out")
         edges = np.union1d(path.breaks, breaks_argument(breaks, length))
         description = ParticleDescription(weights, ParticlePath(path), edges, path.oscillations)
     ends, _ = description.centred(np.array([0.0, length]))
@@ -450,7 +461,10 @@ def particles(
 def _sampled_positions(samples: tuple[ArrayLike, ArrayLike], masses: Array) -> ShapePath:
     """The spline through samples, each first moved to its centre of mass, which a spline lets through."""
     if not isinstance(samples, tuple | list) or len(samples) != 2:
-        raise ShapeError("positions: a function of times, or the pair times (K,), positions (K, m, 3) is needed")
+        raise ShapeError(
+            "positions: a function of times, or the pair times (K,), positions (K, m, 3) is needed, got "
+            f"{what_came(samples)}"
+        )
     points = finite_array(samples[1], "positions", (None, len(masses), 3), unit="m")
     if points.ndim != 3:
         raise ShapeError(f"positions: samples (K, {len(masses)}, 3) are needed, got {points.shape}")

@@ -22,6 +22,7 @@ from ..integrator.integrate import stepped_rotation
 from ..integrator.resolved import DEGREE
 from ..integrator.sampling import sampler
 from ..integrator.stepped import SteppedRotation
+from ..letters import what_came
 from ..shape_space.function_scan import ScannedFunction
 from ..shape_space.scanning import scanned
 from ._principal_frame import Frames, principal_frames
@@ -78,8 +79,8 @@ class GivenFrames:
 
 def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> GivenFrames:
     """A user's U(t) with its rates, differentiated where it comes without. Raises as `in_gauge`."""
-    if not callable(u):
-        raise ShapeError(f"a gauge u is a function of times, got {u!r}")
+    if not callable(u) or isinstance(u, type):
+        raise ShapeError(f"a gauge u is a function of times, got {what_came(u)}")
     if _turns_of(u, breaks[:1])[1] is None:
         return _differentiated(u, breaks)
     frames = _TurnsWithRates(u)
@@ -197,7 +198,7 @@ def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
 def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> GivenFrames:
     """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises as `in_gauge`."""
     if not callable(rates):
-        raise ShapeError(f"the body rates of a gauge are a function of times, got {rates!r}")
+        raise ShapeError(f"the body rates of a gauge are a function of times, got {what_came(rates)}")
 
     def unit_body(times: Array) -> tuple[Array, Array]:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -_spins_of(rates, times)
@@ -331,9 +332,9 @@ GAUGES = ("horizontal", "base", *_NAMED)
 
 def gauge_link(name: str) -> str | None:
     """The link that a gauge is named after, None for another. Raises UnknownNameError if there is no such gauge."""
-    if name.startswith(_LINK):
+    if isinstance(name, str) and name.startswith(_LINK):
         return name.removeprefix(_LINK)
-    if name not in GAUGES:
+    if not isinstance(name, str) or name not in GAUGES:
         raise unknown_name("gauge", name, (*GAUGES, f"{_LINK}NAME"))
     return None
 

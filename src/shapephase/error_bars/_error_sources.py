@@ -12,6 +12,7 @@ from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.family import BodyFamily
 from ..errors import ShapeError, unknown_name
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files._labels import amounts
 from ..shape_space.path_samples import path_samples
@@ -63,6 +64,8 @@ def inputs_of(
         raise ShapeError("start: it has the errors of momentum and attitude together; leave momentum and attitude out")
     samples = None
     if joints is not None:
+        if not isinstance(joints, str):
+            finite_array(joints, "joints")
         through = path_samples(path)
         numbers = through.count * path.n_shape
         given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
@@ -107,7 +110,7 @@ def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
 
 def _deviations(given: Array, name: str) -> Array:
     if np.any(given < 0.0):
-        raise ShapeError(f"{name}: a standard deviation is not negative, got {given}")
+        raise ShapeError(f"{name}: a standard deviation is not negative, got {what_came(given)}")
     return given
 
 

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import check_object, whole_argument
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..deformation.deformation import articulated
 from ..display import short_repr
-from ..errors import ShapeError
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
@@ -135,6 +135,8 @@ def uncertainty(
     >>> print(f"{found.dynamic_phase:.6f} rad")
     0.000813 rad
     """
+    if inertias is not None:
+        check_object(inertias, "InertiaErrors", "inertias")
     found = derivatives(motion)
     inputs = inputs_of(motion, joints, inertias, momentum, attitude, start)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
@@ -186,8 +188,9 @@ def sampled_uncertainty(
     >>> print(f"{found.draws} draws, {found.dynamic_phase:.4f} rad")
     10 draws, 0.0008 rad
     """
-    if draws < 2:
-        raise ShapeError(f"draws: two or more are needed, got {draws}")
+    if inertias is not None:
+        check_object(inertias, "InertiaErrors", "inertias")
+    draws, seed = whole_argument(draws, "draws", 2), whole_argument(seed, "seed", 0)
     body, path = described_by(motion)
     inputs, rng = inputs_of(motion, joints, inertias, momentum, attitude, start), np.random.default_rng(seed)
     normal = partial(_drawn, rng, draws)

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, times_argument
+from ..arguments import check_flag, check_object, number_argument, times_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..reconstruction.recorded_base import W_FIRST, read_w_first
 from ._along_motion import responses
 
 # Rounds of Gauss and Newton; a flight of many turns takes ten.
@@ -122,7 +123,8 @@ def momentum_from_recording(
     ShapeError
         If the shapes disagree.
     TrajectoryError
-        If there are fewer than three times, or they do not ascend.
+        If there are fewer than three times, or they do not ascend; or if the attitudes are a flight only once their
+        quaternions are read with w first.
     AccuracyNotReached
         If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
         the axes.
@@ -139,6 +141,7 @@ def momentum_from_recording(
     >>> print(found.momentum.round(6) + 0.0)
     [0.    0.    0.005]
     """
+    check_flag(find_axes, "find_axes")
     check_object(deformation, "Deformation", "deformation")
     at = times_argument(finite_array(times, "times", (None,), unit="s"), deformation.duration)
     recorded = so3.rotation_argument(attitudes, "attitudes")
@@ -146,17 +149,15 @@ def momentum_from_recording(
         raise ShapeError(f"attitudes: ({at.size}, 3, 3), one for each time, are needed, got {recorded.shape}")
     if len(at) < 3 or np.any(np.diff(at) <= 0.0):
         raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
-    if noise is not None and not noise > 0.0:
+    if noise is not None and not number_argument(noise, "noise", "rad") > 0.0:
         raise ShapeError(f"noise: a positive standard deviation is needed, got {noise}")
-    if find_axes:
-        fit = _with_axes(deformation, at, recorded, tolerance)
-    else:
-        fit = _fitted(deformation, at, recorded, tolerance, np.eye(3))
+    try:
+        fit = _flight_fitted(deformation, at, recorded, tolerance, find_axes=find_axes)
+    except AccuracyNotReached as error:
+        if _is_flight_with_w_first(deformation, at, recorded, tolerance, find_axes=find_axes):
+            raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
+        raise
     residuals, slopes, motion = fit.residuals, fit.slopes, fit.motion
-    if _spread(residuals) > _NO_FLIGHT:
-        raise AccuracyNotReached(
-            f"{_apart(residuals)}: is it a free flight of this body, and are the recorded axes those of its base?"
-        )
     if noise is None:
         noise = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
     covariance = np.asarray(noise**2 * np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
@@ -184,6 +185,34 @@ class _Fitted(NamedTuple):
     axes: Array
     residuals: Array
     slopes: Array
+
+
+def _flight_fitted(
+    deformation: Deformation, times: Array, recorded: Array, tolerance: float, *, find_axes: bool
+) -> _Fitted:
+    """The nearest flight; raises AccuracyNotReached where none is near."""
+    if find_axes:
+        fit = _with_axes(deformation, times, recorded, tolerance)
+    else:
+        fit = _fitted(deformation, times, recorded, tolerance, np.eye(3))
+    if _spread(fit.residuals) > _NO_FLIGHT:
+        raise AccuracyNotReached(
+            f"{_apart(fit.residuals)}: is it a free flight of this body, and are the recorded axes those of its base?"
+        )
+    return fit
+
+
+def _is_flight_with_w_first(
+    deformation: Deformation, times: Array, recorded: Array, tolerance: float, *, find_axes: bool
+) -> bool:
+    """Whether a flight is near once quaternions are read with w first; axes that are to be found leave that open."""
+    if find_axes:
+        return False
+    try:
+        _flight_fitted(deformation, times, read_w_first(recorded), tolerance, find_axes=False)
+    except AccuracyNotReached:
+        return False
+    return True
 
 
 def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float, axes: Array) -> _Fitted:

@@ -12,11 +12,12 @@ from scipy.integrate import quad_vec
 from scipy.optimize import root_scalar
 
 from .. import so3
-from ..arguments import vector_argument
+from ..arguments import number_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation, prescribed
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
+from ..letters import what_came
 from ..rigid_body.euler_top import EulerTop
 
 # Of the first guess of a time: a function that has not reached its target by then is taken never to reach it.
@@ -192,9 +193,10 @@ def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
     >>> print(f"{sp.examples.pulsation(0.5, 3.0).clock(np.array(3.0)):.9f}")  # after a period the time itself
     3.000000000
     """
+    amount = number_argument(amount, "amount")
     frequency = 2.0 * np.pi / positive(period, "period", "s")
     if not 0.0 < abs(amount) < 1.0:
-        raise ShapeError(f"amount: a number between −1 and 1, not 0, is needed, got {amount!r}")
+        raise ShapeError(f"amount: a number between −1 and 1, not 0, is needed, got {what_came(amount)}")
     return Scale(
         factor=lambda t: 1.0 / np.sqrt(1.0 + amount * np.sin(frequency * t)),
         clock=lambda t: t + 2.0 * amount / frequency * np.sin(0.5 * frequency * t) ** 2,
@@ -312,5 +314,5 @@ def positive(value: float, name: str, unit: str) -> float:
     """A user's number, checked to be above 0. Raises ShapeError."""
     number = finite_array(value, name, unit=unit)
     if number.ndim or number <= 0.0:
-        raise ShapeError(f"{name}: a number above 0 [{unit}] is needed, got {value!r}")
+        raise ShapeError(f"{name}: a number above 0 [{unit}] is needed, got {what_came(value)}")
     return float(number)

@@ -18,12 +18,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import moments_argument
+from ..arguments import check_flag, check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..body.catalog import load_body
 from ..deformation.assemblies import assembly, moving_mass, rigid_part
 from ..deformation.deformation import articulated, prescribed, rigid
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..letters import what_came
 from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
 from ._closed_form_motions import (
@@ -84,6 +85,10 @@ def homothety(
     >>> print(f"{np.abs(motion.body_momentum(1.0) - example.known.body_momentum(1.0)).max():.6f}")
     0.000000
     """
+    if scale is not None:
+        check_object(scale, "Scale", "scale")
+    if duration is not None:
+        duration = number_argument(duration, "duration", "s")
     growing = pulsation() if scale is None else scale
     top = EulerTop(inertia, momentum)
     span = top.period if duration is None else duration
@@ -235,14 +240,16 @@ def printed_antenna(
     >>> certificate.regime.name
     'ABOUT_LARGEST'
     """
-    if axis not in (1, 3):
-        raise ShapeError(f"axis: 1 or 3 is needed, got {axis!r}")
+    if not isinstance(axis, int | np.integer) or axis not in (1, 3):
+        raise ShapeError(f"axis: 1 or 3 is needed, got {what_came(axis)}")
     usual, usual_momentum = (1.45, (0.8, 0.1, 0.6)) if axis == 1 else (2.4, (0.3, 0.4, 0.9))
     start = moments_argument((1.0, 1.5, 2.0) if moments is None else moments)
     end = start.copy()
     end[axis - 1] = positive(usual if grown is None else grown, "grown", "kg m^2")
     if end[axis - 1] <= start[axis - 1]:
-        raise ShapeError(f"grown: above the moment at the start, {start[axis - 1]:g} kg m^2, is needed, got {grown!r}")
+        raise ShapeError(
+            f"grown: above the moment at the start, {start[axis - 1]:g} kg m^2, is needed, got {what_came(grown)}"
+        )
     return _extension(
         lambda share: start + (end - start) * share[:, None],
         usual_momentum if momentum is None else momentum,
@@ -304,8 +311,8 @@ def dipole_antenna(
     >>> print(example.deformation.inertia([0.0, 5.0])[:, 0, 0].round(6))  # 1 + 2 * 0.5 * 1.5^2 in the end
     [1.   3.25]
     """
-    if axis not in (1, 2, 3):
-        raise ShapeError(f"axis: 1, 2 or 3 is needed, got {axis!r}")
+    if not isinstance(axis, int | np.integer) or axis not in (1, 2, 3):
+        raise ShapeError(f"axis: 1, 2 or 3 is needed, got {what_came(axis)}")
     bare = moments_argument(hub)
     added = 2.0 * positive(tip_mass, "tip_mass", "kg") * positive(reach, "reach", "m") ** 2 * np.ones(3)
     added[axis - 1] = 0.0
@@ -347,6 +354,7 @@ def furniture(
     >>> print(f"{motion.body_momentum(20.0)[2]:.6f}")  # walking about the axis of the momentum
     30.000000
     """
+    height = number_argument(height, "height", "m")
     moments, inner, outer = moments_argument(hub), positive(hub_mass, "hub_mass", "kg"), positive(mass, "mass", "kg")
     wide, walk_rate = positive(radius, "radius", "m"), 2.0 * np.pi / positive(duration, "duration", "s")
     spatial = momentum_argument(momentum)
@@ -372,6 +380,7 @@ def cat(halves: bool = False) -> Example:
     >>> print(f"{np.degrees(sp.so3.angle(motion.final_attitude)):.4f}")
     180.0000
     """
+    check_flag(halves, "halves")
     if halves:
         deformation = articulated(load_body("cat_two_halves"), kane_scher(0.0, _HALF_TURN_CONE * _DEGREE))
     else:
@@ -391,6 +400,7 @@ def astronaut(legs: bool = False) -> Example:
     >>> print(f"{np.degrees(sp.so3.angle(motion.final_attitude)):.6f} degrees")
     11.825049 degrees
     """
+    check_flag(legs, "legs")
     path, degrees = (astronaut_leg_swing(), 12.352775) if legs else (astronaut_arm_circles(), 11.825049)
     deformation = articulated(load_body("astronaut"), path)
     return Example(deformation=deformation, momentum=np.zeros(3), turn=degrees * _DEGREE)
@@ -442,7 +452,7 @@ def named_example(name: str) -> Example:
     >>> print(f"{example.phase:.6f} rad")
     16.739018 rad
     """
-    if name not in EXAMPLES:
+    if not isinstance(name, str) or name not in EXAMPLES:
         raise unknown_name("example", name, EXAMPLES)
     return EXAMPLES[name]()
 

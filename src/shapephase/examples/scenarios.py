@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arguments import positive_argument
+from ..arguments import number_argument, positive_argument
 from ..arrays import Array
 from ..body.catalog import load_body
 from ..deformation.deformation import articulated
@@ -75,8 +75,11 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(sp.holonomy(cat, path))):.6f} degrees")
     180.000000 degrees
     """
+    alpha = number_argument(alpha, "alpha", "rad")
+    beta = number_argument(beta, "beta", "rad")
+    duration = number_argument(duration, "duration", "s")
     if not 0.0 <= alpha < beta < 0.5 * np.pi:
-        raise TrajectoryError(f"0 <= alpha < beta < pi/2 [rad] is needed, got alpha = {alpha!r}, beta = {beta!r}")
+        raise TrajectoryError(f"0 <= alpha < beta < pi/2 [rad] is needed, got alpha = {alpha:.9g}, beta = {beta:.9g}")
     return replace(_loop(_KaneScher(float(alpha), float(beta), float(duration)), duration, _WAIST), smooth_loop=True)
 
 
@@ -94,6 +97,7 @@ def cat_righting(duration: float = 0.5) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     180.000000 degrees
     """
+    duration = number_argument(duration, "duration", "s")
     names = load_body("cat").joint_names
     return _loop(_CatRighting(float(duration), names), duration, names)
 
@@ -110,6 +114,7 @@ def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     11.825049 degrees
     """
+    duration = number_argument(duration, "duration", "s")
     abduction = (0.75, 0.0, -0.75)
     return _one_harmonic(
         "astronaut",
@@ -135,6 +140,7 @@ def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     12.352775 degrees
     """
+    duration = number_argument(duration, "duration", "s")
     return _one_harmonic(
         "astronaut",
         duration,
@@ -157,6 +163,7 @@ def antenna_deployment(duration: float = 60.0) -> ShapePath:
     >>> print(path.shape([0.0, 60.0])[:, path.joint_names.index("boom_extension")].round(6))
     [0.  1.8]
     """
+    duration = number_argument(duration, "duration", "s")
     body = load_body("satellite")
     lower, upper = body.joint_limits[body.joint_index("boom_extension")]
     ends = [body.shape({"boom_extension": float(length)}) for length in (lower, upper)]
@@ -174,6 +181,7 @@ def satellite_sweep(duration: float = 60.0) -> ShapePath:
     >>> print(np.abs(path.shape(0.0) - path.shape(path.duration)).max().round(9))  # a loop
     0.0
     """
+    duration = number_argument(duration, "duration", "s")
     return _one_harmonic(
         "satellite",
         duration,
@@ -250,7 +258,7 @@ def named_motion(name: str) -> ShapePath:
     >>> sp.examples.named_motion("cat_righting").duration
     0.5
     """
-    if name not in MOTIONS:
+    if not isinstance(name, str) or name not in MOTIONS:
         raise unknown_name("motion", name, MOTIONS)
     return MOTIONS[name].path()
 
@@ -278,9 +286,9 @@ def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
     >>> print(f"{sp.split(motion).momentum_gap:.6f}")
     0.000000
     """
-    if name not in CLOSED_ORBITS:
+    if not isinstance(name, str) or name not in CLOSED_ORBITS:
         raise unknown_name("closed orbit", name, CLOSED_ORBITS)
-    if gauge not in ("horizontal", "base"):
+    if not isinstance(gauge, str) or gauge not in ("horizontal", "base"):
         raise unknown_name("gauge of a closed orbit", gauge, ("horizontal", "base"))
     motion, magnitude = CLOSED_ORBITS[name]
     deformation = articulated(load_body(MOTIONS[motion].body), named_motion(motion))

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root_scalar
 
 from .. import so3
-from ..arguments import check_object, moments_argument
+from ..arguments import check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body._momentum_orbit import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop
@@ -83,7 +84,7 @@ def slow_antenna(
     >>> print(f"{example.rigid.montgomery_phase:.6f} rad")  # of the body as it was at the start
     11.187497 rad
     """
-    if law not in _LAWS:
+    if not isinstance(law, str) or law not in _LAWS:
         raise unknown_name("law", law, _LAWS)
     slow, start = positive(rate, "rate", "1/s"), moments_argument(moments)
     top = orbit_about_third(start, momentum)
@@ -173,6 +174,7 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
     >>> print(f"{abs(top.solid_angle):.9f} sr")
     0.500000000 sr
     """
+    solid_angle = number_argument(solid_angle, "solid_angle", "sr")
     end, norm = moments_argument(moments), positive(magnitude, "magnitude", "kg m^2/s")
     limit = separatrix_solid_angle(end, 2)
 
@@ -182,7 +184,7 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
     nearest, farthest = _END_MARGIN, 0.5 * np.pi - _END_MARGIN
     if not orbit(nearest).solid_angle < solid_angle < orbit(farthest).solid_angle:
         raise ShapeError(
-            f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {solid_angle!r}"
+            f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {what_came(solid_angle)}"
         )
     found = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
     return orbit(float(found.root))
@@ -282,8 +284,11 @@ def first_loop(motion: Motion, axis: int = 3) -> float:
     >>> print(f"{sp.examples.first_loop(motion) / top.period:.6f} periods")
     1.000000 periods
     """
-    if motion.batch or axis not in (1, 2, 3):
-        raise ShapeError(f"one motion and axis 1, 2 or 3 are needed, got a batch {motion.batch} and axis {axis!r}")
+    check_object(motion, "Motion", "motion")
+    if motion.batch or not isinstance(axis, int | np.integer) or axis not in (1, 2, 3):
+        raise ShapeError(
+            f"one motion and axis 1, 2 or 3 are needed, got a batch {motion.batch} and axis {what_came(axis)}"
+        )
     across = np.array([axis, axis + 1]) % 3
 
     def azimuth(times: Array) -> Array:

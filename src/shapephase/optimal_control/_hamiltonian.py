@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..display import short_repr
@@ -82,11 +83,12 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     >>> print(np.array(found.metric(np.zeros(3))).diagonal().round(6))
     [0.005   0.005   0.00125]
     """
-    if metric not in _COSTS:
+    check_object(body, "Body", "body")
+    if not isinstance(metric, str) or metric not in _COSTS:
         raise unknown_name("metric", metric, _COSTS)
     with _building:
         of_body = _built.setdefault(body, {})
-        if metric not in of_body:
+        if not isinstance(metric, str) or metric not in of_body:
             of_body[metric] = _hamiltonian(body, metric)
         return of_body[metric]
 

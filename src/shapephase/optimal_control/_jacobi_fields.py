@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import so3
-from ..arguments import positive_argument, tolerance_argument
+from ..arguments import check_object, number_argument, positive_argument, tolerance_argument
 from ..arrays import Array
 from ..body.body import Body
 from ..display import short_repr
@@ -122,6 +122,9 @@ def jacobi_fields(
     >>> print(np.abs(fields.matrix(np.array([0.0]))).max())  # they vanish at the start
     0.0
     """
+    check_object(body, "Body", "body")
+    duration = number_argument(duration, "duration", "s")
+    tolerance = number_argument(tolerance, "tolerance")
     n, equations = body.n_shape, hamiltonian(body, metric)
     momenta, charge_scale = natural_scales(body, equations, shape, rate, charge)
     charges = np.concatenate([np.zeros((3, n)), charge_scale * np.eye(3)], axis=1)
@@ -189,6 +192,7 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     >>> sp.optimal_control.conjugate_times(path)
     []
     """
+    check_object(motion, "Extremal", "motion")
     if motion.energy == 0.0:
         raise ShapeError("an extremal at rest has no conjugate times; give it a rate")
     span = _BEYOND_END * motion.duration if until is None else positive_argument(until, "until")

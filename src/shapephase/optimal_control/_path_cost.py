@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from .. import so3
+from ..arguments import check_object
 from ..body.body import Body
 from ..errors import AccuracyNotReached, unknown_name
 from ..shape_space.connection import mechanical_connection
@@ -42,7 +43,9 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     >>> print(f"{sp.optimal_control.path_cost(cat, loop, 'rate'):.6f} rad^2/s")
     5.169923 rad^2/s
     """
-    if cost not in ("kinetic", "rate"):
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
+    if not isinstance(cost, str) or cost not in ("kinetic", "rate"):
         raise unknown_name("cost of a path", cost, ("kinetic", "rate"))
     route = path.matched(body.joint_names, body.name)
     before = _quadrature(body, route, cost, _FIRST_PANELS)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import tolerance_argument
+from ..arguments import check_object, tolerance_argument
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError
@@ -177,6 +177,8 @@ def shoot(
     >>> print(f"{path.cost:.4f} <= {sp.optimal_control.path_cost(cat, loop):.4f} J s")
     0.0204 <= 0.0204 J s
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)
     goal = tolerance_argument(tolerance)
     turn = horizontal_lift(body, route).end if target is None else so3.rotation_argument(target, "target")

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..display import short_repr
@@ -88,6 +89,8 @@ def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> Wo
     >>> print(f"{sp.optimal_control.wong_residual(cat, loop).residual:.3f}")  # an extremal
     0.000
     """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)
     equations = hamiltonian(body, metric)
     lift = horizontal_lift(body, route)

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import number_argument
 from ..arrays import Array, finite_array, real_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
+from ..letters import what_came
 
 METHODS = ("collocation", "reduced")
 RATES_AT_ENDS = ("zero", "periodic", "free")
@@ -63,6 +65,9 @@ class Goal:
 
     def __post_init__(self) -> None:
         """Check what is given and keep it as read-only arrays."""
+        for name in ("somersaults", "half_twists"):
+            if getattr(self, name) is not None:
+                number_argument(getattr(self, name), name)
         given = (self.rotation is not None, self.pointing is not None, self.winds)
         if sum(given) > 1:
             raise ShapeError(
@@ -78,10 +83,11 @@ class Goal:
             self._keep("rotation", rotation)
         if self.pointing is not None:
             self._keep("pointing", _unit_pair(self.pointing))
-        finite_array([self.somersaults or 0.0, self.half_twists or 0.0], "somersaults, half_twists", (2,))
         axis = finite_array(self.twist_axis, "twist_axis", (3,))
         if axis.ndim != 1 or not axis.any():
-            raise ShapeError(f"twist_axis: one vector (3,) that is not zero is needed, got {self.twist_axis!r}")
+            raise ShapeError(
+                f"twist_axis: one vector (3,) that is not zero is needed, got {what_came(self.twist_axis)}"
+            )
         self._keep("twist_axis", axis)
 
     def _keep(self, name: str, value: Array) -> None:
@@ -122,7 +128,7 @@ class Limits:
     def __post_init__(self) -> None:
         """Check what is given and keep it as a read-only array."""
         if not isinstance(self.joint_limits, bool | np.bool_):
-            raise ShapeError(f"joint_limits: True or False is needed, got {self.joint_limits!r}")
+            raise ShapeError(f"joint_limits: True or False is needed, got {what_came(self.joint_limits)}")
         if self.rate_limits is None:
             return
         if isinstance(self.rate_limits, str):
@@ -134,7 +140,8 @@ class Limits:
         rates = finite_array(self.rate_limits, "rate_limits", unit="rad/s or m/s")
         if rates.ndim > 1 or np.any(rates <= 0.0):
             raise ShapeError(
-                f"rate_limits: one number above 0, or one for each of the joints, is needed, got {self.rate_limits!r}"
+                "rate_limits: one number above 0, or one for each of the joints, is needed, got "
+                f"{what_came(self.rate_limits)}"
             )
         object.__setattr__(self, "rate_limits", _read_only(rates))
 
@@ -179,7 +186,7 @@ class Search:
 
     def __post_init__(self) -> None:
         """Check what is given."""
-        if self.method not in METHODS:
+        if not isinstance(self.method, str) or self.method not in METHODS:
             raise unknown_name("method", self.method, METHODS)
         if self.pieces is not None:
             _check_count(self.pieces, "pieces", _LEAST_PIECES, _MOST_PIECES)
@@ -205,16 +212,16 @@ def _unit_pair(pointing: ArrayLike) -> Array:
     if pair.shape != (2, 3) or not np.all(lengths > 0.0):
         raise ShapeError(
             "pointing: an axis of the base and a direction in inertial axes, two vectors (3,) that are not zero, are "
-            f"needed, got {pointing!r}"
+            f"needed, got {what_came(pointing)}"
         )
     return pair / lengths[:, None]
 
 
 def _check_count(value: Any, name: str, least: int, most: int | None = None) -> None:
     if not isinstance(value, int | np.integer) or value < least:
-        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {value!r}")
+        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {what_came(value)}")
     if most is not None and value > most:
-        raise ShapeError(f"{name}: a whole number, up to {most}, is needed, got {value!r}")
+        raise ShapeError(f"{name}: a whole number, up to {most}, is needed, got {what_came(value)}")
 
 
 def _read_only(array: Array) -> Array:

@@ -9,6 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.joint_chain import JointChain
@@ -133,6 +134,7 @@ def symbolic_body(body: Body) -> SymbolicBody:
     >>> print(np.array(functions.inertia(np.zeros(3))).diagonal().round(6))
     [0.005 0.02  0.02 ]
     """
+    check_object(body, "Body", "body")
     with _building:
         if body not in _built:
             _built[body] = _symbolic(body)

@@ -155,7 +155,7 @@ def reorientation(
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, or unknown names.
     """
-    if cost not in COSTS:
+    if not isinstance(cost, str) or cost not in COSTS:
         raise unknown_name("cost", cost, COSTS)
     if rates_at_ends not in RATES_AT_ENDS:
         raise unknown_name("value of rates_at_ends", rates_at_ends, RATES_AT_ENDS)

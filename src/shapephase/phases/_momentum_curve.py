@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from .. import so3, sphere
 from ..arrays import Array, Integers, Mask
-from ..deformation.frames import Frames, frames_argument, named_frames
-from ..errors import GaugeError
+from ..deformation.frames import GAUGES, Frames, frames_argument, named_frames
+from ..errors import GaugeError, ShapeError
 from ..integrator.curve_integrals import CurveIntegrals, curve_integrals
 from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 
 # Memory and time: a frame that needs more steps along the motion is refused.
@@ -200,6 +201,10 @@ def momentum_curve(
     UnknownNameError, GaugeError, ShapeError
         For a gauge that does not exist.
     """
+    if not isinstance(gauge, str) and (not callable(gauge) or isinstance(gauge, type)):
+        raise ShapeError(
+            f"gauge: one of {', '.join(GAUGES)}, link:NAME or a function of times is needed, got {what_came(gauge)}"
+        )
     lift = motion.lift_with_errors if gauge == "horizontal" else None
     # The integrator's steps are short enough for the base's frame and for the lift, which is stepped alike.
     follows = lift is not None or gauge == "base"

@@ -17,6 +17,7 @@ from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
+from ..letters import what_came
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
@@ -215,7 +216,7 @@ def running_phases(
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
         return by_parts(motion, lambda part: running_phases(part, t, gauge, closing=closing), shared=("times",))
-    if closing not in CLOSINGS:
+    if not isinstance(closing, str) or closing not in CLOSINGS:
         raise unknown_name("closing", closing, CLOSINGS)
     to_start = closing == "start"
     times = times_argument(t, motion.duration)
@@ -330,7 +331,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     check_object(motion, "Motion", "motion")
     cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
     if cuts.ndim != 1 or len(cuts) < 2 or np.any(np.diff(cuts) <= 0.0):
-        raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {cuts}")
+        raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {what_came(cuts)}")
     if len(motion.parts) > 1:
         return by_parts(motion, lambda part: arc_phases(part, times, gauge), shared=("times",))
     curve = momentum_curve(motion, gauge, times=cuts)

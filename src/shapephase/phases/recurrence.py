@@ -17,6 +17,7 @@ from ..arrays import Array, Integers, Mask, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 
 # [rad] Length of a piece of the curve at most: two passages through one piece are distinguished by its cubic.
@@ -127,7 +128,7 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
     check_object(motion, "Motion", "motion")
     largest = finite_array(gap, "gap", unit="rad")
     if largest.ndim or not 0.0 < largest <= np.pi:
-        raise ShapeError(f"gap: an angle above 0, up to pi [rad] is needed, got {gap!r}")
+        raise ShapeError(f"gap: an angle above 0, up to pi [rad] is needed, got {what_came(gap)}")
     curve = _Curve.of(motion)
     times = _resolved(curve, motion)
     directions, rates = curve.at(times)

@@ -21,6 +21,7 @@ from ..deformation.deformation import Deformation
 from ..display import card_html, card_text, short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.stepped import SteppedRotation
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ._card import fixed_points_card
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
@@ -211,7 +212,9 @@ def fixed_points(
     check_object(deformation, "Deformation", "deformation")
     magnitude = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
-        raise ShapeError(f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {most_directions!r}")
+        raise ShapeError(
+            f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {what_came(most_directions)}"
+        )
     loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance)
     looser = _REACHABLE[1:] if tolerance is None else ()
     starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)

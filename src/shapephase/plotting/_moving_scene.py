@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array
 from ..body._drawing_limits import hull, outermost
 from ..body.appearance import BOX_COLOUR, Visual, visuals
@@ -19,6 +20,7 @@ from ..deformation.descriptions import ArticulatedDescription, Description, Part
 from ..deformation.frames import principal_frames
 from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 
 # Frames of a scene: five minutes at 30 a second; a page of more would be too large for a browser.
@@ -156,10 +158,11 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     >>> scene.times.tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
+    check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MAX_FRAMES:
-        raise ShapeError(f"frames: a whole number from 2 to {_MAX_FRAMES} is needed, got {frames!r}")
+        raise ShapeError(f"frames: a whole number from 2 to {_MAX_FRAMES} is needed, got {what_came(frames)}")
     times = np.linspace(0.0, motion.duration, int(frames))
     description = _ungauged(motion.deformation)
     base = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()

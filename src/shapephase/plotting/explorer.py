@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_file_name, check_object
 from ..arrays import Array, finite_array
 from ..body.appearance import visuals
 from ..body.body import Body
 from ..errors import ShapeError
 from ..files import write_whole
+from ..letters import what_came
 from ..shape_space.curvature_field import curvature_on_plane
 from ._moving_scene import shapes_by_link
 from .pages.motion_data import body_data, frame_nodes
@@ -77,6 +78,7 @@ def explore_page(
     [[-2.352, 2.352], [-1.68, 1.68]] True
     """
     check_object(body, "Body", "body")
+    check_file_name(path, "path")
     page, series = explore_html(body, joints, rest=rest, up=up)
     write_whole(path, lambda stream: stream.write(page.encode()))
     return series
@@ -87,8 +89,13 @@ def explore_html(
 ) -> tuple[str, PlaneSeries]:
     """The page that `explore_page` writes, as text, and its series: arguments and errors as there."""
     check_object(body, "Body", "body")
-    if isinstance(joints, str) or len(joints) != 2 or joints[0] == joints[1]:
-        raise ShapeError(f"joints: two different joints of {body.name} are needed, got {joints!r}")
+    if (
+        isinstance(joints, str)
+        or not isinstance(joints, Sequence | np.ndarray)
+        or len(joints) != 2
+        or joints[0] == joints[1]
+    ):
+        raise ShapeError(f"joints: two different joints of {body.name} are needed, got {what_came(joints)}")
     places = body.joint_index(joints[0]), body.joint_index(joints[1])
     still = body.shape() if rest is None else finite_array(rest, "rest", (body.n_shape,))
     upwards = up_axis(up, body)

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import number_argument
 from ..arrays import Array, Integers, finite_array
 from ..errors import ShapeError
+from ..letters import what_came
 from ..rigid_body.geodesics import (
     SurfaceOfRevolution,
     conjugate_locus,
@@ -134,12 +136,13 @@ def plot_ellipsoid_locus(
     >>> len(sp.plotting.plot_ellipsoid_locus(ax, 0.8, geodesics=4).lines) >= 2
     True
     """
+    latitude = number_argument(latitude, "latitude", "rad")
     check_flat_axes(ax)
     surface = ellipsoid(aspect)
     if aspect == 1.0:
         raise ShapeError("aspect: on a sphere the caustics are single points; give another one than 1")
-    if not len(orders):
-        raise ShapeError("orders: at least one is needed, such as (1, 2)")
+    if not isinstance(orders, Sequence | np.ndarray) or not len(orders):
+        raise ShapeError(f"orders: at least one is needed, such as (1, 2), got {what_came(orders)}")
     curves = []
     for order in orders:
         locus = conjugate_locus(surface, _POINTS, order, latitude)
@@ -194,7 +197,9 @@ def plot_caustic(
     if getattr(ax, "name", "") != "3d":
         raise ShapeError('ax: three-dimensional axes are needed; make them with projection="3d"')
     if isinstance(circles, bool) or not isinstance(circles, int | np.integer) or circles < 2:
-        raise ShapeError(f"circles: a whole number from 2 on, got {circles!r}")
+        raise ShapeError(f"circles: a whole number from 2 on, got {what_came(circles)}")
+    if finite_array(view, "view", (2,), unit="deg").ndim != 1:
+        raise ShapeError("view: elevation and azimuth [deg] are needed")
     from matplotlib.patches import Patch
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -229,7 +234,7 @@ def plot_caustic(
 def _evenly_chosen(count: int, chosen: int) -> Integers:
     """`chosen` of the indices below `count`, evenly spread, the ends left out."""
     if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer) or not 0 <= chosen <= count:
-        raise ShapeError(f"geodesics: a whole number from 0 to {count} is needed, got {chosen!r}")
+        raise ShapeError(f"geodesics: a whole number from 0 to {count} is needed, got {what_came(chosen)}")
     return np.linspace(0, count - 1, chosen + 2)[1:-1].astype(np.int64)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import so3, sphere
-from ..arguments import check_object, times_argument
+from ..arguments import check_flag, check_object, number_argument, times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
 from ..phases._momentum_curve import Gauge, MomentumCurve, momentum_curve
@@ -99,6 +99,7 @@ def plot_momentum_curve(
     >>> len(sp.plotting.plot_momentum_curve(ax, motion, "base").lines) > 3
     True
     """
+    check_flag(area, "area")
     check_object(motion, "Motion", "motion")
     check_axes(ax)
     one_motion(motion)
@@ -126,7 +127,7 @@ def plot_momentum_curve(
     for axis, name in zip(np.eye(3), "xyz"):
         drawn.text(axis, name, 0.13, alpha=1.0 if axis @ drawn.eye >= 0.0 else 0.45)
     if frozen_at is not None:
-        time = times_argument(finite_array(frozen_at, "frozen_at", unit="s"), motion.duration).reshape(1)
+        time = times_argument(number_argument(frozen_at, "frozen_at", "s"), motion.duration).reshape(1)
         inertia = motion.deformation.description.sample(time)[0][0]
         frame = curve.frame(time)
         if frame is not None:
@@ -164,6 +165,7 @@ def plot_fixed_points(
     >>> len(sp.plotting.plot_fixed_points(ax, points).lines) >= 2
     True
     """
+    check_object(points, "FixedPoints", "points")
     check_axes(ax)
     drawn = SphereAxes(ax, _DEFAULT_VIEW if view is None else view)
     for direction, index, kind in zip(points.directions, points.index.tolist(), points.stability, strict=True):

@@ -134,7 +134,7 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     one_motion(motion)
-    if kind not in ATTITUDES:
+    if not isinstance(kind, str) or kind not in ATTITUDES:
         raise unknown_name("kind of attitude", kind, ATTITUDES)
     t = motion_times(motion, times)
     if kind == "quaternion":
@@ -178,7 +178,7 @@ def plot_inertia(
     """
     check_object(deformation, "Deformation", "deformation")
     check_flat_axes(ax)
-    if kind not in INERTIAS:
+    if not isinstance(kind, str) or kind not in INERTIAS:
         raise unknown_name("kind of inertia", kind, INERTIAS)
     t = even_times(deformation, times)
     inertia = deformation.inertia(t)
@@ -264,6 +264,8 @@ def plot_energy(
     >>> sp.plotting.plot_energy(ax, motion).get_xlabel()
     '$t$ [s]'
     """
+    if certificate is not None:
+        check_object(certificate, "RegimeCertificate", "certificate")
     check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     one_motion(motion)

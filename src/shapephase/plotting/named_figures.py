@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..arguments import check_object
+from ..arguments import check_file_name, check_object
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..files import write_whole
@@ -119,7 +119,7 @@ def motion_figure(
 
 def _figure_of(kind: str, motion: Motion) -> Figure:
     """A kind of figure that this motion has. Raises UnknownNameError, ShapeError."""
-    if kind not in FIGURES:
+    if not isinstance(kind, str) or kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     if FIGURES[kind].with_momentum and not motion.momentum.any():
         raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
@@ -152,8 +152,10 @@ def figure_image(
     b'<?xml'
     """
     check_object(motion, "Motion", "motion")
+    if path is not None:
+        check_object(path, "ShapePath", "path")
     figure = _figure_of(kind, motion)
-    if ending not in ("svg", "pdf", "png"):
+    if not isinstance(ending, str) or ending not in ("svg", "pdf", "png"):
         raise unknown_name("kind of image", ending, ("svg", "pdf", "png"))
     ax = column_axes(figure.height)
     figure.draw(ax, motion, path, gauge)
@@ -178,5 +180,8 @@ def write_figure(
     '<?xml'
     """
     check_object(motion, "Motion", "motion")
+    check_file_name(out, "out")
+    if path is not None:
+        check_object(path, "ShapePath", "path")
     image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
     write_whole(out, lambda stream: stream.write(image))

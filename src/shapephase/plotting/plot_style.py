@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import times_argument
-from ..arrays import Array, finite_array
+from ..arguments import check_choice, number_argument, times_argument
+from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import MissingExtraError, ShapeError
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 
@@ -79,10 +80,13 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     """
     _check_matplotlib()
     from matplotlib.figure import Figure
+    from matplotlib.projections import get_projection_names
 
-    inches = float(finite_array(height, "height", unit="in"))
+    inches = number_argument(height, "height", "in")
+    if projection is not None:
+        check_choice(projection, "projection", get_projection_names())
     if not inches > 0.0:
-        raise ShapeError(f"height: a length above 0 [in] is needed, got {height!r}")
+        raise ShapeError(f"height: a length above 0 [in] is needed, got {what_came(height)}")
     return Figure(figsize=(COLUMN, inches), layout="constrained").add_subplot(projection=projection)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object, number_argument
 from ..arrays import Array, finite_array
 from ..elliptic import incomplete_f
 from ..errors import ShapeError
@@ -134,8 +135,9 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     >>> len(sp.plotting.plot_herpolhode(ax, top, 2).lines) >= 1
     True
     """
+    check_object(top, "EulerTop", "top")
     check_axes(ax)
-    count = float(finite_array(periods, "periods"))
+    count = number_argument(periods, "periods")
     if not count > 0.0:
         raise ShapeError(f"periods: a positive number of them is drawn, got {periods}")
     poinsot = Poinsot(top)
@@ -189,7 +191,7 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     check_axes(ax)
     marked = finite_array(tops, "tops") if np.size(tops) == 0 else finite_array(tops, "tops", (2,))
     marked = marked.reshape(-1, 2)
-    end = float(finite_array(fastest, "fastest"))
+    end = number_argument(fastest, "fastest")
     if not end > 2.0:
         raise ShapeError(f"fastest: the chart must reach beyond the threshold 2, got {fastest}")
     end = max(end, 1.05 * float(np.abs(marked[:, 0]).max(initial=0.0)))

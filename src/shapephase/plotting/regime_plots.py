@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..arguments import check_object
 from ..arrays import Array
 from ..bounds.all_bounds import Bound
 from ..bounds.regimes import CrownRegion
-from ..errors import ShapeError
+from ..errors import ShapeError, WrongObjectError
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, SKY, SMALL, VERMILION, check_flat_axes, one_motion
@@ -60,6 +62,9 @@ def plot_crown(
     >>> len(sp.plotting.plot_crown(ax, crown).lines) > 1
     True
     """
+    check_object(crown, "CrownRegion", "crown")
+    if motion is not None:
+        check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
     from matplotlib.patches import Patch
 
@@ -105,6 +110,8 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
     True
     """
     check_flat_axes(ax)
+    if not isinstance(bounds, Sequence) or not all(isinstance(bound, Bound) for bound in bounds):
+        raise WrongObjectError(f"bounds: those of bounds.bounds(motion) are needed, got {what_came(bounds)}")
     if not bounds:
         raise ShapeError("bounds: one or more are needed to be drawn, got none")
     places = np.arange(len(bounds))[::-1]

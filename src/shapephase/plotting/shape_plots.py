@@ -12,6 +12,7 @@ from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, unknown_name
+from ..letters import what_came
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.shape_path import ShapePath
 from ._letters import plain_text
@@ -66,12 +67,16 @@ def plot_shape_path(
     >>> len(sp.plotting.plot_shape_path(ax, sp.examples.kane_scher(0.0, 0.5)).lines)  # one for each joint
     3
     """
+    if body is not None:
+        check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     check_flat_axes(ax)
     t = even_times(path, times)
     route, names, units = _named(path, body)
     values = route.shape(t)
     span = np.ptp(values, axis=0)
+    if joints is not None and (isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray)):
+        raise ShapeError(f"joints: several names or numbers in a list are needed, got {what_came(joints)}")
     chosen = np.flatnonzero(span > _AT_REST) if joints is None else np.array([_place(j, names) for j in joints], int)
     if not len(chosen):
         raise ShapeError("joints: none of them moves along this path; name those to draw")
@@ -124,6 +129,8 @@ def plot_shape_plane(
     >>> len(sp.plotting.plot_shape_plane(ax, path, (0, 1)).lines) >= 1
     True
     """
+    if body is not None:
+        check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     check_flat_axes(ax)
     t = even_times(path, times)
@@ -174,6 +181,8 @@ def plot_curvature(
     >>> sp.plotting.plot_curvature(ax, cat, ("waist_pitch", "waist_yaw"), axis="x").get_xlabel()
     'waist_pitch [rad]'
     """
+    if path is not None:
+        check_object(path, "ShapePath", "path")
     check_object(body, "Body", "body")
     check_flat_axes(ax)
     names, units = body.joint_names, body.joint_units
@@ -262,7 +271,7 @@ def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:
     direction = finite_array(axis, "axis", (3,))
     norm = float(np.linalg.norm(direction))
     if direction.ndim != 1 or not norm:
-        raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {direction}")
+        raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {what_came(direction)}")
     unit = direction / norm
     return unit, "along ({:.2g}, {:.2g}, {:.2g})".format(*unit).replace("-", "−")
 
@@ -291,8 +300,8 @@ def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ..
 
 
 def _pair(joints: Sequence[str | int], names: Sequence[str]) -> tuple[int, int]:
-    if isinstance(joints, str) or len(joints) != 2:
-        raise ShapeError(f"joints: two joints are needed, got {joints!r}")
+    if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
+        raise ShapeError(f"joints: two joints are needed, got {what_came(joints)}")
     i, j = (_place(joint, names) for joint in joints)
     if i == j:
         raise ShapeError(f"joints: two different joints are needed, got {names[i]} twice")

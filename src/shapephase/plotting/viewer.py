@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
-from ..errors import VisualWarning
+from ..arguments import check_file_name, check_flag, check_object
+from ..errors import ShapeError, VisualWarning
 from ..files import write_whole
+from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ._letters import printable
 from ._moving_scene import MovingScene, moving_scene
@@ -32,6 +33,8 @@ FILM_SIZE = (640, 480)
 """Width and height of a frame of a film, unless they are given [px]."""
 # Ports after the given one that are tried when that is in use.
 _PORTS = 100
+# The highest port there is.
+_LAST_PORT = 65535
 # Height of a motion in a notebook [px].
 _HEIGHT = 520
 
@@ -85,6 +88,7 @@ def motion_page(
     True
     """
     check_object(motion, "Motion", "motion")
+    check_file_name(path, "path")
     page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, **fall)
     write_whole(path, lambda stream: stream.write(page.encode()))
 
@@ -178,6 +182,7 @@ def scene_and_data(
 ) -> tuple[MovingScene, dict[str, Any]]:
     """A motion as a scene, and as the data of a page; arguments, errors and warnings as `motion_page`."""
     check_object(motion, "Motion", "motion")
+    check_flag(ghost, "ghost")
     rate = playing_speed(motion.duration, speed)
     up_axis(up, None)
     scene = _scene(motion, rate, frames, trail, fall)
@@ -228,6 +233,12 @@ def view(
     True
     """
     check_object(motion, "Motion", "motion")
+    check_flag(browser, "browser")
+    check_flag(notebook, "notebook", allow_none=True)
+    if not isinstance(host, str):
+        raise ShapeError(f"host: the name or the address of this computer is needed, got {what_came(host)}")
+    if isinstance(port, bool) or not isinstance(port, int) or not 0 <= port <= _LAST_PORT:
+        raise ShapeError(f"port: a whole number from 0 to {_LAST_PORT} is needed, got {what_came(port)}")
     page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, **fall)
     if _in_notebook() if notebook is None else notebook:
         _show_in_cell(page)

@@ -78,7 +78,7 @@ def somersault_tilt_twist(attitudes: Array, lateral: str, longitudinal: str) -> 
         For other axes, or twice the same.
     """
     for name, axis in (("lateral axis", lateral), ("longitudinal axis", longitudinal)):
-        if axis not in _AXES:
+        if not isinstance(axis, str) or axis not in _AXES:
             raise unknown_name(name, axis, _AXES)
     if lateral == longitudinal:
         raise unknown_name("longitudinal axis", longitudinal, [axis for axis in _AXES if axis != lateral])

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import (
+    check_file_name,
     check_object,
     initial_state_arguments,
     threads_argument,
@@ -277,6 +278,7 @@ class Motion(MotionViews):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
+        check_file_name(path, "path")
         record = MotionRecord(
             deformation=self.deformation,
             momentum=self.momentum,
@@ -391,7 +393,7 @@ def reconstruct(
         with watched(progress):
             return reconstruct_family(deformation, momentum, attitude, goal, method, workers)
     check_object(deformation, "Deformation", "deformation")
-    if method not in SOLVERS:
+    if not isinstance(method, str) or method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
@@ -428,6 +430,7 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
     >>> print(np.abs(sp.load_motion("motion.npz").final_attitude - motion.final_attitude).max().round(9))
     0.0
     """
+    check_file_name(path, "path")
     return Motion(**vars(read_motion_record(path)))
 
 

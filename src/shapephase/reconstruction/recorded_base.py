@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
-from ..errors import ShapeError
+from ..errors import ShapeError, TrajectoryWarning
 from .reconstruction import Motion
+
+W_FIRST = "read as w x y z instead of x y z w, its quaternions agree: were they written with w first?"
+"""What is said of a recorded base that contradicts the motion, and no longer does so then."""
+_APART = 0.3
+"""[rad] A recorded base that comes so far from the motion's is asked about the order of its quaternions."""
+_NEARER = 0.1
+"""Of that: how near it has to be in the other order, for this to be the reason."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +66,11 @@ def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> B
     ShapeError
         If the shapes disagree, or the motion is a batch.
 
+    Warns
+    -----
+    TrajectoryWarning
+        Where the two are far apart, and near once the quaternions of the recording are read with w first.
+
     Examples
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
@@ -75,4 +89,20 @@ def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> B
     ours = motion.attitude(at)
     since = so3.transpose(ours[0]) @ ours
     difference = so3.transpose(since) @ so3.transpose(recorded[0]) @ recorded
-    return BaseDifference(at, difference, so3.angle(difference))
+    apart = so3.angle(difference)
+    farthest = float(apart.max(initial=0.0))
+    if farthest > _APART:
+        other = read_w_first(recorded)
+        nearer = so3.angle(so3.transpose(since) @ so3.transpose(other[0]) @ other)
+        if nearer.max() < _NEARER * farthest:
+            warnings.warn(
+                f"the recorded base comes {np.degrees(farthest):.3g} degrees from this motion's; {W_FIRST}",
+                TrajectoryWarning,
+                stacklevel=2,
+            )
+    return BaseDifference(at, difference, apart)
+
+
+def read_w_first(attitudes: Array) -> Array:
+    """The attitudes whose quaternions w x y z are, number by number, those of these as x y z w: (..., 3, 3) twice."""
+    return so3.matrix_from_quat(np.roll(so3.quat_from_matrix(attitudes), -1, axis=-1))

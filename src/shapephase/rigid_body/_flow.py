@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_function
 from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 
@@ -43,6 +44,7 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
     >>> print(f"{decay[-1, 0]:.9f} = exp(-1)")
     0.367879441 = exp(-1)
     """
+    check_function(rate, "rate", "a function that gives rates of change")
     from scipy.integrate import DOP853
 
     shape, out = start.shape, [start]

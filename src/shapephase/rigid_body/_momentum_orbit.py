@@ -26,6 +26,7 @@ from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
+from ..letters import what_came
 
 _NEGLIGIBLE = 1e-140
 """Components of Pi below this (in units of its own power of two) count as zero: squares of smaller ones underflow."""
@@ -193,11 +194,12 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     """
     values = finite_array(moments, "moments", (3,), unit="kg m^2")
     if values.ndim != 1 or values.min() <= 0.0 or values.min() == values.max():
-        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {values}")
+        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {what_came(values)}")
     (low, middle, high), _, _ = ascending_moments(values)
-    if axis not in (0, 1, 2) or values[axis] not in (low, high):
+    if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2) or values[axis] not in (low, high):
         raise ShapeError(
-            f"axis: one of 0, 1, 2 with the smallest or the largest of the moments {values} is needed, got {axis!r}"
+            f"axis: one of 0, 1, 2 with the smallest or the largest of the moments {values} is needed, got "
+            f"{what_came(axis)}"
         )
     circled, other = (low, high) if values[axis] == low else (high, low)
     own, opposite = np.sqrt(abs(middle - circled) / circled), np.sqrt(abs(other - middle) / other)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..elliptic import complete_k, incomplete_f, jacobi
@@ -81,6 +82,7 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     >>> print(f"{found.lowest:.6f} to {found.highest:.6f} in {found.period:.6f} s")
     0.647308 to 0.800000 in 3.313171 s
     """
+    check_object(top, "LagrangeTop", "top")
     if top.mgl <= 0.0:
         raise ShapeError(f"mgl: the nutation needs Mgl > 0, got {top.mgl:.6g} J; turn e3 towards the centre of mass")
     body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")

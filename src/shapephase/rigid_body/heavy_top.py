@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 
 from .. import so3
-from ..arguments import inertia_argument
+from ..arguments import check_pair, inertia_argument
 from ..arrays import Array, common_batch, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
+from ..letters import what_came
 
 _FLOOR = 3e-14
 """Relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14."""
@@ -232,9 +233,9 @@ class HeavyTop:
         time = finite_array(duration, "duration", unit="s")
         requested = finite_array(tolerance, "tolerance", unit="rad")
         if time.shape != () or time <= 0.0:
-            raise ShapeError(f"duration: one number above 0 s is needed, got {duration}")
+            raise ShapeError(f"duration: one number above 0 s is needed, got {what_came(duration)}")
         if requested.shape != () or not 1e-12 <= requested <= 1e-2:
-            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {tolerance}")
+            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {what_came(tolerance)}")
         shape = common_batch(
             inertia=self.inertia.shape[:-2],
             mgl=self.mgl.shape,
@@ -350,6 +351,8 @@ def semidirect_bracket(
     >>> sp.rigid_body.semidirect_bracket((x, zero), (y, zero), [0.0, 0.0, 5.0], z).item()  # -Pi . (x x y)
     -5.0
     """
+    for pair, name in ((df, "df"), (dg, "dg")):
+        check_pair(pair, name, "the gradients by momentum and by gamma")
     (fp, fg), (gp, gg) = (tuple(finite_array(part, "gradient", (3,)) for part in pair) for pair in (df, dg))
     pi, up = _point(momentum, gamma)
     turning = np.sum(pi * np.cross(fp, gp), axis=-1)

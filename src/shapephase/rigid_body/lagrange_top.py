@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array, Mask, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, SingularInertiaError
@@ -160,6 +161,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     >>> [sp.rigid_body.sleeping_top(top, spin).spectrally_stable for spin in (2.8, 2.9)]  # sqrt(8) = 2.83
     [False, True]
     """
+    check_object(top, "LagrangeTop", "top")
     p = _number(momentum, "momentum")
     i1, i3, mgl = top.transverse, top.axial, top.mgl
     phi_dot = -0.5 * p / i1
@@ -204,6 +206,7 @@ def second_variation(
     >>> sp.rigid_body.second_variation(top, 3.0, 0.0).shape
     (6, 6)
     """
+    check_object(top, "LagrangeTop", "top")
     p, phi_dot, a, b, c, d = (_number(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
     vertical = -(top.mgl + phi_dot * p)
     matrix = np.diag([1.0 / top.transverse, 1.0 / top.transverse, 1.0 / top.axial + a + c, vertical, vertical, 0.0])
@@ -224,6 +227,7 @@ def e_quadratic(top: LagrangeTop, momentum: float) -> Array:
     >>> sp.rigid_body.e_quadratic(sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0), 3.0).tolist()
     [-9.0, 9.0, -2.0]
     """
+    check_object(top, "LagrangeTop", "top")
     p, i1 = _number(momentum, "momentum"), top.transverse
     return np.array([-p * p, p * p / i1, -top.mgl / i1])
 

@@ -33,6 +33,7 @@ from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
+from ..letters import what_came
 
 _FAINT = 1e-140
 """Least part of a momentum, relative to the largest, that is not zero: squares of smaller parts underflow."""
@@ -326,7 +327,7 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     else:
         order = np.asarray(axes)
         if order.shape != (3,) or sorted(order.tolist()) != [0, 1, 2]:
-            raise ShapeError(f"axes: got {axes!r}; expected an order of 0, 1, 2")
+            raise ShapeError(f"axes: got {what_came(axes)}; expected an order of 0, 1, 2")
     first, second, third = (int(i) for i in order)
     one, two, three = (1 / Fraction(float(values[i])) for i in (first, second, third))
     by_first, by_second = one - three, two - three

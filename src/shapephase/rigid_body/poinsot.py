@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3, sphere
+from ..arguments import check_object, number_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
+from ..letters import what_came
 from .euler_top import EulerTop
 from .portrait import inverse_difference
 
@@ -110,6 +112,7 @@ class Poinsot:
 
     def __post_init__(self) -> None:
         """Refuse a top at rest, which has no invariable plane."""
+        check_object(self.top, "EulerTop", "top")
         if not self.top.magnitude > 0.0:
             raise ShapeError("top: its angular momentum is zero, so there is no invariable plane; give it a momentum")
 
@@ -161,8 +164,8 @@ class Poinsot:
         ShapeError
             If side is not 1 or -1.
         """
-        if side not in (1, -1):
-            raise ShapeError(f"side: expected 1 or -1, got {side!r}")
+        if not isinstance(side, int | np.integer) or side not in (1, -1):
+            raise ShapeError(f"side: expected 1 or -1, got {what_came(side)}")
         ellipsoid = self.ellipsoid(t)
         direction = np.linalg.solve(ellipsoid, np.broadcast_to(self.normal, ellipsoid.shape[:-1])[..., None])[..., 0]
         length = np.sqrt(self.distance * self.top.magnitude / np.sum(direction * self.normal, axis=-1, keepdims=True))
@@ -234,8 +237,10 @@ class Poinsot:
         ShapeError
             If the tolerance is not positive or `most_lobes` is below 1.
         """
-        if not (tolerance > 0.0 and most_lobes >= 1):
-            raise ShapeError(f"closure: expected tolerance > 0 and most_lobes >= 1, got {tolerance}, {most_lobes}")
+        tolerance = number_argument(tolerance, "tolerance", "rad")
+        if not isinstance(most_lobes, int | np.integer) or not (tolerance > 0.0 and most_lobes >= 1):
+            came = f"{tolerance}, {what_came(most_lobes)}"
+            raise ShapeError(f"closure: expected tolerance > 0 and most_lobes >= 1, got {came}")
         inner, outer = self.annulus
         if outer == inner:
             return Closure(int(outer > 0.0), 0, 0.0)
@@ -383,6 +388,7 @@ def cones(top: EulerTop) -> Cones:
     >>> cones.precession_rate, cones.space_inside_body
     (2.5, False)
     """
+    check_object(top, "EulerTop", "top")
     moments, magnitude = top.moments, top.magnitude
     close = np.diff(moments) <= _EQUAL * moments[1:]
     if close.sum() != 1 or not magnitude > 0.0:

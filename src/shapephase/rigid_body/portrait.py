@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import moments_argument
+from ..arguments import moments_argument, whole_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
+from ..letters import what_came
 
 _ROUNDED = 1e-12
 """An energy outside its range by no more than this, relative to the bound, is taken for the bound, rounded."""
@@ -91,6 +92,7 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     ascending, order, parity = ascending_moments(inertia)
     if not np.all(np.diff(ascending) > 0.0):
         raise ShapeError(f"moments: three different ones are needed for a separatrix, got {inertia} kg m^2")
+    count = whole_argument(count, "count", 2)
     angle = np.linspace(0.0, np.pi, count)
     least = np.sqrt(inverse_difference(ascending, 1, 2) / inverse_difference(ascending, 0, 2))
     most = np.sqrt(inverse_difference(ascending, 0, 1) / inverse_difference(ascending, 0, 2))
@@ -132,7 +134,10 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     if lowest == highest:
         raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
     if levels.ndim != 1 or np.any((levels < lowest * (1.0 - _ROUNDED)) | (levels > highest * (1.0 + _ROUNDED))):
-        raise ShapeError(f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {levels}")
+        raise ShapeError(
+            f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {what_came(levels)}"
+        )
+    count = whole_argument(count, "count", 2)
     phase = np.linspace(0.0, 2.0 * np.pi, count)
     curves = np.empty((len(levels), 2, count, 3))
     for row, level in enumerate(levels):
@@ -158,4 +163,5 @@ def inverse_difference(moments: Array, first: int, second: int) -> float:
     >>> sp.rigid_body.inverse_difference(np.array([1.0, 2.0, 4.0]), 1, 2)
     0.25
     """
+    first, second = whole_argument(first, "first", 0), whole_argument(second, "second", 0)
     return float((moments[second] - moments[first]) / (moments[first] * moments[second]))

@@ -19,6 +19,7 @@ from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
+from ..letters import what_came
 
 _ROUNDING = 16.0 * np.finfo(float).eps
 """Moments of a tensor that is not diagonal closer than this, relative to its trace, may be equal but for rounding."""
@@ -174,7 +175,7 @@ def steady_rotations(
     tensor = _tensor(inertia)
     norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
     if norm.shape != () or norm <= 0.0:
-        raise ShapeError(f"magnitude: one number above 0 kg m^2/s is needed, got {magnitude}")
+        raise ShapeError(f"magnitude: one number above 0 kg m^2/s is needed, got {what_came(magnitude)}")
     _, axes = principal_axes(tensor)
     smallest, intermediate, largest = (steady_rotation(tensor, norm * axes[:, k]) for k in range(3))
     return smallest, intermediate, largest

@@ -40,8 +40,8 @@ def check_closed(body: Body, path: ShapePath) -> None:
     worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
     if len(gap) and abs(gap[worst]) > CLOSED:
         raise OpenPathError(
-            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} from "
-            "its start; close the path, or take the end of its horizontal_lift"
+            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} "
+            f"{body.joint_units[worst]} from its start; close the path, or take the end of its horizontal_lift"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, times_argument, tolerance_argument
+from ..arguments import check_function, check_object, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..display import short_repr
@@ -20,6 +20,7 @@ from ..integrator.integrate import stepped_rotation
 from ..integrator.stepped import SteppedRotation
 from .body_path import check_closed, path_sampler
 from .shape_path import CLOSED, ShapePath
+from .unit_doubts import followed_by
 
 # Points of the Gauss rule on a panel: they resolve a curvature that swings a few times there.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(16)
@@ -101,6 +102,7 @@ def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
     >>> print(columns.round(6).tolist(), slopes.shape)
     [[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]] (3, 3, 3)
     """
+    check_object(body, "Body", "body")
     inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     connection = mechanical_connection(body, shape)
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
@@ -142,7 +144,7 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
-    route = path.matched(body.joint_names, body.name)
+    route = followed_by(body, path)
     return _lift_of_loop(body, route, goal).end[0]
 
 
@@ -226,7 +228,7 @@ def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Hor
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
-    route = path.matched(body.joint_names, body.name)
+    route = followed_by(body, path)
     return HorizontalLift(body, route, _lift(body, route, goal))
 
 
@@ -284,8 +286,9 @@ def holonomy_derivative(
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
+    check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
     goal = tolerance_argument(tolerance)
-    route = path.matched(body.joint_names, body.name)
+    route = followed_by(body, path)
     lift = _lift_of_loop(body, route, goal)
     ends = np.array([0.0, route.duration])
     at_ends = _variation_at(variation, ends, body.n_shape)

@@ -16,6 +16,7 @@ from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularIner
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import sampler
+from ..letters import what_came
 from .body_path import check_closed
 from .connection import connection_slopes
 from .shape_path import CLOSED, ShapePath
@@ -67,7 +68,7 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
     check_object(body, "Body", "body")
     goal = finite_array(tolerance, "tolerance")
     if goal.ndim or goal <= 0.0:
-        raise ShapeError(f"tolerance: a number above 0 is needed, got {tolerance!r}")
+        raise ShapeError(f"tolerance: a number above 0 is needed, got {what_came(tolerance)}")
     places = _random_shapes(body) if shapes is None else finite_array(shapes, "shapes")
     if not places.size and body.n_shape:
         raise ShapeError(f"shapes: one shape or more is needed, got an array of shape {places.shape}")
@@ -348,8 +349,8 @@ def _rounding_of_slopes(body: Body, shapes: Array) -> Array:
 
 
 def _two_joints(body: Body, joints: Sequence[str | int]) -> tuple[int, int]:
-    if isinstance(joints, str) or len(joints) != 2:
-        raise ShapeError(f"joints: two joints of {body.name} are needed, got {joints!r}")
+    if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
+        raise ShapeError(f"joints: two joints of {body.name} are needed, got {what_came(joints)}")
     i, j = (_joint_place(body, joint) for joint in joints)
     if i == j:
         raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[i]} twice")

@@ -13,8 +13,9 @@ from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
 from ..display import short_repr
-from ..errors import ShapeError, ShapePhaseError
+from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
+from ..letters import what_came
 from .body_path import path_samplers
 from .shape_path import ShapePath
 
@@ -85,10 +86,13 @@ def final_attitudes(
     for name, array, single in (("momentum", spatial, 1), ("attitude", start, 2)):
         if array.ndim > single + 1:
             raise ShapeError(f"{name}: one for all paths or one for each is needed, got {array.shape}")
+    if isinstance(paths, str | ShapePath) or not isinstance(paths, Iterable):
+        raise WrongObjectError(f"paths: several of ShapePath in a list are needed, got {what_came(paths)}")
     ends: list[Array] = []
     estimates: list[float] = []
     evaluations: list[int] = []
     for number, path in enumerate(paths):
+        check_object(path, "ShapePath", f"path {number}")
         mu, first = _of_path(spatial, 1, number), _of_path(start, 2, number)
         try:
             samplers = path_samplers(body, path.matched(body.joint_names, body.name))

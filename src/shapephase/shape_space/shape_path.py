@@ -11,10 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import breaks_argument, check_time_steps, positive_argument, times_argument
+from ..arguments import (
+    breaks_argument,
+    check_function,
+    check_time_steps,
+    names_argument,
+    positive_argument,
+    times_argument,
+)
 from ..arrays import Array, check_reach, finite_array, lock_arrays
 from ..display import card_html, card_text
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
+from ..letters import what_came
 from ._card import shape_path_card
 from ._derived_scan import DerivedScan, JoinedScan
 from ._rate_check import check_rates
@@ -201,6 +209,7 @@ class ShapePath:
         TrajectoryError
             If the rates are not the derivatives of the shapes (checked at a few times, and again by the scan).
         """
+        check_function(f, "f", "a function of times that gives shapes and rates")
         period = positive_argument(duration)
         edges = breaks_argument(breaks, period)
         start, _ = returned_pair(f(np.zeros(1)))
@@ -339,7 +348,7 @@ class ShapePath:
             If the path does not end where it begins (to whole turns of joints).
         """
         if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
-            raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {count}")
+            raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {what_came(count)}")
         gap = self.gap
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
         if not _closes(gap, turns):
@@ -442,9 +451,9 @@ def _closes(a: Array, b: Array) -> bool:
 def _names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[str, ...] | None:
     if joint_names is None:
         return None
-    names = tuple(joint_names)
+    names = names_argument(joint_names, "joint_names", f"{n_shape} names")
     if len(names) != n_shape or len(set(names)) != len(names):
-        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {names}")
+        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {what_came(names)}")
     return names
 
 

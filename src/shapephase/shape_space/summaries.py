@@ -13,6 +13,7 @@ from ..display import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap
 from .shape_path import CLOSED, ShapePath
+from .unit_doubts import followed_by
 
 _SAMPLES = 401
 """Even times at which extremes are sought, beside the breaks."""
@@ -192,7 +193,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    route = path.matched(body.joint_names, body.name)
+    route = followed_by(body, path)
     times = np.union1d(np.linspace(0.0, route.duration, _SAMPLES), route.breaks)
     shapes, rates = route.curve(times)
     lowest, highest, fastest = shapes.min(axis=0), shapes.max(axis=0), np.abs(rates).max(axis=0)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ...errors import ShapeError
+from ...letters import what_came
 
 # Seconds that something is played in, unless a speed is given: long enough to follow it, not so long as to tire.
 _MIN_PLAYING = 4.0
@@ -22,7 +23,9 @@ def playing_speed(duration: float, speed: float | None) -> float:
     if speed is None:
         return duration / min(max(duration, _MIN_PLAYING), _MAX_PLAYING)
     if not (isinstance(speed, int | float | np.floating | np.integer) and 0.0 < speed < math.inf):
-        raise ShapeError(f"speed: seconds of motion in a second of playing, above 0, are needed, got {speed!r}")
+        raise ShapeError(
+            f"speed: seconds of motion in a second of playing, above 0, are needed, got {what_came(speed)}"
+        )
     return float(speed)
 
 

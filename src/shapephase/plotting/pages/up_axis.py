@@ -35,7 +35,7 @@ def up_axis(up: str | None, body: Body | None) -> Array:
         If there is no such axis.
     """
     if up is not None:
-        if up not in AXES:
+        if not isinstance(up, str) or up not in AXES:
             raise unknown_name("axis", up, AXES)
         return np.array(AXES[up])
     y_up = body is not None and body.n_shape > 0 and _mirrored(body, 2) and not _mirrored(body, 1)

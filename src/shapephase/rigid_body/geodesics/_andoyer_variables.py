@@ -26,11 +26,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import inertia_argument
+from ...arguments import check_object, inertia_argument
 from ...arrays import Array, Mask, finite_array
 from ...display import short_repr
-from ...errors import AccuracyNotReached, ChartPoleError, ShapeError
+from ...errors import AccuracyNotReached, ChartPoleError, ShapeError, WrongObjectError
 from ...inertia_tensor import inverse_inertia
+from ...letters import what_came
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
 _NEAREST = 1e-8
@@ -300,6 +301,7 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
     >>> print(f"{state.vertical:.9f} {state.axial:.9f}")
     1.200000000 0.300000000
     """
+    check_object(chart, "EulerChart", "chart")
     return andoyer_variables(chart.attitude(angles), chart.body_momentum(angles, momenta))
 
 
@@ -335,6 +337,8 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     >>> print(state.total.round(9), f"{state.g[1] - state.g[0]:.6f}")
     [1.58113883 1.58113883] 7.508599
     """
+    if not (hasattr(motion, "attitude") and hasattr(motion, "body_momentum")):
+        raise WrongObjectError(f"motion: a Motion or an EulerTop is needed, got {what_came(motion)}")
     times = finite_array(t, "t", (None,), unit="s")
     if times.ndim != 1 or not (np.all(np.diff(times) > 0.0) or np.all(np.diff(times) < 0.0)):
         raise ShapeError(f"t: a list (N,) of times in strict order is needed, got shape {times.shape}")

@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_object, number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
+from ...letters import what_came
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
@@ -108,6 +110,7 @@ def conjugate_points(
     >>> print(points.time.round(9))  # pi on a sphere
     [3.14159265 3.14159265]
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     _check_order(order)
     angle = finite_array(direction, "direction", unit="rad")
     return _points(surface, angle, start_of(surface, angle, latitude), order)[0]
@@ -125,6 +128,7 @@ def conjugate_points_of_momentum(surface: SurfaceOfRevolution, momentum: ArrayLi
     >>> print(np.abs(points.latitude).round(5))
     [0.04656 0.43376]
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     _check_order(order)
     p, q, room = surface.parameters(momentum)
     start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
@@ -157,6 +161,8 @@ def conjugate_locus(
     >>> geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60).cusps
     4
     """
+    latitude = number_argument(latitude, "latitude", "rad")
+    check_object(surface, "SurfaceOfRevolution", "surface")
     _check_order(order)
     if isinstance(directions, int | np.integer):
         east = _eastward(surface, int(directions), latitude)
@@ -204,6 +210,7 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     >>> float(geodesics.conjugate_height_rate(geodesics.ellipsoid(0.8), 0.5)) > 0.0  # one cusp on each axis
     True
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     _check_order(order)
     p, q, room = surface.parameters(momentum)
     if np.any(q == 0.0):
@@ -321,4 +328,4 @@ def _widest(surface: SurfaceOfRevolution, latitude: float) -> float:
 
 def _check_order(order: int) -> None:
     if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= _HIGHEST_ORDER:
-        raise ShapeError(f"order: expected a whole number from 1 to {_HIGHEST_ORDER}, got {order!r}")
+        raise ShapeError(f"order: expected a whole number from 1 to {_HIGHEST_ORDER}, got {what_came(order)}")

@@ -15,9 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
+from ...letters import what_came
 from ...roots import safe_newton
 from ._conjugate_locus import conjugate_points
 from ._extremal import start_of
@@ -67,6 +69,7 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     >>> print(cut.kind, np.round(np.array(cut.longitudes) / np.pi, 9))
     parallel [0.8 1.2]
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     kind = _kind(surface, latitude)
     phi = float(latitude)
     if kind == "point":
@@ -94,6 +97,7 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     >>> print(f"{geodesics.cut_time(geodesics.ellipsoid(1.0), 0.5):.9f} = pi")
     3.141592654 = pi
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     kind = _kind(surface, latitude)
     angle = finite_array(direction, "direction", unit="rad")
     start = start_of(surface, angle, latitude)
@@ -122,7 +126,7 @@ def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
     if not surface.has_smooth_poles:
         raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this one ends at a {surface.end}")
     if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - _POLE_MARGIN:
-        raise ShapeError(f"latitude: one number between the poles is needed, got {latitude!r}")
+        raise ShapeError(f"latitude: one number between the poles is needed, got {what_came(latitude)}")
     trend = surface.curvature_trend()
     if trend == "neither":
         raise ShapeError("the curvature must fall, or rise, all the way from the equator to the poles; it does neither")

@@ -20,6 +20,7 @@ from ... import elliptic
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
+from ...letters import what_came
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
@@ -87,9 +88,9 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
     """
     epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
     if not _LEAST_ASPECT <= epsilon <= _LARGEST_ASPECT:
-        raise ShapeError(f"aspect: polar over equatorial axis must be between 0.001 and 1000, got {epsilon!r}")
+        raise ShapeError(f"aspect: polar over equatorial axis must be between 0.001 and 1000, got {what_came(epsilon)}")
     if not radius > 0.0:
-        raise ShapeError(f"equatorial_radius: must be positive, got {radius!r}")
+        raise ShapeError(f"equatorial_radius: must be positive, got {what_came(radius)}")
     stretch = EllipsoidStretch(aspect=epsilon, radius=radius)
     return surface_of_stretch(stretch, radius**2, 1.0, "pole", stretch.arcs)
 

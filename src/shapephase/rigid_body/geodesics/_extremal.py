@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
+from ...arguments import check_object, number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
@@ -168,6 +169,7 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     >>> print(f"{latitude:.9f}")  # on a sphere as far north as it went
     0.300000000
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     return Extremal(surface=surface, start=start_of(surface, direction, latitude))
 
 
@@ -181,6 +183,7 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     >>> print(f"{start.momentum:.9f} = cos 0.5")
     0.877582562 = cos 0.5
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     angle = finite_array(direction, "direction", unit="rad")
     if np.ndim(latitude) != 0:
         raise ShapeError(f"latitude: expected one number, got shape {np.shape(latitude)}")
@@ -207,6 +210,7 @@ def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array
     >>> float(geodesics.stretch_at(surface, start.q, start.room, start.phase)[0])
     1.0
     """
+    check_object(surface, "SurfaceOfRevolution", "surface")
     q, room, phase = np.broadcast_arrays(q, room, phase)
     sine2, cosine2 = np.sin(phase) ** 2, np.cos(phase) ** 2
     found = surface.stretch((q * sine2).ravel(), (room + q * cosine2).ravel())
@@ -237,6 +241,7 @@ def variational_jacobi_field(
     >>> print(field.round(9))  # sin t on a sphere
     [0. 1.]
     """
+    direction = number_argument(direction, "direction", "rad")
     t = finite_array(times, "times", (None,))
     if t.ndim != 1 or not t.size or t[0] < 0.0 or np.any(np.diff(t) < 0.0):
         raise ShapeError("times: expected ascending times (N,), from 0 on")

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import elliptic, so3
+from ...arguments import check_object
 from ...arrays import Array, Mask, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
@@ -85,6 +86,7 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
     >>> print(f"{found.total:.9f} {found.own_rate:.6f}")
     1.581138830 0.474919
     """
+    check_object(variables, "AndoyerVariables", "variables")
     metric = serret_andoyer_metric(moments)
     axes = metric.andoyer_axes
     if not np.array_equal(axes, np.eye(3)):

@@ -25,6 +25,7 @@ from ... import so3
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
+from ...letters import what_came
 from ...roots import safe_newton
 
 
@@ -258,7 +259,8 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     try:
         first, third = float(equatorial), float(axial)
     except (TypeError, ValueError):
-        raise ShapeError(f"moments: two numbers are needed, got {equatorial!r} and {axial!r}") from None
+        came = f"{what_came(equatorial)} and {what_came(axial)}"
+        raise ShapeError(f"moments: two numbers are needed, got {came}") from None
     if not (0.0 < first < np.inf and third > 0.0):
         raise ShapeError(
             f"moments: the equatorial must be finite and above 0, the axial one above 0 or inf; got {first}, {third}"

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
+from ...arguments import check_object
 from ...arrays import Array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
@@ -105,6 +106,7 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     >>> print(f"{found.length:.9f}")
     0.500000000
     """
+    check_object(metric, "LeftInvariantMetric", "metric")
     matrix = so3.rotation_argument(attitude, "attitude")
     if matrix.shape != (3, 3):
         raise ShapeError(f"attitude: one rotation (3, 3) is needed, got {matrix.shape}; call it for each of them")

@@ -27,6 +27,7 @@ from ...arrays import Array, common_batch, finite_array, real_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
+from ...letters import what_came
 from ._conjugate_search import conjugate_times
 from ._momentum_flow import attitude_flow, exponential_derivative
 
@@ -161,7 +162,7 @@ class LeftInvariantMetric:
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         self._moving(pi)
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
-            raise ShapeError(f"order: a whole number of 1 or more is needed, got {order!r}")
+            raise ShapeError(f"order: a whole number of 1 or more is needed, got {what_came(order)}")
         times = conjugate_times(self.inverse_moments, pi.reshape(-1, 3) @ self.axes, int(order))
         return times.reshape(pi.shape[:-1])[()]
 

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.fft import dct
 
+from ...arguments import check_function, number_argument
 from ...arrays import Array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
+from ...letters import what_came
 from ...roots import safe_newton
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
@@ -150,8 +152,11 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
     >>> found.is_symmetric, found.falls_to_reach, found.end
     (True, True, 'pole')
     """
+    reach = number_argument(reach, "reach")
+    if meridian is not None:
+        check_function(meridian, "meridian", "a function")
     if not (np.isfinite(reach) and reach > 0.0):
-        raise ShapeError(f"reach: the largest x must be positive and finite, got {reach!r}")
+        raise ShapeError(f"reach: the largest x must be positive and finite, got {what_came(reach)}")
     x = reach * np.linspace(0.0, 1.0, _SAMPLES)
     north, north_slope = _values(profile, x)
     south, south_slope = _values(profile, -x)
@@ -207,6 +212,9 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
     >>> print(f"{geodesics.cut_time(surface, 0.5):.6f} = pi")
     3.141593 = pi
     """
+    reach = number_argument(reach, "reach")
+    if meridian is not None:
+        check_function(meridian, "meridian", "a function")
     found = assumptions(profile, reach, meridian)
     if not found.equator_is_parallel:
         raise ShapeError("(A1) fails: the equator x = 0 is no extremal, as F_2'(0) is not 0; count x from the equator")

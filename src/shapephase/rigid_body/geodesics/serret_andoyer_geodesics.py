@@ -38,6 +38,7 @@ from ... import elliptic
 from ...arrays import Array, Mask, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
+from ...letters import what_came
 from ...roots import safe_newton
 from ._checks import check_entries
 from ._serret_andoyer_constants import GeodesicClass, GeodesicConstants, moment_gaps
@@ -244,7 +245,7 @@ class GeodesicFamily:
         Source: Bonnard et al., section 4.4; theory.md R12.
         """
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
-            raise ShapeError(f"order: expected a whole number from 1 on, got {order!r}")
+            raise ShapeError(f"order: expected a whole number from 1 on, got {what_came(order)}")
         a3 = float(1.0 / self.constants.moments[2])
         level = -order * self._period_slopes()[0] * self.constants.rate * self.constants.at_equator
         v = _argument_of_level(a3, self.constants.second_kind, self.complement, level)

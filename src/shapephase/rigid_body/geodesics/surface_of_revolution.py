@@ -33,9 +33,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_function, number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
+from ...letters import what_came
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
 from ._checks import check_entries
@@ -346,12 +348,19 @@ def surface_of_stretch(
     >>> print(f"{geodesics.cut_time(sphere, 0.5):.9f} = pi")
     3.141592654 = pi
     """
-    if end not in _ENDS:
-        raise ShapeError(f"end: expected one of {', '.join(_ENDS)}, got {end!r}")
+    check_function(stretch, "stretch", "a function of arrays")
+    if closed_arcs is not None:
+        check_function(closed_arcs, "closed_arcs", "a function of arrays")
+    equator = number_argument(equator, "equator", "m")
+    depth = number_argument(depth, "depth")
+    if not isinstance(end, str) or end not in _ENDS:
+        raise ShapeError(f"end: expected one of {', '.join(_ENDS)}, got {what_came(end)}")
     if not (np.isfinite(equator) and equator > 0.0):
-        raise ShapeError(f"equator: m(0) must be positive and finite, got {equator!r}")
+        raise ShapeError(f"equator: m(0) must be positive and finite, got {what_came(equator)}")
     if not (0.0 < depth <= 1.0) or (end == "pole") != (depth == 1.0):
-        raise ShapeError(f"depth: 1 - m(reach)/m(0) must be in (0, 1), and 1 for a pole; got {depth!r} for a {end}")
+        raise ShapeError(
+            f"depth: 1 - m(reach)/m(0) must be in (0, 1), and 1 for a pole; got {what_came(depth)} for a {end}"
+        )
     square = depth * np.linspace(0.0, 0.999, 33)
     value, _, _ = stretch(square, depth - square)
     if not (np.isfinite(value).all() and (value > 0.0).all()):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from .._flow import ascending_times, flow
@@ -88,6 +89,7 @@ def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: Array
     >>> lie.euler_poincare_rate(lie.so3(), np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()
     [0.0, 0.75, 0.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     operator = inertia_operator(algebra, inertia)
     mu = finite_array(momentum, "momentum", (algebra.dimension,))
     return algebra.coad(linear_solution(operator, mu), mu)
@@ -122,6 +124,7 @@ def euler_poincare_motion(
     >>> print(np.linalg.norm(motion.momentum, axis=-1).round(9))
     [1.3 1.3]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     operator, d = inertia_operator(algebra, inertia), algebra.dimension
     mu, instants = finite_array(momentum, "momentum", (d,)), ascending_times(times)
     inverse, basis = np.linalg.inv(operator), algebra.basis

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import LieAlgebraError
@@ -99,6 +100,7 @@ def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: Arr
     >>> plane.normal.tolist(), plane.level.item()
     ([0.0, 0.0, 2.0], 1.0)
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     operator = inertia_operator(algebra, inertia)
     mu = finite_array(momentum, "momentum", (algebra.dimension,))
     if not np.all(np.abs(mu).max(axis=-1) > 0.0):
@@ -154,6 +156,7 @@ def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLik
     >>> lie.contact_velocity(lie.so3(), np.eye(3), z, x).tolist()  # z x x
     [0.0, 1.0, 0.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     ad = finite_array(adjoint, "adjoint", (algebra.dimension, algebra.dimension))
     return np.einsum("...ij,...j->...i", ad, algebra.bracket(velocity, body_point))
 
@@ -171,6 +174,7 @@ def rolling_contact(motion: EulerPoincareMotion) -> RollingContact:
     >>> np.abs(contact.contact_velocity).max().round(9).item()  # it rolls
     0.0
     """
+    check_object(motion, "EulerPoincareMotion", "motion")
     algebra, inertia = motion.algebra, motion.inertia
     hyperplane = invariable_hyperplane(algebra, inertia, motion.momentum[..., 0, :])
     point = motion.space_velocity

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import check_object
 from ...arrays import Array
 from ...errors import LieAlgebraError, ShapeError
 from .lie_algebra import LieAlgebra, Matrices, complex_or_real
@@ -28,6 +29,7 @@ def group_exponential(algebra: LieAlgebra, a: ArrayLike) -> Matrices:
      [ 1.  0.  0.]
      [ 0.  0.  1.]]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     from scipy.linalg import expm
 
     return expm(algebra.matrix(a))
@@ -50,6 +52,7 @@ def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
      [ 0. -1.  0.]
      [ 0.  0. -1.]]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     element, inverse = _element(algebra, g)
     turned = element[..., None, :, :] @ algebra.matrix_basis @ inverse[..., None, :, :]
     return np.swapaxes(algebra.coordinates(turned), -1, -2)
@@ -68,6 +71,7 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     >>> print(lie.coadjoint_action(lie.so3(), half).diagonal().round(9))
     [ 1. -1. -1.]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return np.swapaxes(adjoint_action(algebra, inverse), -1, -2)
 
@@ -90,6 +94,7 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
     >>> lie.body_velocity(lie.so3(), np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).round(9).tolist()
     [1.0, 2.0, 3.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return algebra.coordinates(inverse @ _like(algebra, velocity, "velocity"))
 
@@ -106,6 +111,7 @@ def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Ar
     >>> lie.space_velocity(lie.so3(), turn, turn @ sp.so3.hat(np.array([1.0, 0.0, 0.0]))).round(9).tolist()
     [0.0, 1.0, 0.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return algebra.coordinates(_like(algebra, velocity, "velocity") @ inverse)
 
@@ -121,6 +127,7 @@ def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Arr
     >>> lie.body_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
     [0.0, 0.0, 2.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), element[..., None, :, :] @ algebra.matrix_basis)
 
@@ -136,6 +143,7 @@ def space_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Ar
     >>> lie.space_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
     [0.0, 0.0, 2.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), algebra.matrix_basis @ element[..., None, :, :])
 

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import LieAlgebraError, ShapeError
+from ...letters import what_came
 
 Matrices = NDArray[Any]
 """Real or complex square matrices (..., n, n)."""
@@ -317,6 +319,7 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
     >>> lie.inertia_operator(lie.so3(), np.diag([1.0, 2.0, 4.0])).shape
     (3, 3)
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     d = algebra.dimension
     operator = finite_array(inertia, "inertia", (d, d))
     if operator.ndim != 2:
@@ -368,7 +371,7 @@ def _unit(n: int, row: int, column: int) -> Array:
 
 def _whole(value: int, least: int, name: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise LieAlgebraError(f"{name}: a whole number from {least} up is needed, got {value!r}")
+        raise LieAlgebraError(f"{name}: a whole number from {least} up is needed, got {what_came(value)}")
     return int(value)
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import inverse_inertia_argument
+from ...arguments import check_object, check_pair, inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from .._flow import ascending_times, flow
@@ -46,6 +46,7 @@ def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
      [ 3.  0. -1.]
      [-2.  1.  0.]]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     return -np.einsum("ijk,...k->...ij", algebra.structure, _momentum(momentum, algebra))
 
 
@@ -69,6 +70,7 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
     >>> lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
     -5.0
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     bracket = algebra.bracket(gradient_at(first, "first", mu), gradient_at(second, "second", mu))
     return -np.sum(mu * bracket, axis=-1)
@@ -98,7 +100,10 @@ def bracket_gradient(
     >>> lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
     [0.0, 0.0, -1.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     d, mu = algebra.dimension, _momentum(momentum, algebra)
+    for pair, name in ((first, "first"), (second, "second")):
+        check_pair(pair, name, "a gradient and a Hessian")
     df, dg = finite_array(first[0], "first gradient", (d,)), finite_array(second[0], "second gradient", (d,))
     ddf, ddg = finite_array(first[1], "first Hessian", (d, d)), finite_array(second[1], "second Hessian", (d, d))
     tensor = poisson_tensor(mu, algebra)
@@ -117,6 +122,7 @@ def hamiltonian_vector_field(hamiltonian: Gradient, momentum: ArrayLike, algebra
     >>> lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
     [0.0, -1.0, 0.0]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     return algebra.coad(gradient_at(hamiltonian, "hamiltonian", mu), mu)
 
@@ -146,6 +152,7 @@ def lie_poisson_motion(
     >>> print(np.linalg.norm(pi, axis=-1).round(9))
     [1.3 1.3 1.3]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     start, instants = _momentum(momentum, algebra), ascending_times(times)
     gradient_at(hamiltonian, "hamiltonian", start)
 
@@ -169,6 +176,7 @@ def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra 
     >>> lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
     0.0
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     return np.linalg.norm(hamiltonian_vector_field(function, momentum, algebra), axis=-1)
 
 
@@ -181,6 +189,7 @@ def linear_casimirs(algebra: LieAlgebra) -> Array:
     >>> lie.linear_casimirs(lie.so3()).shape  # none
     (0, 3)
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     return _null_space(algebra.structure.reshape(algebra.dimension, -1).T)
 
 
@@ -198,6 +207,7 @@ def quadratic_casimirs(algebra: LieAlgebra) -> Array:
      [0. 1. 0.]
      [0. 0. 1.]]
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     d = algebra.dimension
     rows, columns = np.triu_indices(d)
     symmetric = np.zeros((len(rows), d, d))
@@ -231,6 +241,7 @@ def coadjoint_orbit_form(first: ArrayLike, second: ArrayLike, momentum: ArrayLik
     >>> lie.coadjoint_orbit_form(x, y, [0.0, 0.0, 5.0]).item()
     -0.2
     """
+    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     tensor = poisson_tensor(mu, algebra)
     inverse = np.linalg.pinv(tensor, rcond=_RANK)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, SingularInertiaError
+from ...letters import what_came
 from .lie_algebra import so
 
 _ASYMMETRY = 1e-9
@@ -162,7 +163,7 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     [-18.0, 0.0, 98.0]
     """
     if isinstance(power, bool) or not isinstance(power, int | np.integer) or power < 1:
-        raise ShapeError(f"power: a whole number from 1 up is needed, got {power!r}")
+        raise ShapeError(f"power: a whole number from 1 up is needed, got {what_came(power)}")
     j = _second_moment(second_moment)
     m = _antisymmetric(momentum, "momentum", len(j))
     coefficients = [m, np.broadcast_to(j @ j, m.shape)]

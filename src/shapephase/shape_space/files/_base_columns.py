@@ -12,6 +12,7 @@ import numpy as np
 from ... import so3
 from ...arrays import FARTHEST, Array, Integers
 from ...errors import TrajectoryError
+from ...letters import what_came
 from ._labels import ANGLES, LENGTHS, SI, Label, label
 from ._recording import Recording
 
@@ -19,6 +20,10 @@ ESTIMATE = "estimate"
 """Instead of the axes of the base: they are found by a fit."""
 # In the tables that `Motion.write_csv` writes; they follow from the rest.
 _FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
+_AGREES = 0.1
+"""Of the rates themselves, in the median: turns between samples that are off by less are the turns of these rates."""
+_CONTRADICTS = 0.5
+"""Of the rates themselves: turns that are off by more are others."""
 _PREFIXES = ("base", "pelvis", "root")
 # A quaternion may be off the unit length by this much: recordings keep as few as three digits.
 _OFF_UNIT = 1e-3
@@ -115,8 +120,12 @@ class BaseMotion:
 
 def base_choices(order: str | None, axes: Any) -> BaseChoices:
     """A user's order of angles and axes of the base. Raises TrajectoryError, ShapeError."""
-    if order is not None and order not in {"".join(letters) for letters in permutations(_AXES)}:
-        raise TrajectoryError(f"base_order: the three axes in their order, as 'zxy', are needed, got {order!r:.40}")
+    if order is not None and (
+        not isinstance(order, str) or order not in {"".join(letters) for letters in permutations(_AXES)}
+    ):
+        raise TrajectoryError(
+            f"base_order: the three axes in their order, as 'zxy', are needed, got {what_came(order)}"
+        )
     if axes is None or (isinstance(axes, str) and axes == ESTIMATE):
         return BaseChoices(order=order, axes=axes, said=axes)
     if isinstance(axes, str):
@@ -141,7 +150,7 @@ def named_axes(text: str) -> Array:
     if len(words) != 3 or np.linalg.det(matrix) != 1.0:
         raise TrajectoryError(
             f"base_axes: where the x, y and z axis of the base point to is needed, three right-handed words such as "
-            f"'x,-z,y', or {ESTIMATE!r}; got {text!r:.40}"
+            f"'x,-z,y', or {ESTIMATE!r}; got {what_came(text)}"
         )
     return matrix
 
@@ -154,10 +163,12 @@ class BaseColumns:
     choices: BaseChoices
     degrees: bool | None
     found: dict[str, tuple[str, str | None]] = field(default_factory=dict)
+    rates: dict[str, str] = field(default_factory=dict)
 
     def take(self, text: str, target: str) -> bool:
         """Keep a column, by its label and the name that it goes by, if it is one of the base."""
         if target in _FOLLOWING:
+            self.rates[target] = text
             return True
         parts = Label(target, None) if target in _KNOWN else label(target)
         if parts.name not in _KNOWN:
@@ -231,6 +242,8 @@ class BaseColumns:
                 order = self.choices.order or group.order
                 turned = _by_angles(values, group.parts, order)
                 record |= {"order": order, "order_said": self.choices.order is not None}
+        if "order" not in record:
+            self._check_parts(turned)
         if "order" not in record and self.choices.order is not None:
             raise TrajectoryError(
                 f"{self.recording.table.where}: base_order is for angles, and the attitude of the base is a quaternion"
@@ -238,6 +251,29 @@ class BaseColumns:
         record |= {"axes": self.choices.said or usual, "axes_said": self.choices.said is not None}
         axes = named_axes(usual) if self.choices.axes is None else self.choices.axes
         return (turned if isinstance(axes, str) else turned @ axes), record
+
+    def _check_parts(self, turned: Array) -> None:
+        """Raise TrajectoryError where rates beside a quaternion say that its first number is w: (N, 3, 3)."""
+        if len(self.rates) < len(_FOLLOWING) or len(turned) < 2:
+            return
+        rates = np.stack([self.recording.table.columns[self.rates[name]] for name in _FOLLOWING], axis=-1)
+        if not np.isfinite(rates).all():
+            return
+        between = 0.5 * (rates[1:] + rates[:-1])
+        size = float(np.median(np.linalg.norm(between, axis=-1)))
+        w_first = so3.matrix_from_quat(np.roll(so3.quat_from_matrix(turned), -1, axis=-1))
+        as_read, other = (self._off_rates(attitudes, between) for attitudes in (turned, w_first))
+        if as_read > _CONTRADICTS * size and other < _AGREES * size:
+            raise TrajectoryError(
+                f"{self.recording.table.where}: read as x y z w, the quaternion of the base turns otherwise than "
+                f"{', '.join(_FOLLOWING)} say; read as w x y z it turns as they say: write its numbers in the order "
+                "x y z w, or give the columns their names"
+            )
+
+    def _off_rates(self, attitudes: Array, rates: Array) -> float:
+        """How far turns between neighbouring samples are from rates there, in the median [rad/s]."""
+        turns = so3.log(so3.transpose(attitudes[:-1]) @ attitudes[1:]) / np.diff(self.recording.times)[:, None]
+        return float(np.median(np.linalg.norm(turns - rates, axis=-1)))
 
     def _position(self, group: _Group | None) -> Array | None:
         if group is None:

@@ -12,6 +12,7 @@ from ... import so3
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
+from ...letters import what_came
 from ._base_columns import ESTIMATE
 from ._free_fall import FreeFall, free_fall
 from ._joint_columns import Matched
@@ -62,8 +63,8 @@ def flight_argument(flight: str | Sequence[float] | None) -> str | tuple[float, 
     """A user's flight. Raises ShapeError."""
     if flight is None or (isinstance(flight, str) and flight in (AUTO, ALL)):
         return flight
-    if isinstance(flight, str):
-        raise ShapeError(f"flight: {AUTO!r}, {ALL!r} or two times are needed, got {flight!r:.40}")
+    if isinstance(flight, str) or not isinstance(flight, Sequence | np.ndarray) or len(flight) != 2:
+        raise ShapeError(f"flight: {AUTO!r}, {ALL!r} or two times are needed, got {what_came(flight)}")
     first, last = flight
     return trim_argument((first, last), "flight")
 

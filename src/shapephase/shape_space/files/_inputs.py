@@ -9,8 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ...arguments import check_file_name, positive_argument
 from ...body.body import Body
-from ...errors import InputFileNotFoundError, TrajectoryError, unknown_name
+from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
+from ...letters import what_came
 from ._recording import MOST_BYTES, Table, digest, file_bytes
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.frames import is_frame, read_frame
@@ -80,10 +82,15 @@ def read_input(source: Any, body: Body, topic: str | None, timestep: float | Non
     TrajectoryError
         For faults of the file.
     """
+    if topic is not None and not isinstance(topic, str):
+        raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")
+    if timestep is not None:
+        timestep = positive_argument(timestep, "timestep")
     if is_frame(source):
         _no_topic(topic, "a table in memory")
         table = read_frame(source)
         return Input(table, table.where, None), timestep
+    check_file_name(source, "file")
     if source == STANDARD_INPUT:
         _no_topic(topic, "standard input")
         return _standard_input(), timestep
@@ -101,7 +108,9 @@ def read_input(source: Any, body: Body, topic: str | None, timestep: float | Non
         raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
     _check_exists(where)
     if topic is not None and suffix not in _WITH_PARTS:
-        raise TrajectoryError(f"{where}: topic={topic!r} is for bags, workbooks and .mat files; this one has no parts")
+        raise TrajectoryError(
+            f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
+        )
     data = file_bytes(where, MOST_YAML if suffix in _YAML else MOST_BYTES)
     sha256 = hashlib.sha256(data).hexdigest()
     if suffix in _ARRAYS:
@@ -127,4 +136,4 @@ def _check_exists(where: Path) -> None:
 
 def _no_topic(topic: str | None, what: str) -> None:
     if topic is not None:
-        raise TrajectoryError(f"topic={topic!r} is for bags, workbooks and .mat files, and this is {what}")
+        raise TrajectoryError(f"topic={what_came(topic)} is for bags, workbooks and .mat files, and this is {what}")

@@ -8,9 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...arguments import check_flag
 from ...arrays import FARTHEST, Array, Integers
 from ...body.body import Body
-from ...errors import TrajectoryError, UnknownColumnError, unknown_name
+from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
+from ...letters import what_came
 from ._base_columns import BaseChoices, BaseColumns, BaseMotion
 from ._labels import ANGLES, LENGTHS, SI, Label, in_square_brackets, label, quantity
 from ._recording import LONGEST_NAME, Recording
@@ -42,6 +44,14 @@ class JointChoices:
     rest: Mapping[str, float | str] | None = None
     rest_missing: bool = False
     ignore_extra: bool = False
+
+    def __post_init__(self) -> None:
+        """Check what a caller has said. Raises ShapeError."""
+        check_flag(self.degrees, "degrees", allow_none=True)
+        check_flag(self.rest_missing, "rest_missing")
+        check_flag(self.ignore_extra, "ignore_extra")
+        if self.rest is not None and not isinstance(self.rest, Mapping):
+            raise ShapeError(f"rest: a mapping, joint -> value, is needed, got {what_came(self.rest)}")
 
 
 class Matched(NamedTuple):

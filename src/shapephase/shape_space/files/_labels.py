@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import ShapeError, TrajectoryError
+from ...letters import what_came
 
 _DEGREE = np.pi / 180.0
 ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}
@@ -83,7 +84,7 @@ def time_unit_argument(unit: str | None) -> str | None:
         return None
     found = unit_of(unit) if isinstance(unit, str) else None
     if found not in IN_A_SECOND:
-        raise TrajectoryError(f"time_unit: one of {', '.join(IN_A_SECOND)} is needed, got {unit!r:.40}")
+        raise TrajectoryError(f"time_unit: one of {', '.join(IN_A_SECOND)} is needed, got {what_came(unit)}")
     return found
 
 
@@ -113,7 +114,7 @@ def amounts(value: object, what: str) -> dict[str, float]:
     for part in value.split(",") if isinstance(value, str) else [value]:
         number, said = _number_and_unit(part, what)
         if number < 0.0:
-            raise TrajectoryError(f"{what}: zero or more is needed, got {value!r:.40}")
+            raise TrajectoryError(f"{what}: zero or more is needed, got {what_came(value)}")
         kinds = ["rad", "m"] if said is None else ["rad" if said in ANGLES else "m"]
         for kind in kinds:
             if kind in found:
@@ -129,16 +130,18 @@ def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:
         if match is None or (match["unit"] and said not in ANGLES | LENGTHS):
             units = ", ".join(ANGLES | LENGTHS)
             raise TrajectoryError(
-                f"{what}: a number is needed, with one of {units} behind it or none; got {value!r:.40}"
+                f"{what}: a number is needed, with one of {units} behind it or none; got {what_came(value)}"
             )
         number = float(match["number"])
     else:
         try:
             number, said = float(value), None  # type: ignore[arg-type]
         except (TypeError, ValueError):
-            raise TrajectoryError(f"{what}: a number or a text such as '30deg' is needed, got {value!r:.40}") from None
+            raise TrajectoryError(
+                f"{what}: a number or a text such as '30deg' is needed, got {what_came(value)}"
+            ) from None
     if not np.isfinite(number):
-        raise TrajectoryError(f"{what}: a finite number is needed, got {value!r:.40}")
+        raise TrajectoryError(f"{what}: a finite number is needed, got {what_came(value)}")
     return number, said
 
 
@@ -163,7 +166,7 @@ def mapping_argument(names: Mapping[str, str | None] | None, labels: Iterable[st
     found: dict[str, str | None] = {}
     for old, new in names.items():
         if not isinstance(old, str) or not (new is None or isinstance(new, str)):
-            raise ShapeError(f"names: texts are needed (None leaves a column out), got {old!r:.40}: {new!r:.40}")
+            raise ShapeError(f"names: texts are needed (None leaves a column out), got {what_came(old)}: {new!r:.40}")
         candidates = [old] if old in there else plain.get(old, [])
         if not candidates:
             raise KeyError(old)

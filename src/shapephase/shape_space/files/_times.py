@@ -10,6 +10,7 @@ import numpy as np
 from ...arguments import positive_argument
 from ...arrays import Array, Integers, Mask, finite_array
 from ...errors import ShapeError, TrajectoryError
+from ...letters import what_came
 from ._labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
 from ._recording import Recording, Table, times_from_zero
 
@@ -163,7 +164,7 @@ def trim_argument(trim: tuple[float, float] | None, name: str = "trim") -> tuple
         return None
     ends = finite_array(trim, name, (2,))
     if ends.ndim != 1 or not ends[0] < ends[1]:
-        raise ShapeError(f"{name}: two times, the first before the last, are needed, got {trim!r}")
+        raise ShapeError(f"{name}: two times, the first before the last, are needed, got {what_came(trim)}")
     return float(ends[0]), float(ends[1])
 
 

@@ -7,12 +7,11 @@ import numpy as np
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
+from ..unit_doubts import looks_like
 from ._labels import ANGLES, LENGTHS
 from ._recording import Recording, warn
 
 _WHOLE_TURN = 2.0 * np.pi
-_FAR_BEYOND = 0.2
-"""Of the width of a joint's limits: a recording with noise leaves them by less."""
 _MANY_TURNS = 2.0 * _WHOLE_TURN
 """Range of a joint without limits [rad] from which on one asks; wheels turn on, but who counts their turns says so."""
 _HALF_TURN = np.pi
@@ -45,7 +44,7 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
             raise TrajectoryError(f"{recording.place(largest)}: joint {name} is at {at:.6g} rad, {limits}: {way}")
         if table.by_format:
             return
-        if limited and _looks_like(values, ANGLES["deg"], lower, upper):
+        if limited and looks_like(values, ANGLES["deg"], lower, upper):
             raise TrajectoryError(
                 f"{recording.place(largest)}: joint {name} is at {at:.6g} rad, far beyond its limits, and within them "
                 f"in degrees; {limits}: {way}, and see to the signs"
@@ -56,7 +55,7 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
                 f"{recording.place(largest)}: joint {name} is at {at:.6g} rad; it would turn {turns:.3g} times, and up "
                 f"to {step:.3g} rad from one {table.row} to the next: {way}"
             )
-    elif not table.by_format and limited and _looks_like(values, LENGTHS["mm"], lower, upper):
+    elif not table.by_format and limited and looks_like(values, LENGTHS["mm"], lower, upper):
         raise TrajectoryError(
             f"{recording.place(largest)}: joint {name} is at {at:.6g} m, {limits}, and within them in millimetres; "
             f"write the unit into the header, as `{name} [mm]` or `{name} [m]`, or give names={{column: '{name} [mm]'}}"
@@ -83,14 +82,6 @@ def warn_of_values(values: Array, joint: int, body: Body, recording: Recording) 
 def doubtful_turns(values: Array) -> bool:
     """Whether angles [rad] of a joint without limits would be taken for degrees where nobody says the unit."""
     return bool(np.ptp(values) > _MANY_TURNS or np.abs(np.diff(values)).max(initial=0.0) > _HALF_TURN)
-
-
-def _looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:
-    """Whether values are far beyond limits, and within them in a unit of this size, in SI units."""
-    room = _FAR_BEYOND * (upper - lower)
-    lowest, highest = float(values.min()), float(values.max())
-    far = lowest < lower - room or highest > upper + room
-    return far and factor * lowest >= lower - room and factor * highest <= upper + room
 
 
 def _check_turns(values: Array, name: str, recording: Recording) -> None:

@@ -95,7 +95,7 @@ def closed_path(
     """
     check_object(body, "Body", "body")
     way = ("smooth" if recorded.noise.any() else "drift") if by is None else by
-    if way not in WAYS:
+    if not isinstance(way, str) or way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)
     whole = recorded.shapes[-1] - recorded.shapes[0]
     turns = np.where(body.continuous, _WHOLE_TURN * np.round(whole / _WHOLE_TURN), 0.0)

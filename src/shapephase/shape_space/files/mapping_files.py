@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+from ...arguments import check_file_name
 from ...errors import ShapeError
 from ._recording import check_text, file_bytes
 
@@ -33,6 +34,7 @@ def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
     >>> sp.shape_space.files.read_names("names.txt")
     {'LKnee': 'left_knee'}
     """
+    check_file_name(file, "file")
     where = Path(file)
     data = file_bytes(where, _MOST_BYTES)
     check_text(data, where)

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_object, positive_argument
+from ...arguments import check_file_name, check_object, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import write_whole
+from ...letters import what_came
 from ...provenance import provenance
 from ..shape_path import ShapePath
 from ._base_columns import base_choices
@@ -323,6 +324,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     0.5
     """
     check_object(path, "ShapePath", "path")
+    check_file_name(file, "file")
     where = Path(file)
     suffix = where.suffix.lower()
     if suffix not in _WRITTEN:
@@ -376,7 +378,7 @@ def _path(
         return closed_path(samples, body, within=within, by=close_by, penalty=penalty)
     if close_by is not None:
         raise TrajectoryError(
-            f"close_by={close_by!r:.40}: how large a gap is to be closed? Give close, as 0.05 or '3deg'"
+            f"close_by={what_came(close_by)}: how large a gap is to be closed? Give close, as 0.05 or '3deg'"
         )
     path, smoothing = prepared_path(samples, periodic=loop and samples.meets, penalty=penalty)
     return path, smoothing, None

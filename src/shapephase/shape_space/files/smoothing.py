@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import positive_argument
+from ...arguments import check_flag, positive_argument
 from ...arrays import Array, finite_array, lock_arrays
 from ...errors import ShapeError, TrajectoryError
+from ...letters import what_came
 from ..curves import CLOSED
 from ..shape_path import ShapePath
 from ._linear_smoother import LinearSmoother, pilot
@@ -108,11 +109,14 @@ def smoothed_path(
     >>> print(path.duration, told.residual.shape)
     1.0 (1,)
     """
+    check_flag(periodic, "periodic", allow_none=True)
     plain = ShapePath.spline(times, shapes, False, joint_names=joint_names)
     at, recorded = plain.breaks, np.array(finite_array(shapes, "shapes"))
     levels = finite_array(noise, "noise")
     if levels.shape not in ((), (plain.n_shape,)) or np.any(levels < 0.0):
-        raise ShapeError(f"noise: a number or {plain.n_shape} of them, zero or above, are needed, got {noise}")
+        raise ShapeError(
+            f"noise: a number or {plain.n_shape} of them, zero or above, are needed, got {what_came(noise)}"
+        )
     samples = Recorded(at, recorded, np.broadcast_to(levels, plain.n_shape), plain.joint_names)
     return prepared_path(samples, periodic=samples.meets if periodic is None else periodic, penalty=penalty)
 
@@ -238,7 +242,7 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
     for joint in map(int, np.flatnonzero(drowned)):
         warn(
             f"joint {joint_names[joint]} moves by {spread[joint]:.6g} rms about its mean, no more than the noise level "
-            f"{noise[joint]:.6g}: of what it does, little is sure"
+            f"{noise[joint]:.6g} (both in rad or m): of what it does, little is sure"
         )
 
 

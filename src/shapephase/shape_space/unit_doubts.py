@@ -1,0 +1,82 @@
+"""Joint motions in another unit than radians and metres: what they look like, and the question that is asked then."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from ..arrays import Array
+from ..body.body import Body
+from ..errors import TrajectoryWarning
+from .curves import Fourier, PiecewisePolynomial
+from .shape_path import ShapePath
+
+DEGREE = np.pi / 180.0
+"""[rad]"""
+_FAR_BEYOND = 0.2
+"""Of the width of a joint's limits: a recording with noise leaves them by less."""
+_HALF_TURN = np.pi
+"""[rad] By less than this beyond its limits a joint may go in radians, where someone tries what limits forbid."""
+_LOOKS = 17
+"""Even times at which a path is looked at that is neither a spline nor a series."""
+
+
+def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:
+    """Whether values are far beyond limits, and within them in a unit of this size, in SI units: (N,) [rad or m]."""
+    room = _FAR_BEYOND * (upper - lower)
+    lowest, highest = float(values.min()), float(values.max())
+    far = lowest < lower - room or highest > upper + room
+    return far and factor * lowest >= lower - room and factor * highest <= upper + room
+
+
+def followed_by(body: Body, path: ShapePath) -> ShapePath:
+    """The path with its columns in the order of the body's joints; raises as `ShapePath.matched`.
+
+    Warns
+    -----
+    TrajectoryWarning
+        Where angles look like degrees: a joint goes more than half a turn beyond its limits, and in degrees all would
+        stay within theirs. Of a recording this was asked when it was read.
+    """
+    route = path.matched(body.joint_names, body.name)
+    if route.record is None and _farthest(route) > _HALF_TURN:
+        _ask_of_degrees(body, route)
+    return route
+
+
+def _ask_of_degrees(body: Body, path: ShapePath) -> None:
+    times = _looked_at(path)
+    shapes, _ = path.curve(times)
+    limited = np.isfinite(body.joint_limits).all(axis=1) & (np.array(body.joint_units) == "rad")
+    beyond = np.maximum(body.joint_limits[:, 0] - shapes, shapes - body.joint_limits[:, 1])
+    far = [k for k in np.flatnonzero(limited) if beyond[:, k].max() > _HALF_TURN]
+    if not far or not all(looks_like(shapes[:, k], DEGREE, *body.joint_limits[k]) for k in far):
+        return
+    worst = max(far, key=lambda k: float(beyond[:, k].max()))
+    row = int(np.argmax(beyond[:, worst]))
+    lower, upper = body.joint_limits[worst]
+    warnings.warn(
+        f"joint {body.joint_names[worst]} of {body.name} is at {shapes[row, worst]:.6g} rad at {times[row]:.6g} s, far "
+        f"beyond its limits {lower:.4g} to {upper:.4g} rad, and within them in degrees: are the angles of this path in "
+        "degrees? A ShapePath is in radians: np.radians(angles) makes them. If radians are meant, nothing is wrong",
+        TrajectoryWarning,
+        stacklevel=4,
+    )
+
+
+def _farthest(path: ShapePath) -> float:
+    """A bound of the joint coordinates, without looking at a spline or a series in time [rad or m]."""
+    if isinstance(path.curve, Fourier):
+        curve = path.curve
+        sizes = np.abs(curve.mean) + np.abs(curve.cosines).sum(axis=1) + np.abs(curve.sines).sum(axis=1)
+    elif isinstance(path.curve, PiecewisePolynomial):
+        sizes = np.abs(path.curve.coefficients[0])
+    else:
+        sizes = np.abs(path.curve(_looked_at(path))[0])
+    return float(sizes.max(initial=0.0))
+
+
+def _looked_at(path: ShapePath) -> Array:
+    known = isinstance(path.curve, PiecewisePolynomial)
+    return path.breaks if known else np.linspace(0.0, path.duration, _LOOKS)

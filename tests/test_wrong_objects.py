@@ -1,0 +1,73 @@
+"""Whatever is given for an argument of a public function: a sentence says what was wanted and what came."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.errors import UnknownNameError
+from shapephase.letters import what_came
+from support.example_calls import TRUSTING, example_calls, fault_of, trusts, works, wrong_things
+from test_documentation import LONG, NAMES
+
+TRIED = [name for name in NAMES if name not in LONG and not name.removeprefix("shapephase.").startswith(TRUSTING)]
+# Of these an example takes a few milliseconds, and so do the calls with something wrong.
+QUICK = ("shapephase.articulated", "shapephase.reconstruct", "shapephase.momentum_from_rate", "shapephase.split",
+         "shapephase.holonomy", "shapephase.final_attitudes", "shapephase.base_difference", "shapephase.ShapePath",
+         "shapephase.bounds.return_time_bounds", "shapephase.link_gauge", "shapephase.examples.kane_scher",
+         "shapephase.load_motion", "shapephase.rigid_body.cones")  # fmt: skip
+# A function is what is wanted, whatever it then does.
+FUNCTIONS = ("Callable", "Gauge", "Profile", "Meridian")
+
+
+def faults(name: str) -> list[str]:
+    """Of the functions that an example calls, with each argument in turn something else."""
+    found = []
+    for call in filter(works, example_calls(name, NAMES[name])):
+        for argument, said in call.annotations.items():
+            if trusts(call, argument):
+                continue
+            for kind, value in wrong_things().items():
+                wanted = kind == "builtin_function_or_method" and any(word in said for word in FUNCTIONS)
+                if wanted or type(call.arguments[argument]) is type(value):
+                    continue
+                fault = fault_of(call, argument, value)
+                found += [f"{call.place}({argument}) <- {kind}: {fault}"] if fault else []
+    return found
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_wrong_argument_gets_a_sentence(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert not faults(name)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", TRIED)
+def test_every_wrong_argument_gets_a_sentence(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert not faults(name)
+
+
+def test_what_came_is_shown_in_a_line():
+    path = sp.examples.kane_scher(0.3, 1.0)
+    assert what_came(path) == "a ShapePath"
+    assert what_came(sp.EulerTop) == "the class EulerTop itself"
+    assert what_came(sp.EulerTop.principal((1.0, 2.0, 3.0), (0.7, 0.2, 1.5))) == "an EulerTop"
+    assert what_came("cat") == "'cat'"
+    assert what_came(1.5) == "1.5"
+    assert "\n" not in what_came(np.eye(9))
+    assert len(what_came("x" * 5000)) <= 80
+
+
+def test_a_name_that_is_none_is_shown_by_its_kind():
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 0.0, 0.0])
+    with pytest.raises(UnknownNameError, match=r"^unknown method \(a name is needed\): a Motion. Valid: "):
+        sp.reconstruct(motion.deformation, [1.0, 0.0, 0.0], method=motion)  # type: ignore[arg-type]
