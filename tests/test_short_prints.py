@@ -76,13 +76,11 @@ def test_what_an_example_makes_prints_itself_in_a_few_lines(name, monkeypatch, t
 
 
 @pytest.mark.full
-def test_nearly_every_public_class_is_looked_at(monkeypatch, tmp_path):
-    """But for those that an example of a few milliseconds cannot make; all by their own `repr`, which bounds itself."""
+def test_more_than_a_hundred_public_classes_are_looked_at(monkeypatch, tmp_path):
+    """The others are made by long searches, or inside of functions; how they print is that of these."""
     monkeypatch.chdir(tmp_path)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         seen = {type(thing) for name in EVERY for thing in made_by(name)}
     classes = {kind for kind in NAMES.values() if inspect.isclass(kind) and not issubclass(kind, BaseException)}
-    missing = {kind.__name__ for kind in classes - seen if not getattr(kind, "_is_protocol", False)}
     assert len(classes & seen) > 100
-    assert missing <= {"Plan", "LiveView"}

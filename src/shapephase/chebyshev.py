@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from .arrays import Array, Integers
+from .display import short_repr
 
 # Numbers in the largest intermediate array of an evaluation: 16 megabytes.
 _CHUNK = 2_000_000
@@ -25,6 +26,8 @@ class PiecewiseChebyshev:
 
     edges: Array
     coefficients: Array
+
+    __repr__ = short_repr
 
     def panel_of(self, times: Array) -> Integers:
         """The panel of each time, an edge belonging to the panel on its right: (N,) -> (N,)."""

@@ -25,10 +25,10 @@ from shapephase.errors import ShapePhaseError
 from shapephase.examples.scenarios import kane_scher
 
 SOURCE = str(Path(sp.__file__).parent)
-# Functions of arrays that check nothing, since the library itself calls them within its loops; and the integrator,
-# which gets what was checked.
+# Functions of arrays that check nothing, since the library itself calls them within its loops; the integrator, which
+# gets what was checked; and studies, which take names and numbers, and no objects of ours.
 TRUSTING = ("so3", "sphere", "elliptic", "inertia_tensor", "chebyshev", "roots", "refinement", "errors",
-            "integrator")  # fmt: skip
+            "integrator", "study")  # fmt: skip
 # The same of single arguments.
 TRUSTED = ("Array", "Integers", "Mask", "Evaluate")
 

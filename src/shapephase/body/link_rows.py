@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
+from ..display import short_repr
 
 if TYPE_CHECKING:
     from .joint_chain import JointChain
@@ -44,6 +45,8 @@ class LinkRows:
     matrix: Array | None
     offset: Array | None
     bases: Any
+
+    __repr__ = short_repr
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """Of all joints, followers included: (N, n), (N, n) -> (N, k), (N, k), each in one piece."""

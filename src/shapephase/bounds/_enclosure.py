@@ -16,6 +16,7 @@ from ..arguments import interval_argument
 from ..arrays import Array, Mask
 from ..chebyshev import derivative_matrix, local_coordinate, restriction_matrix
 from ..deformation.deformation import Deformation
+from ..display import short_repr
 from ..inertia_tensor import inverse_inertia
 from ..integrator.interpolant import Interpolant
 
@@ -79,6 +80,8 @@ class Enclosure:
     drift_rate: Array
     drift_rate_radius: Array
     sampling_error: Array
+
+    __repr__ = short_repr
 
     @property
     def widths(self) -> Array:

@@ -17,6 +17,7 @@ from .. import so3
 from ..arguments import check_picklable, times_argument
 from ..arrays import Array, finite_array
 from ..chebyshev import PiecewiseChebyshev
+from ..display import short_repr
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import stepped_rotation
 from ..integrator.resolved import DEGREE
@@ -64,6 +65,8 @@ class GivenFrames:
 
     frames: _OfUser
     breaks: Array
+
+    __repr__ = short_repr
 
     @property
     def function(self) -> ScannedFunction:
@@ -137,6 +140,8 @@ class _TurnsAlone(_OfFunction):
     """U as a function gives it, with the slopes of a series of it: times (N,) -> (N, 9)."""
 
     slopes: PiecewiseChebyshev
+
+    __repr__ = short_repr
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         turned, _ = _turns_of(self.function, times)

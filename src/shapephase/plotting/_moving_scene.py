@@ -18,6 +18,7 @@ from ..body.body import Body
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription, Description, ParticleDescription
 from ..deformation.frames import principal_frames
+from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
 from ..letters import what_came
@@ -49,6 +50,8 @@ class MovingNode:
     shapes: tuple[Visual, ...]
     poses: Array
     scales: Array | None = None
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,8 @@ class MovingScene:
     body: Body | None = None
     shapes: Array | None = None
     falls: bool = False
+
+    __repr__ = short_repr
 
     def world_pose(self, node: MovingNode) -> Array:
         """Pose of a node: (F, 4, 4)."""

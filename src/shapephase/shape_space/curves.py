@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import check_picklable
 from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_array
+from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 
 if TYPE_CHECKING:
@@ -72,6 +73,8 @@ class Fourier:
     sines: Array
     period: float
 
+    __repr__ = short_repr
+
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
@@ -128,6 +131,8 @@ class PiecewisePolynomial:
     coefficients: Array
     through: Interpolation | None = None
     origin: SampleOrigin | None = None
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 
@@ -215,6 +220,8 @@ class Function:
     f: Callable[[Array], tuple[ArrayLike, ArrayLike]]
     n_shape: int
 
+    __repr__ = short_repr
+
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled. Raises LocalFunctionError for a lambda."""
         check_picklable(self.f, "a path")
@@ -247,6 +254,8 @@ class Reversed:
     curve: Curve
     duration: float
 
+    __repr__ = short_repr
+
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
         shapes, rates = self.curve(self.duration - times)
@@ -261,6 +270,8 @@ class Stretched:
     factor: float
     duration: float
 
+    __repr__ = short_repr
+
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """As `Curve`."""
         shapes, rates = self.curve(np.minimum(times / self.factor, self.duration))
@@ -273,6 +284,8 @@ class Reordered:
 
     curve: Curve
     order: Integers
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 
@@ -291,6 +304,8 @@ class Joined:
     second: Curve
     second_duration: float
     offset: Array
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 
@@ -313,6 +328,8 @@ class Repeated:
     period: float
     count: int
     turns: Array
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 

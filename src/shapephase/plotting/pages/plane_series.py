@@ -10,6 +10,7 @@ from ... import so3
 from ...arrays import Array
 from ...body.body import Body
 from ...chebyshev import chebyshev, nodes_on, values_to_coefficients
+from ...display import short_repr
 from ...inertia_tensor import inverse_inertia
 
 # Degrees that are tried, along each joint.
@@ -49,6 +50,8 @@ class PlaneSeries:
     inertia_error: float
     momentum_error: float
     error: float
+
+    __repr__ = short_repr
 
     def connection(self, first: Array, second: Array) -> Array:
         """A at all pairs of coordinates, I^-1 J of the series: (P,), (Q,) -> (P, Q, 3, 2)."""

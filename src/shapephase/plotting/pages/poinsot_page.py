@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from ... import so3
-from ...arguments import check_object
-from ...arrays import Array, finite_array
+from ...arguments import check_file_name, check_object, number_argument
+from ...arrays import Array
 from ...display import numbers
 from ...errors import ShapeError
 from ...files import write_whole
 from ...inertia_tensor import inverse_inertia
+from ...letters import what_came
 from ...rigid_body.euler_top import EulerTop
 from ...rigid_body.poinsot import Poinsot
 from .playing import frame_count, playing_speed
@@ -74,6 +75,8 @@ def poinsot_page(
     >>> Path("rolling.html").stat().st_size > 1000
     True
     """
+    check_object(top, "EulerTop", "top")
+    check_file_name(path, "path")
     page = poinsot_html(top, duration=duration, speed=speed, frames=frames)
     write_whole(path, lambda stream: stream.write(page.encode()))
 
@@ -95,7 +98,7 @@ def poinsot_html(
     rate = playing_speed(shown, speed)
     count = frame_count(shown, rate) if frames is None else frames
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
-        raise ShapeError(f"frames: a whole number of 2 or more is needed, got {frames!r}")
+        raise ShapeError(f"frames: a whole number of 2 or more is needed, got {what_came(frames)}")
     times = np.linspace(0.0, shown, int(count))
     return page_html(
         "poinsot.html",
@@ -116,9 +119,9 @@ def _duration(top: EulerTop, duration: float | None) -> float:
         if np.isfinite(top.period):
             return _PERIODS * top.period
         return _TURNS * 2.0 * np.pi / float(np.linalg.norm(top.angular_velocity(0.0)))
-    found = float(finite_array(duration, "duration", (), unit="s"))
+    found = number_argument(duration, "duration", "s")
     if not found > 0.0:
-        raise ShapeError(f"duration: a time above 0 is needed, got {duration!r} s")
+        raise ShapeError(f"duration: a time above 0 is needed, got {what_came(duration)} s")
     return found
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array, Mask, lock_arrays
+from ...display import short_repr
 from ..curves import PiecewisePolynomial
 from ..path_samples import path_samples
 from ..shape_path import ShapePath
@@ -36,6 +37,8 @@ class Prepared:
     turns: Array
     drift: bool
     joint_names: tuple[str, ...] | None
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 

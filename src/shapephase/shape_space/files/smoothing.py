@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...arguments import check_flag, positive_argument
 from ...arrays import Array, finite_array, lock_arrays
+from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
 from ..curves import CLOSED
@@ -50,6 +51,8 @@ class Smoothing:
     bias: Array
     bias_in_bars: float
     residual: Array
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 
