@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3, sphere
-from ..arguments import check_object, number_argument
+from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
@@ -237,9 +237,9 @@ class Poinsot:
         ShapeError
             If the tolerance is not positive or `most_lobes` is below 1.
         """
-        tolerance = number_argument(tolerance, "tolerance", "rad")
-        if not isinstance(most_lobes, int | np.integer) or not (tolerance > 0.0 and most_lobes >= 1):
-            came = f"{tolerance}, {what_came(most_lobes)}"
+        numbers = isinstance(tolerance, int | float | np.number) and isinstance(most_lobes, int | np.integer)
+        if not numbers or not (tolerance > 0.0 and most_lobes >= 1):
+            came = f"{what_came(tolerance)}, {what_came(most_lobes)}"
             raise ShapeError(f"closure: expected tolerance > 0 and most_lobes >= 1, got {came}")
         inner, outer = self.annulus
         if outer == inner:
