@@ -13,8 +13,8 @@ from .text_motions import delimited, number_text, opensim
 
 _GOOD_MOTION = "time,hip,wrist,boom\n0,0,0,0\n0.25,0.2,0.1,0.05\n0.5,0.3,0.3,0.1\n0.75,0.1,0.2,0.02\n1,0,0,0\n"
 _ODD_VALUES = (*ODD_WORDS, "-", "x", "a=b", "[", "1,2,3", "@", "%s", "\n")
-_SMALL_SEARCH = ("--pieces", "8", "--iterations", "5")
-"""What a plan may take of the processor grows with these; the search of a whole one has no end of its own."""
+_SMALL_SEARCH = ("--pieces", "12", "--iterations", "30", "--duration", "10")
+"""What a plan takes of the processor grows with the first two; in so many seconds the rates of the body suffice."""
 
 
 def _number(chance: Random, usual: str) -> str:
@@ -91,7 +91,7 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
             c.choice(("x", "0,1,1", "0,0,0", "nan,1,1", "1e400,0,0", "w", "1e200,1e200,0", "1e-320,0,0"))
         ],
         "--momentum": _three,
-        "--duration": lambda c: [_number(c, "1")],
+        "--duration": lambda c: [_number(c, "10")],
         "--somersaults": lambda c: [_number(c, "0")],
         "--half-twists": lambda c: [_number(c, "1")],
         "--cost": lambda c: [c.choice(("kinetic", "rate", "time", "x"))],
