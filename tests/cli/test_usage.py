@@ -12,7 +12,7 @@ from shapephase.cli.main import main
 SHALL = {
     "splt cat cat_righting": ["no command 'splt'", "Did you mean 'split'?"],
     "SPLIT cat cat_righting": ["no command 'SPLIT'", "Did you mean 'split'?"],
-    "cat cat_righting": ["no command 'cat'", "`shapephase split cat cat_righting`", "orbits, robots, compile, doctor"],
+    "cat cat_righting": ["no command 'cat'", "`shapephase split cat cat_righting`", "robots, compile, doctor"],
     "help": ["`shapephase --help`", "`shapephase COMMAND --help`"],
     "version": ["`shapephase --version`"],
     "list": ["`shapephase robots`"],
@@ -32,6 +32,8 @@ SHALL = {
     "plan cat_two_halves --rotate 5 --pieces 1e9": ["--pieces: a whole number", "got '1e9'", "`--pieces 12`"],
     "plan cat_two_halves --rotate 5 --pieces 9000": ["pieces: a whole number, up to 2000", "got 9000"],
     "plan cat_two_halves --rotate 5 --starts 9000": ["starts: a whole number, up to 1000", "got 9000"],
+    "explore cat": ["--joints is needed; for example `--joints waist_pitch waist_yaw`"],
+    "sweep study.toml": ["--store is needed; for example `--store out.zarr`"],
     "explore cat --joints waist_pitch": ["--joints: 2 values", "`--joints waist_pitch waist_yaw`"],
     "split cat_righting cat": ["cat_righting is a motion; the body comes before it"],
     "check motion.csv body.urdf": ["motion.csv is a motion; the body comes before it"],

@@ -43,6 +43,8 @@ def _missing(error: MissingArgumentError, command: str) -> str:
     name = error.keyword or _name(error)
     if not name.startswith("-"):
         return f"{command}: {name} is missing; it is `{_form(error, command)}`"
+    if not any(word.split("=", 1)[0] in error.argument.names for word in error.root_input_tokens or ()):
+        return f"{command}: {name} is needed{_such_as(error)}"
     if count < 2:
         return f"{name}: a value is missing after it{_such_as(error)}"
     came = " ".join(error.tokens_so_far)[:_LONGEST_SHOWN]
