@@ -35,7 +35,8 @@ def export_study(store: StudyStore, path: str | os.PathLike[str]) -> None:
     --------
     >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1]}, outputs=("turn",))
     >>> sp.study.export_study(study.run("exported.zarr", workers=0), "exported.csv")
-    >>> print(open("exported.csv").readline().strip())
+    >>> with open("exported.csv") as file:
+    ...     print(file.readline().strip())
     case,status,momentum_z,turn,error
     """
     place = Path(path)
