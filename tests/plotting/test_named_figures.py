@@ -213,7 +213,7 @@ def test_what_is_beside_the_body_follows_the_scrubber(tmp_path, chromium):
         np.testing.assert_allclose(so3.exp(turn), motion.attitude(t) @ motion.initial_attitude.T, atol=1e-6)
     # A pointer on a plot moves the clock, and with it all else.
     page.evaluate("document.querySelector('#plots').scrollIntoView()")
-    box = page.locator("#plots svg").first.bounding_box()
+    box = page.locator("#plots figure > svg").first.bounding_box()
     page.mouse.click(box["x"] + (52 + 0.25 * 398) / 460 * box["width"], box["y"] + 0.4 * box["height"])
     assert page.evaluate("page.clock.time") == pytest.approx(0.25 * motion.duration, abs=0.01 * motion.duration)
     assert float(bar.input_value()) == pytest.approx(page.evaluate("page.clock.time"), abs=1e-9)
