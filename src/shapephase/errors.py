@@ -12,6 +12,11 @@ from pickle import PicklingError
 
 from .letters import what_came
 
+# Characters of a name up to which an error repeats all of it: no name that is meant has more.
+_LONGEST_NAME = 1000
+# And how many of a longer one.
+_LONGEST_SHOWN = 80
+
 
 class ShapePhaseError(Exception):
     """Root of every error raised on purpose by this library.
@@ -519,5 +524,7 @@ def unknown_name(
     near = difflib.get_close_matches(name, choices, n=1) if isinstance(name, str) else []
     hint = f" Did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(choices) if choices else "none"
+    if isinstance(name, str) and len(name) > _LONGEST_NAME:
+        name = f"{name[:_LONGEST_SHOWN]}..."
     shown = repr(name) if isinstance(name, str) else f"(a name is needed): {what_came(name)}"
     return error(f"unknown {kind} {shown}.{hint} Valid: {listed}")

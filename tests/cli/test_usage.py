@@ -54,3 +54,13 @@ def test_what_is_typed_wrongly_is_answered_in_one_line(words, capsys, monkeypatc
     assert told.err.count("\n") == 1
     for said in SHALL[words]:
         assert said in told.err
+
+
+def test_a_name_of_70000_characters_is_not_repeated(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.toml").write_text("x" * 70_000 + " = 1")
+    with pytest.raises(SystemExit):
+        main(["sweep", "study.toml", "--store", "out.zarr"])
+    said = capsys.readouterr().err
+    assert f"unknown entry '{'x' * 80}...'. Valid: body" in said
+    assert len(said) < 500
