@@ -37,16 +37,16 @@ def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
     turns[:, 0] = np.eye(3)
     # Of all joints at once, from the parent's axes to the child's.
     turned = chain.turns @ so3.exp(all_coordinates[..., None] * chain.axes)
-    for joint, parent in enumerate(chain.parents):
-        before, spin = turns[:, parent] @ chain.turns[joint], spins[:, parent]
-        coordinate, rate = all_coordinates[:, joint, None], all_rates[:, joint, None]
-        slide = before @ chain.slides[joint]
-        step = turns[:, parent] @ chain.places[joint] + slide * coordinate
-        turns[:, joint + 1] = turns[:, parent] @ turned[:, joint]
-        spins[:, joint + 1] = spin + before @ chain.axes[joint] * rate
+    for joints, parents in chain.generations:
+        before, spin = turns[:, parents] @ chain.turns[joints], spins[:, parents]
+        coordinate, rate = all_coordinates[:, joints, None], all_rates[:, joints, None]
+        slide = so3.apply(before, chain.slides[joints])
+        step = so3.apply(turns[:, parents], chain.places[joints]) + slide * coordinate
+        turns[:, joints + 1] = turns[:, parents] @ turned[:, joints]
+        spins[:, joints + 1] = spin + so3.apply(before, chain.axes[joints]) * rate
         # From origin to origin, so that nothing far away is taken off again.
-        places[:, joint + 1] = places[:, parent] + step
-        speeds[:, joint + 1] = speeds[:, parent] + so3.cross(spin, step) + slide * rate
+        places[:, joints + 1] = places[:, parents] + step
+        speeds[:, joints + 1] = speeds[:, parents] + so3.cross(spin, step) + slide * rate
     levers = so3.apply(turns, chain.centres)
     share = chain.masses / chain.masses.sum()
     places, speeds = places + levers, speeds + so3.cross(spins, levers)
@@ -56,3 +56,14 @@ def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
         speeds=speeds - (share @ speeds)[:, None],
         spins=spins,
     )
+
+
+def components(vectors: Array) -> Array:
+    """(N, k, c) -> (c, N, k), each in one piece, which is sooner added and multiplied."""
+    return np.ascontiguousarray(np.moveaxis(vectors, -1, 0))
+
+
+def cross(first: Array, second: Array) -> Array:
+    """Of vectors whose components come first: (3, ...), (3, ...) -> (3, ...)."""
+    (a, b, c), (x, y, z) = first, second
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x])

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._link_motions import LinkMotions, link_motions
+from ._link_motions import LinkMotions, components, cross, link_motions
 from .joint_chain import JointChain
 
 PARAMETERS = 10
@@ -98,23 +98,27 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
     spins : (N, 3)
     moving : whether the links move as seen from the base; else the sums are of row . dI spin
     """
-    all_spins = spins[:, None] + (links.spins if moving else 0.0)
-    speeds = so3.cross(spins[:, None], links.places) + (links.speeds if moving else 0.0)
-    # Axes: shapes, links, rows, components.
-    across = rows[:, None]
-    arms = so3.cross(across, links.places[:, :, None])
-    moments = so3.cross(speeds[:, :, None], across) + so3.cross(arms, all_spins[:, :, None])
-    turning = (all_spins[:, :, None] @ links.turns)[:, :, 0]
-    found = np.empty((rows.shape[1], links.places.shape[1], PARAMETERS))
-    found[..., 0] = (arms @ speeds[..., None])[..., 0].sum(axis=0).T
-    found[..., 1:4] = np.swapaxes((moments @ links.turns).sum(axis=0), 0, 1)
-    # Sums over shapes, for each link a product of matrices.
-    near = np.moveaxis(across @ links.turns, 0, -1).reshape(found.shape[1], -1, len(rows))
-    products = (near @ np.moveaxis(turning, 0, 1)).reshape(found.shape[1], -1, 3, 3)
-    symmetric = np.swapaxes(products + so3.transpose(products), 0, 1)
-    for entry, (i, j) in enumerate(_VOIGT):
-        found[..., 4 + entry] = symmetric[..., i, j] * (0.5 if i == j else 1.0)
+    turns = components(links.turns.reshape(*links.places.shape[:2], 9))
+    places, spin = components(links.places), spins.T[:, :, None]
+    all_spins = spin + (components(links.spins) if moving else np.zeros_like(places))
+    speeds = cross(spin, places) + (components(links.speeds) if moving else 0.0)
+    turning = _seen(turns, all_spins)
+    found = np.empty((rows.shape[1], places.shape[2], PARAMETERS))
+    for row, sums in zip(np.moveaxis(rows, 0, 2), found, strict=True):
+        across = np.broadcast_to(row[:, :, None], places.shape)
+        arms, near = cross(across, places), _seen(turns, across)
+        sums[:, 0] = (arms * speeds).sum(axis=(0, 1))
+        sums[:, 1:4] = _seen(turns, cross(speeds, across) + cross(arms, all_spins)).sum(axis=1).T
+        for entry, (i, j) in enumerate(_VOIGT):
+            product = near[i] * turning[j]
+            sums[:, 4 + entry] = (product if i == j else product + near[j] * turning[i]).sum(axis=0)
     return found.reshape(len(found), -1)
+
+
+def _seen(turns: Array, vectors: Array) -> Array:
+    """Vectors in axes of the links: (9, N, k), (3, N, k) -> (3, N, k)."""
+    x, y, z = vectors
+    return np.stack([turns[i] * x + turns[3 + i] * y + turns[6 + i] * z for i in range(3)])
 
 
 def parameters(masses: Array, centres: Array, inertias: Array, about: Array) -> Array:

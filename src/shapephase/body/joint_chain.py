@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..display import short_repr
 from ._link_tree import Mimic
 from ._model_tree import mimic_map, moving_joints
@@ -64,6 +64,25 @@ class JointChain:
     def rows(self) -> LinkRows:
         """The same for loops in machine code, made when first needed."""
         return link_rows(self)
+
+    @cached_property
+    def generations(self) -> tuple[tuple[Integers, Integers], ...]:
+        """Joints as far from the base as each other, and the frames that they hang on: those near the base first."""
+        depths, parents = np.zeros(len(self.names) + 1, dtype=np.int64), np.array(self.parents, dtype=np.int64)
+        for joint, parent in enumerate(self.parents):
+            depths[joint + 1] = depths[parent] + 1
+        groups = (np.flatnonzero(depths[1:] == depth) for depth in range(1, int(depths.max()) + 1))
+        return tuple((joints, parents[joints]) for joints in groups)
+
+    @cached_property
+    def hanging(self) -> Array:
+        """(k, k + 1) one where a frame hangs on a joint, at whatever distance, else zero."""
+        found = np.zeros((len(self.names), len(self.names) + 1))
+        for joint in range(len(self.names) - 1, -1, -1):
+            found[joint, joint + 1] = 1.0
+            if self.parents[joint]:
+                found[self.parents[joint] - 1] += found[joint]
+        return found
 
     def with_inertias(self, masses: Array, centres: Array, inertias: Array) -> JointChain:
         """The same joints between other links; what is known of the joints' rows goes with them."""

@@ -54,6 +54,23 @@ class LinkRows:
             return np.ascontiguousarray(shapes), np.ascontiguousarray(rates)
         return shapes @ self.matrix.T + self.offset, rates @ self.matrix.T
 
+    def in_chain_axes(self, derivatives: Array) -> Array:
+        """Derivatives by first moments and inertias of frames, (m, k + 1, 10) as `inertial_sums` has them, turned."""
+        bases, found = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
+        found[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
+        # An entry off the diagonal of a tensor stands there twice.
+        tensors = derivatives[..., [4, 9, 8, 9, 5, 7, 8, 7, 6]] * [1.0, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 1.0]
+        turned = bases @ tensors.reshape(*derivatives.shape[:2], 3, 3) @ np.swapaxes(bases, -1, -2)
+        found[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., [0, 4, 8, 5, 2, 1]] * [
+            1.0,
+            1.0,
+            1.0,
+            2.0,
+            2.0,
+            2.0,
+        ]
+        return found
+
 
 def link_rows(chain: JointChain) -> LinkRows:
     """The rows of a chain, with each of its frames turned about its origin so that z is the joint's axis."""

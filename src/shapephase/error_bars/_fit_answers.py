@@ -10,29 +10,28 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..body.inertial_regressor import by_link_parameters, link_motions
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import path_samples
 from ._along_motion import AlongMotion, along_motion, responses
+from ._body_along import BodyAlong
 from .result_derivatives import described_by
 
 
 def fit_by_samples(motion: Motion, times: Array, by_attitudes: Array) -> Array:
     """By the samples of the path: (6, N n); `by_attitudes` as `RecordedMomentum` has it."""
     body, path = described_by(motion)
-    along = along_motion(motion, body, path, times)
+    along = along_motion(motion, path, times)
     rows = _by_added_momentum(motion, along, times, by_attitudes)
-    by_shape = rows @ np.swapaxes(body.angular_momentum_gradient(along.shapes, along.rates, along.spins), 1, 2)
-    samples = path_samples(path)
-    return samples.by_samples(samples.by_knots(along.times, by_shape, rows @ body.momentum_matrix(along.shapes)))
+    samples, there = path_samples(path), BodyAlong(body, along.times, along.shapes, along.rates)
+    return samples.by_samples(there.by_knots(samples, along.spins[:, None], rows[:, None]))
 
 
 def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
     """By mass, first moment and inertia of the frames of the body as in `Derivatives.by_inertias`: (6, 10 (k + 1))."""
     body, path = described_by(motion)
-    along = along_motion(motion, body, path, times)
+    along = along_motion(motion, path, times)
     rows = _by_added_momentum(motion, along, times, by_attitudes)
-    return by_link_parameters(link_motions(body.chain, along.shapes, along.rates), rows, along.spins)
+    return BodyAlong(body, along.times, along.shapes, along.rates).by_inertias(along.spins[:, None], rows[:, None])
 
 
 def _by_added_momentum(motion: Motion, along: AlongMotion, times: Array, by_attitudes: Array) -> Array:

@@ -11,7 +11,6 @@ from .. import so3
 from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
-from ..body.inertial_regressor import by_link_parameters, link_motions
 from ..deformation.descriptions import ArticulatedDescription
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
@@ -19,6 +18,7 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
 from ._along_motion import along_motion
+from ._body_along import BodyAlong
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class Derivatives:
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
         self.body, self.path = described_by(motion)
-        self._along = along_motion(motion, self.body, self.path)
+        self._along = along_motion(motion, self.path)
 
     @cached_property
     def by_momentum(self) -> ResultDerivative:
@@ -130,15 +130,7 @@ class Derivatives:
     @cached_property
     def by_knots(self) -> ResultDerivative:
         """The same by the values of the path at its knots, of a periodic path without the last."""
-        along, body = self._along, self.body
-        of_shape = np.swapaxes(body.angular_momentum_gradient(along.shapes, along.rates, along.spins), 1, 2)
-        lifted = np.swapaxes(body.angular_momentum_gradient(along.shapes, along.rates, along.lifted_spins), 1, 2)
-        matrix = body.momentum_matrix(along.shapes)
-        relative = along.spins - along.lifted_spins
-        by_shape = self._density(of_shape, lifted, np.einsum("na,nak->nk", relative, of_shape - lifted))
-        by_rate = self._density(matrix, matrix, np.zeros((len(matrix), body.n_shape)))
-        found = self._samples.by_knots(along.times, by_shape, by_rate)
-        return self._results(_Changes(found[:3], found[3:6], found[6]))
+        return self._results(_changes(self._body.by_knots(self._samples, *self._weights)))
 
     @cached_property
     def by_inertias(self) -> ResultDerivative:
@@ -147,45 +139,30 @@ class Derivatives:
         Of each frame: mass [kg], first moment (3) [kg m] and inertia xx yy zz yz xz xy [kg m^2], both about the point
         where its centre of mass is, axes of the frame.
         """
-        along = self._along
-        links = link_motions(self.body.chain, along.shapes, along.rates)
-        relative = along.spins - along.lifted_spins
-        weighted = along.weights[:, None] * relative
-        carried, lifted = self._carried()
-        rows = np.concatenate([carried, 2.0 * weighted[:, None]], axis=1)
-        of_motion = by_link_parameters(links, rows, along.spins)
-        of_lift = by_link_parameters(links, lifted, along.lifted_spins)
-        (squares,) = by_link_parameters(links, weighted[:, None], relative, moving=False)
-        action = 2.0 * self.motion.momentum @ of_motion[:3] + of_motion[3] - squares
-        return self._results(_Changes(of_motion[:3], of_lift, action))
+        return self._results(_changes(self._body.by_inertias(*self._weights)))
 
     @property
     def _samples(self) -> PathSamples:
         return path_samples(self.path)
 
-    def _carried(self) -> tuple[Array, Array]:
-        """What a unit of angular momentum at each node turns both ends by: (N, 3, 3) each."""
+    @cached_property
+    def _body(self) -> BodyAlong:
+        return BodyAlong(self.body, self._along.times, self._along.shapes, self._along.rates)
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array]:
+        """The spins of the motion and of its lift at each node, (N, 2, 3), and what a unit of angular momentum that is
+        added to either, base axes, does to the end of each, and to the action: (N, 2, 4, 3)."""
         along = self._along
-        minus = -along.weights[:, None, None]
-        inverse = minus * along.inverse
-        return so3.transpose(along.adjoint) @ along.attitudes @ inverse, along.lifted @ inverse
-
-    def _density(self, of_motion: Array, of_lift: Array, squares: Array) -> Array:
-        """What each node adds to turns of both ends and to the action, per unit of each number: (N, 7, m).
-
-        of_motion, of_lift: (N, 3, m) the angular momentum that a unit adds at the spins of both
-        squares: (N, m) w . dI w with w = I^-1 Pi
-        """
-        along, momentum = self._along, self.motion.momentum
-        carried, lifted = self._carried()
-        whole = np.empty((len(squares), 7, squares.shape[1]))
-        whole[:, :3] = carried @ of_motion
-        whole[:, 3:6] = lifted @ of_lift
-        relative = along.spins - along.lifted_spins
-        whole[:, 6] = 2.0 * np.einsum("a,nam->nm", momentum, whole[:, :3]) + along.weights[:, None] * (
-            2.0 * np.einsum("na,nam->nm", relative, of_motion) - squares
-        )
-        return whole
+        turned = -along.weights[:, None, None] * along.inverse
+        ends = so3.transpose(along.adjoint) @ along.attitudes @ turned, along.lifted @ turned
+        weighted = along.weights[:, None] * (along.spins - along.lifted_spins)
+        rows = np.empty((len(weighted), 2, 4, 3))
+        rows[:, 0, :3], rows[:, 1, :3] = ends
+        # The action is quadratic in what is between the two: half of its change goes with each.
+        rows[:, 0, 3] = 2.0 * (self.motion.momentum @ ends[0]) + weighted
+        rows[:, 1, 3] = weighted
+        return np.stack([along.spins, along.lifted_spins], axis=1), rows
 
     def _results(
         self, changes: _Changes, *, by_momentum: bool = False, turned_start: Array | None = None
@@ -195,29 +172,45 @@ class Derivatives:
         by_momentum: whether the numbers are the components of the momentum
         turned_start: (3, m) turns of the start, inertial axes
         """
-        motion = self.motion
-        start, momentum = motion.initial_attitude, motion.momentum
-        magnitude = float(np.linalg.norm(momentum))
-        closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
-        total = motion.final_attitude @ closure @ start.T
-        holonomy = start @ motion.horizontal_lift.end[0] @ closure @ start.T
+        total, holonomy, dynamical = self._rotations
         of_total, of_holonomy = changes.end, changes.lifted
         if turned_start is not None:
             of_total, of_holonomy = of_total - total @ turned_start, of_holonomy - holonomy @ turned_start
-        none = np.zeros(changes.action.shape)
+        momentum = self.motion.momentum
+        magnitude = float(np.linalg.norm(momentum))
         if not magnitude:
-            parts = (0.0 * of_total, none, none, none)
-        else:
-            dynamical = total @ holonomy.T
-            of_dynamical = of_total - dynamical @ of_holonomy
-            axis = momentum / magnitude
-            of_axis = (np.eye(3) - np.outer(axis, axis)) / magnitude if by_momentum else np.zeros((3, len(none)))
-            dynamic = changes.action / magnitude
-            if by_momentum:
-                dynamic = dynamic - self._dynamic_phase * axis / magnitude
-            montgomery = _twist_slope(dynamical, axis, of_dynamical, of_axis)
-            parts = (of_dynamical, dynamic, dynamic - montgomery, montgomery)
-        return ResultDerivative(changes.end, of_total, of_holonomy, *parts)
+            none = np.zeros(changes.action.shape)
+            return ResultDerivative(changes.end, of_total, of_holonomy, 0.0 * of_total, none, none, none)
+        of_dynamical = of_total - dynamical @ of_holonomy
+        axis = momentum / magnitude
+        by_turn, by_axis = self._twist_slopes
+        dynamic, montgomery = changes.action / magnitude, by_turn @ of_dynamical
+        if by_momentum:
+            dynamic = dynamic - self._dynamic_phase * axis / magnitude
+            montgomery = montgomery + (by_axis - (by_axis @ axis) * axis) / magnitude
+        phases = dynamic, dynamic - montgomery, montgomery
+        return ResultDerivative(changes.end, of_total, of_holonomy, of_dynamical, *phases)
+
+    @cached_property
+    def _rotations(self) -> tuple[Array, Array, Array]:
+        """The total rotation, the holonomy and the dynamical rotation."""
+        motion = self.motion
+        start = motion.initial_attitude
+        closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
+        total = motion.final_attitude @ closure @ start.T
+        holonomy = start @ motion.horizontal_lift.end[0] @ closure @ start.T
+        return total, holonomy, total @ holonomy.T
+
+    @cached_property
+    def _twist_slopes(self) -> tuple[Array, Array]:
+        """Of the angle about the momentum that is left of the dynamical rotation when the shortest tilt of its axis is
+        taken off: (3,) each, by a turn of the rotation, exp(hat(turn)) rotation, and by the axis."""
+        momentum, quaternion = self.motion.momentum, so3.quat_from_matrix(self._rotations[2])
+        axis, vector, scalar = momentum / np.linalg.norm(momentum), quaternion[:3], quaternion[3]
+        along = vector @ axis
+        by_turn = scalar * (scalar * axis + so3.hat(vector) @ axis) + along * vector
+        square = scalar * scalar + along * along
+        return by_turn / square, 2.0 * scalar * vector / square
 
     @property
     def _dynamic_phase(self) -> float:
@@ -226,6 +219,11 @@ class Derivatives:
         relative = along.spins - along.lifted_spins
         body_momentum = so3.apply(so3.transpose(along.attitudes), momentum)
         return float(along.weights @ (relative * body_momentum).sum(axis=-1) / np.linalg.norm(momentum))
+
+
+def _changes(found: Array) -> _Changes:
+    """From sums of the products with `Derivatives._weights`: (8, m)."""
+    return _Changes(found[:3], found[4:7], found[3] + found[7])
 
 
 def derivatives(motion: Motion) -> Derivatives:
@@ -262,18 +260,3 @@ def described_by(motion: Motion) -> tuple[Body, ShapePath]:
     if not isinstance(description, ArticulatedDescription):
         raise WrongObjectError("derivatives by path and inertias need an articulated body, made by `articulated`")
     return description.body, description.path
-
-
-def _twist_slope(rotation: Array, axis: Array, turn: Array, of_axis: Array) -> Array:
-    """Of the angle about an axis that is left when the shortest tilt of the axis is taken off a rotation: (m,).
-
-    turn: (3, m) of the rotation, exp(hat(turn)) rotation
-    of_axis: (3, m) how the axis itself changes
-    """
-    quaternion = so3.quat_from_matrix(rotation)
-    vector, scalar = quaternion[:3], quaternion[3]
-    of_scalar = -0.5 * vector @ turn
-    of_vector = 0.5 * (scalar * turn + np.cross(turn, vector, axis=0))
-    along = vector @ axis
-    of_along = axis @ of_vector + vector @ of_axis
-    return 2.0 * (scalar * of_along - along * of_scalar) / (scalar * scalar + along * along)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,22 @@ from .shape_path import ShapePath
 
 # The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
 _REST_TO_REST = (10.0, -15.0, 6.0)
+
+
+class PathBasis(NamedTuple):
+    """A path at N times by the coefficients of its polynomials.
+
+    Attributes
+    ----------
+    pieces : (N,) the piece of each time
+    powers, slopes : (N, order) derivatives of the shape, and of its rate, by the coefficients of that piece
+    total : of all pieces
+    """
+
+    pieces: Integers
+    powers: Array
+    slopes: Array
+    total: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,24 +89,34 @@ class PathSamples:
 
     def by_knots(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
         """The same by the values at the knots: (k, knots n)."""
-        from scipy.sparse import coo_array
+        from scipy.sparse import csc_array
 
+        basis = self.basis(times)
+        order, count = basis.powers.shape[1], len(times)
+        # Sums over the times in each piece, for each power, as products with a matrix that has a column for each time.
+        rows, ends = (np.arange(order) * basis.total + basis.pieces[:, None]).ravel(), order * np.arange(count + 1)
+        whole = np.zeros((order * basis.total, by_shape[0].size))
+        for factors, values in ((basis.powers, by_shape), (basis.slopes, by_rate)):
+            sums = csc_array((factors.ravel(), rows, ends), shape=(len(whole), count))
+            whole += sums @ values.reshape(count, -1)
+        return self.by_knots_of(whole.reshape(order, basis.total, *by_shape.shape[1:]))
+
+    def basis(self, times: Array) -> PathBasis:
+        """The path at times (N,) by the coefficients of its polynomials."""
         curve = self.curve
-        order, pieces, n_shape = curve.coefficients.shape
         piece = np.searchsorted(curve.knots[1:-1], times, side="right")
-        exponents = np.arange(order)
+        exponents = np.arange(len(curve.coefficients))
         powers = (times - curve.knots[piece])[:, None] ** exponents
         slopes = np.zeros_like(powers)
         slopes[:, 1:] = exponents[1:] * powers[:, :-1]
-        count = by_shape.shape[1]
-        by_coefficients = np.zeros((order, pieces, count * n_shape))
-        # Sums over the times in each piece, as products with a matrix of ones.
-        within = coo_array((np.ones(len(times)), (piece, np.arange(len(times)))), shape=(pieces, len(times))).tocsr()
-        of_shape, of_rate = by_shape.reshape(len(times), -1), by_rate.reshape(len(times), -1)
-        for power in range(order):
-            by_coefficients[power] = within @ (powers[:, power, None] * of_shape + slopes[:, power, None] * of_rate)
+        return PathBasis(piece, powers, slopes, curve.coefficients.shape[1])
+
+    def by_knots_of(self, by_coefficients: Array) -> Array:
+        """From derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
+        curve, (order, pieces, count, n_shape) = self.curve, by_coefficients.shape
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
-        found = rule(np.diff(curve.knots), by_coefficients, curve.through == "periodic")
+        given = by_coefficients.reshape(order, pieces, -1)
+        found = rule(np.diff(curve.knots), given, curve.through == "periodic")
         return np.moveaxis(found.reshape(-1, count, n_shape), 0, 1).reshape(count, -1)
 
     def by_samples(self, by_knots: Array) -> Array:
@@ -131,64 +157,80 @@ def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
 def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     """As above, of the C2 cubic spline with slopes s at the knots: on a piece c1 = s and, with the mean slope m,
     c2 = (3 m - 2 s - s_next)/h, c3 = (s + s_next - 2 m)/h^2."""
-    from scipy.sparse.linalg import splu
-
     h = widths[:, None]
-    pieces = len(widths)
-    by_slope = np.zeros((pieces + 1, by_coefficients.shape[2]))
-    by_slope[:-1] += by_coefficients[1] - 2.0 * by_coefficients[2] / h + by_coefficients[3] / h**2
-    by_slope[1:] += by_coefficients[3] / h**2 - by_coefficients[2] / h
-    by_mean = 3.0 * by_coefficients[2] / h - 2.0 * by_coefficients[3] / h**2
-    left, right = _slope_equations(widths, periodic)
+    found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
+    by_second, by_third = by_coefficients[2] / h, by_coefficients[3] / h**2
+    by_slope, by_mean = found.copy(), 3.0 * by_second - 2.0 * by_third
+    by_slope[:-1] += by_coefficients[1] - 2.0 * by_second + by_third
+    by_slope[1:] += by_third - by_second
     if periodic:
         by_slope[0] += by_slope[-1]
-        by_slope = by_slope[:-1]
-    by_mean = by_mean + right.T @ splu(left.T.tocsc()).solve(by_slope)
-    found = np.zeros((pieces + 1, by_coefficients.shape[2]))
-    found[:-1] += by_coefficients[0] - by_mean / h
-    found[1:] += by_mean / h
+        by_mean += _by_means_of_loop(widths, by_slope[:-1])
+    else:
+        by_mean += _by_means(widths, by_slope)
+    by_mean /= h
+    found[:-1] += by_coefficients[0] - by_mean
+    found[1:] += by_mean
     if periodic:
         found[0] += found[-1]
         found = found[:-1]
     return found
 
 
-def _slope_equations(h: Array, periodic: bool) -> tuple[Any, Any]:
-    """The equations left @ slopes = right @ means of a C2 cubic spline, periodic or with ends that are no knots."""
-    from scipy.sparse import coo_array
+def _by_means(h: Array, by_slopes: Array) -> Array:
+    """From derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
 
+    Between the ends h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before
+    m_after); the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.
+    """
     pieces = len(h)
-    count = pieces if periodic else pieces + 1
-    knots = np.arange(0 if periodic else 1, pieces)
-    before, after = h[knots - 1], h[knots]
-    rows, columns = np.tile(knots, 3), np.concatenate([knots, (knots - 1) % count, (knots + 1) % count])
-    entries = np.concatenate([2.0 * (before + after), after, before])
-    left = coo_array((entries, (rows, columns)), shape=(count, count)).tolil()
-    sides = (np.tile(knots, 2), np.concatenate([(knots - 1) % pieces, knots]))
-    right = coo_array((3.0 * np.concatenate([after, before]), sides), shape=(count, pieces)).tolil()
-    if not periodic:
-        _end_equation(left, right, h, 0, 1)
-        _end_equation(left, right, h, -1, -1)
-    return left.tocsc(), right.tocsc()
-
-
-def _end_equation(left: Any, right: Any, h: Array, end: int, inward: int) -> None:
-    """That the first two pieces, or the last two, are one cubic; of two pieces one parabola, of one a line."""
-    pieces = len(h)
-    knots, piece = pieces + 1, end % pieces
-    here, next_knot = end % knots, (end + inward) % knots
-    left[here, here] = 1.0
     if pieces == 1:
-        right[here, 0] = 1.0
-        return
+        return by_slopes[:1] + by_slopes[1:]
+    before, after = h[:-1], h[1:]
+    diagonal = np.concatenate([[1.0], 2.0 * (before + after), [1.0]])
     if pieces == 2:
-        # The second derivative at the end is the one of the whole parabola.
-        left[here, next_knot] = 1.0
-        right[here, piece] = 2.0
-        return
-    other = (piece + inward) % pieces
-    near, far = h[piece], h[other]
-    both = near + far
-    left[here, here], left[here, next_knot] = far, both
-    right[here, piece] = (near + 2.0 * both) * far / both
-    right[here, other] = near * near / both
+        # The second derivative at the ends is the one of the whole parabola.
+        next_ones, of_means = (1.0, 1.0), ((2.0, 0.0), (2.0, 0.0))
+    else:
+        ends = (h[0], h[1]), (h[-1], h[-2])
+        diagonal[[0, -1]] = h[[1, -2]]
+        next_ones = tuple(near + far for near, far in ends)
+        of_means = tuple(
+            ((near + 2.0 * (near + far)) * far / (near + far), near * near / (near + far)) for near, far in ends
+        )
+    lower, upper = np.append(after, next_ones[1]), np.append(next_ones[0], before)
+    # Of the transposed equations, below the diagonal is what was above.
+    answers = _tridiagonal(upper, diagonal, lower, by_slopes)
+    found = np.zeros((pieces, by_slopes.shape[1]))
+    found[:-1] += 3.0 * after[:, None] * answers[1:-1]
+    found[1:] += 3.0 * before[:, None] * answers[1:-1]
+    for end, inward, factors in ((0, 1, of_means[0]), (-1, -1, of_means[1])):
+        found[end] += factors[0] * answers[end]
+        found[end + inward] += factors[1] * answers[end]
+    return found
+
+
+def _by_means_of_loop(h: Array, by_slopes: Array) -> Array:
+    """The same of a periodic spline: (pieces, m) -> (pieces, m)."""
+    before = np.roll(h, 1)[:, None]
+    after, diagonal = h[:, None], 2.0 * (h + before[:, 0])
+    # The first and the last equation know each other, too: what stands in the corners is taken off as a product of two
+    # vectors, and put back by the answer to one more right side.
+    corner = -diagonal[0]
+    ends = np.zeros(len(h))
+    ends[0], ends[-1] = corner, h[0]
+    diagonal[0] -= corner
+    diagonal[-1] -= h[0] * h[-2] / corner
+    whole = _tridiagonal(before[:-1, 0], diagonal, after[1:, 0], np.column_stack([by_slopes, ends]))
+    across = whole[0] + h[-2] / corner * whole[-1]
+    answers = whole[:, :-1] - whole[:, -1:] * (across[:-1] / (1.0 + across[-1]))
+    weighted = 3.0 * before * answers
+    return np.roll(3.0 * after * answers, -1, axis=0) + weighted
+
+
+def _tridiagonal(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
+    """The solution of equations with three diagonals: (k - 1,), (k,), (k - 1,), (k, m) -> (k, m)."""
+    from scipy.linalg import get_lapack_funcs
+
+    (solve,) = get_lapack_funcs(("gtsv",), dtype=np.float64)
+    return np.asarray(solve(lower, diagonal, upper, right)[3], dtype=np.float64)

@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import curves, marches, panels, tree, variants
+from . import curves, gradients, marches, nodes, panels, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, is_wanted, may_compile
 
@@ -25,6 +25,9 @@ _KERNELS = {
     "march_variants": ".kernels.variant_kernel",
     "growths_and_rounding": ".kernels.growth_kernel",
     "step_derivatives": ".kernels.derivative_kernel",
+    "momentum_gradients": ".kernels.gradient_kernel",
+    "inertial_sums": ".kernels.gradient_kernel",
+    "rotations_within_steps": ".kernels.node_kernel",
     "curve_terms": ".kernels.curve_kernel",
     "times_of_samples": ".kernels.panel_kernel",
     "series_of_panels": ".kernels.panel_kernel",
@@ -144,6 +147,8 @@ def _announced() -> Iterator[None]:
 def _warm() -> None:
     """Call every kernel, so that it is loaded, or compiled and kept."""
     tree.warm()
+    gradients.warm()
+    nodes.warm()
     marches.warm()
     panels.warm()
     curves.warm()

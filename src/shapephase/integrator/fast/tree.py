@@ -62,7 +62,7 @@ def tree_inertia_and_momentum(tree: LinkRows, shapes: Array, rates: Array) -> tu
 
 def warm() -> None:
     """Call the kernel with the least that it takes."""
-    tree_channels(_OneLink(), np.zeros((1, 0)), np.zeros((1, 0)))
+    tree_channels(OneLink(), np.zeros((1, 0)), np.zeros((1, 0)))
 
 
 def trees_channels(tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array) -> tuple[Array, Mask]:
@@ -97,8 +97,8 @@ def _kernel() -> Any:
     return import_module(".kernels.tree_kernel", __package__)
 
 
-class _OneLink:
-    """A body without joints."""
+class OneLink:
+    """A body without joints, the least that kernels take."""
 
     parents = np.zeros(0, dtype=np.uint32)
     turning = leads = np.zeros(0)
@@ -106,4 +106,5 @@ class _OneLink:
     mass = 1.0
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
+        """As `LinkRows`."""
         return shapes, rates

@@ -53,14 +53,9 @@ def terms_that_count(series):
     return count
 
 
-@part
-def basis_at(first, count, steps, terms, basis):
-    """T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel -> numbers in a row."""
-    used = 0
-    for k in range(first, first + count):
-        for i in range(STAGES):
-            basis[STRIDE + used] = 2.0 * (k + NODES[i]) / steps - 1.0
-            used += 1
+@inline
+def basis_between(used, terms, basis):
+    """The same at `used` places in [-1, 1] that stand in its second row."""
     while used % _VECTOR:
         basis[STRIDE + used] = 0.0
         used += 1
@@ -71,6 +66,17 @@ def basis_at(first, count, steps, terms, basis):
         for i in range(used):
             basis[b + i] = 2.0 * basis[STRIDE + i] * basis[b1 + i] - basis[b2 + i]
     return used
+
+
+@part
+def basis_at(first, count, steps, terms, basis):
+    """T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel -> numbers in a row."""
+    used = 0
+    for k in range(first, first + count):
+        for i in range(STAGES):
+            basis[STRIDE + used] = 2.0 * (k + NODES[i]) / steps - 1.0
+            used += 1
+    return basis_between(used, terms, basis)
 
 
 @part

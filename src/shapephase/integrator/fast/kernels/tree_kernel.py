@@ -16,11 +16,11 @@ from .jit import inline, kernel
 from .trigonometry import MOST_ANGLE, cos_sin
 
 LANES = 8
-_FRAME = 24
+FRAME = 24
 """Rows of a frame."""
-_TOTAL = 15
+TOTAL = 15
 """Rows of the sums: mass times place (3), mass times velocity (3), inertia (6), momentum (3)."""
-_NUMBERS = 22
+NUMBERS = 22
 """Of a frame in the body, as `shapephase.body.link_rows` has them."""
 _CONDITION = 1e10
 """Product of the traces of I and I^-1, one to nine times the condition number; what is above it is left to slower
@@ -61,7 +61,7 @@ def _move_frame(body, before, after, turning, lead, cosine, sine, shape, rate, l
 
 
 @inline
-def _add_link(body, frame, total, lanes):
+def add_link(body, frame, total, lanes):
     """Place and velocity of a link's centre of mass, and what it adds to the sums whatever the centre of the whole."""
     mass, c0, c1, c2 = body[12], body[13], body[14], body[15]
     j0, j1, j2, j3, j4, j5 = body[16], body[17], body[18], body[19], body[20], body[21]
@@ -100,7 +100,7 @@ def _add_link(body, frame, total, lanes):
 
 
 @inline
-def _add_point(mass, frame, centre, total, lanes):
+def add_point(mass, frame, centre, total, lanes):
     """What a link's mass adds as a point, seen from the centre of mass of the whole, which moves."""
     for i in range(lanes):
         x, y = frame[18 * LANES + i] - centre[i], frame[19 * LANES + i] - centre[LANES + i]
@@ -121,7 +121,8 @@ def _add_point(mass, frame, centre, total, lanes):
 
 
 @inline
-def _centres(total, mass, centre, lanes):
+def centres(total, mass, centre, lanes):
+    """Place and velocity of the centre of mass of all."""
     for i in range(lanes):
         for j in range(6):
             centre[j * LANES + i] = total[j * LANES + i] / mass
@@ -161,6 +162,31 @@ def _write(total, lane, inverted, out):
     return fine and math.isfinite(xx + yy + zz + u + v + w)
 
 
+@inline
+def place_frames(parents, turning, leads, body, shapes, rates, first, frames, shape, rate, cosine, sine, lanes):
+    """All frames at eight shapes from `first` on, the last repeated; the base's is there.
+
+    body: the rows of the tree one after another
+    shape, rate, cosine, sine: room for LANES numbers, of the rates for each joint
+    """
+    count = len(shapes)
+    for joint in range(len(parents)):
+        far = 0.0
+        for i in range(LANES):
+            row = min(first + i, count - 1)
+            shape[i], rate[joint, i], cosine[i], sine[i] = shapes[row, joint], rates[row, joint], 1.0, 0.0
+            far = max(far, abs(shape[i]))
+        if turning[joint] != 0.0:
+            _cosines_and_sines(shape, cosine, sine, lanes)
+            if not far < MOST_ANGLE:
+                for i in range(LANES):
+                    if not abs(shape[i]) < MOST_ANGLE:
+                        cosine[i], sine[i] = math.cos(shape[i]), math.sin(shape[i])
+        start = (joint + 1) * NUMBERS
+        own, after, before = body[start : start + NUMBERS], frames[joint + 1], frames[parents[joint]]
+        _move_frame(own, before, after, turning[joint], leads[joint], cosine, sine, shape, rate[joint], lanes)
+
+
 @kernel
 def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted, lanes, values, reliable):
     """Of trees that differ in their masses, I^-1 and I^-1 L_o, or I and L_o, about the centre of mass, base axes.
@@ -175,38 +201,23 @@ def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted,
     reliable: (V,) to be filled: whether all can be relied on
     """
     joints, count = len(parents), len(shapes)
-    frames = np.zeros((joints + 1, _FRAME * LANES))
-    total, centre = np.empty(_TOTAL * LANES), np.empty(6 * LANES)
-    shape, rate, cosine, sine = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    frames = np.zeros((joints + 1, FRAME * LANES))
+    total, centre = np.empty(TOTAL * LANES), np.empty(6 * LANES)
+    shape, rate, cosine, sine = np.empty(LANES), np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES)
     geometry = rows[0]
     for i in range(LANES):
         frames[0, i] = frames[0, 4 * LANES + i] = frames[0, 8 * LANES + i] = 1.0
     for tree in range(len(rows)):
         reliable[tree] = True
     for first in range(0, count, LANES):
-        for joint in range(joints):
-            far = 0.0
-            for i in range(LANES):
-                row = min(first + i, count - 1)
-                shape[i], rate[i], cosine[i], sine[i] = shapes[row, joint], rates[row, joint], 1.0, 0.0
-                far = max(far, abs(shape[i]))
-            if turning[joint] != 0.0:
-                _cosines_and_sines(shape, cosine, sine, lanes)
-                if not far < MOST_ANGLE:
-                    for i in range(LANES):
-                        if not abs(shape[i]) < MOST_ANGLE:
-                            cosine[i], sine[i] = math.cos(shape[i]), math.sin(shape[i])
-            start = (joint + 1) * _NUMBERS
-            body, after = geometry[start : start + _NUMBERS], frames[joint + 1]
-            before = frames[parents[joint]]
-            _move_frame(body, before, after, turning[joint], leads[joint], cosine, sine, shape, rate, lanes)
+        place_frames(parents, turning, leads, geometry, shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
         for tree in range(len(rows)):
             total[:] = 0.0
             for frame in range(joints + 1):
-                _add_link(rows[tree, frame * _NUMBERS : (frame + 1) * _NUMBERS], frames[frame], total, lanes)
-            _centres(total, masses[tree], centre, lanes)
+                add_link(rows[tree, frame * NUMBERS : (frame + 1) * NUMBERS], frames[frame], total, lanes)
+            centres(total, masses[tree], centre, lanes)
             for frame in range(joints + 1):
-                _add_point(rows[tree, frame * _NUMBERS + 12], frames[frame], centre, total, lanes)
+                add_point(rows[tree, frame * NUMBERS + 12], frames[frame], centre, total, lanes)
             for i in range(min(LANES, count - first)):
                 fine = _write(total, i, inverted, values[tree, first + i])
                 reliable[tree] = reliable[tree] and fine

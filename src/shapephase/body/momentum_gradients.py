@@ -1,0 +1,119 @@
+"""How a body's angular momentum answers to its shape and to its rates, for all joints at once and without Pinocchio.
+
+What hangs on a joint moves with it as one: the sums over it are those over its links, a product with a fixed matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ._link_motions import LinkMotions, components, cross
+from .joint_chain import JointChain
+
+
+def by_shape_and_rate(
+    chain: JointChain, links: LinkMotions, rates: Array, spins: Array, rows: Array
+) -> tuple[Array, Array]:
+    """Products of row . d(I w + J rate) by the shape, while w and the rates stay, and by the rates.
+
+    With z a joint's axis, o a point of it that moves at v_o; p, q, h and J the sums of m x, m v, of angular momentum
+    and of inertia over what hangs on it, about the centre of mass of all; in a body that turns at w: a unit of turn adds
+    z x h - (z x o) x q + J y - p x (z x v_o + y x o), where y is the velocity of z, and a unit of slide along s adds
+    s x q + p x y, where y is that of s.
+
+    Parameters
+    ----------
+    links : of the chain at N shapes and rates
+    rates : (N, n)
+    spins : (N, S, 3) w, several for each shape
+    rows : (N, S, r, 3)
+
+    Returns
+    -------
+    (N, S r, n) each, by shapes and by rates
+    """
+    sums, at = _carried_sums(chain, links), _joint_axes(chain, links, rates @ chain.matrix.T)
+    count, several, each, _ = rows.shape
+    arms = cross(at.axes, at.origins)
+    by_rate = _turned(sums.inertia, at.axes) + cross(sums.moment, at.slides - arms)
+    by_shape = np.empty((count, several, each, by_rate.shape[-1]))
+    for which in range(several):
+        spin = spins[:, which].T[:, :, None]
+        drift = sums.drift + cross(spin, sums.moment)
+        momentum = sums.momentum + _turned(sums.inertia, spin)
+        whole = spin + at.spins
+        swung = cross(whole, at.axes)
+        point = cross(at.axes, at.speeds + cross(spin, at.origins)) + cross(swung, at.origins)
+        found = cross(at.axes, momentum) + _turned(sums.inertia, swung)
+        found += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
+        np.matmul(rows[:, which], np.moveaxis(found, 0, 1), out=by_shape[:, which])
+    by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
+    return by_shape.reshape(count, several * each, -1) @ chain.matrix, by_rates @ chain.matrix
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Over what hangs on each joint, about the centre of mass of all, the base at rest; components first.
+
+    Attributes
+    ----------
+    moment, drift : (3, N, k) of mass times place, and times velocity
+    inertia : (6, N, k) xx yy zz yz xz xy
+    momentum : (3, N, k) angular
+    """
+
+    moment: Array
+    drift: Array
+    inertia: Array
+    momentum: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Axes:
+    """Of the joints, in axes of the base and about the centre of mass of all; components first, (3, N, k).
+
+    Attributes
+    ----------
+    axes, slides : unit vectors, zero of a joint that does not turn, or does not slide
+    origins, speeds : a point of each axis, and its velocity as part of what the joint hangs on
+    spins : angular velocity of what turns with the joint
+    """
+
+    axes: Array
+    slides: Array
+    origins: Array
+    speeds: Array
+    spins: Array
+
+
+def _carried_sums(chain: JointChain, links: LinkMotions) -> _Sums:
+    places, speeds, spins = (components(one) for one in (links.places, links.speeds, links.spins))
+    own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))
+    own = own[[0, 4, 8, 5, 2, 1]]
+    moment = chain.masses * places
+    whole = np.empty((15, *places.shape[1:]))
+    whole[:3], whole[3:6] = moment, chain.masses * speeds
+    whole[6:9] = cross(moment, speeds) + _turned(own, spins)
+    squares = moment * places
+    whole[9:12] = own[:3] + squares.sum(axis=0) - squares
+    whole[12:] = own[3:] - moment[[1, 0, 0]] * places[[2, 2, 1]]
+    sums = whole @ chain.hanging.T
+    return _Sums(moment=sums[:3], drift=sums[3:6], momentum=sums[6:9], inertia=sums[9:])
+
+
+def _joint_axes(chain: JointChain, links: LinkMotions, rates: Array) -> _Axes:
+    """rates: (N, k) of all joints."""
+    turns = links.turns[:, 1:]
+    axes, slides, levers = (components(so3.apply(turns, one)) for one in (chain.axes, chain.slides, chain.centres[1:]))
+    spins, places, speeds = (components(one[:, 1:]) for one in (links.spins, links.places, links.speeds))
+    return _Axes(axes, slides, places - levers, speeds - cross(spins, levers) - slides * rates, spins)
+
+
+def _turned(tensor: Array, vector: Array) -> Array:
+    """A symmetric tensor (6, ...) times a vector (3, ...)."""
+    (xx, yy, zz, yz, xz, xy), (x, y, z) = tensor, vector
+    return np.stack([xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z])
