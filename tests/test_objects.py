@@ -28,8 +28,8 @@ MOMENTUM = (0.01, 0.02, 0.03)
 # Functions that other functions of the library call with what they have checked.
 INNER = ("deformation.frames", "shape_space.body_path", "plotting.plot_style", "optimal_control.task",
          "optimal_control.symbolic", "body.appearance", "examples.slow_deformation.first_loop",
-         "shape_space.connection.connection_slopes", "plotting.pages", "shape_space.path_samples",
-         "phases.split_text", "body.engines", "shape_space.unit_doubts")  # fmt: skip
+         "shape_space.connection.connection_slopes", "shape_space.closing_arc", "plotting.pages",
+         "shape_space.path_samples", "phases.split_text", "body.engines", "shape_space.unit_doubts")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

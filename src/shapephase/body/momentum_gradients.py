@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._link_motions import LinkMotions, components, cross
+from ._link_motions import LinkMotions, components, cross, link_motions
 from .joint_chain import JointChain
 
 
@@ -21,8 +21,8 @@ def by_shape_and_rate(
     """Products of row . d(I w + J rate) by the shape, while w and the rates stay, and by the rates.
 
     With z a joint's axis, o a point of it that moves at v_o; p, q, h and J the sums of m x, m v, of angular momentum
-    and of inertia over what hangs on it, about the centre of mass of all; in a body that turns at w: a unit of turn adds
-    z x h - (z x o) x q + J y - p x (z x v_o + y x o), where y is the velocity of z, and a unit of slide along s adds
+    and of inertia over what hangs on it, about the centre of mass of all; in a body that turns at w. A unit of turn
+    adds z x h - (z x o) x q + J y - p x (z x v_o + y x o), where y is the velocity of z; a unit of slide along s adds
     s x q + p x y, where y is that of s.
 
     Parameters
@@ -36,7 +36,7 @@ def by_shape_and_rate(
     -------
     (N, S r, n) each, by shapes and by rates
     """
-    sums, at = _carried_sums(chain, links), _joint_axes(chain, links, rates @ chain.matrix.T)
+    sums, at = _carried(chain, _link_sums(chain, links)), _joint_axes(chain, links, rates @ chain.matrix.T)
     count, several, each, _ = rows.shape
     arms = cross(at.axes, at.origins)
     by_rate = _turned(sums.inertia, at.axes) + cross(sums.moment, at.slides - arms)
@@ -53,6 +53,36 @@ def by_shape_and_rate(
         np.matmul(rows[:, which], np.moveaxis(found, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
     return by_shape.reshape(count, several * each, -1) @ chain.matrix, by_rates @ chain.matrix
+
+
+def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
+    """The gradients by shape and by rates of the kinetic energy that a joint motion without angular momentum has.
+
+    The base turns so that the energy is least: how that changes does not matter. In the names of `by_shape_and_rate` a
+    unit of turn adds y . (h - o x q) - q . (z x v_o), of its rate z . (h - o x q); a unit of slide q . y, of its rate
+    q . s.
+
+    Parameters
+    ----------
+    shapes, rates : (N, n)
+
+    Returns
+    -------
+    (N, n) each [J per unit of joint], [J s per unit of joint]
+    """
+    links = link_motions(chain, shapes, rates)
+    each = _link_sums(chain, links)
+    sums, at = _carried(chain, each), _joint_axes(chain, links, rates @ chain.matrix.T)
+    inertia, momentum = each[9:].sum(axis=-1), each[6:9].sum(axis=-1)
+    tensors = np.moveaxis(inertia[[0, 5, 4, 5, 1, 3, 4, 3, 2]], 0, -1).reshape(-1, 3, 3)
+    spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
+    drift = sums.drift + cross(spin, sums.moment)
+    whole = spin + at.spins
+    about = sums.momentum + _turned(sums.inertia, spin) - cross(at.origins, drift)
+    speeds = at.speeds + cross(spin, at.origins)
+    by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
+    by_rate = at.axes * about + at.slides * drift
+    return by_shape.sum(axis=0) @ chain.matrix, by_rate.sum(axis=0) @ chain.matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +120,9 @@ class _Axes:
     spins: Array
 
 
-def _carried_sums(chain: JointChain, links: LinkMotions) -> _Sums:
+def _link_sums(chain: JointChain, links: LinkMotions) -> Array:
+    """What each frame adds to the sums: (15, N, k + 1), in the order of mass times place, mass times velocity, angular
+    momentum and inertia."""
     places, speeds, spins = (components(one) for one in (links.places, links.speeds, links.spins))
     own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))
     own = own[[0, 4, 8, 5, 2, 1]]
@@ -101,7 +133,11 @@ def _carried_sums(chain: JointChain, links: LinkMotions) -> _Sums:
     squares = moment * places
     whole[9:12] = own[:3] + squares.sum(axis=0) - squares
     whole[12:] = own[3:] - moment[[1, 0, 0]] * places[[2, 2, 1]]
-    sums = whole @ chain.hanging.T
+    return whole
+
+
+def _carried(chain: JointChain, each: Array) -> _Sums:
+    sums = each @ chain.hanging.T
     return _Sums(moment=sums[:3], drift=sums[3:6], momentum=sums[6:9], inertia=sums[9:])
 
 

@@ -31,17 +31,32 @@ class BodyAlong:
     shapes: Array
     rates: Array
 
-    def by_knots(self, samples: PathSamples, spins: Array, rows: Array) -> Array:
-        """Sums of row . d(I w + J rate), w staying, by the path at its knots: (N, S, 3), (N, S, r, 3) -> (S r, m)."""
-        chain = self.body.chain
-        if not engine.is_ready():
-            links = self._links
-            return samples.by_knots(self.times, *by_shape_and_rate(chain, links, self.rates, spins, rows))
-        basis = samples.basis(self.times)
-        found = gradients.momentum_gradients(
-            chain.rows, self.shapes, self.rates, spins, rows, basis.pieces, basis.powers, basis.slopes, basis.total
-        )
-        return samples.by_knots_of(found if chain.rows.matrix is None else found @ chain.matrix)
+    def by_knots(self, samples: PathSamples, spins: Array, rows: Array, momenta: Array) -> Array:
+        """Sums of row . d(I w + J rate), w staying, by the path at its knots.
+
+        Parameters
+        ----------
+        spins, rows : (N, S, 3), (N, S, r, 3)
+        momenta : (N, S, 3) I w + J rate, which a unit of the duration's logarithm takes off where a path is closed
+
+        Returns
+        -------
+        (S r, m)
+        """
+        chain, closing = self.body.chain, samples.is_closing(self.times)
+        if engine.is_ready():
+            basis = samples.basis(self.times)
+            sums = gradients.momentum_gradients(
+                chain.rows, self.shapes, self.rates, spins, rows, basis.pieces, basis.powers, basis.slopes, basis.total
+            )
+            found = samples.by_knots_of(sums if chain.rows.matrix is None else sums @ chain.matrix)
+        else:
+            parts = by_shape_and_rate(chain, self._links, self.rates, spins, rows)
+            found = samples.by_knots(self.times, *parts)
+        if closing.any():
+            by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
+            found += by_duration[:, None] * samples.seconds_by_knots()
+        return found
 
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """The same by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""

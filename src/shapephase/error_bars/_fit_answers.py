@@ -23,7 +23,8 @@ def fit_by_samples(motion: Motion, times: Array, by_attitudes: Array) -> Array:
     along = along_motion(motion, path, times)
     rows = _by_added_momentum(motion, along, times, by_attitudes)
     samples, there = path_samples(path), BodyAlong(body, along.times, along.shapes, along.rates)
-    return samples.by_samples(there.by_knots(samples, along.spins[:, None], rows[:, None]))
+    momenta = motion.momentum @ along.attitudes
+    return samples.by_samples(there.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None]))
 
 
 def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:

@@ -130,7 +130,9 @@ class Derivatives:
     @cached_property
     def by_knots(self) -> ResultDerivative:
         """The same by the values of the path at its knots, of a periodic path without the last."""
-        return self._results(_changes(self._body.by_knots(self._samples, *self._weights)))
+        momenta = np.zeros((len(self._along.times), 2, 3))
+        momenta[:, 0] = self.motion.momentum @ self._along.attitudes
+        return self._results(_changes(self._body.by_knots(self._samples, *self._weights, momenta)))
 
     @cached_property
     def by_inertias(self) -> ResultDerivative:

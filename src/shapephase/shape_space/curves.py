@@ -17,6 +17,7 @@ from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 
 if TYPE_CHECKING:
+    from .closing_arc import ClosingArc
     from .shape_path import ShapePath
 
 CLOSED = 1e-9
@@ -125,12 +126,14 @@ class PiecewisePolynomial:
 
     `through`: by which rule the polynomials follow from their values at the knots; None: by none.
     `origin`: how these values follow from samples; None: they are the samples.
+    `arc`: the geodesic that the last of the polynomials are, behind a path that follows from samples; None: none.
     """
 
     knots: Array
     coefficients: Array
     through: Interpolation | None = None
     origin: SampleOrigin | None = None
+    arc: ClosingArc | None = None
 
     __repr__ = short_repr
 

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, Mask
 from ..errors import WrongObjectError
+from .closing_arc import arc_again, closed_by_arc
 from .curves import PiecewisePolynomial, Reordered
 from .shape_path import ShapePath
 
@@ -49,38 +50,51 @@ class PathSamples:
     def count(self) -> int:
         """How many samples there are that may differ: of a periodic path the last is the first, unless both were
         recorded."""
-        return self._at_knots if self.curve.origin is None else len(self.curve.origin.samples)
+        return self._at_knots if self._source.origin is None else len(self._source.origin.samples)
 
     @property
     def values(self) -> Array:
         """(count, n) [rad or m]."""
-        origin = self.curve.origin
-        if origin is not None:
-            return origin.samples[:, self.order]
-        return self.curve(self.curve.knots[: self._at_knots])[0][:, self.order]
+        source = self._source
+        if source.origin is not None:
+            return source.origin.samples[:, self.order]
+        return source(source.knots[: self._at_knots])[0][:, self.order]
 
     @property
     def bias(self) -> Array:
         """What smoothing took off the motion at the knots, as far as it is known: (knots n,) [rad or m]."""
-        origin = self.curve.origin
+        origin = self._source.origin
         if origin is None:
             return np.zeros(self._at_knots * len(self.order))
         return origin.bias[:, self.order].ravel()
 
     @property
     def _at_knots(self) -> int:
-        return len(self.curve.knots) - (self.curve.through == "periodic")
+        return len(self._source.knots) - (self._source.through == "periodic")
+
+    @property
+    def _source(self) -> PiecewisePolynomial:
+        """The polynomials through samples: those before a closing geodesic."""
+        if self.curve.arc is None:
+            return self.curve
+        curve = self.curve.arc.opened.curve
+        assert isinstance(curve, PiecewisePolynomial)
+        return curve
 
     def path_through(self, values: Array) -> ShapePath:
         """The path of the same kind through other samples (count, n), made of them in the same way."""
-        times, origin = self.curve.knots, self.curve.origin
+        arc, source = self.curve.arc, self._source
+        if arc is not None:
+            opened = PathSamples(source, self.order).path_through(values)
+            return closed_by_arc(arc_again(arc, opened))
+        times, origin = source.knots, source.origin
         if origin is not None:
             recorded = np.empty_like(values)
             recorded[:, self.order] = values
             return origin.path(recorded)
-        if self.curve.through == "rest to rest":
+        if source.through == "rest to rest":
             return ShapePath.waypoints(times, values)
-        periodic = self.curve.through == "periodic"
+        periodic = source.through == "periodic"
         return ShapePath.spline(times, np.concatenate([values, values[:1]]) if periodic else values, periodic)
 
     def derivative(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
@@ -113,20 +127,39 @@ class PathSamples:
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
         """From derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
-        curve, (order, pieces, count, n_shape) = self.curve, by_coefficients.shape
+        curve, (order, _, count, n_shape) = self._source, by_coefficients.shape
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
-        given = by_coefficients.reshape(order, pieces, -1)
-        found = rule(np.diff(curve.knots), given, curve.through == "periodic")
-        return np.moveaxis(found.reshape(-1, count, n_shape), 0, 1).reshape(count, -1)
+        given = by_coefficients[:, : len(curve.knots) - 1].reshape(order, len(curve.knots) - 1, -1)
+        found = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
+        if self.curve.arc is not None:
+            by_cubics = np.empty_like(by_coefficients[:, len(curve.knots) - 1 :])
+            by_cubics[..., self.order] = by_coefficients[:, len(curve.knots) - 1 :]
+            found[[0, -1]] += self.curve.arc.by_ends(by_cubics)[..., self.order]
+        return np.moveaxis(found, 0, 1).reshape(count, -1)
+
+    def is_closing(self, times: Array) -> Mask:
+        """Which times are on a geodesic that closes the path, whose duration follows from the path: (N,)."""
+        return times > self._source.knots[-1] if self.curve.arc is not None else np.zeros(len(times), dtype=bool)
+
+    def seconds_by_knots(self) -> Array:
+        """The derivatives of the logarithm of that duration by the values at the knots: (knots n,)."""
+        arc, source = self.curve.arc, self._source
+        assert arc is not None
+        by_ends, by_shape, by_rate = arc.seconds_by_path()
+        opened = PathSamples(source, np.arange(len(self.order)))
+        found = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
+        found[[0, -1]] += by_ends
+        return (found[:, self.order] / arc.seconds).ravel()
 
     def by_samples(self, by_knots: Array) -> Array:
         """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
-        if self.curve.origin is None:
+        origin = self._source.origin
+        if origin is None:
             return by_knots
         n_shape = len(self.order)
         of_curve = np.empty((self._at_knots, len(by_knots), n_shape))
         of_curve[:, :, self.order] = np.moveaxis(by_knots.reshape(len(by_knots), -1, n_shape), 1, 0)
-        found = self.curve.origin.by_samples(of_curve)[:, :, self.order]
+        found = origin.by_samples(of_curve)[:, :, self.order]
         return np.moveaxis(found, 0, 1).reshape(len(by_knots), -1)
 
 
@@ -135,10 +168,10 @@ def path_samples(path: ShapePath) -> PathSamples:
     curve, order = path.curve, np.arange(path.n_shape)
     while isinstance(curve, Reordered):
         curve, order = curve.curve, curve.order[order]
-    if not isinstance(curve, PiecewisePolynomial) or curve.through is None:
+    if not isinstance(curve, PiecewisePolynomial) or (curve.through is None and curve.arc is None):
         raise WrongObjectError(
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
-            "ShapePath.waypoints and of recorded motions that no geodesic closes"
+            "ShapePath.waypoints and of recorded motions; of those that a geodesic closes, not if they were resampled"
         )
     return PathSamples(curve, order)
 

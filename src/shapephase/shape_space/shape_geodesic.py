@@ -71,7 +71,7 @@ def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesi
         finite_array(end, "end", (body.n_shape,)).copy(),
     )
     nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)
-    once, twice = _integrals(nodes)
+    once, twice = integrals(nodes)
     straight = last - first
     shapes = first + nodes[:, None] * straight
     rates = np.broadcast_to(straight, shapes.shape)
@@ -96,7 +96,7 @@ def _too_far(scale: float) -> TrajectoryError:
     return TrajectoryError(f"no geodesic was found between two shapes whose joints differ by up to {scale:.6g}")
 
 
-def _integrals(nodes: Array) -> tuple[Array, Array]:
+def integrals(nodes: Array) -> tuple[Array, Array]:
     """Matrices from values at the nodes to the integral from 0 to each node, once and twice."""
     powers = np.vander(nodes, increasing=True)
     orders = np.arange(len(nodes))

@@ -153,5 +153,8 @@ def resampled(path: ShapePath, times: Array, joint_names: tuple[str, ...] | None
     plain = ShapePath.spline(times, path.shape(times), joint_names=joint_names)
     curve = plain.curve
     assert isinstance(curve, PiecewisePolynomial)
+    if isinstance(path.curve, PiecewisePolynomial) and path.curve.arc is not None:
+        # Its times follow from its samples, too.
+        return replace(plain, curve=PiecewisePolynomial(curve.knots, curve.coefficients))
     origin = Resampled(path, times, len(times) - (curve.through == "periodic"))
     return replace(plain, curve=PiecewisePolynomial(curve.knots, curve.coefficients, curve.through, origin))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from ... import so3
 from ...arguments import check_object
@@ -16,9 +14,10 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import TrajectoryError, unknown_name
+from ..closing_arc import ClosingArc, closed_by_arc
 from ..connection import horizontal_lift
-from ..curves import CLOSED, PiecewisePolynomial
-from ..shape_geodesic import shape_geodesic, shape_speed
+from ..curves import CLOSED
+from ..shape_geodesic import shape_geodesic
 from ..shape_path import ShapePath
 from ._labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path
@@ -26,8 +25,6 @@ from .smoothing import Recorded, Smoothing, prepared_path
 WAYS = ("smooth", "drift", "geodesic")
 """A smoother that runs on from the end to the start; the gap taken off evenly in time; a geodesic put at the end."""
 _WHOLE_TURN = 2.0 * np.pi
-_PIECES = 4
-"""Cubics that a geodesic is written as; each is within some 1e-9 of a geodesic of a tenth of a radian."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,40 +143,9 @@ def _check_noise(gap: Array, noise: Array, body: Body) -> None:
 
 def _with_geodesic(opened: ShapePath, turns: Array, gap: Array, body: Body) -> tuple[ShapePath, Closing]:
     """The open path, and from its end to its start a geodesic, as fast as the path itself, rms."""
-    curve = opened.curve
-    assert isinstance(curve, PiecewisePolynomial)
     first, last = opened.curve(np.array([0.0, opened.duration]))[0]
-    way = shape_geodesic(body, last, first + turns)
-    speeds = shape_speed(body, *opened.curve(opened.breaks))
-    speed = float(np.sqrt(np.mean(speeds**2)))
-    if way.length == 0.0 or speed == 0.0:
+    arc = ClosingArc(body, opened, shape_geodesic(body, last, first + turns))
+    if arc.way.length == 0.0 or arc.speed == 0.0:
         return opened, Closing(by="geodesic", gap=gap, opened=opened, closed=opened, body=body)
-    edges = np.linspace(0.0, 1.0, _PIECES + 1)
-    fit = polynomial.polyfit(way.nodes, way.shapes, len(way.nodes) - 1)
-    shapes = np.array(polynomial.polyval(edges, fit).T, dtype=np.float64)
-    shapes[[0, -1]] = last, first + turns
-    rates = np.array(polynomial.polyval(edges, polynomial.polyder(fit)).T, dtype=np.float64)
-    seconds = way.length / speed
-    knots = np.concatenate([curve.knots, curve.knots[-1] + seconds * edges[1:]])
-    pieces = _hermite(seconds / _PIECES, shapes, rates / seconds)
-    coefficients = np.concatenate([curve.coefficients, pieces], axis=1)
-    closed = _cubics(knots, coefficients, opened.joint_names)
+    closed = closed_by_arc(arc)
     return closed, Closing(by="geodesic", gap=gap, opened=opened, closed=closed, body=body)
-
-
-def _hermite(step: float, values: Array, slopes: Array) -> Array:
-    """Cubics on pieces of one length with these values and slopes at their ends: (4, pieces, n)."""
-    rise = (values[1:] - values[:-1]) / step
-    start, end = slopes[:-1], slopes[1:]
-    return np.stack([values[:-1], start, (3.0 * rise - 2.0 * start - end) / step, (start + end - 2.0 * rise) / step**2])
-
-
-def _cubics(knots: Array, coefficients: Array, joint_names: Sequence[str] | None) -> ShapePath:
-    return ShapePath(
-        PiecewisePolynomial(knots, coefficients),
-        float(knots[-1]),
-        knots,
-        coefficients.shape[2],
-        None if joint_names is None else tuple(joint_names),
-        0.5,
-    )

@@ -1,0 +1,104 @@
+"""The geodesic that closes a recorded path, and how it answers to the path that it closes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from ..arrays import Array
+from ..body.body import Body
+from ..body.momentum_gradients import energy_gradients
+from ._geodesic_changes import changes_by_ends
+from .curves import PiecewisePolynomial
+from .shape_geodesic import ShapeGeodesic, shape_geodesic, shape_speed
+from .shape_path import ShapePath
+
+PIECES = 4
+"""Cubics that a geodesic is written as; each is within some 1e-9 of a geodesic of a tenth of a radian."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClosingArc:
+    """The way back from the end of a path to its start, as fast as the path itself, rms.
+
+    Attributes
+    ----------
+    body : in whose metric it is the shortest
+    opened : the path
+    way : the geodesic, from the last shape to the first
+    """
+
+    body: Body
+    opened: ShapePath
+    way: ShapeGeodesic
+
+    @cached_property
+    def speed(self) -> float:
+        """Of the path, rms [kg^(1/2) m/s]."""
+        speeds = shape_speed(self.body, *self.opened.curve(self.opened.breaks))
+        return float(np.sqrt(np.mean(speeds**2)))
+
+    @property
+    def seconds(self) -> float:
+        """How long the way back takes [s]."""
+        return self.way.length / self.speed
+
+    @property
+    def curve(self) -> PiecewisePolynomial:
+        """The path and the way back as one."""
+        opened = self.opened.curve
+        assert isinstance(opened, PiecewisePolynomial)
+        seconds = self.seconds
+        knots = np.concatenate([opened.knots, opened.knots[-1] + seconds * np.arange(1, PIECES + 1) / PIECES])
+        cubics = _cubics(self.way.nodes, self.way.shapes) / seconds ** np.arange(4)[:, None, None]
+        return PiecewisePolynomial(knots, np.concatenate([opened.coefficients, cubics], axis=1), arc=self)
+
+    def by_ends(self, by_cubics: Array) -> Array:
+        """From derivatives by the coefficients of the cubics, (4, PIECES, m, n), to those by the path's first and last
+        shape: (2, m, n)."""
+        changes = changes_by_ends(self.body, self.way)
+        n = changes.shape[1]
+        by_nodes = _cubics(self.way.nodes, changes.reshape(len(changes), -1)).reshape(4, PIECES, n, 2, n)
+        by_nodes /= self.seconds ** np.arange(4)[:, None, None, None, None]
+        # The geodesic starts where the path ends.
+        return np.einsum("pimj,pijek->emk", by_cubics, by_nodes)[::-1]
+
+    def seconds_by_path(self) -> tuple[Array, Array, Array]:
+        """The derivatives of the time that it takes: by the path's first and last shape, (2, n), and by its shapes and
+        rates at its breaks, (N, n) each."""
+        ends = [0, -1]
+        momenta = energy_gradients(self.body.chain, self.way.shapes[ends], self.way.rates[ends])[1]
+        of_length = np.stack([momenta[1], -momenta[0]]) / self.way.length
+        by_shape, by_rate = energy_gradients(self.body.chain, *self.opened.curve(self.opened.breaks))
+        factor = -self.seconds / (self.speed**2 * len(by_shape))
+        return of_length / self.speed, factor * by_shape, factor * by_rate
+
+
+def closed_by_arc(arc: ClosingArc) -> ShapePath:
+    """The path with the way back at its end."""
+    curve, opened = arc.curve, arc.opened
+    return ShapePath(curve, float(curve.knots[-1]), curve.knots, opened.n_shape, opened.joint_names, 0.5)
+
+
+def arc_again(arc: ClosingArc, opened: ShapePath) -> ClosingArc:
+    """The way back of another path, which makes the same whole turns."""
+    before = arc.opened.curve(arc.opened.breaks[[0, -1]])[0]
+    first, last = opened.curve(opened.breaks[[0, -1]])[0]
+    turns = arc.way.shapes[-1] - before[0]
+    return ClosingArc(arc.body, opened, shape_geodesic(arc.body, last, first + turns))
+
+
+def _cubics(nodes: Array, shapes: Array) -> Array:
+    """Cubics in the parameter from 0 to 1, PIECES of them, with the values and slopes of the polynomial through shapes
+    at nodes: (N,), (N, m) -> (4, PIECES, m)."""
+    edges = np.linspace(0.0, 1.0, PIECES + 1)
+    fit = polynomial.polyfit(nodes, shapes, len(nodes) - 1)
+    values = np.array(polynomial.polyval(edges, fit).T, dtype=np.float64)
+    values[[0, -1]] = shapes[[0, -1]]
+    slopes = np.array(polynomial.polyval(edges, polynomial.polyder(fit)).T, dtype=np.float64)
+    step = 1.0 / PIECES
+    rise, start, end = (values[1:] - values[:-1]) / step, slopes[:-1], slopes[1:]
+    return np.stack([values[:-1], start, (3.0 * rise - 2.0 * start - end) / step, (start + end - 2.0 * rise) / step**2])
