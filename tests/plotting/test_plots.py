@@ -16,9 +16,11 @@ from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
 from shapephase.deformation.gauge import named_gauge
 from shapephase.errors import GaugeError, MissingExtraError, ShapeError, UnknownNameError
-from shapephase.examples.scenarios import astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
+from shapephase.examples.scenarios import MOTIONS, astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
 from shapephase.plotting import plots
+from shapephase.plotting._joint_looks import other_side
 from shapephase.plotting._sphere_area import enclosed_cells
+from shapephase.plotting.motion_plots import _pieces
 from shapephase.plotting.plot_style import axes_image
 from shapephase.rigid_body.euler_top import EulerTop
 from support.long_runs import full_but
@@ -379,17 +381,49 @@ def test_the_attitude_is_drawn_as_it_is(motions, name):
     vectors = np.stack([piece[:, 1] for piece in pieces], axis=-1)
     times = pieces[0][:, 0]
     assert so3.angle(so3.transpose(so3.exp(vectors)) @ motion.attitude(times)).max() < 1e-12
-    assert by_label(ax, "|θ|") == pytest.approx(np.linalg.norm(vectors, axis=-1), abs=1e-15)
-    assert np.linalg.norm(vectors, axis=-1).max() <= np.pi + 1e-12
+    assert by_label(ax, r"$|\theta|$") == pytest.approx(np.linalg.norm(vectors, axis=-1), abs=1e-15)
+    # Both turn by more than a half turn, and no line jumps there.
+    assert np.linalg.norm(vectors, axis=-1).max() > 1.2 * np.pi
     for piece in drawn(ax, BLUE, 1.6):
         assert np.abs(np.diff(piece[:, 1])).max(initial=0.0) < 1.0
-    assert labels(ax) == ["θx", "θy", "θz", "|θ|"]
+    assert labels(ax) == [r"$\theta_x$", r"$\theta_y$", r"$\theta_z$", r"$|\theta|$"]
+    assert [other.get_ylabel() for other in (ax, *ax.child_axes)] == ["[rad]", "rotation vector [deg]"]
     ax = plots.plot_attitude(flat_axes(2.6), motion, "quaternion")
-    quaternions = np.stack([by_label(ax, f"q{name}") for name in "xyzw"], axis=-1)
+    quaternions = np.stack([by_label(ax, f"$q_{name}$") for name in "xyzw"], axis=-1)
     assert np.linalg.norm(quaternions, axis=-1) == pytest.approx(np.ones(len(quaternions)), abs=1e-14)
     assert np.abs(so3.matrix_from_quat(quaternions) - motion.attitude(times)).max() < 1e-12
     # One sign throughout.
     assert np.linalg.norm(np.diff(quaternions, axis=0), axis=-1).max() < 0.5
+
+
+def test_a_rotation_vector_goes_on_past_half_turns_which_are_marked():
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 7.0), [0.0, 0.0, 3.0])
+    ax = plots.plot_attitude(flat_axes(2.6), motion)
+    z = np.concatenate(drawn(ax, GREEN, 1.5))
+    assert z[:, 1] == pytest.approx(z[:, 0], abs=1e-9)
+    half_turns = [line.get_ydata()[0] for line in ax.lines if len(line.get_ydata()) == 2]
+    assert half_turns == pytest.approx([np.pi, 2.0 * np.pi, 0.0])
+
+
+def test_lines_are_interrupted_where_they_jump():
+    ax = flat_axes()
+    _pieces(ax, np.arange(4.0), np.array([[0.0], [0.5], [3.0], [3.5]]), [("jump", {"color": "red"})])
+    assert [line.tolist() for line in drawn(ax, "red")] == [[[0.0, 0.0], [1.0, 0.5]], [[2.0, 3.0], [3.0, 3.5]]]
+
+
+def test_a_small_geometric_phase_is_enlarged(motions):
+    ax = plots.plot_phases(flat_axes(2.6), motions["cat"])
+    (inset,) = ax.child_axes[1:]
+    (small,) = [line for line in inset.lines if len(line.get_xdata()) > 2]
+    assert np.asarray(small.get_ydata()) == pytest.approx(np.degrees(beginning(ax, "geometric")), abs=1e-12)
+    assert np.degrees(np.ptp(beginning(ax, "geometric"))) < 0.06 * np.degrees(np.ptp(beginning(ax, "total")))
+    # No line of the figure passes beneath it.
+    ax.figure.draw_without_rendering()
+    frame = inset.get_window_extent()
+    for line in ax.lines:
+        assert not any(frame.contains(*point) for point in ax.transData.transform(line.get_xydata()))
+    # One that can be seen is not.
+    assert len(plots.plot_phases(flat_axes(2.6), motions["spinning"]).child_axes) == 1
 
 
 def test_a_start_upside_down_is_drawn_without_a_jump(cat):
@@ -405,21 +439,21 @@ def test_inertia_and_internal_momentum(motions):
     ax = plots.plot_inertia(flat_axes(2.6), deformation)
     times = np.asarray(ax.lines[0].get_xdata())
     inertia = deformation.inertia(times)
-    moments = np.stack([by_label(ax, f"I{k}") for k in "₁₂₃"], axis=-1)
+    moments = np.stack([by_label(ax, f"$I_{k}$") for k in "123"], axis=-1)
     assert moments.sum(axis=-1) == pytest.approx(np.trace(inertia, axis1=1, axis2=2), rel=1e-13)
     assert moments.prod(axis=-1) == pytest.approx(np.linalg.det(inertia), rel=1e-12)
     assert np.all(np.diff(moments, axis=-1) >= 0.0)
     assert ax.get_ylim()[0] == 0.0
     ax = plots.plot_inertia(flat_axes(2.6), deformation, "entries")
     for name, (i, j) in {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "xz": (0, 2)}.items():
-        assert by_label(ax, f"I{name}") == pytest.approx(inertia[:, j, i], abs=1e-13)
+        assert by_label(ax, f"$I_{{{name}}}$") == pytest.approx(inertia[:, j, i], abs=1e-13)
     assert "[kg m²]" in ax.get_ylabel()
     ax = plots.plot_internal_momentum(flat_axes(2.6), deformation)
-    internal = np.stack([by_label(ax, f"L{name}") for name in "xyz"], axis=-1)
+    internal = np.stack([by_label(ax, f"$L_{{o,{name}}}$") for name in "xyz"], axis=-1)
     path = satellite_sweep()
     body = sp.load_body("satellite")
     assert internal == pytest.approx(body.internal_momentum(path.shape(times), path.rate(times)), abs=1e-12)
-    assert by_label(ax, "|L₀|") == pytest.approx(np.linalg.norm(internal, axis=-1), abs=1e-15)
+    assert by_label(ax, "$|L_o|$") == pytest.approx(np.linalg.norm(internal, axis=-1), abs=1e-15)
     assert "[kg m²/s]" in ax.get_ylabel()
 
 
@@ -427,15 +461,15 @@ def test_inertia_and_internal_momentum(motions):
 def test_energy_lies_between_the_bands_whose_edges_are_the_thresholds_e5(motions, name):
     motion = motions[name]
     ax = plots.plot_energy(flat_axes(2.6), motion)
-    energy = by_label(ax, "E")
-    times = np.asarray(next(line for line in ax.lines if line.get_label() == "E").get_xdata())
+    energy = by_label(ax, "$E$")
+    times = np.asarray(next(line for line in ax.lines if line.get_label() == "$E$").get_xdata())
     size = np.linalg.norm(motion.momentum)
     moments = np.linalg.eigvals(motion.deformation.inertia(times)).real
     least, middle, most = np.sort(moments, axis=-1).T
     momenta = motion.body_momentum(times)
     solved = np.linalg.solve(motion.deformation.inertia(times), momenta[..., None])[..., 0]
     assert energy == pytest.approx(0.5 * np.sum(momenta * solved, axis=-1), rel=1e-10)
-    assert by_label(ax, "l²/(2I₂), separatrix") == pytest.approx(size**2 / (2.0 * middle), rel=1e-12)
+    assert by_label(ax, r"$\ell^2\!/2I_2$, separatrix") == pytest.approx(size**2 / (2.0 * middle), rel=1e-12)
     bands = {band.get_label(): band.get_paths()[0].vertices for band in ax.collections}
     for label, low, high in (
         ("about smallest moment", size**2 / (2.0 * middle), size**2 / (2.0 * least)),
@@ -453,6 +487,22 @@ def test_energy_lies_between_the_bands_whose_edges_are_the_thresholds_e5(motions
     hatches = {band.get_label(): band.get_hatch() for band in ax.collections}
     assert hatches["about smallest moment"] != hatches["about largest moment"]
     assert ax.get_ylabel() == "energy [J]"
+
+
+def test_the_energy_is_on_an_axis_where_it_is_seen():
+    """A diver's smallest moment is a tenth of the others: with its bound the energy would be a line at the bottom."""
+    dive = sp.articulated(sp.load_body("diver"), MOTIONS["diver_twist"].path())
+    motion = sp.reconstruct(dive, [0.0, 61.558831, 0.0])
+    ax = plots.plot_energy(flat_axes(2.6), motion)
+    energy = by_label(ax, "$E$")
+    low, high = ax.get_ylim()
+    assert low < energy.min() < energy.max() < high
+    assert np.ptp(energy) > 0.5 * (high - low)
+    greatest = 0.5 * 61.558831**2 / np.linalg.eigvalsh(dive.inertia(0.0))[0]
+    assert high < 0.2 * greatest
+    title = ax.get_legend().get_title().get_text()
+    assert rf"$\ell^2\!/2I_1$ is beyond the axis, up to {greatest:.4g} J" in title
+    assert r"$\ell^2\!/2I_3$" in labels(ax)
 
 
 def test_certain_bounds_of_the_energy_are_drawn_as_steps(motions):
@@ -476,10 +526,10 @@ def test_shapes_in_time_are_grouped_by_unit(satellite):
     names = list(satellite.joint_names)
     assert angle.get_ydata() == pytest.approx(path.shape(times)[:, names.index("arm_1")], abs=0.0)
     assert length.get_ydata() == pytest.approx(path.shape(times)[:, names.index("boom_extension")], abs=0.0)
-    assert (ax.get_ylabel(), twin.get_ylabel()) == ("joints [rad]", "joints [m]")
-    assert labels(ax) == ["arm_1 [rad]", "boom_extension [m]"]
+    assert [other.get_ylabel() for other in (ax, *ax.child_axes, twin)] == ["", "joints [deg]", "joints [m]"]
+    assert labels(ax) == ["arm_1 [deg]", "boom_extension [m]", "beyond a limit"]
     ax = plots.plot_shape_path(flat_axes(2.6), path, satellite, ["arm_2", 0])
-    assert ["arm_2", names[0]] == [label.split(" [")[0] for label in labels(ax)]
+    assert ["arm_2", names[0]] == [label.split(" [")[0] for label in labels(ax)[:2]]
     ax = plots.plot_shape_path(flat_axes(2.6), path)
     assert ax.get_ylabel() == "joints [rad or m]"
     unnamed = sp.ShapePath.waypoints([0.0, 1.0], [[0.0, 1.0], [1.0, 1.0]])
@@ -491,14 +541,64 @@ def test_of_many_joints_those_that_move_most_are_named(cat):
     ax = plots.plot_shape_path(flat_axes(2.6), path, cat)
     values = path.matched(cat.joint_names, cat.name).shape(np.asarray(ax.lines[0].get_xdata()))
     span = np.ptp(values, axis=0)
-    named = labels(ax)[:-1]
-    assert len(named) == 6
+    named = labels(ax)[:6]
     others = [k for k, name in enumerate(cat.joint_names) if name not in named]
     assert span[[cat.joint_index(name) for name in named]].min() >= span[others].max()
-    assert labels(ax)[-1] == f"{int((span > 1e-9).sum()) - 6} others"
+    assert labels(ax)[6:] == [f"{int((span > 1e-9).sum()) - 6} others", "beyond a limit"]
+    seven = plots.plot_shape_path(flat_axes(2.6), path, cat, [cat.joint_index(name) for name in named] + others[:1])
+    assert labels(seven)[6] == "1 other"
     for line, name in zip(ax.lines, named):
         assert line.get_ydata() == pytest.approx(values[:, cat.joint_index(name)], abs=0.0)
     assert len({(str(line._dash_pattern), line.get_color()) for line in ax.lines[:6]}) == 6
+
+
+def test_left_and_right_joints_share_a_colour_and_dashes_are_the_right(cat):
+    ax = plots.plot_shape_path(flat_axes(2.6), cat_righting(), cat)
+    lines = dict(zip(labels(ax), ax.lines))
+    for name in ("rear_{}_knee", "front_{}_elbow"):
+        left, right = (lines[name.format(side)] for side in ("left", "right"))
+        assert left.get_markerfacecolor() == right.get_markerfacecolor() == right.get_color()
+        assert left.get_marker() == right.get_marker()
+        assert (left.get_linestyle(), right.get_linestyle()) == ("-", "--")
+        # Both are seen where they are the same: the dashes lie on a broad pale line.
+        assert left.get_linewidth() > 2.0 * right.get_linewidth()
+        assert left.get_zorder() < right.get_zorder()
+        assert 0.299 * left.get_color()[0] + 0.587 * left.get_color()[1] + 0.114 * left.get_color()[2] > 0.45
+    assert len({line.get_marker() for line in ax.lines[:6]}) == 4
+    assert "dashes: the right side" in ax.get_legend().get_title().get_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [
+        ("left_knee", "right_knee"),
+        ("hip_flexion_r", "hip_flexion_l"),
+        ("RightElbow", "LeftElbow"),
+        ("LF_HAA", None),
+        ("ankle_L", "ankle_R"),
+        ("waist_roll", None),
+        ("arm_1", None),
+        ("r-wrist", "l-wrist"),
+    ],
+)
+def test_the_other_side_of_a_joint_is_told_by_its_name(name, other):
+    assert other_side(name) == other
+    assert other is None or other_side(other) == name
+
+
+def test_limits_are_bands_where_they_are_near(satellite):
+    ax = plots.plot_shape_path(flat_axes(2.6), satellite_sweep(), satellite)
+    (twin,) = [other for other in ax.figure.axes if other is not ax]
+    low, high = satellite.joint_limits[satellite.joint_index("boom_extension")]
+    bands = sorted((band.get_y(), band.get_y() + band.get_height()) for band in twin.patches)
+    assert (bands[0][1], bands[1][0]) == pytest.approx((low, high), abs=1e-15)
+    assert twin.get_ylim()[0] < bands[0][0]
+    assert twin.get_ylim()[1] > bands[1][1]
+    # The arm may turn much farther than it does: its limits are not in the figure.
+    limits = satellite.joint_limits[satellite.joint_index("arm_1")]
+    assert np.abs(limits).min() > 1.5 * 1.2
+    assert not ax.patches
+    assert "beyond a limit" not in labels(plots.plot_shape_path(flat_axes(2.6), satellite_sweep()))
 
 
 def test_the_plane_of_two_joints(satellite):

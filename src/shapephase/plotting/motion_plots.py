@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
 from ..arguments import check_object
 from ..arrays import Array, Integers
 from ..bounds.energy import energy_along
@@ -25,11 +24,13 @@ from .plot_style import (
     ORANGE,
     SERIES,
     SKY,
+    SMALL,
     VERMILION,
     check_flat_axes,
     degrees_first,
     even_times,
     in_time,
+    inset_where_free,
     motion_times,
     one_motion,
 )
@@ -46,8 +47,20 @@ _TOTAL: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 1.5)), "linewidth
 _JUMPED: dict[str, Any] = {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 1.2, "zorder": 1.4}
 # Change between neighbouring points [rad, or 1 for a quaternion] that is a jump and not a curve.
 _JUMP = 1.0
-# Angle short of a half turn [rad] at which the sign of a rotation vector is free.
+# Angle short of a half turn [rad] that counts as one.
 _HALF_TURN = 1e-6
+# Of the other phases' range: a geometric phase within it looks like a flat line.
+_FLAT = 0.06
+# Phase [rad] that is zero up to rounding.
+_NOTHING = 1e-9
+# Of the axis: the least that the energy and the two nearest curves are to have of it.
+_PRESSED = 0.3
+# Of the range of the energies, beyond its ends.
+_ROOM = 0.05
+# Energies that bound the regimes, as the legend names them.
+_LEAST = r"$\ell^2\!/2I_1$"
+_SEPARATRIX = r"$\ell^2\!/2I_2$, separatrix"
+_MOST = r"$\ell^2\!/2I_3$"
 
 
 def plot_phases(
@@ -63,7 +76,8 @@ def plot_phases(
     Each ends in the number of `split`, which the legend has: at every time the momentum's curve so far is closed by
     the great circle back to its start. Where it stays open by more than a degree, the legend says how much the circle
     adds at the end. Where the great circle passes over the region that is not counted, the lines jump by a whole
-    sphere, 720 degrees, which dots mark.
+    sphere, 720 degrees, which dots mark. A geometric phase too small to be seen beside the others is enlarged in an
+    inset, in degrees.
 
     Parameters
     ----------
@@ -103,14 +117,16 @@ def plot_phases(
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
     in_time(ax, (t[0], t[-1]), "", title=_phase_title(found, len(jumps)))
     degrees_first(ax, "phase")
+    _enlarged(ax, t, found)
     return ax
 
 
 def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, times: ArrayLike | None = None) -> Axes:
     """The attitude in time, base axes to inertial ones: its rotation vector and angle, or its quaternion x y z w.
 
-    The rotation vector is at most a half turn long; beyond that it jumps to the opposite side, and the lines are
-    interrupted. The quaternion does not change its sign.
+    The rotation vector is `Motion.rotation_vector`: it goes on past half turns. Where it jumps nevertheless, because
+    the attitude is the identity again after whole turns, the lines are interrupted. The quaternion does not change its
+    sign.
 
     Parameters
     ----------
@@ -140,16 +156,22 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     if kind == "quaternion":
         values = motion.quat_xyzw(t)
         values[1:] *= np.cumprod(np.where(np.sum(values[1:] * values[:-1], axis=-1) < 0.0, -1.0, 1.0))[:, None]
-        _pieces(ax, t, values, [(f"q{name}", SERIES[k]) for k, name in enumerate("xyzw")])
+        _pieces(ax, t, values, [(f"$q_{name}$", SERIES[k]) for k, name in enumerate("xyzw")])
         ax.set_ylim(-1.08, 1.08)
-        label = "quaternion [1]"
+        label, title = "quaternion [1]", "attitude, base to inertial axes: quaternion of one sign"
     else:
-        values = _rotation_vectors(motion.attitude(t))
-        _pieces(ax, t, values, [(f"θ{name}", SERIES[k]) for k, name in enumerate("xyz")])
-        ax.plot(t, np.linalg.norm(values, axis=-1), label="|θ|", color=GREY, linewidth=2.2, zorder=1.5)
-        label = "rotation vector [rad]"
+        values = motion.rotation_vector(t)
+        _pieces(ax, t, values, [(rf"$\theta_{name}$", SERIES[k]) for k, name in enumerate("xyz")])
+        size = np.linalg.norm(values, axis=-1)
+        ax.plot(t, size, label=r"$|\theta|$", color=GREY, linewidth=2.2, zorder=1.5)
+        for turn in np.arange(np.pi, size.max() + _HALF_TURN, np.pi):
+            ax.axhline(turn, color=GREY, linewidth=0.5, linestyle=(0, (1, 2)), zorder=1)
+        label, title = "", "attitude, base to inertial axes: rotation vector"
+        title += "; dots: half turns" if size.max() > np.pi - _HALF_TURN else ""
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    in_time(ax, (t[0], t[-1]), label, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    in_time(ax, (t[0], t[-1]), label, title=title, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    if kind != "quaternion":
+        degrees_first(ax, "rotation vector")
     return ax
 
 
@@ -184,14 +206,17 @@ def plot_inertia(
     inertia = deformation.inertia(t)
     if kind == "principal":
         for k, moment in enumerate(np.linalg.eigvalsh(inertia).T):
-            ax.plot(t, moment, label=f"I{'₁₂₃'[k]}", **SERIES[k])
+            ax.plot(t, moment, label=f"$I_{k + 1}$", **SERIES[k])
         ax.set_ylim(bottom=0.0)
     else:
         for k, (i, j, name) in enumerate(_ENTRIES):
-            ax.plot(t, inertia[:, i, j], label=f"I{name}", **SERIES[k])
+            ax.plot(t, inertia[:, i, j], label=f"$I_{{{name}}}$", **SERIES[k])
         ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    label = "principal moments [kg m²]" if kind == "principal" else "locked inertia [kg m²]"
-    in_time(ax, (t[0], t[-1]), label, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    label, title = {
+        "principal": ("principal moments [kg m²]", "locked inertia, about the centre of mass"),
+        "entries": ("locked inertia [kg m²]", "locked inertia in the deformation's frame"),
+    }[kind]
+    in_time(ax, (t[0], t[-1]), label, title=title, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return ax
 
 
@@ -220,10 +245,11 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
     t = even_times(deformation, times)
     internal = deformation.internal_momentum(t)
     for k, name in enumerate("xyz"):
-        ax.plot(t, internal[:, k], label=f"L{name}", **SERIES[k])
-    ax.plot(t, np.linalg.norm(internal, axis=-1), label="|L₀|", color=GREY, linewidth=2.2, zorder=1.5)
+        ax.plot(t, internal[:, k], label=f"$L_{{o,{name}}}$", **SERIES[k])
+    ax.plot(t, np.linalg.norm(internal, axis=-1), label="$|L_o|$", color=GREY, linewidth=2.2, zorder=1.5)
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    in_time(ax, (t[0], t[-1]), "L₀ [kg m²/s]", ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    in_time(ax, (t[0], t[-1]), "$L_o$ [kg m²/s]", title="momentum of the joints, the base at rest", **above)
     return ax
 
 
@@ -237,7 +263,9 @@ def plot_energy(
     """The energy E_t in time between the bands of the regimes of the body frozen at each time.
 
     With l the momentum's norm, the energy lies between l²/(2 I₃) and l²/(2 I₁). Above l²/(2 I₂), the energy on the
-    separatrix, the frozen polhode circles the axis of the smallest moment, below it that of the largest.
+    separatrix, the frozen polhode circles the axis of the smallest moment, below it that of the largest. Where the
+    farthest of these three would press the energy into a small part of the axis, the axis ends before it, and the
+    legend says up to where it goes.
 
     Parameters
     ----------
@@ -280,18 +308,58 @@ def plot_energy(
     )
     for low, high, label, look in bands:
         ax.fill_between(t, low, high, linewidth=0.0, label=label, zorder=1, **look)
+    energy = energy_along(motion, t)
+    low, high, beyond = _energy_range(energy, bottom, middle, top)
     limits = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
-    ax.plot(t, top, label="l²/(2I₁), l²/(2I₃)", **limits)
+    seen = [label for label, values in ((_LEAST, top), (_MOST, bottom)) if np.any((values >= low) & (values <= high))]
+    ax.plot(t, top, label=", ".join(seen) if seen else None, **limits)
     ax.plot(t, bottom, **limits)
-    ax.plot(t, middle, label="l²/(2I₂), separatrix", color=VERMILION, linestyle=(0, (5, 1.5)), linewidth=1.3)
+    ax.plot(t, middle, label=_SEPARATRIX, color=VERMILION, linestyle=(0, (5, 1.5)), linewidth=1.3)
     if certificate is not None:
         known = certificate.bounds
         edges = known.enclosure.edges
         for values, label in ((known.lower, "certain bounds"), (known.upper, None)):
             ax.stairs(values, edges, baseline=None, color=BLACK, linestyle=(0, (1, 1)), linewidth=1.2, label=label)
-    ax.plot(t, energy_along(motion, t), label="E", color=BLACK, linewidth=1.7)
-    in_time(ax, (t[0], t[-1]), "energy [J]")
+    ax.plot(t, energy, label="$E$", color=BLACK, linewidth=1.7)
+    ax.set_ylim(low, high)
+    in_time(
+        ax, (t[0], t[-1]), "energy [J]", title="\n".join(["energy, and the axis that the momentum circles", *beyond])
+    )
     return ax
+
+
+def _energy_range(energy: Array, bottom: Array, middle: Array, top: Array) -> tuple[float, float, list[str]]:
+    """Ends of an axis on which the energy is seen, and a line about the curve that is beyond it, if one is."""
+    curves = sorted(
+        ((bottom, _MOST), (middle, _SEPARATRIX), (top, _LEAST)), key=lambda curve: np.abs(curve[0] - energy).max()
+    )
+    near = np.concatenate([energy, curves[0][0], curves[1][0]])
+    far, name = curves[2]
+    low, high = float(near.min()), float(near.max())
+    whole = max(high, float(far.max())) - min(low, float(far.min()))
+    beyond = []
+    if high - low > _PRESSED * whole:
+        low, high = min(low, float(far.min())), max(high, float(far.max()))
+    else:
+        up = far.max() > high
+        end = f"{far.max() if up else far.min():.4g}"
+        beyond = [f"{name} is beyond the axis, {'up' if up else 'down'} to {end} J"]
+    room = _ROOM * ((high - low) or abs(high))
+    return low - room, high + room, beyond
+
+
+def _enlarged(ax: Any, t: Array, found: RunningPhases) -> None:
+    """The geometric phase in an inset, where it would be a flat line beside the others."""
+    reach = float(np.ptp(found.geometric_phase))
+    whole = float(np.ptp(np.concatenate([found.dynamic_phase, found.montgomery_phase, np.zeros(1)])))
+    inset = inset_where_free(ax, (0.27, 0.22), (0.19, 0.1, 0.09)) if _NOTHING < reach < _FLAT * whole else None
+    if inset is not None:
+        inset.plot(t, np.degrees(found.geometric_phase), **SERIES[1])
+        inset.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+        inset.set_xlim(t[0], t[-1])
+        inset.locator_params(nbins=3)
+        inset.tick_params(labelsize=SMALL - 2, length=2.0, pad=1.5)
+        inset.set_title(r"$\theta_\mathrm{G}$ [deg]", fontsize=SMALL - 1, pad=2.0)
 
 
 def _phase_title(found: RunningPhases, jumps: int) -> str:
@@ -322,14 +390,3 @@ def _pieces(ax: Any, t: Array, values: Array, looks: list[tuple[str, dict[str, A
     for k, (label, look) in enumerate(looks):
         for start, end in pairwise(cuts):
             ax.plot(t[start:end], values[start:end, k], label=None if start else label, **look)
-
-
-def _rotation_vectors(attitudes: Array) -> Array:
-    """Rotation vectors; of the two of a half turn, the one nearer to its neighbour: (N, 3, 3) -> (N, 3)."""
-    values = so3.log(attitudes)
-    straight = np.flatnonzero(np.linalg.norm(values, axis=-1) > np.pi - _HALF_TURN)
-    for k in straight[::-1]:
-        beside = values[k + 1] if k + 1 < len(values) else values[k - 1]
-        if values[k] @ beside < 0.0:
-            values[k] *= -1.0
-    return values

@@ -48,8 +48,14 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": PURPLE, "linestyle": (0, (3, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.5},
 )
 """One style for each curve of a figure, the first three for x, y and z."""
+# The letters of symbols: in the sans-serif of the other text, I and l are the same bar.
+_SYMBOLS = "dejavuserif"
 # Dots per inch of raster images: what journals ask for.
 _RESOLUTION = 300
+# Between an inset and the edge of the axes or the next line [their widths and heights].
+_EDGE = 0.05
+# Points of a line that is a mark or a zero line, and no curve to be kept free.
+_FEW = 2
 # Points of a curve in time: more than one column has pixels at 200 dpi.
 _MIN_POINTS = 800
 # Points of a curve in time for each loop of a repeated path.
@@ -186,7 +192,17 @@ def finish(ax: Any, **place: Any) -> Any:
         "handletextpad": 0.6,
         "columnspacing": 1.0,
     }
-    return ax.legend(**{"ncols": 2, "frameon": False, **look, **above, **place})
+    legend = ax.legend(**{"ncols": 2, "frameon": False, **look, **above, **place})
+    with_symbols(ax)
+    return legend
+
+
+def with_symbols(ax: Any) -> None:
+    """Let the symbols in labels, legend and texts of some axes have serifs, by which l, I and 1 are told apart."""
+    legend = ax.get_legend()
+    named = [*legend.get_texts(), legend.get_title()] if legend else []
+    for text in (ax.xaxis.label, ax.yaxis.label, *ax.texts, *named):
+        text.set_math_fontfamily(_SYMBOLS)
 
 
 def in_time(ax: Any, duration: tuple[float, float], label: str, **place: Any) -> None:
@@ -209,6 +225,27 @@ def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
     else:
         ax.tick_params(axis="y", left=False, labelleft=False)
         ax.set_ylabel("")
+
+
+def inset_where_free(ax: Any, size: tuple[float, float], room: tuple[float, float, float]) -> Any | None:
+    """Axes in a corner of others over which none of their lines passes; None if there is no such corner.
+
+    Parameters
+    ----------
+    size : width and height [widths and heights of the axes]
+    room : to the left of them, below and above them, for what is written there [the same]
+    """
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    curves = [line.get_xydata() for line in ax.lines if len(line.get_xydata()) > _FEW]
+    points = np.concatenate(curves or [np.zeros((0, 2))])
+    x, y = (points[:, 0] - left) / (right - left), (points[:, 1] - bottom) / (top - bottom)
+    wide, high = size[0] + room[0] + _EDGE, size[1] + room[1] + room[2] + _EDGE
+    for across, up in ((0.0, 1.0 - high), (1.0 - wide, 1.0 - high), (1.0 - wide, 0.0), (0.0, 0.0)):
+        inside = (x > across) & (x < across + wide) & (y > up) & (y < up + high)
+        if not inside.any():
+            place = (across + room[0] + 0.5 * _EDGE, up + room[1] + 0.5 * _EDGE)
+            return ax.inset_axes((*place, *size))
+    return None
 
 
 def _check_matplotlib() -> None:

@@ -15,8 +15,9 @@ from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.shape_path import ShapePath
+from ._joint_looks import both_sides, joint_looks
 from ._letters import plain_text
-from .plot_style import BLACK, BLUE, GREEN, GREY, SERIES, SMALL, check_flat_axes, even_times, finish, in_time
+from .plot_style import BLACK, BLUE, GREEN, GREY, SMALL, check_flat_axes, degrees_first, even_times, finish, in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,6 +36,12 @@ _COUNT = 61
 _MARGIN = 0.25
 # Level over the largest value [1] that is zero up to rounding.
 _ZERO_LEVEL = 1e-9
+# Units of joints as the legend has them: what turns is read in degrees.
+_SHOWN = {"rad": "deg", "m": "m", "rad or m": "rad or m"}
+# Of the range of the joints drawn: limits farther than that from where a joint goes are not in the figure.
+_NEAR_LIMIT = 0.3
+# Of the height of the figure: a band beyond a limit.
+_BAND = 0.035
 _AXES = "xyz"
 
 
@@ -46,7 +53,10 @@ def plot_shape_path(
     *,
     times: ArrayLike | None = None,
 ) -> Axes:
-    """The joints in time, those in radians on the left scale and those in metres on the right.
+    """The joints in time: those that turn in degrees, with radians beside them or metres of those that slide.
+
+    A joint of the left side and its like on the right have one colour and marker, the left one a pale broad line, the
+    right one dashes. What is beyond a joint's limit is a band of its colour, where the limit is near enough to be seen.
 
     Parameters
     ----------
@@ -83,21 +93,33 @@ def plot_shape_path(
     chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MAX_NAMED else chosen
     scales = sorted({units[k] for k in chosen}, key=("rad", "m", "rad or m").index)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
-    handles: dict[int, Any] = {}
-    texts: dict[int, str] = {}
-    for number, k in enumerate(chosen):
-        named = number < _MAX_NAMED
-        look = SERIES[number] if named else {"color": GREY, "linewidth": 0.6, "zorder": 1.5}
-        (line,) = places[units[k]].plot(t, values[:, k], **look)
-        text = plain_text(names[k]) if len(scales) == 1 else f"{plain_text(names[k])} [{units[k]}]"
-        place = min(number, _MAX_NAMED)
-        handles[place], texts[place] = line, text if named else f"{len(chosen) - _MAX_NAMED} others"
+    named = chosen[:_MAX_NAMED]
+    shown = [names[int(k)] for k in named]
+    looks = joint_looks(shown)
+    handles: list[Any] = []
+    texts: list[str] = []
+    for k, look in zip(named, looks, strict=True):
+        handles += places[units[k]].plot(t, values[:, k], **look)
+        own = "" if len(scales) == 1 else f" [{_SHOWN[units[k]]}]"
+        texts.append(plain_text(names[k]) + own)
+    others = [
+        places[units[k]].plot(t, values[:, k], color=GREY, linewidth=0.6, zorder=1.5)[0] for k in chosen[_MAX_NAMED:]
+    ]
+    if others:
+        handles.append(others[0])
+        texts.append("1 other" if len(others) == 1 else f"{len(others)} others")
+    if body is not None and _limit_bands(places, units, body.joint_limits, values, named, looks):
+        handles.append(_band_patch())
+        texts.append("beyond a limit")
     for unit, twin in list(places.items())[1:]:
         twin.set_ylabel(f"joints [{unit}]", fontsize=SMALL)
         twin.tick_params(labelsize=SMALL)
-    columns = 1 if max(map(len, texts.values())) > _MAX_BESIDE else 2
+    columns = 1 if max(map(len, texts)) > _MAX_BESIDE else 2
     above = {"ncols": columns, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", handles=handles.values(), labels=texts.values(), **above)
+    title = "joints in time; dashes: the right side" if both_sides(shown) else "joints in time"
+    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", handles=handles, labels=texts, title=title, **above)
+    if scales[0] == "rad":
+        degrees_first(ax, "joints", radians=len(scales) == 1)
     return ax
 
 
@@ -214,6 +236,44 @@ def plot_curvature(
     bar.set_label(f"curvature, {name}\n[{scale}rad/{per}]", fontsize=SMALL)
     bar.ax.tick_params(labelsize=SMALL)
     return ax
+
+
+def _limit_bands(
+    places: dict[str, Any], units: Sequence[str], limits: Array, values: Array, named: Any, looks: list[dict[str, Any]]
+) -> bool:
+    """Bands beyond the limits of joints that are near to what is drawn; whether there is one."""
+    drawn = False
+    for unit, ax in places.items():
+        own = [(k, look) for k, look in zip(named, looks, strict=True) if units[k] == unit]
+        if not own:
+            continue
+        columns = values[:, [k for k, _ in own]]
+        low, high = float(columns.min()), float(columns.max())
+        reach = _NEAR_LIMIT * (high - low)
+        # The same limit of a left and a right joint is one band.
+        near = {
+            (float(limit), sign, look.get("markerfacecolor", look["color"]))
+            for k, look in own
+            for limit, sign, end in zip(limits[k], (-1.0, 1.0), (values[:, k].min(), values[:, k].max()), strict=True)
+            if abs(limit - end) <= reach
+        }
+        if near:
+            bottom = min(low, min(limit for limit, _, _ in near))
+            top = max(high, max(limit for limit, _, _ in near))
+            thick = _BAND * (top - bottom)
+            ax.set_ylim(bottom - 2.0 * thick, top + 2.0 * thick)
+            for limit, sign, colour in sorted(near):
+                ax.axhspan(
+                    *sorted((limit, limit + sign * thick)), facecolor=colour, alpha=0.35, linewidth=0.0, zorder=1
+                )
+        drawn = drawn or bool(near)
+    return drawn
+
+
+def _band_patch() -> Any:
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=GREY, alpha=0.5, linewidth=0.0)
 
 
 def _loop(ax: Any, points: Array) -> None:
