@@ -83,12 +83,12 @@ def test_the_faint_geodesics_solve_the_equations_and_touch_the_locus():
 
 def test_given_momenta_are_marked_and_the_second_order_starts_on_the_other_side():
     ax = plot_conjugate_locus(column_axes(), MOMENTS, momenta=TABLE[:, 0])
-    assert np.abs(curves(ax, "of the p given")[0] - TABLE[:, [4, 3]].T).max() < 1e-6
+    assert np.abs(curves(ax, r"of the $p_\theta$ given")[0] - TABLE[:, [4, 3]].T).max() < 1e-6
     ax = plot_conjugate_locus(column_axes(), MOMENTS, 2)
     second = curves(ax, "locus, upward start")[0]
     assert np.abs(second[:, 0] - [2.0 * np.pi, 0.0]).max() < 1e-7
     assert np.all(second[1, 1:] > 0.0)
-    assert "of the p given" not in labels(ax)
+    assert r"of the $p_\theta$ given" not in labels(ax)
 
 
 @pytest.mark.parametrize("order", [1, 2])

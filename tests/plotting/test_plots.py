@@ -259,9 +259,47 @@ def test_a_steady_rotation_is_a_point():
         flat.figure.draw_without_rendering()
 
 
+def test_a_curve_too_small_on_its_sphere_is_enlarged(motions):
+    halves = sp.articulated(sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 1.0))
+    motion = sp.reconstruct(halves, [0.0, 0.002, 0.005])
+    ax = plots.plot_momentum_curve(flat_axes(), motion)
+    (inset,) = ax.child_axes
+    whole, near = (joined([xy(line) for line in lines]) for lines in (
+        [line for line in axes.lines if line.get_color() == BLACK and line.get_linewidth() == 1.5]
+        for axes in (ax, inset)
+    ))  # fmt: skip
+    assert near == pytest.approx(whole, abs=0.0)
+    (left, right), (bottom, top) = inset.get_xlim(), inset.get_ylim()
+    assert left < near[:, 0].min() < near[:, 0].max() < right
+    assert bottom < near[:, 1].min() < near[:, 1].max() < top
+    # The bar is as long as the angle that stands above it, where the sphere faces the eye.
+    (bar,) = [xy(line) for line in inset.lines if line.get_linewidth() == 2.0]
+    (text,) = [text.get_text() for text in inset.texts if text.get_text()]
+    assert np.sin(np.radians(float(text[:-1]))) == pytest.approx(np.ptp(bar[:, 0]), rel=1e-12)
+    # It is larger there, and covers nothing of the curve itself.
+    ax.figure.draw_without_rendering()
+    frame = inset.get_window_extent()
+    assert not any(frame.contains(*point) for point in ax.transData.transform(whole))
+    unit = np.ptp(ax.transData.transform([(0.0, 0.0), (1.0, 0.0)])[:, 0])
+    assert frame.width / (right - left) > 2.0 * unit
+    assert not plots.plot_momentum_curve(flat_axes(), motions["astronaut"]).child_axes
+
+
+def test_no_text_stands_on_the_curve(motions):
+    for motion in (motions["astronaut"], motions["satellite"]):
+        ax = plots.plot_momentum_curve(flat_axes(), motion)
+        ax.figure.draw_without_rendering()
+        curve = np.concatenate([xy(line) for line in ax.lines if line.get_color() == BLACK])
+        places = ax.transData.transform(curve)
+        for text in ax.texts:
+            if text.get_text() in ("$x$", "$y$", "$z$"):
+                box = text.get_window_extent()
+                assert not any(box.contains(*place) for place in places), text
+
+
 def test_a_closed_curve_has_no_closing_circle():
     ax = plots.plot_momentum_curve(flat_axes(), closed_orbit("cat", "base"), "base")
-    assert labels(ax)[:2] == ["Π/|Π|", "start"]
+    assert labels(ax)[:2] == [r"$\Pi/|\Pi|$", "start"]
     assert "closing great circle" not in labels(ax)
     assert len(marked(ax, "s", VERMILION)) == 0
     assert "winding −1" in labels(ax) or "winding +1" in labels(ax)
@@ -742,6 +780,7 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
     }
     elsewhere = ("polhodes", "herpolhode", "heavy_top_stability", "crown", "bounds")
     elsewhere += ("caustic", "conjugate_locus", "ellipsoid_locus")
+    elsewhere += ("cones", "rolling_ellipsoid")
     others = {getattr(plots, f"plot_{name}") for name in elsewhere}
     assert {getattr(plots, name) for name in plots.__all__} - others == {*figures, plots.column_axes}
     for plot, arguments in figures.items():

@@ -117,6 +117,25 @@ def test_pieces_of_a_curve_join_at_the_limb_g8():
         assert np.linalg.norm(ends - piece[-1], axis=-1).min() < 1e-14
 
 
+def test_heads_on_the_separatrix_point_the_way_the_momentum_goes_g8():
+    """By Euler's equations alone: Pi' = Pi x I^-1 Pi."""
+    moments, view = np.array([1.0, 2.0, 3.0]), (24.0, 32.0)
+    ax = plot_polhodes(flat_axes(), moments, view=view)
+    elevation, azimuth = np.radians(view)
+    eye = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    screen = np.stack([right, np.cross(eye, right)])
+    heads = [text for text in ax.texts if hasattr(text, "arrow_patch")]
+    assert len(heads) >= 3
+    for head in heads:
+        x, y = 0.5 * (np.array(head.xy) + head.xyann)
+        point = x * screen[0] + y * screen[1] + np.sqrt(1.0 - x * x - y * y) * eye
+        assert energy(point, moments) == pytest.approx(0.25, abs=2e-3)
+        onward = screen @ np.cross(point, point / moments)
+        step = np.array(head.xy) - head.xyann
+        assert step @ onward > 0.99 * np.linalg.norm(step) * np.linalg.norm(onward)
+
+
 @pytest.mark.parametrize("name", TOPS)
 def test_the_polhode_of_a_top_is_drawn_whole_g8(name):
     top = TOPS[name]
@@ -128,7 +147,7 @@ def test_the_polhode_of_a_top_is_drawn_whole_g8(name):
     passed = top.body_momentum(np.linspace(-far, far, 200)) @ top.axes / top.magnitude
     assert max(np.linalg.norm(own - point, axis=-1).min() for point in passed) < 0.01
     assert markers(ax, "*") == pytest.approx(top.body_momentum(0.0)[None] @ top.axes / top.magnitude, abs=1e-15)
-    assert {"this top", "t = 0"} <= set(labels(ax))
+    assert {"this top", "$t = 0$"} <= set(labels(ax))
     assert OWN in {line.get_color() for line in plot_polhodes(flat_axes(), top).lines}
 
 
@@ -147,9 +166,9 @@ def test_degenerate_bodies_g8():
     assert len({round(float(energy(c[0], (1.0, 2.0, 2.0))), 12) for c in curves(ax, ROUND_SMALLEST)}) == 4
     spherical = EulerTop.principal((2.0, 2.0, 2.0), (0.3, 0.5, -0.8))
     ax = plot_polhodes(flat_axes(), spherical)
-    assert labels(ax) == ["t = 0", "equilibrium, as every point"]
+    assert labels(ax) == ["$t = 0$", "equilibrium, as every point"]
     ax = plot_polhodes(flat_axes(), EulerTop.principal((1.0, 2.0, 3.0), (0.0, 0.0, 0.0)))
-    assert "t = 0" not in labels(ax)
+    assert "$t = 0$" not in labels(ax)
     ax = plot_polhodes(solid_axes(), EulerTop.principal((1.0, 2.0, 3.0), (0.0, -2.0, 0.0)))
     assert markers(ax, "*") == pytest.approx(np.array([[0.0, -1.0, 0.0]]), abs=0.0)
 
@@ -185,7 +204,7 @@ def test_a_steady_rotation_is_drawn_as_a_point_i5(momentum):
     ax = plot_herpolhode(flat_axes(), EulerTop.principal((1.0, 2.0, 3.0), momentum))
     assert curves(ax) == []
     assert markers(ax, "*") == pytest.approx(np.zeros((1, 2)), abs=0.0)
-    assert labels(ax) == ["t = 0", "foot of the normal"]
+    assert labels(ax) == ["$t = 0$", "foot of the normal"]
     assert ax.get_xlim()[1] > 0.0
 
 
@@ -210,7 +229,7 @@ def test_heavy_top_chart_has_the_threshold_and_the_double_roots():
         roots = np.roots([1.0, 0.0, (1.0 + (1.0 - ratio) ** 2) * (spin / ratio) ** 2 - 2.0, 0.0,
                           ((1.0 - ratio) * (spin / ratio) ** 2 + 1.0) ** 2])  # fmt: skip
         assert (np.abs(roots.real).max() < 1e-6) == (abs(spin) > 2.0)
-    assert labels(ax)[:4] == ["stable", "unstable", "Π₃² = 4MglI₁", "I₃ = 2I₁, double roots"]
+    assert labels(ax)[:4] == ["stable", "unstable", r"$\Pi_3^2 = 4\,M g \ell I_1$", "$I_3 = 2I_1$, double roots"]
 
 
 def test_heavy_top_chart_grows_with_its_tops():

@@ -49,7 +49,15 @@ def test_the_crown_is_filled_where_the_momentum_can_be(antenna):
     projected = motion.body_momentum(times) @ np.stack([right, up], axis=-1) / np.linalg.norm(example.momentum)
     for point in projected[::37]:
         assert np.abs(curve - point).max(axis=1).min() < 1e-12
-    assert "crown: where Π can be" in [text.get_text() for text in ax.get_legend().get_texts()]
+    assert r"crown: where $\Pi$ can be" in [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_a_crown_that_cannot_be_seen_is_not_in_the_legend():
+    """Of a rigid body the energy is certain, and the crown is its polhode, without a width."""
+    body = sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0)
+    ax = plot_crown(column_axes(3.4), crown_region(body, [0.1, 0.2, 2.0]), sp.reconstruct(body, [0.1, 0.2, 2.0]))
+    assert not any("crown" in text.get_text() for text in ax.get_legend().get_texts())
+    assert "thinner than a line" in ax.get_legend().get_title().get_text()
 
 
 def test_bars_are_as_long_as_bounds_are_tight(antenna):

@@ -10,6 +10,7 @@ from .plot_style import column_axes
 from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
 from .report import write_report
+from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
 from .viewer import LiveView, motion_html, motion_page, motion_video, view
 
@@ -28,6 +29,7 @@ __all__ = [
     "plot_attitude",
     "plot_bounds",
     "plot_caustic",
+    "plot_cones",
     "plot_conjugate_locus",
     "plot_crown",
     "plot_curvature",
@@ -41,6 +43,7 @@ __all__ = [
     "plot_momentum_curve",
     "plot_phases",
     "plot_polhodes",
+    "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",
     "plots",

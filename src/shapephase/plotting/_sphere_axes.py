@@ -33,12 +33,12 @@ _VISIBLE_AREA = 5e-3
 _LIMB = -1e-9
 
 
-class SphereAxes:
-    """The unit sphere in parallel projection; what is on its far side is dimmed.
+class ParallelAxes:
+    """Space in parallel projection, on flat axes, or on three-dimensional ones in the view they have.
 
     Parameters
     ----------
-    ax : flat axes, or three-dimensional ones, in the view they have
+    ax : flat axes, or three-dimensional ones
     view : elevation and azimuth of the eye [degrees], for flat axes
     """
 
@@ -53,19 +53,48 @@ class SphereAxes:
         self.screen = np.array(
             [[-np.sin(azimuth), np.cos(azimuth), 0.0], [-rise * np.cos(azimuth), -rise * np.sin(azimuth), level]]
         )
+        self.view = view
+        self.named: dict[str, Any] = {}
+        if self.solid:
+            # Matplotlib would sort collections by their middles; here it is known what covers what.
+            self.ax.computed_zorder = False
+
+    def seen(self, points: Array) -> tuple[Array, ...]:
+        """Coordinates in the axes: (..., 3) -> two or three (...)."""
+        return tuple(np.moveaxis(points if self.solid else points @ self.screen.T, -1, 0))
+
+    def line(self, points: Array, near: Mask, label: str | None, *, depth: float = 3.0, **style: Any) -> None:
+        """Draw a curve (N, 3) of which `near` (N,) is seen; the rest is dimmed, and one unit deeper."""
+        for piece, front in _pieces(points, near):
+            self._draw(piece, front, label, zorder=depth if front else depth - 1.0, **style)
+
+    def _draw(self, points: Array, near: bool, label: str | None, **style: Any) -> None:
+        from matplotlib.lines import Line2D
+
+        self.ax.plot(*self.seen(points), alpha=1.0 if near else _FAR_OPACITY, **style)
+        if label is not None:
+            # The legend shows the style of the near side, even if all of the curve is on the far side.
+            self.named.setdefault(label, Line2D([], [], alpha=1.0, **style))
+
+
+class SphereAxes(ParallelAxes):
+    """The unit sphere in parallel projection; what is on its far side is dimmed.
+
+    Parameters
+    ----------
+    ax, view : as for `ParallelAxes`
+    """
+
+    def __init__(self, ax: Axes, view: tuple[float, float]) -> None:
+        super().__init__(ax, view)
         around = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
         limb = np.cos(around) * self.screen[0] + np.sin(around) * self.screen[1]
-        self.named: dict[str, Any] = {}
         self.written: list[Array] = []
-        if self.solid:
-            # Matplotlib would sort collections by their middles; the side of the sphere decides what covers what.
-            self.ax.computed_zorder = False
         self.ax.plot(*self.seen(limb), color="0.6", linewidth=0.8, zorder=1)
 
     def curve(self, points: Array, label: str, *, behind: bool = False, **style: Any) -> None:
         """Draw a curve (N, 3), dimmed on the far side; `behind` the others of its side."""
-        for piece, near in _pieces(points, points @ self.eye >= _LIMB):
-            self._draw(piece, near, label, zorder=(3 if near else 2) - _BEHIND * behind, **style)
+        self.line(points, points @ self.eye >= _LIMB, label, depth=3.0 - _BEHIND * behind, **style)
 
     def point(self, point: Array, label: str | None, *, behind: bool = False, **style: Any) -> None:
         """Draw a marker at (3,); without a label it is not in the legend."""
@@ -74,17 +103,20 @@ class SphereAxes:
             point[None], bool(point @ self.eye >= _LIMB), label, zorder=5 - _BEHIND * behind, **{**look, **style}
         )
 
-    def arrows(self, points: Array, places: Array, colour: str) -> None:
-        """Draw arrowheads along a curve (N, 3) at some of its points, on the near side of flat axes."""
+    def arrows(self, points: Array, places: Array, colour: str, *, shaft: float = 0.01) -> None:
+        """Draw arrowheads along a curve (N, 3) at some of its points, on the near side of flat axes.
+
+        `shaft` is the length of the arrow, of which only the head is seen [radii of the sphere].
+        """
         for k in np.asarray(places, dtype=int):
             if self.solid or points[k] @ self.eye < 0.1:
                 continue
             start, end = self.screen @ points[max(k - 1, 0)], self.screen @ points[min(k + 1, len(points) - 1)]
             length = float(np.linalg.norm(end - start))
             if length > 0.0:
-                middle, step = self.screen @ points[k], 0.01 * (end - start) / length
+                middle, step = self.screen @ points[k], shaft * (end - start) / length
                 style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 9.0, "linewidth": 0.0}
-                self.ax.annotate("", middle + step, middle - step, arrowprops=style, zorder=4)
+                self.ax.annotate("", middle + step, middle - step, arrowprops=style, zorder=4, annotation_clip=True)
 
     def area(self, cells: AreaCells) -> None:
         """Fill the area inside a curve, shaded by winding number; negative areas are hatched."""
@@ -123,8 +155,8 @@ class SphereAxes:
     def finish(self, name: str, title: str) -> None:
         """Draw frame and legend; `name` labels three-dimensional axes, with {} for the index of the axis."""
         if self.solid:
-            for axis, index in zip("xyz", "₁₂₃"):
-                getattr(self.ax, f"set_{axis}label")(name.format(index), fontsize=SMALL, labelpad=-8.0)
+            for axis, index in zip("xyz", "123"):
+                getattr(self.ax, f"set_{axis}label")(name.replace("{}", index), fontsize=SMALL, labelpad=-8.0)
                 getattr(self.ax, f"set_{axis}ticks")([-1.0, 1.0])
             self.ax.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0), zlim=(-1.0, 1.0))
             self.ax.set_box_aspect((1.0, 1.0, 1.0))
@@ -138,18 +170,6 @@ class SphereAxes:
         legend = finish(self.ax, handles=self.named.values(), labels=self.named.keys(), title=title, **place)
         # A legend wider than the axes would make the layout shrink them.
         legend.set_in_layout(self.solid)
-
-    def seen(self, points: Array) -> tuple[Array, ...]:
-        """Coordinates in the axes: (..., 3) -> two or three (...)."""
-        return tuple(np.moveaxis(points if self.solid else points @ self.screen.T, -1, 0))
-
-    def _draw(self, points: Array, near: bool, label: str | None, **style: Any) -> None:
-        from matplotlib.lines import Line2D
-
-        self.ax.plot(*self.seen(points), alpha=1.0 if near else _FAR_OPACITY, **style)
-        if label is not None:
-            # The legend shows the style of the near side, even if all of the curve is on the far side.
-            self.named.setdefault(label, Line2D([], [], alpha=1.0, **style))
 
     def _fill(self, parts: list[Array], near: bool, label: str | None, colour: str, winding: int) -> None:
         """Fill all cells of one kind as one path, so that there are no seams between them."""

@@ -89,19 +89,25 @@ def plot_conjugate_locus(
             label = "_"
     for side, style, name in ((1.0, SERIES[0], "upward start"), (-1.0, SERIES[1], "downward start")):
         ax.plot(locus.theta, side * locus.phi, label=f"locus, {name}", **style)
-    label = "φ = −K/α, K/α"
+    label = r"$\varphi = \mp K/\alpha$"
     for side in (-1.0, 1.0):
         ax.axhline(side * metric.crest, color=BLACK, linewidth=0.8, linestyle=(0, (2, 2)), label=label)
         label = "_"
     if shown is not None:
         ax.plot(
-            shown.theta, shown.phi, linestyle="none", marker="o", markersize=3.5, color=BLACK, label="of the p given"
+            shown.theta,
+            shown.phi,
+            linestyle="none",
+            marker="o",
+            markersize=3.5,
+            color=BLACK,
+            label=r"of the $p_\theta$ given",
         )
     ax.plot([0.0], [0.0], linestyle="none", marker="*", markersize=8.0, color=BLACK, label="start", clip_on=False)
     ax.set_xlim(0.0, float(max(locus.theta.max(), 0.0 if shown is None else 1.02 * shown.theta.max())))
-    ax.set_xlabel("θ [rad]", fontsize=SMALL)
-    ax.set_ylabel("φ [√kg m]", fontsize=SMALL)
-    finish(ax)
+    ax.set_xlabel(r"$\theta$ [rad]", fontsize=SMALL)
+    ax.set_ylabel(r"$\varphi$ [$\sqrt{\mathrm{kg}}$ m]", fontsize=SMALL)
+    finish(ax, title=f"Serret-Andoyer metric: conjugate locus of order {order}")
     return ax
 
 
@@ -156,9 +162,9 @@ def plot_ellipsoid_locus(
     for index, (x, y, label) in enumerate(curves):
         ax.plot(x, y, label=label, zorder=3.0, **SERIES[index % len(SERIES)])
     ax.set(xlim=(-wide - room, wide + room), ylim=(bottom - room, top + room), aspect="equal")
-    ax.set_xlabel("θ − nπ [rad]", fontsize=SMALL)
+    ax.set_xlabel(r"$\theta - n\pi$ [rad]", fontsize=SMALL)
     ax.set_ylabel("parametric latitude [rad]", fontsize=SMALL)
-    finish(ax)
+    finish(ax, title=f"ellipsoid of aspect {aspect:.4g}: caustics of a point")
     return ax
 
 

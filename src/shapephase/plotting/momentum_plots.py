@@ -15,7 +15,7 @@ from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
 from ._letters import plain_text
-from ._sphere_area import enclosed_cells
+from ._sphere_area import AreaCells, enclosed_cells
 from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided
 from .polhode_plots import spread_energies
@@ -45,6 +45,15 @@ _MAX_PARTS = 40
 _LONG = 40.0
 # Angle between start and end [rad] below which a curve counts as closed.
 _CLOSED = 1e-6
+# Half the size of a curve on the screen [radii of the sphere] below which it is enlarged, and what is none.
+_SMALL_CURVE = 0.13
+_NOTHING = 1e-6
+# Middles and side of the places where it may be, in the corners beside the sphere [radii].
+_INSET_CORNERS = np.array([[0.98, 0.9], [-0.98, 0.9], [0.98, -0.9], [-0.98, -0.9]])
+_INSET_SIDE = 0.78
+# Between points of a curve that keep text away [radii], and how many there are at most.
+_FREE = 0.1
+_MOST_FREE = 200
 # Relative difference of two moments that is rounding.
 _EQUAL = 1e-9
 # Elevation and azimuth of the eye [degrees] where no direction is preferred: no axis points to it or stands upright.
@@ -113,19 +122,16 @@ def plot_momentum_curve(
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     # Many revolutions need a finer line, or they would run together.
     width = _CURVE["linewidth"] * float(np.clip(_LONG / max(length[-1], _LONG), 0.2, 1.0))
-    drawn.curve(points, "Π/|Π|", **{**_CURVE, "linewidth": width})
-    drawn.arrows(points, np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875])), BLACK)
-    drawn.point(points[0], "start", marker="*", color=GREEN, markersize=10.0)
-    if so3.angle_between(points[0], points[-1]) > _CLOSED:
-        drawn.point(points[-1], "end", marker="s", color=VERMILION, markersize=5.5)
-        drawn.curve(closing, "closing great circle", **_CLOSURE)
+    cells = None
     if area:
         solid_angle = float(curve.slivers.sum() + sphere.polygon_area(curve.corners)[0])
-        drawn.area(enclosed_cells(np.concatenate([points, closing[1:-1]]), curve.references[0]))
+        cells = enclosed_cells(np.concatenate([points, closing[1:-1]]), curve.references[0])
         title += f"; solid angle {_signed(solid_angle)} sr"
-    drawn.keep_free(points[[0, -1]])
+    look = {**_CURVE, "linewidth": width}
+    _draw_curve(drawn, points, closing, cells, look)
+    drawn.keep_free(_spread(points, length))
     for axis, name in zip(np.eye(3), "xyz"):
-        drawn.text(axis, name, 0.13, alpha=1.0 if axis @ drawn.eye >= 0.0 else 0.45)
+        drawn.text(axis, f"${name}$", 0.13, alpha=1.0 if axis @ drawn.eye >= 0.0 else 0.45)
     if frozen_at is not None:
         time = times_argument(number_argument(frozen_at, "frozen_at", "s"), motion.duration).reshape(1)
         inertia = motion.deformation.description.sample(time)[0][0]
@@ -134,7 +140,11 @@ def plot_momentum_curve(
             inertia = frame[0] @ inertia @ frame[0].T
         _portrait(drawn, inertia)
         title += f"\nbehind it: polhodes of the body frozen at t = {float(time[0]):.4g} s"
-    drawn.finish("Π{}/|Π| [1]", title)
+    drawn.finish(r"$\Pi_{}/|\Pi|$ [1]", title)
+    middle = points.mean(axis=0)
+    reach = float(np.abs((points - middle) @ drawn.screen.T).max())
+    if not drawn.solid and _NOTHING < reach < _SMALL_CURVE and middle @ drawn.eye > 0.0:
+        _enlarged(drawn, points, closing, cells, look)
     return ax
 
 
@@ -174,9 +184,50 @@ def plot_fixed_points(
         drawn.text(direction, "0" if not index else f"{'+' if index > 0 else '−'}1", 0.13, alpha=1.0 if near else 0.45)
     if inertia is not None:
         _portrait(drawn, finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
-    total = f"|Π| = {points.magnitude:.4g} kg m²/s; indices sum to {points.index_sum}"
-    drawn.finish("u{} [1]", total + ("" if points.complete else "\nsome may be missing"))
+    total = rf"$|\Pi|$ = {points.magnitude:.4g} kg m²/s; indices sum to {points.index_sum}"
+    drawn.finish("$u_{}$ [1]", total + ("" if points.complete else "\nsome may be missing"))
     return ax
+
+
+def _draw_curve(
+    drawn: SphereAxes, points: Array, closing: Array, cells: AreaCells | None, look: dict[str, Any], size: float = 1.0
+) -> None:
+    """The curve, where it begins and ends, which way it goes, what closes it, and the area inside."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    drawn.curve(points, r"$\Pi/|\Pi|$", **look)
+    places = np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875]))
+    drawn.arrows(points, places, BLACK, shaft=0.01 * size)
+    drawn.point(points[0], "start", marker="*", color=GREEN, markersize=10.0)
+    if so3.angle_between(points[0], points[-1]) > _CLOSED:
+        drawn.point(points[-1], "end", marker="s", color=VERMILION, markersize=5.5)
+        drawn.curve(closing, "closing great circle", **_CLOSURE)
+    if cells is not None:
+        drawn.area(cells)
+
+
+def _enlarged(drawn: SphereAxes, points: Array, closing: Array, cells: AreaCells | None, look: dict[str, Any]) -> None:
+    """A curve too small on its sphere, in an inset in the corner that is farthest from it, with a scale in degrees."""
+    flat = np.concatenate([points, closing]) @ drawn.screen.T
+    middle, half = 0.5 * (flat.min(axis=0) + flat.max(axis=0)), 0.62 * float(np.ptp(flat, axis=0).max())
+    corner = _INSET_CORNERS[int(np.argmax(np.linalg.norm(_INSET_CORNERS - middle, axis=1)))]
+    side = _INSET_SIDE
+    inset = drawn.ax.inset_axes((*(corner - 0.5 * side), side, side), transform=drawn.ax.transData, zorder=7)
+    near = SphereAxes(inset, drawn.view)
+    _draw_curve(near, points, closing, cells, look, half)
+    inset.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
+    inset.set(xticks=[], yticks=[])
+    power = 10.0 ** np.floor(np.log10(np.degrees(half)))
+    degrees = power * max(step for step in (1.0, 2.0, 5.0) if step * power <= np.degrees(half))
+    left, bottom = middle - 0.88 * half
+    inset.plot([left, left + np.sin(np.radians(degrees))], [bottom, bottom], color=BLACK, linewidth=2.0, zorder=6)
+    inset.text(left, bottom + 0.08 * half, f"{degrees:g}°", fontsize=SMALL - 1, zorder=6)
+    drawn.ax.indicate_inset_zoom(inset, edgecolor=GREY)
+
+
+def _spread(points: Array, length: Array) -> Array:
+    """Points of a curve, and its ends, near enough to each other that no text fits between: (M, 3)."""
+    steps = np.linspace(0.0, length[-1], min(_MOST_FREE, 2 + int(length[-1] / _FREE)))
+    return points[np.searchsorted(length, steps).clip(0, len(points) - 1)]
 
 
 def _fine_curve(motion: Motion, gauge: Gauge) -> MomentumCurve:
@@ -215,7 +266,7 @@ def _portrait(drawn: SphereAxes, inertia: Array) -> None:
             marker = "o" if point.kind == "centre" else "X"
             drawn.point(axes @ point.direction, None, behind=True, marker=marker, color=GREY, markersize=5.0)
             if axes @ point.direction @ drawn.eye >= 0.0:
-                drawn.text(axes @ point.direction, f"I{'₁₂₃'[number // 2]}", 0.13, color="#555555", fontsize=SMALL - 1)
+                drawn.text(axes @ point.direction, f"$I_{number // 2 + 1}$", 0.13, color="#555555", fontsize=SMALL - 1)
 
 
 def _great_circle(start: Array, end: Array) -> Array:

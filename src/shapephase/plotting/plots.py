@@ -15,6 +15,7 @@ from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_interna
 from .plot_style import column_axes
 from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
+from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "plot_attitude",
     "plot_bounds",
     "plot_caustic",
+    "plot_cones",
     "plot_conjugate_locus",
     "plot_crown",
     "plot_curvature",
@@ -35,6 +37,7 @@ __all__ = [
     "plot_momentum_curve",
     "plot_phases",
     "plot_polhodes",
+    "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",
 ]

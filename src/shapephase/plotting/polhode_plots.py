@@ -26,9 +26,11 @@ if TYPE_CHECKING:
 
 _LARGEST = {"color": BLUE, "linestyle": "-", "linewidth": 0.9}
 _SMALLEST = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.9}
-_SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.8}
+_SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.6}
 _AT_REST = {"color": ORANGE, "linestyle": (0, (1, 1)), "linewidth": 2.4}
-_OWN = {"color": GREEN, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 2.4}
+_OWN = {"color": GREEN, "linestyle": "-", "linewidth": 2.8}
+# Along a separatrix [its length]: arrowheads that tell where the momentum goes.
+_HEADS = np.array([0.25, 0.7])
 # Time from its crest [1/rate] at which a herpolhode of the separatrix is within a line's width of the foot: exp(-10).
 _TAIL = 10.0
 # Of the amplitude on the separatrix [rad], short of a quarter turn, where the elliptic integral is infinite.
@@ -85,6 +87,7 @@ def plot_polhodes(
     if "saddle" in kinds:
         for curve in heteroclinics(moments):
             sphere.curve(curve, "separatrix", **_SEPARATRIX)
+            sphere.arrows(curve, len(curve) * _HEADS, BLACK)
     elif "centre" in kinds:
         around = np.linspace(0.0, 2.0 * np.pi, 181)[:, None]
         first, second = [point.direction for point in points if point.kind == "degenerate"][::2]
@@ -101,8 +104,8 @@ def plot_polhodes(
         label, style = markers[point.kind]
         sphere.point(point.direction, label, **style)
     for axis, end in enumerate(np.eye(3) * np.copysign(1.0, sphere.eye)):
-        sphere.text(end, f"I{'₁₂₃'[axis]} = {moments[axis]:.3g}", 0.17)
-    sphere.finish("Π{}/|Π| [1]", "principal moments in kg m²")
+        sphere.text(end, f"$I_{axis + 1}$ = {moments[axis]:.3g}", 0.17)
+    sphere.finish(r"$\Pi_{}/|\Pi|$ [1]", "momentum in the body: polhodes; moments in kg m²")
     return ax
 
 
@@ -144,20 +147,20 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     inner, outer = poinsot.annulus
     around = np.linspace(0.0, 2.0 * np.pi, 361)
     if outer > 0.0:
-        times = _herpolhode_times(top, count)
+        times = herpolhode_times(top, count)
         radius, angle = poinsot.herpolhode_radius(times), poinsot.herpolhode_angle(times)
         ax.plot(radius * np.cos(angle), radius * np.sin(angle), color=BLUE, linewidth=1.0, label="herpolhode")
         for circle, label in ((outer, f"annulus, {inner:.3g} to {outer:.3g} rad/s"), (inner, None)):
             x, y = circle * np.cos(around), circle * np.sin(around)
             ax.plot(x, y, color=VERMILION, linestyle=(0, (4, 2)), linewidth=1.2, label=label)
     start = float(poinsot.herpolhode_radius(0.0))
-    ax.plot([start], [0.0], marker="*", color=GREEN, markersize=9, linestyle="none", label="t = 0")
+    ax.plot([start], [0.0], marker="*", color=GREEN, markersize=9, linestyle="none", label="$t = 0$")
     ax.plot([0.0], [0.0], marker="+", color=BLACK, markersize=8, linestyle="none", label="foot of the normal")
     reach = 1.1 * (outer or poinsot.distance)
     ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    ax.set_xlabel("ω₁ in the invariable plane [rad/s]", fontsize=SMALL)
-    ax.set_ylabel("ω₂ in the invariable plane [rad/s]", fontsize=SMALL)
-    finish(ax)
+    ax.set_xlabel(r"$\omega_1$ in the invariable plane [rad/s]", fontsize=SMALL)
+    ax.set_ylabel(r"$\omega_2$ in the invariable plane [rad/s]", fontsize=SMALL)
+    finish(ax, title="herpolhode: where the angular velocity touches the plane")
     return ax
 
 
@@ -185,8 +188,8 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     --------
     >>> from matplotlib.figure import Figure
     >>> ax = Figure().subplots()
-    >>> sp.plotting.plot_heavy_top_stability(ax).get_xlabel()
-    'Π₃ / √(MglI₁) [1]'
+    >>> sp.plotting.plot_heavy_top_stability(ax).get_ylabel()
+    '$I_3 / I_1$ [1]'
     """
     check_axes(ax)
     marked = finite_array(tops, "tops") if np.size(tops) == 0 else finite_array(tops, "tops", (2,))
@@ -203,30 +206,30 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     unstable = {"facecolor": "#F7E1C0", "edgecolor": ORANGE, "hatch": "///", "linewidth": 0.0}
     ax.fill_betweenx(ratios, -2.0, 2.0, label="unstable", **unstable)
     for sign in (-1.0, 1.0):
-        label = "Π₃² = 4MglI₁" if sign > 0.0 else None
+        label = r"$\Pi_3^2 = 4\,M g \ell I_1$" if sign > 0.0 else None
         ax.plot([2.0 * sign, 2.0 * sign], ratios, color=BLACK, linewidth=1.8, label=label)
-    ax.plot([-end, end], [2.0, 2.0], color=BLUE, linewidth=1.5, linestyle=(0, (1, 1)), label="I₃ = 2I₁, double roots")
+    ax.plot(
+        [-end, end], [2.0, 2.0], color=BLUE, linewidth=1.5, linestyle=(0, (1, 1)), label="$I_3 = 2I_1$, double roots"
+    )
     for stable, label, style in ((True, "stable top", "o"), (False, "unstable top", "X")):
         chosen = marked[(np.abs(marked[:, 0]) > 2.0) == stable]
         if len(chosen):
             colour = GREEN if stable else VERMILION
             ax.plot(chosen[:, 0], chosen[:, 1], marker=style, color=colour, linestyle="none", markersize=5, label=label)
     ax.set(xlim=(-end, end), ylim=(0.0, highest))
-    ax.set_xlabel("Π₃ / √(MglI₁) [1]", fontsize=SMALL)
-    ax.set_ylabel("I₃ / I₁ [1]", fontsize=SMALL)
-    finish(ax)
+    ax.set_xlabel(r"$\Pi_3 / \sqrt{M g \ell I_1}$ [1]", fontsize=SMALL)
+    ax.set_ylabel("$I_3 / I_1$ [1]", fontsize=SMALL)
+    finish(ax, title="the upright Lagrange top")
     return ax
 
 
 def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
-    """The polhode of a top, at even amplitudes, which on the separatrix span only half a turn."""
+    """The polhode of a top and its start."""
     orbit = top.orbit
     if top.regime not in ("steady", "spherical"):
-        half = 0.5 * np.pi - _SEPARATRIX_END if top.regime == "separatrix" else np.pi
-        u = incomplete_f(np.linspace(-half, half, 721), top.complement)
-        points = top.body_momentum((u - orbit.phase) / top.rate) @ top.axes / top.magnitude
+        points = top.body_momentum(polhode_times(top)) @ top.axes / top.magnitude
         sphere.curve(points, "this top", **_OWN)
-    sphere.point(orbit.start / orbit.magnitude, "t = 0", marker="*", color=GREEN, markersize=11)
+    sphere.point(orbit.start / orbit.magnitude, "$t = 0$", marker="*", color=GREEN, markersize=11)
 
 
 def spread_energies(moments: Array) -> Array:
@@ -241,7 +244,14 @@ def spread_energies(moments: Array) -> Array:
     return np.array(levels)
 
 
-def _herpolhode_times(top: EulerTop, periods: float) -> Array:
+def polhode_times(top: EulerTop) -> Array:
+    """Times of points of the whole polhode at even amplitudes, on the separatrix half a turn of them: (N,) [s]."""
+    half = 0.5 * np.pi - _SEPARATRIX_END if top.regime == "separatrix" else np.pi
+    u = incomplete_f(np.linspace(-half, half, 721), top.complement)
+    return (u - top.orbit.phase) / top.rate
+
+
+def herpolhode_times(top: EulerTop, periods: float) -> Array:
     """Times fine enough both for the rotation about mu and for the waves between the circles."""
     if top.regime == "separatrix":
         start, end = (np.array([-_TAIL, _TAIL]) - top.orbit.phase) / top.rate

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # Points of the raster of the crown across the sphere: one is 0.01 in wide.
 _POINTS = 241
+# Of the half sphere that is seen: a smaller crown is not.
+_VISIBLE = 1e-3
 # Points of the motion's curve.
 _TIMES = 800
 # Angle between eye and axis [degrees] in the default view, where the axis would be too near to the pole.
@@ -80,13 +82,17 @@ def plot_crown(
     within[inside] = crown.contains(directions[inside])
     ax.contourf(x, y, within, levels=[0.5, 1.5], colors=[SKY], alpha=0.45, zorder=1.2)
     ax.contour(x, y, within, levels=[0.5], colors=[BLUE], linewidths=0.8, zorder=1.5)
-    sphere.named["crown: where Π can be"] = Patch(facecolor=SKY, edgecolor=BLUE, alpha=0.45)
+    title = f"certain before the motion: {crown.certificate.regime}"
+    if within[inside].mean() > _VISIBLE:
+        sphere.named[r"crown: where $\Pi$ can be"] = Patch(facecolor=SKY, edgecolor=BLUE, alpha=0.45)
+    else:
+        title += "\nits crown is thinner than a line, or behind"
     if motion is not None:
         track = _track(motion, crown)
-        sphere.curve(track, "Π/|Π|", color=BLACK, linewidth=1.6)
+        sphere.curve(track, r"$\Pi/|\Pi|$", color=BLACK, linewidth=1.6)
         sphere.point(track[0], "start", color=VERMILION, marker="*", markersize=9.0)
     sphere.point(axis, None, color=BLACK, marker="o")
-    sphere.finish("Π{}/|Π|", f"certain before the motion: {crown.certificate.regime}")
+    sphere.finish(r"$\Pi_{}/|\Pi|$", title)
     return ax
 
 
