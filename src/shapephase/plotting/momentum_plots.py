@@ -190,13 +190,13 @@ def plot_fixed_points(
 
 
 def _draw_curve(
-    drawn: SphereAxes, points: Array, closing: Array, cells: AreaCells | None, look: dict[str, Any], size: float = 1.0
+    drawn: SphereAxes, points: Array, closing: Array, cells: AreaCells | None, look: dict[str, Any], scale: float = 1.0
 ) -> None:
     """The curve, where it begins and ends, which way it goes, what closes it, and the area inside."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     drawn.curve(points, r"$\Pi/|\Pi|$", **look)
     places = np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875]))
-    drawn.arrows(points, places, BLACK, shaft=0.01 * size)
+    drawn.arrows(points, places, BLACK, shaft=0.01 * scale)
     drawn.point(points[0], "start", marker="*", color=GREEN, markersize=10.0)
     if so3.angle_between(points[0], points[-1]) > _CLOSED:
         drawn.point(points[-1], "end", marker="s", color=VERMILION, markersize=5.5)

@@ -227,24 +227,24 @@ def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
         ax.set_ylabel("")
 
 
-def inset_where_free(ax: Any, size: tuple[float, float], room: tuple[float, float, float]) -> Any | None:
+def inset_where_free(ax: Any, extent: tuple[float, float], room: tuple[float, float, float]) -> Any | None:
     """Axes in a corner of others over which none of their lines passes; None if there is no such corner.
 
     Parameters
     ----------
-    size : width and height [widths and heights of the axes]
+    extent : width and height [widths and heights of the axes]
     room : to the left of them, below and above them, for what is written there [the same]
     """
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     curves = [line.get_xydata() for line in ax.lines if len(line.get_xydata()) > _FEW]
     points = np.concatenate(curves or [np.zeros((0, 2))])
     x, y = (points[:, 0] - left) / (right - left), (points[:, 1] - bottom) / (top - bottom)
-    wide, high = size[0] + room[0] + _EDGE, size[1] + room[1] + room[2] + _EDGE
+    wide, high = extent[0] + room[0] + _EDGE, extent[1] + room[1] + room[2] + _EDGE
     for across, up in ((0.0, 1.0 - high), (1.0 - wide, 1.0 - high), (1.0 - wide, 0.0), (0.0, 0.0)):
         inside = (x > across) & (x < across + wide) & (y > up) & (y < up + high)
         if not inside.any():
             place = (across + room[0] + 0.5 * _EDGE, up + room[1] + 0.5 * _EDGE)
-            return ax.inset_axes((*place, *size))
+            return ax.inset_axes((*place, *extent))
     return None
 
 
