@@ -49,7 +49,7 @@ _CLOSED = 1e-6
 _SMALL_CURVE = 0.13
 _NOTHING = 1e-6
 # Middles and side of the places where it may be, in the corners beside the sphere [radii].
-_INSET_CORNERS = np.array([[0.98, 0.9], [-0.98, 0.9], [0.98, -0.9], [-0.98, -0.9]])
+_INSET_CORNERS = np.array([[0.98, 0.9], [-0.98, 0.9], [0.98, -0.8], [-0.98, -0.8]])
 _INSET_SIDE = 0.78
 # Between points of a curve that keep text away [radii], and how many there are at most.
 _FREE = 0.1

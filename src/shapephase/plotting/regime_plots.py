@@ -91,7 +91,7 @@ def plot_crown(
         track = _track(motion, crown)
         sphere.curve(track, r"$\Pi/|\Pi|$", color=BLACK, linewidth=1.6)
         sphere.point(track[0], "start", color=VERMILION, marker="*", markersize=9.0)
-    sphere.point(axis, None, color=BLACK, marker="o")
+    sphere.point(axis, "the axis it circles", color=BLACK, marker="o")
     sphere.finish(r"$\Pi_{}/|\Pi|$", title)
     return ax
 
