@@ -15,6 +15,7 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
@@ -169,6 +170,22 @@ def test_what_attributes_show_of_the_inside_cannot_be_written_to(inside):
     for name in NAMED:
         key, _, attributes = name.partition(".")
         assert not operator.attrgetter(attributes)(inside[key]).flags.writeable, name
+
+
+def test_attitudes_that_are_shown_are_copies(objects):
+    """SciPy before 1.16 makes no rotation of an array that is locked; what is written to a copy changes nothing."""
+    motion = objects["Motion"]
+    times = np.linspace(0.0, motion.duration, 12)
+    fitted = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times), noise=1e-3)
+    for result, name in ((motion, "initial_attitude"), (fitted, "initial_attitude"), (fitted, "base_axes")):
+        first = getattr(result, name)
+        for thing in (result, copy.copy(result), pickle.loads(pickle.dumps(result)), dataclasses.replace(result)):
+            shown = getattr(thing, name)
+            np.testing.assert_allclose(Rotation.from_matrix(shown).as_matrix(), first, rtol=0, atol=1e-15)
+            shown[...] = 0.0
+            np.testing.assert_array_equal(getattr(thing, name), first)
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(result, name, first)
 
 
 def test_times_of_a_path_cannot_be_scaled_in_place(inside):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -15,6 +16,7 @@ Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 AnyArray = TypeVar("AnyArray", Array, Integers, Mask)
+Kind = TypeVar("Kind", bound=type)
 
 FARTHEST = 1e6
 
@@ -108,3 +110,32 @@ def lock_arrays(result: Any) -> None:
     for name, value in fields.items():
         if isinstance(value, np.ndarray) and value.flags.writeable:
             fields[name] = read_only(value)
+
+
+class _CopiedField:
+    """A field of a dataclass that comes back as a copy of the array that it holds."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, result: Any, kind: type | None = None) -> Array:
+        if result is None or self._name not in result.__dict__:
+            raise AttributeError(self._name)
+        return result.__dict__[self._name].copy()
+
+    def __set__(self, result: Any, value: Array) -> None:
+        result.__dict__[self._name] = value
+
+
+def copied_when_read(*names: str) -> Callable[[Kind], Kind]:
+    """A dataclass whose arrays of these names come back as copies that can be written to, and change nothing.
+
+    For attitudes: `Rotation.from_matrix` of SciPy before 1.16 refuses arrays that are locked.
+    """
+
+    def with_copies(kind: Kind) -> Kind:
+        for name in names:
+            setattr(kind, name, _CopiedField(name))
+        return kind
+
+    return with_copies

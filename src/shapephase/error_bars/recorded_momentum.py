@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_flag, check_object, number_argument, times_argument
-from ..arrays import Array, finite_array, lock_arrays
+from ..arrays import Array, copied_when_read, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
@@ -42,6 +42,7 @@ _FIRST_TIMES = 6
 _NO_FLIGHT = 0.5
 
 
+@copied_when_read("initial_attitude", "base_axes")
 @dataclass(frozen=True, eq=False)
 class RecordedMomentum:
     """The momentum and start with which a body comes nearest to the attitudes that were recorded.

@@ -20,7 +20,7 @@ from ..arguments import (
     times_argument,
     tolerance_argument,
 )
-from ..arrays import Array, Integers, common_batch, finite_array, lock_arrays, read_only
+from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..display import short_repr
 from ..errors import unknown_name
@@ -65,6 +65,7 @@ class Sensitivity:
     __repr__ = short_repr
 
 
+@copied_when_read("initial_attitude")
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion(MotionViews):
     """How a free body turns: attitude, body angular momentum and angular velocity at any time of [0, T].
@@ -99,7 +100,7 @@ class Motion(MotionViews):
     solution: Solution
 
     def __post_init__(self) -> None:
-        """Nothing that is shown of a motion can be written to."""
+        """What is shown of a motion cannot be written to, or is a copy."""
         lock_arrays(self)
         lock_arrays(self.solution)
 
