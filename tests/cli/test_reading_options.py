@@ -76,9 +76,12 @@ def test_a_cycle_is_closed_for_split_and_orbits(tmp_path, capsys):
         assert closing["gap"]["left_shoulder_abduction"] == pytest.approx(0.01)
         assert 0.0 < np.linalg.norm(closing["holonomy_change_rotation_vector_rad"]) < 0.01
     assert len(answer(capsys, "orbits", "diver", take, "5", "--close", "1deg")["orbits"]) >= 2
+    main(["check", "diver", take, "--close", "1deg", "--close-by", "geodesic"])
+    assert "off the samples" not in capsys.readouterr().out
     main(["check", "diver", take, "--close", "0.02"])
     text = capsys.readouterr().out
     assert "by the drift; left_shoulder_abduction ended 0.573 deg off" in text
+    assert "off the samples" in text
     assert "the holonomy   changes by" in text
 
 

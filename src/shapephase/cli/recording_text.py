@@ -25,6 +25,8 @@ _MOST_PARTS = 10
 """Stretches of a flight of which the table has a column."""
 _BAR_DIGITS = 2
 """Digits of a bar that are shown."""
+_ROUNDING = 1e-12
+"""[rad or m] from samples to the path that goes through them."""
 
 
 def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
@@ -184,7 +186,7 @@ def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str
         lines += _closing_lines(recorded.closing)
     if record["resampled_to_hz"] is not None:
         lines.append(f"{'resampled':24}{record['resampled_to_hz']:.6g} samples a second")
-    if recorded.residual.any():
+    if recorded.residual.max(initial=0.0) > _ROUNDING:
         joint = int(np.argmax(recorded.residual))
         names = recorded.path.joint_names or ()
         off = _value(body, names[joint], recorded.residual[joint])
