@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev, derivative_matrix
+from ..display import short_repr
 from ._rotation_step import momentum_step, product, rest_step, tableau, turned
 from .fast.estimate_constants import TERMS
 from .interpolant import Interpolant
@@ -55,6 +56,8 @@ class DenseOutput:
     dynamics: Array
     magnitude: Array
     goal: float
+
+    __repr__ = short_repr
 
     def step_of(self, t: Array) -> Integers:
         """The step of each time; a step's end belongs to the next one: (N,) -> (N,)."""

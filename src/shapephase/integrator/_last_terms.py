@@ -9,6 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from ..arrays import Array, Integers, read_only
+from ..display import short_repr
 from ._spectral_error import spectral_norms
 from .fast import engine
 from .fast.estimate_constants import (
@@ -37,6 +38,8 @@ class Perturbed:
     make: Callable[[], Array]
     hidden: float
     differ: bool = True
+
+    __repr__ = short_repr
 
     @cached_property
     def coefficients(self) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
+from ..display import short_repr
 
 _MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
 
@@ -36,6 +37,8 @@ class Interpolant:
     coefficients: Array
     loops: int
     evaluations: int
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, Integers, lock_arrays
+from ..display import short_repr
 from ._error_propagator import growth_and_rounding
 from ._step_loop import largest_angle, quaternions_alone
 from .stepped import SteppedRotation
@@ -35,6 +36,8 @@ class Lift:
     rotation: SteppedRotation
     turns: Array
     ends: Integers
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import so3, sphere
 from ..arrays import Array, Integers, lock_arrays, read_only
+from ..display import short_repr
 from ._dense_output import DenseOutput
 from ._error_propagator import momentum_slope
 from ._last_terms import Perturbed
@@ -60,6 +61,8 @@ class SteppedRotation:
     rounding_error: Array
     amplification: Array
     perturbed: Perturbed
+
+    __repr__ = short_repr
 
     __post_init__ = lock_arrays
 

@@ -23,6 +23,14 @@ def connected(address: str) -> Iterator[Any]:
         If it does not answer.
     MissingExtraError
         Without Dask.
+
+    Examples
+    --------
+    >>> from distributed import LocalCluster
+    >>> cluster = LocalCluster(n_workers=1, processes=False, dashboard_address=None)
+    >>> with cluster, sp.study.connected(cluster.scheduler_address) as client:
+    ...     print(client.submit(abs, -2).result())
+    2
     """
     try:
         from distributed import Client
