@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
 from sphinx.application import Sphinx
+from sphinx.util import logging
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
+_LOG = logging.getLogger(__name__)
 
 from _site.code_links import with_links, with_targets
 from _site.coverage import write_tables
 from _site.docstrings import bars_are_norms, entries_are_descriptions, name_aliases
-from _site.reader_cells import hide_asserts
+from _site.equations import citing, with_citations
+from _site.executed_notebooks import library_digest, quiet_kernels, write_pages
+from _site.name_links import places, with_names
 from _site.reference_pages import write_reference
 
 import shapephase
@@ -55,8 +58,12 @@ myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "
 myst_heading_anchors = 3
 nb_execution_mode = "cache"
 nb_execution_raise_on_error = True
-# The longest notebook plans a dozen motions; a busy machine takes minutes for it.
-nb_execution_timeout = 1800
+# Notebooks come executed, and compared with the outputs that are committed.
+nb_execution_excludepatterns = ["tutorials/notebooks/*"]
+# A page's few lines of code, on a busy machine.
+nb_execution_timeout = 600
+# Pages are executed anew when they or the library change.
+nb_execution_cache_path = str(HERE / "_build" / "executed" / library_digest()[:16])
 nb_merge_streams = True
 
 autosummary_generate = False
@@ -95,23 +102,21 @@ mathjax3_config = {"options": {"enableMenu": False}, "svg": {"fontCache": "globa
 
 
 def _write_pages(*_: object) -> None:
-    """Pages that are made: the reference, tables of the theory; and notebooks, which have to lie below this folder."""
+    """Pages that are made: the reference, tables of the theory; executed notebooks, as they must lie below."""
+    quiet_kernels(HERE / "_build" / "ipython")
     write_reference(HERE / "reference")
     write_tables(HERE.parent)
-    target = HERE / "tutorials" / "notebooks"
-    target.mkdir(exist_ok=True)
-    wanted = sorted((HERE.parent / "notebooks").glob("*.ipynb"))
-    for old in set(target.glob("*.ipynb")) - {target / file.name for file in wanted}:
-        old.unlink()
-    for file in wanted:
-        copy = target / file.name
-        if not copy.exists() or copy.read_bytes() != file.read_bytes():
-            shutil.copyfile(file, copy)
+    for fault in write_pages(HERE / "tutorials" / "notebooks"):
+        _LOG.warning("notebooks/%s", fault)
 
 
 def _add_targets(_: Sphinx, page: str, source: list[str]) -> None:
     if page in ("theory", "numerics"):
         source[0] = with_targets(page, source[0])
+    if page.startswith(("theory/", "explanation/")):
+        source[0] = with_citations(source[0], citing(HERE / "reference"))
+    if page.startswith(("theory/", "explanation/", "howto/")):
+        source[0] = with_names(source[0], places(HERE / "reference"))
 
 
 def _plain_docstring(*event: Any) -> None:
@@ -126,4 +131,3 @@ def setup(app: Sphinx) -> None:
     app.connect("source-read", _add_targets)
     # Before numpydoc, which makes sections of the text.
     app.connect("autodoc-process-docstring", _plain_docstring, priority=400)
-    app.connect("doctree-read", hide_asserts)

@@ -5,14 +5,18 @@ from __future__ import annotations
 import doctest
 import importlib
 import inspect
+import json
 import re
+import shlex
 import sys
 import types
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from cyclopts import CycloptsError
 
 import shapephase as sp
 from support.places import ROOT
@@ -34,13 +38,17 @@ PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts
 
 
 @pytest.fixture(scope="module")
-def reference() -> types.ModuleType:
-    """The step of the site's build that writes the reference."""
-    sys.path.insert(0, str(DOCS))
-    try:
-        return importlib.import_module("_site.reference_pages")
-    finally:
-        sys.path.remove(str(DOCS))
+def steps() -> Callable[[str], types.ModuleType]:
+    """Steps of the site's build, by name."""
+
+    def step(name: str) -> types.ModuleType:
+        sys.path.insert(0, str(DOCS))
+        try:
+            return importlib.import_module(f"_site.{name}")
+        finally:
+            sys.path.remove(str(DOCS))
+
+    return step
 
 
 def exported() -> dict[str, Any]:
@@ -61,7 +69,8 @@ def exported() -> dict[str, Any]:
 NAMES = exported()
 
 
-def test_every_exported_name_stands_on_one_page_of_the_reference(reference):
+def test_every_exported_name_stands_on_one_page_of_the_reference(steps):
+    reference = steps("reference_pages")
     placed = Counter(
         id(thing) for page in reference.questions(DOCS / "reference") for thing in page["objects"].values()
     )
@@ -81,6 +90,97 @@ def test_equations_have_one_label_each_and_all_that_are_cited_exist():
     sources = [file.read_text(encoding="utf-8") for file in (ROOT / "src").rglob("*.py")]
     cited |= {label for text in sources for label in re.findall(r":eq:`([\w-]+)`", text)}
     assert cited <= set(labels)
+
+
+def test_every_equation_is_cited_by_a_docstring_of_the_reference(steps):
+    """Then its page says which function that is, and the function's page leads to the equation."""
+    equations = steps("equations")
+    names = equations.citing(DOCS / "reference")
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        labels = re.findall(r"^\$\$ \(([\w-]+)\)$", text, re.MULTILINE)
+        assert [label for label in labels if not names[label]] == [], page.name
+        ending = equations.with_citations(text, names).removeprefix(text.rstrip())
+        assert all(f"{{eq}}`{label}`" in ending for label in labels)
+
+
+def commands() -> list[tuple[str, list[str]]]:
+    """Command lines of the pages that stand in blocks of their own, and of the notebooks."""
+    found = []
+    files = [*PAGES, *sorted((ROOT / "notebooks").glob("*.ipynb"))]
+    for file in files:
+        text = file.read_text(encoding="utf-8")
+        if file.suffix == ".ipynb":
+            cells = json.loads(text)["cells"]
+            text = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+        text = text.replace("\\\n", " ")
+        for line in re.findall(r"^(?: {4}|\.venv/bin/)?shapephase ((?:[a-z]+)\b[^\n]*)$", text, re.MULTILINE):
+            if "..." not in line:
+                found.append((file.name, shlex.split(line.partition(" | ")[0])))
+    return found
+
+
+def test_command_lines_of_the_pages_are_understood():
+    from shapephase.cli.main import app
+
+    assert len(commands()) >= 8
+    for place, tokens in commands():
+        try:
+            app.parse_args(tokens, exit_on_error=False, print_error=False)
+        except CycloptsError as error:
+            pytest.fail(f"{place}: {error}")
+
+
+@pytest.mark.full
+def test_command_lines_that_need_no_file_run(tmp_path, monkeypatch):
+    from shapephase.cli.main import main
+
+    monkeypatch.chdir(tmp_path)
+    for _, tokens in commands():
+        if "cat_righting" in tokens:
+            main(tokens)
+
+
+FRONT = """<article><section id="three-ways-from-here"><h2>Ways<a class="headerlink" href="#">#</a></h2>
+<p><a href="a.html">1</a> <a href="b.html#there">2</a> <a href="c.html">3</a></p>{more}</section></article>"""
+WAY = '<p><a href="a.html">1</a> <a href="b.html">2</a> <a href="c.html">3</a></p>'
+
+
+@pytest.mark.parametrize(
+    ("change", "faults"),
+    [
+        ({}, []),
+        ({"a.html": "<article>no link</article>"}, 3 * ["a.html: no link to b.html in its text"]),
+        ({"a.html": '<a href="b.html">beside the text</a>'}, 3 * ["a.html: no link to b.html in its text"]),
+        ({"b.html": '<article><a href="c.html">on</a></article>'}, ["index.html: b.html#there has no such place"]),
+        ({"c.html": '<img src="d.png">'}, ["c.html: d.png leads nowhere"]),
+        ({"index.html": FRONT.format(more="")}, ["index.html: 1 ways"]),
+    ],
+)
+def test_links_of_the_built_site_are_followed(change, faults, tmp_path, steps):
+    links = steps("built_links")
+    site = {
+        "index.html": FRONT.format(more=WAY + WAY),
+        "a.html": '<article><a href="b.html">on</a> <a href="https://example.org/x">out</a></article>',
+        "b.html": '<article><p id="there"></p><a href="c.html">on</a></article>',
+        "c.html": "<article>the answer</article>",
+    } | change
+    for name, text in site.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    found = links.pages(tmp_path.resolve())
+    said = [*links.broken(found), *links.lost_ways(found, tmp_path.resolve() / "index.html")]
+    assert said == faults
+    assert links.main(tmp_path) == len(faults)
+
+
+def test_names_in_backticks_become_links_but_in_code(steps):
+    names = {"split": "shapephase.split"}
+    text = "# `split`\n\n`split` and `sp.split`, ``split`` and {eq}`split`, `motion`\n\n```text\n`split`\n```\n"
+    linked = steps("name_links").with_names(text, names)
+    assert linked.count("{py:obj}") == 2
+    assert linked.startswith(
+        "# `split`\n\n{py:obj}`split <shapephase.split>` and {py:obj}`sp.split <shapephase.split>`"
+    )
 
 
 def test_the_front_page_has_three_ways_whose_steps_lead_on():

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 import zipfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -151,6 +152,20 @@ def test_bodies_say_where_their_numbers_come_from(name):
     assert text.count("<visual>") >= text.count("<mass ")
 
 
+@cache
+def shipped_texts() -> dict[Path, str]:
+    """Texts of the repository, without what is built; of notebooks without pictures and pages among the outputs."""
+    names = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "CITATION.cff", "Makefile", "pyproject.toml", ".ci/run")
+    files = [ROOT / name for name in names]
+    kinds = (".py", ".pyi", ".ipynb", ".md", ".toml", ".urdf", ".js", ".html", ".css", ".bib")
+    made = {"_build", "__pycache__", "tables", "mathjax"}
+    for folder in ("src", "tests", "benchmarks", "notebooks", "docs", "robots"):
+        files += [file for file in (ROOT / folder).rglob("*") if file.suffix in kinds and not made & set(file.parts)]
+    files = [file for file in files if file.parts[-3:-1] != ("tutorials", "notebooks")]
+    output = re.compile(r'"(?:image/png|text/html)": (?:\[[^\]]*\]|"[^"]*")')
+    return {file: output.sub("", file.read_text(encoding="utf-8")) for file in files}
+
+
 _CODE = r"(?:[CBM]-E\d+|[A-U]\d+[a-z]?)"
 
 
@@ -168,19 +183,16 @@ def _sections(name: str) -> set[str]:
 def _cited(name: str) -> list[tuple[str, list[str], list[str]]]:
     """Where a page of docs/ is cited, with which sections and codes; line breaks do not end a citation."""
     found = []
-    for folder in ("src", "tests", "benchmarks", "notebooks"):
-        for file in sorted((ROOT / folder).rglob("*")):
-            if file.suffix not in (".py", ".pyi", ".ipynb") or file == Path(__file__):
-                continue
-            text = re.sub(r"\s*\n[\s#]*", " ", file.read_text(encoding="utf-8"))
-            for match in re.finditer(
-                rf"{name}((?:[ ,;:(-]|and|to|its|errata|sections?|\d+\b|{_CODE}\b|[A-U]\b)*)", text
-            ):
-                citation = match[1]
-                codes = re.findall(rf"(?<![\w-])({_CODE}|[A-U])(?![\w])", citation)
-                sections = re.findall(r"sections? ((?:\d+(?: and |, )?)+)", citation)
-                place = f"{file.relative_to(ROOT)}: {name}{citation}"
-                found.append((place, [number for one in sections for number in re.findall(r"\d+", one)], codes))
+    for file, shipped in shipped_texts().items():
+        if file.suffix not in (".py", ".pyi", ".ipynb") or "docs" in file.parts or file == Path(__file__):
+            continue
+        text = re.sub(r"\s*\n[\s#]*", " ", shipped)
+        for match in re.finditer(rf"{name}((?:[ ,;:(-]|and|to|its|errata|sections?|\d+\b|{_CODE}\b|[A-U]\b)*)", text):
+            citation = match[1]
+            codes = re.findall(rf"(?<![\w-])({_CODE}|[A-U])(?![\w])", citation)
+            sections = re.findall(r"sections? ((?:\d+(?: and |, )?)+)", citation)
+            place = f"{file.relative_to(ROOT)}: {name}{citation}"
+            found.append((place, [number for one in sections for number in re.findall(r"\d+", one)], codes))
     return found
 
 
@@ -230,14 +242,25 @@ def test_nothing_refers_to_a_note_outside_the_repository():
     inside = {"readme.md", "contributing.md", "changelog.md", *(page.name for page in (ROOT / "docs").rglob("*.md"))}
     talk = re.compile(r"\bissues? \d|\bthe issue\b|Must show|\bhazards? \d|\bchecklist\b")
     page = re.compile(r"(?<![\w-])[\w-]+\.md\b")
-    files = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "Makefile", "pyproject.toml")]
-    for folder in ("src", "tests", "benchmarks", "notebooks", "docs"):
-        files += [file for file in (ROOT / folder).rglob("*") if file.suffix in (".py", ".pyi", ".ipynb", ".md")]
-    for file in files:
+    for file, text in shipped_texts().items():
         if file != Path(__file__):
-            text = file.read_text(encoding="utf-8")
             assert not (found := talk.search(text)), f"{file.relative_to(ROOT)}: {found[0]}"
             assert {name.lower() for name in page.findall(text)} <= inside, file.relative_to(ROOT)
+
+
+def test_files_that_are_referred_to_are_there():
+    """By their path from the root, or by name for Python and notebooks; what is built or written is not meant."""
+    texts = shipped_texts()
+    there = {file.name for file in texts}
+    built = re.compile(r"docs/_build|docs/jupyter_execute|docs/reference/\*")
+    path = re.compile(r"(?<![\w./-])(?:\.\./)*((?:docs|notebooks|tests|benchmarks|robots|src|shared|\.ci)/[\w./-]*\w)")
+    name = re.compile(r"(?<![\w*{}<./-])([\w-]+\.(?:py|ipynb|pyi))\b(?!\()")
+    others = {"numpy.py", "casadi.py", "ipython_kernel_config.py"}
+    for file, text in texts.items():
+        for found in path.findall(text):
+            there_is = (ROOT / found).exists() or any(ROOT.glob(f"{found}.*")) or built.match(found)
+            assert there_is, f"{file.relative_to(ROOT)}: {found}"
+        assert set(name.findall(text)) <= there | others, file.relative_to(ROOT)
 
 
 def test_every_benchmark_can_be_imported():

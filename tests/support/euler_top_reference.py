@@ -1,4 +1,6 @@
-"""Free rigid bodies to 60 digits: `python tests/euler_top_reference.py` rewrites tests/data/euler_top_reference.npz.
+"""Free rigid bodies to 60 digits, in tests/data/euler_top_reference.npz.
+
+`python tests/support/euler_top_reference.py` rewrites them.
 
 Every case is a body with principal moments and body momentum given as doubles, taken as exact numbers. The truth is the
 textbook solution at 120 digits, where no cancellation matters: momentum by the Jacobi functions of mpmath, attitude by

@@ -204,7 +204,8 @@ class Body:
 
         Notes
         -----
-        Raises as `locked_inertia`. Source: theory.md A7.
+        Raises as `locked_inertia`. Equation :eq:`internal-momentum` of the documentation.
+        Source: theory.md A7.
         """
         r = self._checked(shape)
         return self._angular_map(self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)

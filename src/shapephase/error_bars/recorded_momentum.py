@@ -132,6 +132,7 @@ def momentum_from_recording(
 
     Notes
     -----
+    Equation :eq:`moved-fit` of the documentation.
     Source: theory.md section 8 (the response of the attitude to start and momentum).
 
     Examples

@@ -240,7 +240,7 @@ def derivatives(motion: Motion) -> Derivatives:
 
     Notes
     -----
-    Equation :eq:`adjoint` of the documentation.
+    Equations :eq:`added-momentum` and :eq:`adjoint` of the documentation.
 
     Examples
     --------

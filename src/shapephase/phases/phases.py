@@ -56,7 +56,7 @@ def split(
 
     Notes
     -----
-    Equation :eq:`tilt` of the documentation.
+    Equations :eq:`split`, :eq:`closed-split` and :eq:`tilt` of the documentation.
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
 
     Examples

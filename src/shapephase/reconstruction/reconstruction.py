@@ -115,7 +115,10 @@ class Motion(MotionViews):
         return self.momentum.shape[:-1]
 
     def attitude(self, t: ArrayLike) -> Array:
-        """R(t), base axes to inertial axes: times (...) -> batch + (..., 3, 3)."""
+        """R(t), base axes to inertial axes: times (...) -> batch + (..., 3, 3).
+
+        Equation :eq:`attitude` of the documentation.
+        """
         times = times_argument(t, self.duration)
         turned = self._flat_attitude[:, None] @ self.solution.rotation(times.ravel())
         return turned.reshape(*self.batch, *times.shape, 3, 3)
@@ -125,7 +128,10 @@ class Motion(MotionViews):
         return so3.quat_from_matrix(self.attitude(t))
 
     def body_momentum(self, t: ArrayLike) -> Array:
-        """Pi(t) = R(t)^T momentum: times (...) -> batch + (..., 3), base axes [kg m^2/s]."""
+        """Pi(t) = R(t)^T momentum: times (...) -> batch + (..., 3), base axes [kg m^2/s].
+
+        Equation :eq:`momentum` of the documentation.
+        """
         times = times_argument(t, self.duration)
         attitude = self.attitude(times)
         spatial = self.momentum.reshape(*self.batch, *(1,) * times.ndim, 3)
@@ -259,6 +265,7 @@ class Motion(MotionViews):
     def dynamic_phase(self, t: ArrayLike) -> Array:
         """The integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
 
+        Equation :eq:`montgomery-phase` of the documentation.
         Source: Cabrera 2006, equation (12); theory.md B9.
         """
         times = times_argument(t, self.duration)
@@ -378,7 +385,7 @@ def reconstruct(
 
     Notes
     -----
-    Equation :eq:`reconstruction` of the documentation.
+    Equations :eq:`reconstruction` and :eq:`euler` of the documentation.
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
 
     Examples

@@ -65,7 +65,7 @@ class EulerTop:
 
     Notes
     -----
-    Equation :eq:`rigid-phase` of the documentation.
+    Equations :eq:`jacobi` and :eq:`rigid-phase` of the documentation.
 
     Examples
     --------

@@ -165,6 +165,7 @@ def steady_rotations(
 
     Notes
     -----
+    Equation :eq:`unstable-rate` of the documentation.
     Source: Marsden and Ratiu, theorem 15.9.1.
 
     Examples

@@ -327,6 +327,7 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
 
     Notes
     -----
+    Equation :eq:`andoyer-energy` of the documentation.
     Source: Cabrera 2006 (13) for the phase; theory.md R1.
 
     Examples

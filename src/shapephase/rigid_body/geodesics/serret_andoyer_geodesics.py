@@ -127,6 +127,7 @@ class GeodesicFamily:
         """R' = dR/dp of oscillating geodesics, which is T'/(2 p) = dT/d(p^2): (...) [rad/(sqrt(kg) m)].
 
         A sum of negative terms. Raises ShapeError if a geodesic does not oscillate.
+        Equation :eq:`first-return` of the documentation.
         Source: Bonnard et al., lemma 2.8 and proposition 9.
         """
         return self._period_slopes()[0]

@@ -299,7 +299,7 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
     Notes
     -----
-    Equation :eq:`euler-rigid` of the documentation.
+    Equations :eq:`euler-rigid` and :eq:`hamiltonian` of the documentation.
     Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
 
     Examples

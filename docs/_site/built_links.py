@@ -1,0 +1,113 @@
+"""What readers can click on in the built site: links lead somewhere, the three ways of the front page too."""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+_WAYS = "three-ways-from-here"
+_CLICKS = 3
+
+
+class _Page(HTMLParser):
+    """Links and anchors of a page: all of them, those of its text, and those of each paragraph of the three ways."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.anchors: set[str] = set()
+        self.links: list[str] = []
+        self.in_text: set[str] = set()
+        self.ways: list[list[str]] = []
+        self._depth: dict[str, int] = defaultdict(int)
+        self._sections: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note links and anchors."""
+        found = {name: value or "" for name, value in attrs}
+        self.anchors |= {found[name] for name in ("id", "name") if name in found}
+        self._depth[tag] += 1
+        if tag == "section":
+            self._sections.append(found.get("id", ""))
+        if tag == "p" and _WAYS in self._sections:
+            self.ways.append([])
+        if tag == "a" and "href" in found:
+            self.links.append(found["href"])
+            if self._depth["article"]:
+                self.in_text.add(found["href"])
+            if _WAYS in self._sections and self.ways and "headerlink" not in found.get("class", ""):
+                self.ways[-1].append(found["href"])
+        if tag in ("img", "script", "iframe", "source") and "src" in found:
+            self.links.append(found["src"])
+
+    def handle_endtag(self, tag: str) -> None:
+        """Note where the text ends."""
+        self._depth[tag] -= 1
+        if tag == "section":
+            self._sections.pop()
+
+
+def pages(site: Path) -> dict[Path, _Page]:
+    """Every page of the site."""
+    return {
+        path: _Page(path.read_text(encoding="utf-8"))
+        for path in sorted(site.rglob("*.html"))
+        if "_static" not in path.parts
+    }
+
+
+def _target(page: Path, link: str) -> tuple[Path, str] | None:
+    """The file and the anchor that a link leads to; None: out of the site."""
+    parts = urlsplit(link)
+    if parts.scheme or parts.netloc:
+        return None
+    file = (page.parent / unquote(parts.path)).resolve() if parts.path else page
+    return file, unquote(parts.fragment)
+
+
+def broken(found: dict[Path, _Page]) -> Iterator[str]:
+    """Links to files and anchors that there are not."""
+    for page, here in found.items():
+        for link in here.links:
+            target = _target(page, link)
+            if target is None:
+                continue
+            file, anchor = target
+            if not file.exists():
+                yield f"{page.name}: {link} leads nowhere"
+            elif anchor and file in found and anchor not in found[file].anchors:
+                yield f"{page.name}: {link} has no such place"
+
+
+def lost_ways(found: dict[Path, _Page], front: Path) -> Iterator[str]:
+    """Ways of the front page that cannot be gone: each click is a link in the text of the page before."""
+    ways = found[front].ways
+    if len(ways) != _CLICKS:
+        yield f"{front.name}: {len(ways)} ways"
+    for way in ways:
+        page = front
+        if len(way) != _CLICKS:
+            yield f"{front.name}: a way of {len(way)} clicks: {way}"
+        for link in way:
+            goal = (_target(front, link) or (front, ""))[0]
+            reached = {(_target(page, href) or (None, ""))[0] for href in found[page].in_text}
+            if goal not in reached:
+                yield f"{page.name}: no link to {goal.name} in its text"
+            page = goal
+
+
+def main(site: Path) -> int:
+    """Print what is wrong; returns how much."""
+    found = pages(site.resolve())
+    wrong = [*broken(found), *lost_ways(found, site.resolve() / "index.html")]
+    links = sum(len(page.links) for page in found.values())
+    print("\n".join([*wrong, f"{len(found)} pages, {links} links, {len(wrong)} faults"]))
+    return len(wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(bool(main(Path(sys.argv[1]))))
