@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import gc
+import locale
 import os
+import signal
 from functools import lru_cache
 
 # The workers share the cores: threads of their own would get in each other's way.
@@ -74,6 +76,22 @@ def fast(monkeypatch):
 def compiled(monkeypatch):
     """Machine code where there is Numba, else none: for tests of what stands on the integrator."""
     monkeypatch.setenv("SHAPEPHASE_FAST", "1")
+
+
+@pytest.fixture
+def heard_ctrl_c():
+    """Ctrl-C as on a terminal: a process that a script starts in the background is told to ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def kept_locale():
+    """For a test of a library that sets the process's locale, and with it the encoding of all pipes."""
+    before = locale.setlocale(locale.LC_ALL)
+    yield
+    locale.setlocale(locale.LC_ALL, before)
 
 
 @pytest.fixture

@@ -43,6 +43,8 @@ def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] =
 def check_finite(array: Array, name: str) -> None:
     """Raise `ShapeError` naming the first entry that is NaN or infinite."""
     if not np.isfinite(array).all():
+        if not array.ndim:
+            raise ShapeError(f"{name}: a finite number is needed, got {array}")
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ShapeError(f"{name}: entry {list(where)} is {array[where]}; every entry must be a finite number")
 

@@ -54,6 +54,7 @@ def test_an_acrobat_is_what_biorbd_has(tmp_path, exact_acrobat):
     np.testing.assert_allclose(body.mass, 57.25, rtol=4 * EPS)
 
 
+@pytest.mark.usefixtures("kept_locale")
 def test_a_floating_motion_is_that_of_biorbd(tmp_path, exact_acrobat):
     """biorbd integrates its own equations of the free base; reconstruct has the same attitude in time."""
     body = loaded(tmp_path, exact_acrobat)

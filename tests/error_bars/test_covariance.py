@@ -115,5 +115,5 @@ def test_what_is_no_covariance(given: dict, error: type, message: str):
 
 
 def test_one_draw_is_no_sample():
-    with pytest.raises(ShapeError, match="two or more"):
+    with pytest.raises(ShapeError, match="2 or more"):
         sp.sampled_uncertainty(motion(), momentum=0.1, draws=1)

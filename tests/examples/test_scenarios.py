@@ -6,7 +6,7 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
-from shapephase.errors import TrajectoryError, UnknownNameError
+from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.examples.scenarios import (
     CLOSED_ORBITS,
     MOTIONS,
@@ -96,10 +96,15 @@ def test_the_pace_of_a_named_motion_does_not_matter():
     assert so3.angle(slow.T @ turned("kane_scher")) < 1e-11
 
 
-@pytest.mark.parametrize(("alpha", "beta"), [(0.5, 0.4), (-0.1, 0.5), (0.3, 1.6), (np.nan, 1.0)])
+@pytest.mark.parametrize(("alpha", "beta"), [(0.5, 0.4), (-0.1, 0.5), (0.3, 1.6)])
 def test_bends_that_no_waist_has_are_refused(alpha, beta):
     with pytest.raises(TrajectoryError, match="alpha"):
         kane_scher(alpha, beta)
+
+
+def test_a_lean_that_is_no_number_is_refused():
+    with pytest.raises(ShapeError, match="alpha: a finite number is needed, got nan"):
+        kane_scher(np.nan, 1.0)
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf])

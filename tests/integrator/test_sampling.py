@@ -29,6 +29,8 @@ from support.independent import (
 )
 from support.long_runs import full_but
 
+# The joints go where no limits are looked at.
+pytestmark = pytest.mark.filterwarnings("ignore:joint .* far beyond its limits")
 TIMES = np.linspace(0.0, 2.0, 101)
 AMPLITUDE = np.array([0.8, -0.5, 0.6])
 Curve = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

@@ -57,6 +57,7 @@ class Interrupted:
         raise AttributeError
 
 
+@pytest.mark.usefixtures("heard_ctrl_c")
 def test_ctrl_c_while_casadi_asks_what_an_argument_is_comes_a_moment_later():
     argument = Interrupted()
 
