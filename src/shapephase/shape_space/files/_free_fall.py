@@ -116,7 +116,8 @@ def free_fall(times: Array, centres: Array, where: str) -> FreeFall:
     if longest is None:
         raise TrajectoryError(
             f"{where}: nowhere does the centre of mass fall freely for {window:.2g} s or more (it is known to "
-            f"{1e3 * noise:.2g} mm); if there is a flight, give its times: flight=(first, last) (--flight FIRST LAST)"
+            f"{1e3 * noise:.2g} mm). Are the axes of the base right (base_axes, --base-axes)? If so, and there is a "
+            "flight, give its times: flight=(first, last) (--flight FIRST LAST)"
         )
     return longest
 
