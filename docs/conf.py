@@ -56,14 +56,15 @@ nitpick_ignore_regex = [
 
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-nb_execution_mode = "cache"
+# Without a cache: two processes that read pages would make its database at once.
+nb_execution_mode = "auto"
 nb_execution_raise_on_error = True
 # Notebooks come executed, and compared with the outputs that are committed.
 nb_execution_excludepatterns = ["tutorials/notebooks/*"]
 # A page's few lines of code, on a busy machine.
 nb_execution_timeout = 600
-# Pages are executed anew when they or the library change.
-nb_execution_cache_path = str(HERE / "_build" / "executed" / library_digest()[:16])
+# Pages are read, and so executed, anew when they or the library change.
+library = library_digest()
 nb_merge_streams = True
 
 autosummary_generate = False
@@ -127,6 +128,7 @@ def _plain_docstring(*event: Any) -> None:
 def setup(app: Sphinx) -> None:
     """Steps of the build that are this site's own."""
     name_aliases()
+    app.add_config_value("library", "", "env", str)
     app.connect("config-inited", _write_pages)
     app.connect("source-read", _add_targets)
     # Before numpydoc, which makes sections of the text.
