@@ -47,7 +47,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     # Other libraries' pages are not on this site, and a build without network cannot look them up.
     ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray)\..*"),
-    ("py:.*", r"(pathlib|collections|typing|types|os)\..*"),
+    ("py:.*", r"(pathlib|collections|concurrent|typing|types|os)\..*"),
     # In signatures: names that stand for a union of types or a kind of function, which the docstring spells out; and
     # classes that no face exports, which results hold and nobody makes.
     ("py:class", r"_?[A-Z]\w*"),
