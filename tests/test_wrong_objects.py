@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ import shapephase as sp
 from shapephase.errors import UnknownNameError
 from shapephase.letters import what_came
 from support.example_calls import TRUSTING, example_calls, fault_of, trusts, works, wrong_things
+from support.long_runs import full_but
 from test_documentation import LONG, NAMES
 
 TRIED = [name for name in NAMES if name not in LONG and not name.removeprefix("shapephase.").startswith(TRUSTING)]
@@ -39,21 +38,11 @@ def faults(name: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", full_but(TRIED, *QUICK))
 def test_a_wrong_argument_gets_a_sentence(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        assert not faults(name)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("name", TRIED)
-def test_every_wrong_argument_gets_a_sentence(name, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        assert not faults(name)
+    assert not faults(name)
 
 
 def test_what_came_is_shown_in_a_line():

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.cli.error_bar_text import error_bar_lines
 from shapephase.cli.main import main
+from shapephase.cli.texts.error_bar_text import error_bar_lines
 
 MOMENTUM = ("--momentum", "2", "3", "20")
 

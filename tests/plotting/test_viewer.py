@@ -611,7 +611,7 @@ def test_the_camera_goes_with_a_body_that_falls_far(tmp_path, chromium):
     page.evaluate("page.scene.draw()")
     start, size = page.evaluate(where), blue()
     page.evaluate("page.clock.show(page.clock.duration); page.scene.draw()")
-    np.testing.assert_allclose(page.evaluate(where), start, atol=1e-3)
+    np.testing.assert_allclose(page.evaluate(where), start, rtol=0, atol=1e-9)
     assert size > 300
     # Two whole turns later it lies as it lay.
     assert blue() == pytest.approx(size, rel=0.05)

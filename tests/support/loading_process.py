@@ -126,7 +126,7 @@ def work(memory: int) -> None:
     # What the commands import late, once for all the processes that are forked from this one.
     import shapephase.cli.main
     import shapephase.cli.motion
-    import shapephase.cli.text  # noqa: F401
+    import shapephase.cli.texts.result_text  # noqa: F401
 
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))

@@ -21,8 +21,8 @@ def check_command(
     from ..body.plausibility import implausible
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import body_argument, joint_motion
-    from .recording_text import recording_data, recording_lines
-    from .text import body_lines, path_data, path_lines, plain, record_data
+    from .texts.recording_text import recording_data, recording_lines
+    from .texts.result_text import body_lines, path_data, path_lines, plain, record_data
 
     loaded = body_argument(body)
     for doubt in implausible(loaded):

@@ -33,7 +33,7 @@ from .plan import plan_command
 from .split import split_command
 from .sweep import sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
-from .usage import usage_message
+from .texts.usage import usage_message
 
 app = App(
     name="shapephase",

@@ -54,8 +54,8 @@ def orbits_command(
     from ..phases.split_text import rotation_line
     from ..reconstruction.reconstruction import reconstruct
     from .motion import body_argument, joint_motion
-    from .recording_text import recording_data, recording_lines
-    from .text import orbit_data, orbit_lines
+    from .texts.recording_text import recording_data, recording_lines
+    from .texts.result_text import orbit_data, orbit_lines
 
     magnitude = magnitude_argument(magnitude)
     goal = None if tolerance is None else tolerance_argument(tolerance)

@@ -58,7 +58,7 @@ def view_command(
     from ..plotting.pages.video import VIDEO_ENDINGS, check_video
     from ..plotting.viewer import FILM_SIZE, motion_page, motion_video, view
     from . import motion as motions
-    from .recording_text import recording_data
+    from .texts.recording_text import recording_data
 
     up_axis(up, None)
     if speed is not None and not 0.0 < speed < math.inf:
@@ -111,7 +111,7 @@ def plot_command(
     """
     from ..plotting.named_figures import FIGURES, write_figure
     from . import motion as motions
-    from .recording_text import recording_data
+    from .texts.recording_text import recording_data
 
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)

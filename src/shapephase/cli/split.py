@@ -60,9 +60,9 @@ def split_command(
     from ..phases.split_text import split_lines
     from ..shape_space.body_path import path_gap
     from . import motion as motions
-    from .error_bar_text import error_bar_data, error_bar_lines, error_bars
-    from .recording_text import fit_data, fit_lines, recording_data, recording_lines
-    from .text import gap_text, recorded_base_text, split_data, split_heading
+    from .texts.error_bar_text import error_bar_data, error_bar_lines, error_bars
+    from .texts.recording_text import fit_data, fit_lines, recording_data, recording_lines
+    from .texts.result_text import gap_text, recorded_base_text, split_data, split_heading
 
     aside = check_writable(out, "--out", ".npz")
     aside = check_writable(phases, "--phases", ".csv") or aside

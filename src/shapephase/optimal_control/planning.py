@@ -158,7 +158,7 @@ def plan_reorientation(
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(_failure_message(task, attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(_failure_message(task, basis, attempts, best, reporter.stopped), plan)
     return plan
 
 
@@ -328,10 +328,14 @@ def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPa
         counted = task.counted_windings(polished.motion.attitude(times))
         if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
             return False
-    duration = polished.path.duration
-    rates = np.abs(basis.rate_control @ polished.control) / duration
     slack = 1.0 + _LIMIT_SLACK
-    return duration <= task.duration * slack and bool(np.all(rates <= task.rate_limit * slack))
+    return polished.path.duration <= task.duration * slack and _share_of_rate_limits(task, basis, polished) <= slack
+
+
+def _share_of_rate_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
+    """How much of its limit the fastest rate takes up."""
+    rates = np.abs(basis.rate_control @ polished.control) / polished.path.duration
+    return float((rates / task.rate_limit).max(initial=0.0))
 
 
 def _plan(
@@ -359,7 +363,9 @@ def _plan(
     )
 
 
-def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: bool) -> str:
+def _failure_message(
+    task: Reorientation, basis: SplineBasis, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: bool
+) -> str:
     """Why no plan is returned, start by start, and what the best attempt reached."""
     name = task.body.name
     summary = "; ".join(
@@ -376,16 +382,12 @@ def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _A
         outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
     if stopped:
         return f"the search for a motion of the joints of {name} was stopped on request ({summary}); {outcome}"
-    fast = best is not None and best.polished is not None and _share_of_rate_limits(task, best.polished) > _NEARLY
+    fast = (
+        best is not None and best.polished is not None and _share_of_rate_limits(task, basis, best.polished) > _NEARLY
+    )
     way_out = (
         f"joints are at their rate limits: give more than {task.duration:.6g} s (cost='time' finds the least)"
         if fast and task.cost != "time"
         else "loosen the limits, or give more time, iterations or starts"
     )
     return f"no motion of the joints of {name} was found that turns it to the goal ({summary}); {outcome}; {way_out}"
-
-
-def _share_of_rate_limits(task: Reorientation, polished: PolishedPath) -> float:
-    """How much of the limit the fastest rate takes up."""
-    rates = np.abs(np.diff(polished.control, axis=0)).max(axis=0) * (len(polished.control) - 1) / polished.duration
-    return float((rates / task.rate_limit).max(initial=0.0))

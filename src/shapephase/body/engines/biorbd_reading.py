@@ -118,8 +118,8 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
             starts[segment] = number
         elif word == "endsegment":
             segment = None
-        elif word in ("loopconstraint", "contact") and segment is None:
-            constraints += word == "loopconstraint"
+        elif word == "loopconstraint" and segment is None:
+            constraints += 1
         elif segment is not None and word:
             _check_word(words, word, segment, number)
     if meshes:

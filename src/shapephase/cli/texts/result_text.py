@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
-from ..body.body import Body
-from ..phases.phase_split import PhaseSplit
-from ..phases.return_map import FixedPoints
-from ..plain_data import plain
-from ..reconstruction.reconstruction import Motion
-from ..reconstruction.recorded_base import base_difference
-from ..shape_space.files.read import RecordedMotion
-from ..shape_space.summaries import BodySummary, PathSummary
+from ...arrays import Array
+from ...body.body import Body
+from ...phases.phase_split import PhaseSplit
+from ...phases.return_map import FixedPoints
+from ...plain_data import plain
+from ...reconstruction.reconstruction import Motion
+from ...reconstruction.recorded_base import base_difference
+from ...shape_space.files.read import RecordedMotion
+from ...shape_space.summaries import BodySummary, PathSummary
 
 
 def split_heading(body: Body, motion_name: str, motion: Motion) -> str:

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import so3
-from ..arrays import Array
-from ..phases.phase_split import PhaseSplit
-from ..plain_data import plain
-from ..reconstruction.reconstruction import Motion
-from ..shape_space.files.read import RecordedMotion
-from .options import EXACT, ErrorOptions
+from ... import so3
+from ...arrays import Array
+from ...phases.phase_split import PhaseSplit
+from ...plain_data import plain
+from ...reconstruction.reconstruction import Motion
+from ...shape_space.files.read import RecordedMotion
+from ..options import EXACT, ErrorOptions
 
 if TYPE_CHECKING:
-    from ..error_bars.covariance import Uncertainty
-    from ..error_bars.recorded_momentum import RecordedMomentum
+    from ...error_bars.covariance import Uncertainty
+    from ...error_bars.recorded_momentum import RecordedMomentum
 
 # Digits of a bar that are shown; the number before it ends where the bar does.
 _DIGITS = 2
@@ -34,8 +34,8 @@ def error_bars(
     deviations = (joints, *relative, options.momentum_error, options.attitude_error)
     if fitted is None and all(given is None for given in deviations):
         return None
-    from ..error_bars.covariance import uncertainty
-    from ..error_bars.inertia_errors import InertiaErrors
+    from ...error_bars.covariance import uncertainty
+    from ...error_bars.inertia_errors import InertiaErrors
 
     masses, centres, inertias = (given or 0.0 for given in relative)
     return uncertainty(

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from cyclopts import App, CoercionError, CycloptsError, MissingArgumentError, UnknownCommandError, UnknownOptionError
 from cyclopts.exceptions import ConsumeMultipleError, UnusedCliTokensError
 
-from .terminal import one_line
+from ..terminal import one_line
 
 _KINDS = {float: "a number", int: "a whole number"}
 _LONGEST_SHOWN = 80

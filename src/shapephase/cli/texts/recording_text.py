@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import so3
-from ..arrays import Array
-from ..body.body import Body
-from ..shape_space.files.closing import Closing
-from ..shape_space.files.read import RecordedMotion
-from ..shape_space.files.smoothing import Smoothing
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...shape_space.files.closing import Closing
+from ...shape_space.files.read import RecordedMotion
+from ...shape_space.files.smoothing import Smoothing
 
 if TYPE_CHECKING:
-    from ..error_bars.covariance import Uncertainty
-    from ..error_bars.recorded_momentum import RecordedMomentum
+    from ...error_bars.covariance import Uncertainty
+    from ...error_bars.recorded_momentum import RecordedMomentum
 
 _MOST_NAMES = 8
 """Names that one line lists."""
