@@ -2,6 +2,7 @@ from . import (
     body,
     bounds,
     deformation,
+    dynamics,
     elliptic,
     error_bars,
     errors,
@@ -23,6 +24,8 @@ from .body.catalog import load_body, robot_names
 from .body.family import BodyFamily
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
+from .dynamics.loads import JointLoads
+from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.inertia_errors import InertiaErrors
 from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
@@ -90,6 +93,8 @@ __all__ = [
     "IgnoredElementWarning",
     "ImplausibleBodyWarning",
     "InertiaErrors",
+    "JointLoads",
+    "JointTorques",
     "Motion",
     "MotionFamily",
     "OrbitBranch",
@@ -121,6 +126,7 @@ __all__ = [
     "deformation",
     "derivatives",
     "dynamic_phase_from_energy",
+    "dynamics",
     "elliptic",
     "error_bars",
     "errors",
@@ -136,6 +142,7 @@ __all__ = [
     "inertia_tensor",
     "integrator",
     "is_flat",
+    "joint_torques",
     "link_gauge",
     "load_body",
     "load_motion",

@@ -34,6 +34,7 @@ COMMANDS = {
     "conjugate": ("conjugate", "1", "2", "3"),
     "orbits": ("orbits", "cat", "cat_righting", "0.02"),
     "doctor": ("doctor",),
+    "torques": ("torques", "cat", "cat_righting"),
 }
 ALL_COMMANDS = (*COMMANDS, "plan", "view", "explore", "plot", "compile", "sweep")
 
@@ -146,6 +147,7 @@ def test_endings_in_any_case(capfd, tmp_path, ending):
         ("plan", "cat_two_halves", "--rotate", "60", "--out"),
         ("plan", "cat_two_halves", "--rotate", "60", "--html"),
         ("conjugate", "1", "2", "3", "--out"),
+        ("torques", *CAT[1:], "--out"),
     ],
 )
 def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_path, monkeypatch, command):
@@ -154,7 +156,9 @@ def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_p
 
     monkeypatch.setattr("shapephase.body.catalog.load_body", never)
     monkeypatch.setattr("shapephase.rigid_body.geodesics.serret_andoyer_metric", never)
-    ending = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html"}[command[0]]
+    ending = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html", "torques": ".csv"}[
+        command[0]
+    ]
     ending = ".html" if command[-1] == "--html" else ending
     folder = tmp_path / f"folder{ending}"
     folder.mkdir()
@@ -315,6 +319,7 @@ ENDINGS = [
     (6, "plan cat_two_halves --rotate 10 --out folder.csv"),
     (2, "conjugate 1 1 2"),
     (6, "conjugate 1 2 3 --out folder.svg"),
+    (6, "torques cat cat_righting --out folder.csv"),
     (2, "robots more"),
     (2, "doctor more"),
     (2, "compile more"),

@@ -75,6 +75,7 @@ _ERRORS: Mapping[str, Callable[[Random], list[str]]] = {
 _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
     "check": _RECORDING,
     "split": _RECORDING | _FLIGHT | _GAUGE | _TOLERANCE | _ERRORS | {"--out": lambda c: _file(c, "out.npz")},
+    "torques": _RECORDING | _FLIGHT | _TOLERANCE | {"--out": lambda c: _file(c, "out.csv")},
     "plot": _RECORDING | _FLIGHT | _GAUGE | {"--out": lambda c: _file(c, "out.png")},
     "view": _RECORDING
     | _FLIGHT

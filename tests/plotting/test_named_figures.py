@@ -79,7 +79,7 @@ def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum):
     text = text_of(page)
     assert "a <satellite>" in text
     assert len(page) < 6e6
-    assert page.count("<figure>") == (7 if momentum else 4)
+    assert page.count("<figure>") == (8 if momentum else 5)
     assert len(told) == page.count("<figure>") + 1
     assert f"{np.degrees(so3.angle(result.total_rotation)):.6f}°" in text
     assert f"{np.degrees(so3.angle(result.holonomy)):.6f}°" in text

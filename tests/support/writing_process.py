@@ -29,6 +29,7 @@ COMMANDS = {
     "split.npz": ("split", *CAT, ("0.02", "0.03"), "--out"),
     "split.html": ("split", *CAT, ("0.02", "0.03"), "--html"),
     "phases.csv": ("split", *CAT, ("0.02", "0.03"), "--phases"),
+    "torques.csv": ("torques", *CAT, ("0.02", "0.03"), "--out"),
     "view.html": ("view", *CAT, ("0.02", "0.03"), "--html"),
     "plot.svg": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "plot.pdf": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),

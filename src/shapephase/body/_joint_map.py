@@ -13,8 +13,8 @@ from ._model_tree import mimic_map, moving_joints
 
 # Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
 _BASE = 6
-# [rad/s or m/s]; what is stated above stands for no limit.
-_NO_RATE_LIMIT = 1e30
+# [rad/s, m/s, N m or N]; what is stated above stands for no limit.
+_NO_LIMIT = 1e30
 
 
 class JointMap:
@@ -26,6 +26,7 @@ class JointMap:
     continuous : (n,) True for a joint that turns without end
     limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
     rate_limits : (n,) the largest rates [rad/s or m/s], infinite where none is stated
+    effort_limits : (n,) what their motors can do [N m or N], infinite where none is stated
     units : "rad" or "m" for each joint
     """
 
@@ -49,12 +50,15 @@ class JointMap:
         self.limits[self.continuous] = [-np.inf, np.inf]
         self.limits.setflags(write=False)
         self.rate_limits = self._slowest(np.array(model.velocityLimit)[[kind.idx_v for kind in kinds]])
+        efforts = np.array(model.effortLimit)[[kinds[one].idx_v for one in independent]]
+        self.effort_limits = np.where((efforts > 0.0) & (efforts < _NO_LIMIT), efforts, np.inf)
+        self.effort_limits.setflags(write=False)
         sliding = [kind.shortname().startswith("JointModelP") for kind in kinds]
         self.units = tuple("m" if sliding[i] else "rad" for i in independent)
 
     def _slowest(self, stated: Array) -> Array:
         """Of each independent joint, so that its followers keep theirs, too; a limit of zero says nothing: (n,)."""
-        stated = np.where((stated > 0.0) & (stated < _NO_RATE_LIMIT), stated, np.inf)
+        stated = np.where((stated > 0.0) & (stated < _NO_LIMIT), stated, np.inf)
         factors = np.abs(self._map)
         each = np.full(factors.shape, np.inf)
         np.divide(stated[:, None], factors, out=each, where=factors > 0.0)

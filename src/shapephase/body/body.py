@@ -52,6 +52,7 @@ class Body:
     mass : [kg]
     joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
     rate_limits : (n,) the largest rates that the file states [rad/s or m/s], infinite where it states none, or zero
+    effort_limits : (n,) the same of the torques or forces of their motors [N m or N]
     joint_units : "rad" or "m" for each joint
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     chain : its links and joints as plain numbers
@@ -74,7 +75,7 @@ class Body:
         self.chain = joint_chain(model, dict(mimics or {}))
         self.joint_names, self.joint_units = self._joints.names, self._joints.units
         self.joint_limits, self.continuous = self._joints.limits, self._joints.continuous
-        self.rate_limits = self._joints.rate_limits
+        self.rate_limits, self.effort_limits = self._joints.rate_limits, self._joints.effort_limits
 
     @property
     def n_shape(self) -> int:

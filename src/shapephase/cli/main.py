@@ -34,6 +34,7 @@ from .split import split_command
 from .sweep import sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
 from .texts.usage import usage_message
+from .torques import torques_command
 
 app = App(
     name="shapephase",
@@ -44,6 +45,7 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 app.command(split_command, name="split")
+app.command(torques_command, name="torques")
 app.command(view_command, name="view")
 app.command(plot_command, name="plot")
 app.command(explore_command, name="explore")

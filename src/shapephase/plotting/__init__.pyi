@@ -12,6 +12,7 @@ from .regime_plots import plot_bounds, plot_crown
 from .report import write_report
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
+from .torque_plots import plot_torques
 from .viewer import LiveView, motion_html, motion_page, motion_video, view
 
 __all__ = [
@@ -46,6 +47,7 @@ __all__ = [
     "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",
+    "plot_torques",
     "plots",
     "poinsot_html",
     "poinsot_page",

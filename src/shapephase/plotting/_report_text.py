@@ -10,6 +10,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
+from ..dynamics.torques import joint_torques
 from ..phases.phases import PhaseSplit
 from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
 from ..provenance import provenance
@@ -69,6 +70,23 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
             f"tilted by {_turn(result.tilt)}."
         )
     return words
+
+
+def torque_words(motion: Motion) -> str:
+    """Which joint bears most, in sentences. Raises as `joint_torques`."""
+    loads = joint_torques(motion, 0.0).loads
+    parts = []
+    for unit, effort, kind in (("rad", "N m", "torque"), ("m", "N", "force")):
+        rows = [k for k, own in enumerate(loads.joint_units) if own == unit]
+        if rows:
+            most = max(rows, key=lambda k: loads.peak_torque[k])
+            limit = f", {loads.effort_share[most]:.1%} of its limit" if np.isfinite(loads.effort_limits[most]) else ""
+            parts.append(
+                f"the largest {kind} is that of {loads.joint_names[most]}, {loads.peak_torque[most]:.3g} {effort} at "
+                f"{loads.peak_time[most]:.3g} s{limit}"
+            )
+    words = f"Of the joints {'; '.join(parts)}. " if parts else ""
+    return f"{words}All joints together do a work of {loads.work.sum():.3g} J, the change of the kinetic energy."
 
 
 def accuracy(motion: Motion, error_bars: Sequence[str]) -> str:

@@ -25,6 +25,7 @@ from .plots import (
     plot_momentum_curve,
     plot_phases,
     plot_shape_path,
+    plot_torques,
 )
 
 if TYPE_CHECKING:
@@ -85,6 +86,12 @@ FIGURES: Mapping[str, Figure] = {
         caption="The joints",
         height=2.8,
         draw=lambda ax, motion, path, _: _draw_shape(ax, motion, path),
+        with_path=True,
+    ),
+    "torques": Figure(
+        caption="The torques of the joints",
+        height=2.8,
+        draw=lambda ax, motion, *_: plot_torques(ax, motion),
         with_path=True,
     ),
     "inertia": Figure(

@@ -17,6 +17,7 @@ from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polho
 from .regime_plots import plot_bounds, plot_crown
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
+from .torque_plots import plot_torques
 
 __all__ = [
     "column_axes",
@@ -40,4 +41,5 @@ __all__ = [
     "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",
+    "plot_torques",
 ]

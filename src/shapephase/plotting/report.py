@@ -12,7 +12,17 @@ from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._letters import printable
-from ._report_text import CONVENTIONS, accuracy, input_rows, joint_rows, lead, part_rows, split_rows, story
+from ._report_text import (
+    CONVENTIONS,
+    accuracy,
+    input_rows,
+    joint_rows,
+    lead,
+    part_rows,
+    split_rows,
+    story,
+    torque_words,
+)
 from .named_figures import FIGURES, figure_image
 from .pages.report_data import report_data
 from .pages.templates import SCENE_SCRIPTS, page_html
@@ -79,6 +89,7 @@ def write_report(
         begin(f"drawing {kind.replace('_', ' ')}")
         image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
         figures.append({"caption": figure.caption, "image": image})
+    torques = [torque_words(motion)] if scene.body is not None and scene.body.n_shape else []
     page = page_html(
         "report.html",
         title=printable(title or motion.deformation.label),
@@ -86,7 +97,7 @@ def write_report(
         styles=("page", "report_page"),
         data={"motion": data, **beside},
         lead=lead(motion),
-        story=[*story(motion, result, scene.body), accuracy(motion, error_bars)],
+        story=[*story(motion, result, scene.body), *torques, accuracy(motion, error_bars)],
         gauge=result.gauge,
         with_sphere=bool(result.has_phase),
         split_rows=split_rows(result),

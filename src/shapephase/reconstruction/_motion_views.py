@@ -124,8 +124,8 @@ class MotionViews:
 
         Parameters
         ----------
-        kind : "phases", "momentum", "attitude", "inertia", "internal_momentum" or "energy"; None: the phases, without
-            momentum the attitude
+        kind : "phases", "momentum", "attitude", "shape", "torques", "inertia", "internal_momentum" or "energy"; None:
+            the phases, without momentum the attitude
         ax : axes to draw into; None: those of a new figure one column wide, which is `axes.figure`
         gauge : as for `split`
 

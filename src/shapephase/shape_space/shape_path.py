@@ -23,6 +23,7 @@ from ..arrays import Array, check_reach, finite_array, lock_arrays
 from ..display import card_html, card_text
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from ..letters import what_came
+from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
 from ._derived_scan import DerivedScan, JoinedScan
 from ._rate_check import check_rates
@@ -227,6 +228,18 @@ class ShapePath:
     def rate(self, t: ArrayLike) -> Array:
         """r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
         return self._evaluated(t)[1]
+
+    def acceleration(self, t: ArrayLike) -> Array:
+        """r''(t): times (...) of [0, duration] -> (..., n) [rad/s^2 or m/s^2]; at a break that of what follows.
+
+        Exact, but of a path known only as a function: there by its rates as the scan resolved them. Raises
+        TrajectoryError outside, and as `scan`.
+        """
+        times = times_argument(t, self.duration)
+        found = exact_accelerations(self.curve, times.ravel())
+        if found is None:
+            found = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
+        return found.reshape(*times.shape, self.n_shape)
 
     def at_samples(self, times: Array) -> tuple[Array, Array]:
         """What `curve` gives at times at which a body is sampled, read-only: kept for the next momentum or body."""

@@ -177,19 +177,28 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
             if math.hypot(*axis) < 1e-9:
                 raise written.fault(owner, f"the axis {axis} points nowhere; give it a length")
         parts += f'<axis xyz="{_text(axis)}"/>'
-    fastest = 0.0
+    fastest = effort = 0.0
     if kind != "fixed" and (limit := child_of(node, "limit", owner)) is not None:
         fastest = abs(number(limit, "velocity", owner, default="0", most=math.inf))
+        effort = _effort(limit)
     if kind in ("revolute", "prismatic"):
         limits = _limits(node, kind, owner)
-        # Effort is for motors; Pinocchio insists on it, this library has no use for it.
-        parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="0" velocity="{fastest!r}"/>'
-    elif kind == "continuous" and fastest:
-        parts += f'<limit effort="0" velocity="{fastest!r}"/>'
+        parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="{effort!r}" velocity="{fastest!r}"/>'
+    elif kind == "continuous" and (fastest or effort):
+        parts += f'<limit effort="{effort!r}" velocity="{fastest!r}"/>'
     reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
     return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits)
+
+
+def _effort(limit: Node) -> float:
+    """The effort of a joint's motor [N m or N]; zero where nothing is stated that is a finite number."""
+    try:
+        stated = abs(float(limit.get("effort") or 0.0))
+    except ValueError:
+        return 0.0
+    return stated if stated < math.inf else 0.0
 
 
 def _limits(node: Node, kind: str, owner: str) -> tuple[float, float]:

@@ -1,0 +1,59 @@
+"""The efforts that drive a known motion of a body in free fall."""
+
+from __future__ import annotations
+
+# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# pyright: reportAttributeAccessIssue=false
+import numpy as np
+import pinocchio as pin
+
+from ..arguments import check_object
+from ..arrays import Array
+from .body import Body
+
+# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
+_BASE = 6
+
+
+def falling_efforts(
+    body: Body, shapes: Array, rates: Array, accelerations: Array, spins: Array, spin_rates: Array
+) -> tuple[Array, Array]:
+    """What the joints of a body in free fall must do, by Newton-Euler steps from link to link (Pinocchio's `rnea`).
+
+    The centre of mass falls freely: gravity moves all links alike, and loads no joint. The effort of a joint that
+    follows another adds to the effort of that one by the work it does.
+
+    Parameters
+    ----------
+    shapes, rates, accelerations : (N, n), unchecked
+    spins, spin_rates : (N, 3) angular velocity of the base and its rate, base axes [rad/s], [rad/s^2]
+
+    Returns
+    -------
+    efforts : (N, n) [N m or N]
+    wrenches : (N, 6) force on the base and torque about its origin, base axes, that the motion would need from
+        outside, which is none for a free body [N], [N m]
+
+    Notes
+    -----
+    Source: Featherstone 2008, Rigid Body Dynamics Algorithms, section 5.3.
+    """
+    check_object(body, "Body", "body")
+    model, data, joints = body._model, body._data(), body._joints
+    configurations = joints.configurations(shapes)
+    velocities, slopes = joints.velocities(rates), joints.velocities(accelerations)
+    gravity = model.gravity.linear
+    whole = np.empty_like(velocities)
+    for row, (q, v, a) in enumerate(zip(configurations, velocities, slopes, strict=True)):
+        pin.centerOfMass(model, data, q, v, a)
+        centre, speed, w = data.com[0].copy(), data.vcom[0].copy(), spins[row]
+        v[:3], v[3:_BASE] = -speed - _cross(w, centre), w
+        a[3:_BASE] = spin_rates[row]
+        a[:3] = gravity - data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
+        whole[row] = pin.rnea(model, data, q, v, a)
+    return joints.columns(whole[:, _BASE:]), whole[:, :_BASE]
+
+
+def _cross(first: Array, second: Array) -> Array:
+    (a, b, c), (x, y, z) = first.tolist(), second.tolist()
+    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])

@@ -1,0 +1,61 @@
+"""`shapephase torques`: what the joints of a free body must do for its motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .options import (
+    AS_RECORDED,
+    AS_TEXT,
+    AT_REST,
+    BodyArgument,
+    FlightOptions,
+    MotionArgument,
+    PrintOptions,
+    RecordingOptions,
+    Tolerance,
+)
+from .outcome import Outcome, check_writable
+from .progress import steps
+from .terminal import say_written
+
+
+def torques_command(
+    body: BodyArgument,
+    motion: MotionArgument,
+    /,
+    *,
+    flight: FlightOptions = AT_REST,
+    tolerance: Tolerance = 1e-9,
+    recording: RecordingOptions = AS_RECORDED,
+    out: Path | None = None,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """Find the torques of the joints: their peaks against the limits of the body's file, power and work.
+
+    The body floats or falls freely: gravity loads no joint.
+
+    Parameters
+    ----------
+    out
+        Write torque (or force), rate and power of each joint in time, in N m, N, rad/s, m/s and W, to this CSV file;
+        without it none is written. For example `--out torques.csv`.
+    """
+    from ..dynamics.torques import joint_torques
+    from . import motion as motions
+    from .texts.recording_text import recording_data
+    from .texts.torque_text import torque_data, torque_lines
+
+    aside = check_writable(out, "--out", ".csv")
+    with steps(2) as work:
+        work.begin("loading and reconstructing")
+        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch)
+        work.begin("inverse dynamics")
+        found = joint_torques(flown.motion)
+        loads = found.loads
+        if out is not None:
+            found.write_csv(out)
+            say_written(out)
+    text = torque_lines(loads, found, flown.body, motion)
+    data = torque_data(loads, found, flown.body, motion) | recording_data(flown.recorded)
+    return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

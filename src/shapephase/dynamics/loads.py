@@ -1,0 +1,258 @@
+"""What the joints of a moving body bear over a whole motion: peaks against limits, and the work that they do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev as series
+from numpy.polynomial.legendre import leggauss
+
+from ..arguments import check_object
+from ..arrays import Array, lock_arrays
+from ..chebyshev import chebyshev
+from ..display import short_repr
+from ..reconstruction.reconstruction import Motion
+from ..refinement import halved, settled
+from ._driven_motion import Drive, body_and_path, drive
+
+# Of a panel of the quadrature.
+_POINTS = 10
+# Of a panel, at which peaks are looked for: between two of them a smooth torque hides 1e-4 of itself at most.
+_LOOKS = 65
+# Of the work done back and forth: how far two quadratures may differ.
+_SETTLED = 1e-11
+# Halvings of the steps of a motion; its torques are as smooth as what was integrated.
+_MOST_HALVINGS = 5
+# Power below this share of the largest is rounding, whose sign means nothing.
+_NO_POWER = 1e-13
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class JointLoads:
+    """Peaks and work of the joints over a whole motion; arrays are batch + (n,) where nothing else is said.
+
+    Attributes
+    ----------
+    joint_names, joint_units : "rad" for torques in N m, "m" for forces in N
+    mass : of the body [kg]
+    peak_torque : largest size [N m or N]
+    peak_time : when [s]
+    peak_rate : (n,) largest size [rad/s or m/s]
+    peak_power : largest size [W]
+    positive_work, negative_work : done by the joint, and taken up by it, the latter negative [J]
+    energy_change : batch, of the kinetic energy [J]
+    energy_defect : batch, by how much the work of all joints misses it, of the work done back and forth [1]
+    effort_limits, rate_limits : (n,) of the body, infinite where none is stated
+
+    Notes
+    -----
+    Equation :eq:`joint-work` of the documentation.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+    >>> loads = sp.joint_torques(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])).loads
+    >>> bool(np.isclose(loads.work.sum(), loads.energy_change))
+    True
+    """
+
+    joint_names: tuple[str, ...]
+    joint_units: tuple[str, ...]
+    mass: float
+    peak_torque: Array
+    peak_time: Array
+    peak_rate: Array
+    peak_power: Array
+    positive_work: Array
+    negative_work: Array
+    energy_change: Array
+    energy_defect: Array
+    effort_limits: Array
+    rate_limits: Array
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+    @property
+    def work(self) -> Array:
+        """Net, done by each joint: batch + (n,) [J]."""
+        return self.positive_work + self.negative_work
+
+    @property
+    def peak_torque_per_mass(self) -> Array:
+        """Of the mass of the body: batch + (n,) [N m/kg or N/kg]."""
+        return self.peak_torque / self.mass
+
+    @property
+    def effort_share(self) -> Array:
+        """The peak torque as a part of the joint's limit: batch + (n,); 0 where none is stated."""
+        return self.peak_torque / self.effort_limits
+
+    @property
+    def rate_share(self) -> Array:
+        """The peak rate as a part of the joint's limit: (n,); 0 where none is stated."""
+        return self.peak_rate / self.rate_limits
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it for JSON: by joint, with units in the names; null for a limit that is not stated."""
+        names = {"rad": ("N_m", "rad"), "m": ("N", "m")}
+        joints = {}
+        for k, (name, unit) in enumerate(zip(self.joint_names, self.joint_units, strict=True)):
+            effort, length = names[unit]
+            effort_limit, rate_limit = float(self.effort_limits[k]), float(self.rate_limits[k])
+            joints[name] = {
+                f"peak_torque_{effort}" if unit == "rad" else f"peak_force_{effort}": np.asarray(
+                    self.peak_torque[..., k]
+                ).tolist(),
+                f"peak_per_mass_{effort}_kg": np.asarray(self.peak_torque_per_mass[..., k]).tolist(),
+                "peak_time_s": np.asarray(self.peak_time[..., k]).tolist(),
+                f"effort_limit_{effort}": effort_limit if np.isfinite(effort_limit) else None,
+                f"peak_rate_{length}_s": np.asarray(self.peak_rate[k]).tolist(),
+                f"rate_limit_{length}_s": rate_limit if np.isfinite(rate_limit) else None,
+                "peak_power_W": np.asarray(self.peak_power[..., k]).tolist(),
+                "work_J": np.asarray(self.work[..., k]).tolist(),
+                "positive_work_J": np.asarray(self.positive_work[..., k]).tolist(),
+                "negative_work_J": np.asarray(self.negative_work[..., k]).tolist(),
+            }
+        return {
+            "mass_kg": self.mass,
+            "joints": joints,
+            "energy_change_J": np.asarray(self.energy_change).tolist(),
+            "energy_defect": np.asarray(self.energy_defect).tolist(),
+        }
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Panels:
+    """The joints at Gauss points of panels.
+
+    Attributes
+    ----------
+    edges : (P + 1,) [s]
+    torque, power : (B, P, m, n)
+    rate : (P, m, n)
+    """
+
+    edges: Array
+    torque: Array
+    power: Array
+    rate: Array
+
+    @property
+    def work(self) -> Array:
+        """(B, n) net [J]."""
+        _, weights, _ = _rule()
+        return np.einsum("p,m,bpmn->bn", 0.5 * np.diff(self.edges), weights, self.power)
+
+    @property
+    def moved(self) -> Array:
+        """(B,) the work done back and forth, about [J]."""
+        _, weights, _ = _rule()
+        return np.einsum("p,m,bpmn->b", 0.5 * np.diff(self.edges), weights, np.abs(self.power))
+
+
+def joint_loads(motion: Motion) -> JointLoads:
+    """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
+    check_object(motion, "Motion", "motion")
+    body, _ = body_and_path(motion)
+    edges = np.union1d(motion.solution.times, motion.deformation.breaks)
+    edges = edges[np.append(True, np.diff(edges) > 1e-12 * motion.duration)]
+    edges[-1] = motion.duration
+    seen: list[_Panels] = []
+
+    def finer() -> Iterator[_Panels]:
+        for one in halved(edges, _MOST_HALVINGS):
+            seen[:] = [_sampled(motion, one)]
+            yield seen[0]
+
+    found = settled(finer(), _difference, _SETTLED) or seen[0]
+    ends = drive(motion, np.array([0.0, motion.duration]))
+    change = ends.energy[:, 1] - ends.energy[:, 0]
+    positive = np.array([[_positive(found, b, k) for k in range(body.n_shape)] for b in range(len(change))])
+    positive = positive.reshape(len(change), body.n_shape)
+    net, moved = found.work, found.moved
+    looked, at = _between(found.torque), _places(found.edges)
+    flat = np.abs(looked).reshape(len(change), at.size, body.n_shape)
+    place = np.argmax(flat, axis=1)
+    single = (*motion.batch, body.n_shape)
+    defect = np.abs(net.sum(axis=1) - change) / np.where(moved > 0.0, moved, 1.0)
+    return JointLoads(
+        joint_names=body.joint_names,
+        joint_units=body.joint_units,
+        mass=body.mass,
+        peak_torque=flat.max(axis=1, initial=0.0).reshape(single),
+        peak_time=at.ravel()[place].reshape(single),
+        peak_rate=np.abs(_between(found.rate[None])).max(axis=(0, 1, 2)),
+        peak_power=np.abs(_between(found.power)).max(axis=(1, 2)).reshape(single),
+        positive_work=positive.reshape(single),
+        negative_work=(net - positive).reshape(single),
+        energy_change=change.reshape(motion.batch)[()],
+        energy_defect=defect.reshape(motion.batch)[()],
+        effort_limits=body.effort_limits,
+        rate_limits=body.rate_limits,
+    )
+
+
+def _difference(last: _Panels, found: _Panels) -> float:
+    """Of the works, as parts of the work done back and forth."""
+    moved = np.where(found.moved > 0.0, found.moved, 1.0)
+    return float(np.max(np.abs(found.work - last.work) / moved[:, None], initial=0.0))
+
+
+def _sampled(motion: Motion, edges: Array) -> _Panels:
+    local, _, _ = _rule()
+    times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * local
+    found: Drive = drive(motion, times.ravel())
+    grid = (*times.shape, found.rate.shape[-1])
+    return _Panels(
+        edges=edges,
+        torque=found.torque.reshape(-1, *grid),
+        power=found.power.reshape(-1, *grid),
+        rate=found.rate.reshape(grid),
+    )
+
+
+def _positive(panels: _Panels, which: int, joint: int) -> float:
+    """The work that a joint does while its power is positive, panels of both signs divided at its zeros [J]."""
+    _, weights, to_series = _rule()
+    power = panels.power[which, :, :, joint]
+    halves = 0.5 * np.diff(panels.edges)
+    looked = power @ (chebyshev(_looks(), _POINTS) @ to_series).T
+    small = _NO_POWER * np.abs(power).max(initial=0.0)
+    both = (looked.min(axis=1) < -small) & (looked.max(axis=1) > small)
+    alike = ~both & (power.sum(axis=1) > 0.0)
+    total = float(halves[alike] @ (power[alike] @ weights))
+    for row in np.flatnonzero(both):
+        coefficients = to_series @ power[row]
+        roots = series.chebroots(coefficients)
+        real = np.sort(roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) < 1.0)])
+        cuts = np.concatenate([[-1.0], real, [1.0]])
+        parts = np.diff(series.chebval(cuts, series.chebint(coefficients)))
+        total += float(halves[row] * parts[parts > 0.0].sum())
+    return total
+
+
+def _between(values: Array) -> Array:
+    """Values at Gauss points as those at the even places of `_looks`: (B, P, m, n) -> (B, P, looks, n)."""
+    _, _, to_series = _rule()
+    return np.einsum("lm,bpmn->bpln", chebyshev(_looks(), _POINTS) @ to_series, values)
+
+
+def _places(edges: Array) -> Array:
+    """The times of those places: (P, looks)."""
+    return 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * _looks()
+
+
+def _looks() -> Array:
+    return np.linspace(-1.0, 1.0, _LOOKS)
+
+
+@lru_cache(maxsize=1)
+def _rule() -> tuple[Array, Array, Array]:
+    """Gauss points of [-1, 1], their weights, and the matrix from values there to Chebyshev coefficients."""
+    local, weights = (np.asarray(one, dtype=np.float64) for one in leggauss(_POINTS))
+    return local, weights, np.asarray(np.linalg.inv(chebyshev(local, _POINTS)), dtype=np.float64)

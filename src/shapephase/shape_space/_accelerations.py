@@ -1,0 +1,78 @@
+"""The second derivatives of shape paths: exact for all known kinds of curves, by the scan's series for functions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array
+from ..chebyshev import PiecewiseChebyshev
+from ..integrator.resolved import ResolvedPath
+from .curves import (
+    Curve,
+    Fourier,
+    Joined,
+    PiecewisePolynomial,
+    Reordered,
+    Repeated,
+    Reversed,
+    Stretched,
+)
+
+
+def exact_accelerations(curve: Curve, times: Array) -> Array | None:
+    """r'' of a curve at times of its interval: (N,) -> (N, n); None where a function of a user is in it.
+
+    At a break it is that of the piece on the right, as rates are.
+    """
+    if isinstance(curve, Fourier):
+        return _fourier(curve, times)
+    if isinstance(curve, PiecewisePolynomial):
+        return _polynomial(curve, times)
+    if isinstance(curve, Reversed):
+        return exact_accelerations(curve.curve, curve.duration - times)
+    if isinstance(curve, Stretched):
+        found = exact_accelerations(curve.curve, np.minimum(times / curve.factor, curve.duration))
+        return None if found is None else found / curve.factor**2
+    if isinstance(curve, Reordered):
+        found = exact_accelerations(curve.curve, times)
+        return None if found is None else found[:, curve.order]
+    if isinstance(curve, Repeated):
+        starts = curve.period * np.arange(curve.count)
+        loop = np.searchsorted(starts, times, side="right") - 1
+        return exact_accelerations(curve.curve, np.minimum(times - starts[loop], curve.period))
+    if isinstance(curve, Joined):
+        late = times >= curve.first_duration
+        inside = np.minimum(times[late] - curve.first_duration, curve.second_duration)
+        first, second = exact_accelerations(curve.first, times[~late]), exact_accelerations(curve.second, inside)
+        if first is None or second is None:
+            return None
+        found = np.empty((len(times), len(curve.offset)))
+        found[~late], found[late] = first, second
+        return found
+    return None
+
+
+def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> Array:
+    """The same by the derivative of the series of the rates, of a path in loops from those of the first: (N, n)."""
+    rows = resolved.leaves
+    n_shape = resolved.coefficients.shape[2] // 2
+    edges = np.append(resolved.left[rows], resolved.right[rows[-1]])
+    rates = PiecewiseChebyshev(edges, resolved.coefficients[rows][:, :, n_shape:])
+    loop = np.minimum(np.floor(times / resolved.duration), loops - 1)
+    return rates.derivative()(times - loop * resolved.duration)
+
+
+def _fourier(curve: Fourier, times: Array) -> Array:
+    harmonics = 2.0 * np.pi / curve.period * np.arange(1, curve.cosines.shape[1] + 1)
+    phase = times[:, None] * harmonics
+    squares = harmonics**2
+    return -(np.cos(phase) @ (curve.cosines * squares).T + np.sin(phase) @ (curve.sines * squares).T)
+
+
+def _polynomial(curve: PiecewisePolynomial, times: Array) -> Array:
+    piece = np.searchsorted(curve.knots[1:-1], times, side="right")
+    since = (times - curve.knots[piece])[:, None]
+    found = np.zeros((len(times), curve.coefficients.shape[2]))
+    for power in range(len(curve.coefficients) - 1, 1, -1):
+        found = found * since + power * (power - 1) * curve.coefficients[power, piece]
+    return found
