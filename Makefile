@@ -1,9 +1,9 @@
 # The checks of .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test times notebooks docs full lowest fuzz bench
+.PHONY: check lint types imports test deaths times notebooks docs full lowest fuzz bench
 
-check: lint types imports test docs
+check: lint types imports test deaths docs
 
 lint:
 	$(BIN)/ruff check .
@@ -18,6 +18,10 @@ imports:
 
 test:
 	$(BIN)/pytest -n auto -m "not full"
+
+# A study of 2,000 cases whose worker, scheduler and driver are killed, in a minute of processor time.
+deaths:
+	$(BIN)/pytest -n 0 tests/study/test_cluster.py -k two_thousand
 
 # What each quick test takes of the processor, and the budget.
 times:

@@ -45,6 +45,11 @@ def test_a_wrong_argument_gets_a_sentence(name, monkeypatch, tmp_path):
     assert not faults(name)
 
 
+@pytest.mark.parametrize("name", QUICK[:3])
+def test_the_calls_of_an_example_are_found(name):
+    assert name.rpartition(".")[2] in [call.place.rpartition(".")[2] for call in example_calls(name, NAMES[name])]
+
+
 def test_what_came_is_shown_in_a_line():
     path = sp.examples.kane_scher(0.3, 1.0)
     assert what_came(path) == "a ShapePath"

@@ -34,6 +34,7 @@ SHALL = {
     "plan cat_two_halves --rotate 5 --starts 9000": ["starts: a whole number, up to 1000", "got 9000"],
     "explore cat": ["--joints is needed; for example `--joints waist_pitch waist_yaw`"],
     "sweep study.toml": ["--store is needed; for example `--store out.zarr`"],
+    "plot sweep out.zarr": ["OUTPUT is missing", "`shapephase plot sweep STORE OUTPUT [OPTIONS]`"],
     "explore cat --joints waist_pitch": ["--joints: 2 values", "`--joints waist_pitch waist_yaw`"],
     "split cat_righting cat": ["cat_righting is a motion; the body comes before it"],
     "check motion.csv body.urdf": ["motion.csv is a motion; the body comes before it"],

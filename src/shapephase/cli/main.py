@@ -31,7 +31,7 @@ from .outcome import Outcome
 from .pictures import plot_command, view_command
 from .plan import plan_command
 from .split import split_command
-from .sweep import sweep_app
+from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
 from .texts.usage import usage_message
 from .torques import torques_command
@@ -47,7 +47,10 @@ app = App(
 app.command(split_command, name="split")
 app.command(torques_command, name="torques")
 app.command(view_command, name="view")
-app.command(plot_command, name="plot")
+plot_app = App(name="plot")
+plot_app.default(plot_command)
+plot_app.command(plot_study_command, name="sweep")
+app.command(plot_app)
 app.command(explore_command, name="explore")
 app.command(plan_command, name="plan")
 app.command(conjugate_command, name="conjugate")

@@ -1,4 +1,4 @@
-"""`shapephase sweep`: a study of very many cases from a file, what its store holds, and the store in other formats."""
+"""`shapephase sweep`: a study of very many cases from a file, what its store holds, in other formats, and figures."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from ..errors import ShapeError
+from ..files import write_whole
 from ..run_progress import RunProgress
-from .options import AS_TEXT, PrintOptions
+from .options import AS_TEXT, FigureFile, PrintOptions
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import Verbosity, say, say_written
@@ -24,6 +25,8 @@ sweep_app = App(name="sweep", help_format="markdown")
 # [s] From there on remaining time is said in minutes, and in hours.
 _MINUTES = 120.0
 _HOURS = 7200.0
+# [in] Of a figure of a study.
+_HEIGHT = 2.8
 
 
 @sweep_app.default
@@ -129,6 +132,51 @@ def export_command(
     export_study(open_study(store), out)
     say_written(out)
     return Outcome("", {"file": str(out)})
+
+
+def plot_study_command(
+    store: str,
+    output: str,
+    /,
+    *,
+    out: FigureFile,
+    kind: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="What is drawn, a histogram, quantiles along a grid, or a map over two, without unit; else what the "
+            "study's grids permit. For example `--kind quantiles`.",
+        ),
+    ] = None,
+    along: Annotated[
+        list[str] | None,
+        Parameter(
+            show_default=False,
+            help="A grid that is an axis of the figure, without unit, once or twice; else the first. For example "
+            "`--along momentum_z`.",
+        ),
+    ] = None,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """Draw one output of a study, one column wide: how it is spread, its quantiles along a grid, or a map over two.
+
+    Parameters
+    ----------
+    store
+        The folder; for example `out.zarr`.
+    output
+        What is drawn, an output of the study, or an entry such as `final_attitude_0_1`; for example `turn`.
+    """
+    from ..plotting.plot_style import axes_image, column_axes
+    from ..study.figures import plot_study
+    from ..study.store import open_study
+
+    check_writable(out, "--out", ".svg", ".pdf", ".png")
+    ax = plot_study(column_axes(_HEIGHT), open_study(store), output, kind=kind, along=along or ())
+    image = axes_image(ax, out.suffix.removeprefix(".").lower())
+    write_whole(out, lambda stream: stream.write(image))
+    say_written(out)
+    return Outcome("", {"figure": str(out)})
 
 
 def progress_line(now: StudyProgress) -> str:

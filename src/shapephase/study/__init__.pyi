@@ -3,6 +3,7 @@ from .case import Case
 from .connection import connected
 from .distributions import Choice, Directions, LogNormal, Normal, Rotations, Uniform
 from .export import export_study
+from .figures import plot_study
 from .outputs import OUTPUTS, Output
 from .progress import StudyProgress
 from .store import STATUS, StudyStore, open_study
@@ -27,5 +28,6 @@ __all__ = [
     "connected",
     "export_study",
     "open_study",
+    "plot_study",
     "read_study",
 ]

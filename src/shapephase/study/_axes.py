@@ -13,6 +13,7 @@ from ..arguments import tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..deformation.frames import gauge_link
 from ..errors import StudyError, unknown_name
+from ..letters import what_came
 from .distributions import Distribution, Normal, drawn_values
 
 COMPONENTS = ("momentum_x", "momentum_y", "momentum_z")
@@ -86,10 +87,7 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
     if lead not in (*UNITS, *LABELS) and name not in parameters:
         raise unknown_name("axis in over", name, (*UNITS, *LABELS, *parameters))
     if name in LABELS:
-        if isinstance(given, str) or not isinstance(given, Sequence):
-            raise StudyError(f"over.{name}: a list of names is needed, got {type(given).__name__}")
-        if not len(given):
-            raise StudyError(f"over.{name}: a grid needs one value or more")
+        check_labels(name, given)
         if name == "gauge":
             for one in given:
                 gauge_link(one)
@@ -103,7 +101,7 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
     try:
         size = len(given)
     except TypeError:
-        raise StudyError(f"over.{name}: a grid of values or a distribution is needed, got {given!r}") from None
+        raise StudyError(f"over.{name}: a grid of values or a distribution is needed, got {what_came(given)}") from None
     if not size:
         raise StudyError(f"over.{name}: a grid needs one value or more")
     values = finite_array(given, f"over.{name}")
@@ -119,6 +117,14 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
         for one in values.tolist():
             tolerance_argument(one)
     return Axis(name, shape, values, None)
+
+
+def check_labels(name: str, given: object) -> None:
+    """Raise StudyError for what is no list of one label or more."""
+    if isinstance(given, str) or not isinstance(given, Sequence):
+        raise StudyError(f"over.{name}: a list of names is needed, got {what_came(given)}")
+    if not len(given):
+        raise StudyError(f"over.{name}: a grid needs one value or more")
 
 
 def start_attitudes(values: Array, base: Array | None) -> Array:

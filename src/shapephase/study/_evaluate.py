@@ -62,11 +62,10 @@ class Results:
     error_text: Any
 
     @classmethod
-    def empty(cls, study: Study, indices: Integers) -> Results:
-        """Of cases of which nothing is known yet but what they are."""
-        count = len(indices)
-        axes = study.axis_values(indices)
-        numbers = {}
+    def empty(cls, study: Study, indices: Integers, axes: dict[str, Any] | None = None) -> Results:
+        """Of cases of which nothing is known yet but what they are, and if it is given what is varied in them."""
+        count, numbers = len(indices), {}
+        axes = study.axis_values(indices) if axes is None else axes
         for axis in study.axes:
             own = axes[axis.name]
             if isinstance(axis.grid, tuple):
@@ -114,8 +113,8 @@ class Evaluator:
 
     def together(self, indices: Integers) -> Results:
         """All cases, by batches where that is possible."""
-        found = Results.empty(self.study, indices)
-        cases = self.study.some_cases(indices)
+        values = self.study.axis_values(indices)
+        found, cases = Results.empty(self.study, indices, values), self.study.some_cases(indices, values)
         for rows in _groups(cases):
             try:
                 self._group([cases[row] for row in rows], rows, found)

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import examples
-from ..arguments import inertia_argument, positive_argument
+from ..arguments import inertia_argument, number_argument, positive_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.catalog import load_body
 from ..display import short_repr
-from ..errors import InputFileNotFoundError, ShapeError, StudyError, unknown_name
+from ..errors import InputFileNotFoundError, ShapeError, StudyError, WrongObjectError, unknown_name
 from ..examples.scenarios import MOTIONS
+from ..letters import what_came
 from ..shape_space.files.read import read_shape_path
 from ..shape_space.shape_path import ShapePath
 
@@ -61,6 +62,32 @@ class RigidBody:
 
 BodySource = str | os.PathLike[str] | RigidBody
 MotionSource = str | os.PathLike[str] | Callable[..., ShapePath]
+
+
+def check_body(value: object) -> None:
+    """Raise WrongObjectError for what is no recipe of a body."""
+    if not isinstance(value, str | os.PathLike | RigidBody):
+        raise WrongObjectError(
+            f"body: a name, a file or a RigidBody is needed, got {what_came(value)}: a study is sent to other "
+            "processes, which load the body themselves"
+        )
+
+
+def check_motion(value: object) -> None:
+    """Raise WrongObjectError for what is no recipe of a motion."""
+    if not isinstance(value, str | os.PathLike) and (not callable(value) or isinstance(value, type)):
+        raise WrongObjectError(
+            f"motion: a name, a file or a function that makes a path is needed, got {what_came(value)}: a study is "
+            "sent to other processes, which make the path themselves"
+        )
+
+
+def check_parameters(given: object) -> None:
+    """Raise WrongObjectError, ShapeError for what are no named numbers."""
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise WrongObjectError(f"parameters: numbers by their names, a dict, are needed, got {what_came(given)}")
+    for name, value in given.items():
+        number_argument(value, f"parameters.{name}")
 
 
 def made_path(source: MotionSource, body: Body, parameters: Mapping[str, float]) -> ShapePath:

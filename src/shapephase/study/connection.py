@@ -7,7 +7,8 @@ import logging
 from collections.abc import Iterator
 from typing import Any
 
-from ..errors import MissingExtraError, SchedulerLostError
+from ..errors import MissingExtraError, SchedulerLostError, WrongObjectError
+from ..letters import what_came
 
 # [s] A scheduler that has not answered by then will not.
 _PATIENCE = 20.0
@@ -36,6 +37,8 @@ def connected(address: str) -> Iterator[Any]:
         from distributed import Client
     except ImportError:
         raise MissingExtraError("a cluster needs Dask; install it with: pip install 'shapephase[study]'") from None
+    if not isinstance(address, str):
+        raise WrongObjectError(f"address: a text such as tcp://10.0.0.1:8786 is needed, got {what_came(address)}")
     # What it says of lost connections is said by one error.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import check_file_name, check_object
 from ..errors import MissingExtraError, UnknownNameError
 from ..files import write_whole
 from .store import STATUS, StudyStore
@@ -39,6 +40,8 @@ def export_study(store: StudyStore, path: str | os.PathLike[str]) -> None:
     ...     print(file.readline().strip())
     case,status,momentum_z,turn,error
     """
+    check_object(store, "StudyStore", "store")
+    check_file_name(path, "path")
     place = Path(path)
     ending = place.suffix.lower()
     if ending == ".nc":

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from .. import so3
+from ..arguments import check_choice, check_function
 from ..arrays import Array
 from ..display import short_repr
-from ..errors import StudyError, unknown_name
+from ..errors import StudyError, WrongObjectError
+from ..letters import what_came
 from ..phases.phase_split import PhaseSplit
 from ..phases.return_map import fixed_points
 from ..reconstruction.reconstruction import Motion
@@ -48,6 +50,16 @@ class Output:
     about: str = ""
 
     __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Check what came. Raises WrongObjectError, StudyError."""
+        check_function(self.function, "function", "a function of a Motion")
+        for name in ("name", "unit", "about"):
+            if not isinstance(text := getattr(self, name), str):
+                raise WrongObjectError(f"{name}: a text is needed, got {what_came(text)}")
+        whole = isinstance(self.shape, tuple) and all(isinstance(one, int) and one > 0 for one in self.shape)
+        if not whole:
+            raise StudyError(f"shape: a tuple of whole numbers above 0 is needed, got {what_came(self.shape)}")
 
     def of(self, motion: Motion, parts: PhaseSplit | None) -> Array:
         """Its value. Raises StudyError for another shape."""
@@ -124,14 +136,15 @@ Examples
 
 def outputs_argument(given: Sequence[str | Output], taken: Sequence[str]) -> tuple[Output, ...]:
     """The outputs of a study; `taken` are names that its arrays have already. Raises UnknownNameError, StudyError."""
-    found = []
+    found: list[Output] = []
+    if not isinstance(given, Sequence):
+        raise WrongObjectError(f"outputs: names, or Output of a function, in a list are needed, got {what_came(given)}")
     for one in (given,) if isinstance(given, str) else given:
         if isinstance(one, Output):
             found.append(one)
-        elif one in OUTPUTS:
-            found.append(OUTPUTS[one])
         else:
-            raise unknown_name("output", str(one), OUTPUTS)
+            check_choice(one, "output", OUTPUTS)
+            found.append(OUTPUTS[one])
     names = [output.name for output in found]
     if not found:
         raise StudyError("outputs: at least one is needed")

@@ -17,9 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import check_file_name, check_object
 from ..arrays import Integers
 from ..errors import MissingExtraError, RunStopped, StudyError, StudyStoreError
 from ..integrator.fast.switch import is_allowed
+from ..letters import what_came
 from ._evaluate import DONE, Evaluator, Results
 from ._processor import processor_text
 from ._workers import CaseWorker
@@ -47,8 +49,11 @@ def run_study(
     progress: Callable[[StudyProgress], Any] | None,
 ) -> StudyStore:
     """As `Study.run`."""
+    check_file_name(store, "store")
+    if client is not None:
+        check_object(client, "Client", "client")
     if workers is not None and (client is not None or not isinstance(workers, int) or workers < 0):
-        raise StudyError(f"workers: a whole number, 0 or more, is needed, without a client; got {workers!r}")
+        raise StudyError(f"workers: a whole number, 0 or more, is needed, without a client; got {what_came(workers)}")
     if workers == 0 and study.time_limit is not None:
         raise StudyError("time_limit: only a process of its own can be stopped; give one worker or more")
     target = _target(study, store, resume)

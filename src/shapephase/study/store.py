@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arguments import check_choice, check_file_name
 from ..arrays import Integers
 from ..display import short_repr
 from ..errors import MissingExtraError, OutputFileError, StudyStoreError
@@ -39,6 +40,8 @@ Examples
 >>> sp.study.STATUS["done"]
 1
 """
+_OF_EVERY_STUDY = ("status", "error_name", "error_text", "processor")
+"""Names of arrays."""
 _PROCESSOR_LENGTH = 96
 """Of what a chunk was computed by [bytes]."""
 _PINNED = ("shapephase", "numpy", "scipy", "pin", "python")
@@ -73,8 +76,8 @@ class StudyStore:
         return int(self.attributes["cases"])
 
     def values(self, name: str) -> Any:
-        """An array of the store, of all cases, in memory."""
-        return self._group[name][...]
+        """An array of the store, of all cases, in memory. Raises UnknownNameError."""
+        return self._array(name)[...]
 
     def statuses(self) -> Any:
         """(cases,) whole numbers as in `STATUS`."""
@@ -93,10 +96,9 @@ class StudyStore:
 
     def errors(self, most: int = 20) -> list[tuple[int, str, str]]:
         """The first cases without results: index, name of the error, what it said."""
-        group = self._group
         found = []
         for index in np.flatnonzero(self.statuses() > DONE)[:most].tolist():
-            said = (bytes(np.asarray(group[name][index])).rstrip(b"\0") for name in ("error_name", "error_text"))
+            said = (bytes(np.asarray(self._array(name)[index])).rstrip(b"\0") for name in ("error_name", "error_text"))
             found.append((index, *(text.decode(errors="ignore") for text in said)))
         return found
 
@@ -135,16 +137,16 @@ class StudyStore:
 
     def write(self, number: int, results: Results, processor: str) -> None:
         """Store a chunk; the status comes last. Raises OutputFileError."""
-        group, first = self._group, number * int(self.attributes["chunk"])
+        first = number * int(self.attributes["chunk"])
         part = slice(first, first + len(results.status))
         with _disk_faults(self.path):
             for name, values in {**results.values, **results.axes}.items():
-                group[name][part] = values
+                self._array(name)[part] = values
             if np.any(results.status > DONE):
-                group["error_name"][part] = results.error_name
-                group["error_text"][part] = results.error_text
-            group["processor"][number] = _letters(processor, _PROCESSOR_LENGTH)
-            group["status"][part] = results.status
+                self._array("error_name")[part] = results.error_name
+                self._array("error_text")[part] = results.error_text
+            self._array("processor")[number] = _letters(processor, _PROCESSOR_LENGTH)
+            self._array("status")[part] = results.status
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -156,6 +158,17 @@ class StudyStore:
                 if error.errno in (errno.EAGAIN, errno.EACCES):
                     raise StudyStoreError(f"{self.path}: another run is writing to this store") from None
             yield
+
+    def _array(self, name: str) -> Any:
+        """One array of the store, opened once."""
+        if not isinstance(name, str) or name not in self._arrays:
+            check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
+            self._arrays[name] = self._group[name]
+        return self._arrays[name]
+
+    @cached_property
+    def _arrays(self) -> dict[str, Any]:
+        return {}
 
     @cached_property
     def _group(self) -> Any:
@@ -179,6 +192,7 @@ def open_study(path: str | os.PathLike[str]) -> StudyStore:
     >>> sp.study.open_study("opened.zarr").counts()["done"]
     3
     """
+    check_file_name(path, "path")
     place = Path(path)
     if not place.exists():
         raise StudyStoreError(f"{place}: there is no store of a study")

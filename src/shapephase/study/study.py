@@ -15,18 +15,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import tolerance_argument, vector_argument
+from ..arguments import check_function, number_argument, tolerance_argument, vector_argument
 from ..arrays import Array, Integers
 from ..body.catalog import load_body
 from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError
-from ._axes import COMPONENTS, LABELS, OF_PARTS, UNITS, Axis, checked_axis, start_attitudes
+from ..letters import what_came
+from ._axes import COMPONENTS, LABELS, OF_PARTS, UNITS, Axis, check_labels, checked_axis, start_attitudes
 from ._recipes import (
     BodySource,
     MotionSource,
     RigidBody,
     body_fingerprint,
+    check_body,
+    check_motion,
+    check_parameters,
     described,
     fingerprint,
     inertia_factors,
@@ -108,6 +112,7 @@ class Study:
 
     def __post_init__(self) -> None:
         """Check what came."""
+        check_parameters(self.parameters)
         for name, most in (("draws", MOST_CASES), ("chunk", MOST_OF_A_CHUNK), ("seed", None)):
             _check_whole(name, getattr(self, name), 0 if name == "seed" else 1, most)
         object.__setattr__(self, "momentum", vector_argument(self.momentum, "momentum", unit="kg m^2/s"))
@@ -115,8 +120,8 @@ class Study:
             so3.quat_argument(self.attitude, "attitude")
         tolerance_argument(self.tolerance)
         gauge_link(self.gauge)
-        if self.time_limit is not None and not 0.0 < self.time_limit < math.inf:
-            raise StudyError(f"time_limit: seconds above 0 are needed, got {self.time_limit!r}")
+        if self.time_limit is not None and not number_argument(self.time_limit, "time_limit", "s") > 0.0:
+            raise StudyError(f"time_limit: seconds above 0 are needed, got {what_came(self.time_limit)}")
         if self.cases > MOST_CASES:
             raise StudyError(f"{self.cases} cases; at most {MOST_CASES} fit into one study")
         _ = self.resolved_outputs, self.inputs
@@ -129,7 +134,16 @@ class Study:
     def axes(self) -> tuple[Axis, ...]:
         """What is varied, in its order."""
         if not isinstance(self.over, Mapping):
-            raise StudyError(f"over: names and what they are varied by are needed, got {type(self.over).__name__}")
+            raise StudyError(f"over: names and what they are varied by are needed, got {what_came(self.over)}")
+        for name in self.over:
+            if not isinstance(name, str):
+                raise StudyError(f"over: a name is needed for what is varied, got {what_came(name)}")
+            if name in LABELS:
+                check_labels(name, self.over[name])
+        for source in self._bodies:
+            check_body(source)
+        for source in self._motions:
+            check_motion(source)
         self._check_motions()
         rigid = isinstance(self.body, RigidBody)
         not_for_rigid = ("motion", "joint_noise", "masses", "centres", "inertias")
@@ -204,13 +218,13 @@ class Study:
 
     def case(self, index: int) -> Case:
         """The numbers of one case. Raises StudyError for an index that there is not."""
-        if not 0 <= index < self.cases:
-            raise StudyError(f"case {index}: there are {self.cases}, from 0 on")
+        if not isinstance(index, int | np.integer) or not 0 <= index < self.cases:
+            raise StudyError(f"case {what_came(index)}: there are {self.cases}, from 0 on")
         return self.some_cases(np.array([index]))[0]
 
-    def some_cases(self, indices: Integers) -> list[Case]:
-        """The numbers of some cases."""
-        values = self.axis_values(indices)
+    def some_cases(self, indices: Integers, values: Mapping[str, Any] | None = None) -> list[Case]:
+        """The numbers of some cases; `values` are their `axis_values`, where these are known."""
+        values = self.axis_values(indices) if values is None else values
         momentum = np.tile(np.asarray(self.momentum, dtype=float), (len(indices), 1))
         momentum = np.asarray(values.get("momentum", momentum), dtype=float)
         for column, name in enumerate(COMPONENTS):
@@ -289,6 +303,8 @@ class Study:
         """
         from .run import run_study
 
+        if progress is not None:
+            check_function(progress, "progress", "a function that takes a StudyProgress")
         return run_study(self, store, client, workers=workers, resume=resume, progress=progress)
 
     @property
@@ -359,7 +375,7 @@ def _check_whole(name: str, value: Any, least: int, most: int | None) -> None:
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or value < least or (most is not None and value > most):
         limit = f"from {least}" + ("" if most is None else f" to {most}")
-        raise StudyError(f"{name}: a whole number {limit} is needed, got {value!r}")
+        raise StudyError(f"{name}: a whole number {limit} is needed, got {what_came(value)}")
 
 
 def _plain(value: Any) -> Any:

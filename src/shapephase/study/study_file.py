@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import check_file_name
 from ..arrays import Array, finite_array
 from ..errors import InputFileNotFoundError, ShapePhaseError, StudyError, unknown_name
 from ._axes import LABELS, UNITS, unit_of
@@ -62,6 +63,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     >>> study.cases, round(study.case(4).parameters["beta"], 6)
     (5, 1.047198)
     """
+    check_file_name(path, "path")
     place = Path(path)
     try:
         with open(place, "rb") as stream:

@@ -1,0 +1,215 @@
+"""What a study costs beside the library's own batches: `python -m benchmarks.studies [--turns N] [--million]`.
+
+Costs are processor time of all processes taken together, in turns. A study of one process is run with few and with many
+cases, and the difference counts, so that starting a process is not in it; so is the store. Two processes are measured
+by the clock between chunks, side by side with two that know nothing of each other.
+
+    --turns N    how often everything is measured (default 5)
+    --million    also 10^6 cases of a rigid body, and the memory of the process that runs them
+"""
+
+from __future__ import annotations
+
+import os
+
+for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_pool, "1")
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import shapephase as sp
+
+CHUNK = 500
+"""Cases, as a study has them by default."""
+_FEW, _MANY = 2, 8
+"""Chunks of the short and of the long study of one process."""
+_SIDE_BY_SIDE = 12
+"""Chunks that two processes share."""
+_MILLION = 1_000_000
+_CHUNK_OF_MILLION = 5000
+_SPREAD = 0.1
+"""Of the logarithm of masses and inertias."""
+_MOMENTUM = sp.study.Normal([1.0, 2.0, 3.0], 2.0)
+_SMALL_MOMENTUM = sp.study.Normal([0.0, 0.0, 0.01], 0.004)
+
+
+@dataclass(frozen=True)
+class Workload:
+    """A study of so many cases, and the same cases in one call of the library."""
+
+    study: Callable[[int], sp.study.Study]
+    batch: Callable[[list[sp.study.Case]], object]
+
+
+def _astronaut(draws: int) -> sp.study.Study:
+    over = {"momentum": _MOMENTUM, "masses": sp.study.LogNormal(_SPREAD), "inertias": sp.study.LogNormal(_SPREAD)}
+    return sp.study.Study("astronaut", "astronaut_leg_swing", over, draws=draws, chunk=CHUNK)
+
+
+def _family(cases: list[sp.study.Case]) -> object:
+    body, path = sp.load_body("astronaut"), sp.examples.named_motion("astronaut_leg_swing")
+    masses = np.array([part.mass for part in body.moving_parts])
+    tensors = np.array([part.inertia for part in body.moving_parts])
+    factors = np.array([case.masses for case in cases])
+    own = np.array([case.inertias for case in cases]) * factors
+    family = body.with_inertias(masses=factors * masses, inertias=own[..., None, None] * tensors)
+    momenta = np.array([case.momentum for case in cases])
+    return sp.reconstruct(sp.articulated(family, path), momenta, threads=1).final_attitude
+
+
+def _cat(draws: int) -> sp.study.Study:
+    return sp.study.Study("cat", "cat_righting", {"momentum": _SMALL_MOMENTUM}, draws=draws, chunk=CHUNK)
+
+
+def _momenta(cases: list[sp.study.Case]) -> object:
+    deformation = sp.articulated(sp.load_body("cat"), sp.examples.named_motion("cat_righting"))
+    return sp.reconstruct(deformation, np.array([case.momentum for case in cases]), threads=1).final_attitude
+
+
+def _bends(draws: int) -> sp.study.Study:
+    over = {"beta": sp.study.Uniform(0.3, 1.2), "momentum": _SMALL_MOMENTUM}
+    return sp.study.Study("cat_two_halves", "kane_scher", over, draws=draws, chunk=CHUNK, parameters={"alpha": 0.0})
+
+
+def _paths(cases: list[sp.study.Case]) -> object:
+    paths = (sp.examples.kane_scher(**case.parameters) for case in cases)
+    momenta = np.array([case.momentum for case in cases])
+    return sp.final_attitudes(sp.load_body("cat_two_halves"), paths, momenta).attitude
+
+
+WORKLOADS = {
+    "astronauts, a family of bodies": Workload(_astronaut, _family),
+    "momenta of the cat": Workload(_cat, _momenta),
+    "paths of the cat of two halves": Workload(_bends, _paths),
+}
+
+
+def print_costs(turns: int) -> None:
+    """What a case costs in chunks of one process, beside one batch of as many (target: 1.3 times)."""
+    print(f"\nprocessor time of a case [ms], chunks of {CHUNK} in one process and one batch")
+    for name, workload in WORKLOADS.items():
+        cases = workload.study(CHUNK * (_MANY - _FEW)).some_cases(np.arange(CHUNK * (_MANY - _FEW)))
+        workload.batch(cases[:2])
+        found = []
+        for _ in range(turns):
+            few, many = (_study_seconds(workload.study(CHUNK * chunks)) for chunks in (_FEW, _MANY))
+            began = time.process_time()
+            workload.batch(cases)
+            found.append([many - few, time.process_time() - began])
+        ours, batch = 1e3 * np.median(found, axis=0) / len(cases)
+        ratios = np.divide(*np.transpose(found))
+        print(f"  {name:32}{ours:8.3f}{batch:8.3f}   {_spread(ratios)}", flush=True)
+
+
+def _study_seconds(study: sp.study.Study) -> float:
+    """Processor time of a study by one process, this one and its own together."""
+    with tempfile.TemporaryDirectory() as folder:
+        before = _used()
+        store = study.run(Path(folder) / "out.zarr", workers=1)
+        taken = _used() - before
+        assert store.counts()["done"] == study.cases
+    return taken
+
+
+def _used() -> float:
+    """[s] of processor time, of this process and of those that it has ended."""
+    taken = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in taken)
+
+
+def print_two_processes(turns: int) -> None:
+    """Cases in a second of a study by two processes, beside two processes on their own (target: 0.85)."""
+    print("\ncases in a second by the clock: a study by two processes, and two that know nothing of each other")
+    for name in WORKLOADS:
+        found = [[_rate_of_study(name), _rate_on_their_own(name)] for _ in range(turns)]
+        ours, theirs = np.median(found, axis=0)
+        print(f"  {name:32}{ours:8.0f}{theirs:8.0f}   {_spread(np.divide(*np.transpose(found)))}", flush=True)
+
+
+def _rate_of_study(name: str) -> float:
+    """From when both have given a chunk until the last but one is stored: what one does alone is left out."""
+    study = WORKLOADS[name].study(CHUNK * (_SIDE_BY_SIDE + 4))
+    stored: list[float] = []
+
+    def note(_: sp.study.StudyProgress) -> None:
+        stored.append(time.perf_counter())
+
+    with tempfile.TemporaryDirectory() as folder:
+        study.run(Path(folder) / "out.zarr", workers=2, progress=note)
+    return CHUNK * _SIDE_BY_SIDE / (stored[-2] - stored[-2 - _SIDE_BY_SIDE])
+
+
+def _rate_on_their_own(name: str) -> float:
+    """Each says that it is ready, waits for the other, and computes half of the chunks by batches."""
+    command = [sys.executable, "-m", "benchmarks.studies", "--alone", name]
+    pair = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    for process in pair:
+        assert process.stdout is not None
+        process.stdout.readline()
+    for process in pair:
+        assert process.stdin is not None
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    taken = [float(process.communicate()[0]) for process in pair]
+    return sum(CHUNK * _SIDE_BY_SIDE / 2 / seconds for seconds in taken)
+
+
+def alone(name: str) -> None:
+    """One of those two."""
+    workload = WORKLOADS[name]
+    study = workload.study(CHUNK * _SIDE_BY_SIDE)
+    workload.batch(study.some_cases(np.arange(CHUNK)))
+    print("ready", flush=True)
+    sys.stdin.readline()
+    began = time.perf_counter()
+    for number in range(_SIDE_BY_SIDE // 2):
+        workload.batch(study.some_cases(np.arange(*study.chunk_range(number))))
+    print(time.perf_counter() - began)
+
+
+def print_million() -> None:
+    """The memory of the process that runs a million cases (target: 500 MB), and what it costs that process."""
+    rigid = sp.study.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0)
+    over = {"momentum": sp.study.Directions(1.0)}
+    study = sp.study.Study(rigid, over=over, draws=_MILLION, chunk=_CHUNK_OF_MILLION)
+    print(f"\n{_MILLION} cases of a rigid body, two processes, chunks of {_CHUNK_OF_MILLION}")
+    with tempfile.TemporaryDirectory() as folder:
+        before = time.process_time()
+        store = study.run(Path(folder) / "out.zarr", workers=2)
+        print(f"  done {store.counts()['done']}, the driver's processor time {time.process_time() - before:.1f} s")
+    peaks = (resource.getrusage(who).ru_maxrss / 1024.0 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    print("  memory at most: driver {:.0f} MB, one of its processes {:.0f} MB".format(*peaks), flush=True)
+
+
+def _spread(ratios: np.ndarray) -> str:
+    return f"ratio {np.median(ratios):5.2f}   from {ratios.min():5.2f} to {ratios.max():5.2f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.studies")
+    parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--million", action="store_true")
+    parser.add_argument("--alone", help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.alone:
+        alone(given.alone)
+        return
+    if given.million:
+        # Before all else: peaks of memory are those since the process began.
+        print_million()
+    print_costs(given.turns)
+    print_two_processes(given.turns)
+
+
+if __name__ == "__main__":
+    main()
