@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 KINDS = ("histogram", "quantiles", "map")
 # Bins of a histogram: 2 n^(1/3) after Rice, but no more than a column shows.
-_FEWEST_BINS, _MOST_BINS = 10, 120
+_FEWEST_BINS = 10
+_MOST_BINS = 120
 # The bands of quantiles: half and nine tenths of the cases are in them.
 _HALF = (0.25, 0.75)
 _MOST = (0.05, 0.95)
