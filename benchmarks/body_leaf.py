@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 import shapephase as sp
-from shapephase.body._link_tree import Mimic
+from shapephase.body import Coupling
 from shapephase.body.body import Body
 from shapephase.body.joint_chain import JointChain
 from shapephase.integrator.fast.tree import tree_channels, tree_inertia_and_momentum
@@ -128,7 +128,7 @@ def random_body(rng: np.random.Generator, *, far: bool) -> sp.Body:
             mimics[name] = str(rng.choice(leaders)), float(rng.normal()), float(rng.normal())
         else:
             leaders.append(name)
-    rules = {name: Mimic(*rule) for name, rule in mimics.items()}
+    rules = {name: Coupling.linear(*rule) for name, rule in mimics.items()}
     return Body(model, "random", rules)
 
 

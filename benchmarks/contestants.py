@@ -59,7 +59,7 @@ class FloatingModel:
         self.q, self.v = pin.neutral(self.model), np.zeros(self.model.nv)
         self._path = scalar_path(case.path)
         joints = self._joints = body._joints
-        self._plain = joints._plain and not body.continuous.any()
+        self._plain = joints.follows.is_identity and not body.continuous.any()
         self._q_joint, self._v_joint = joints._configuration_index, 6 + joints._velocity_index
 
     def set(self, t: float) -> None:
@@ -69,7 +69,7 @@ class FloatingModel:
             self.q[self._q_joint], self.v[self._v_joint] = r, rate
         else:
             self.q[:] = self._joints.configurations(r[None])[0]
-            self.v[:] = self._joints.velocities(rate[None])[0]
+            self.v[:] = self._joints.velocities(r[None], rate[None])[0]
 
 
 def solve_ivp_attitude(case: Case, rtol: float, atol: float | None = None) -> tuple[np.ndarray, int]:

@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.body import catalog
+from shapephase.body import Coupling, catalog
 from shapephase.body._cross_check import check_against_file, inertia_and_momentum
-from shapephase.body._link_tree import LinkTree, Mimic
+from shapephase.body._link_tree import LinkTree
 from shapephase.body.formats.urdf import urdf_tree
 from shapephase.body.formats.xml_text import xml_tree
 from shapephase.errors import ModelFileError, ShapePhaseError
@@ -233,7 +233,7 @@ def test_a_body_that_differs_from_its_file_in_anything_is_refused():
         changed(tree, joint=one.name, kind="fixed"),
         changed(tree, joint=one.name, name="another"),
         replace(tree, links={**tree.links, "lost": replace(head, name="lost", mass=0.0)}),
-        replace(tree, mimics={joint_names[0]: Mimic(joint_names[1], 1.0, 0.0)}),
+        replace(tree, couplings={joint_names[0]: Coupling.linear(joint_names[1], 1.0)}),
     ]
     for other in differing:
         with pytest.raises(ModelFileError, match=r"cat\.urdf:1: the body made from this file has another"):

@@ -99,7 +99,7 @@ def test_it_is_the_derivative_at_its_own_body(body, rng):
 def _sampled(body: Body, model: pin.Model, shape: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """I (xx yy zz yz xz xy) and L_o by Pinocchio's own centroidal map of a model."""
     q = body._joints.configurations(shape)[0]
-    v = body._joints.velocities(rate)[0]
+    v = body._joints.velocities(shape, rate)[0]
     data = model.createData()
     pin.ccrba(model, data, q, v)
     return np.concatenate([np.array(data.Ig.inertia).ravel()[[0, 4, 8, 5, 2, 1]], data.hg.angular])

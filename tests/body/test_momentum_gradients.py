@@ -17,7 +17,7 @@ def test_by_shape_and_rate(body, rng):
     shapes, rates = random_shapes(body, rng, count), rng.normal(size=(count, n))
     spins, rows = rng.normal(size=(count, 2, 3)), rng.normal(size=(count, 2, 4, 3))
     links = link_motions(body.chain, shapes, rates)
-    by_shape, by_rate = by_shape_and_rate(body.chain, links, rates, spins, rows)
+    by_shape, by_rate = by_shape_and_rate(body.chain, links, shapes, rates, spins, rows)
     gradients = [body.angular_momentum_gradient(shapes, rates, spins[:, k]) for k in range(2)]
     expected = np.concatenate([rows[:, k] @ np.swapaxes(gradients[k], 1, 2) for k in range(2)], axis=1)
     # Some hundred terms are rounded.

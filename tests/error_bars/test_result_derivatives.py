@@ -11,8 +11,10 @@ from scipy.interpolate import CubicSpline
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.body import Coupling
 from shapephase.errors import ShapeError, WrongObjectError
 from shapephase.shape_space.path_samples import path_samples
+from support.coupled_bodies import LEG, TURN, couplings
 
 # Of central differences with motions at 1e-12: their error is some 1e-12 over the step, and the step squared.
 _NEAR = 1e-6
@@ -235,3 +237,29 @@ def test_what_has_no_such_derivatives_is_refused():
         sp.derivatives(sp.reconstruct(sp.articulated(body, loop), np.eye(3)))
     with pytest.raises(WrongObjectError, match="articulated"):
         sp.derivatives(sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 2.0, 3.0]))
+
+
+def leg_motion(load_urdf, turn, values: np.ndarray) -> sp.Motion:
+    body = load_urdf(LEG).with_couplings(couplings(turn))
+    path = sp.ShapePath.spline(np.linspace(0.0, 1.0, len(values)), values, periodic=False)
+    return sp.reconstruct(sp.articulated(body, path), [0.5, -0.3, 0.8], START, tolerance=1e-12)
+
+
+def test_by_samples_through_the_knots_of_a_coupling(load_urdf):
+    """Times at which the knee goes through knots move with the samples."""
+    samples = np.array([[0.1, -0.8], [0.3, -0.1], [-0.2, 0.3], [0.2, 0.9], [0.4, 0.4]])
+    turn = TURN["spline"][0]
+    found = sp.derivatives(leg_motion(load_urdf, turn, samples)).by_samples
+    for sample, joint in ((1, 1), (2, 0), (3, 1)):
+
+        def moved(h: float, place: tuple[int, int] = (sample, joint)) -> sp.Motion:
+            values = samples.copy()
+            values[place] += h
+            return leg_motion(load_urdf, turn, values)
+
+        agree(flat(found, sample * 2 + joint), difference(moved, 1e-4))
+    line = Coupling.piecewise_linear("knee", [0.0, 0.5, 1.0], [0.0, 0.3, 0.2])
+    with pytest.raises(
+        ShapeError, match=r"derivatives by a path need joints that follow others smoothly: 'patella_turn'"
+    ):
+        _ = sp.derivatives(leg_motion(load_urdf, line, samples)).by_samples

@@ -30,7 +30,7 @@ def test_sums_are_those_of_arrays(body, rng):
     slopes[:, 0] = 0.0
     found = momentum_gradients(chain.rows, shapes, rates, spins, rows, pieces, powers, slopes, 3) @ chain.matrix
     links = link_motions(chain, shapes, rates)
-    by_shape, by_rate = by_shape_and_rate(chain, links, rates, spins, rows)
+    by_shape, by_rate = by_shape_and_rate(chain, links, shapes, rates, spins, rows)
     expected = np.zeros_like(found)
     for at, piece in enumerate(pieces):
         expected[:, piece] += powers[at, :, None, None] * by_shape[at] + slopes[at, :, None, None] * by_rate[at]

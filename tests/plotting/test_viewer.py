@@ -26,6 +26,7 @@ from shapephase.plotting.pages.up_axis import up_axis
 from shapephase.plotting.viewer import motion_html, motion_page, view
 from support.bodies import link, random_loop, urdf
 from support.browser import furred, opened, seen, wait_for
+from support.coupled_bodies import KNOTS, LEG, TURN, couplings
 from support.pages import page_data
 
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
@@ -537,6 +538,20 @@ def test_the_page_opens_in_a_browser_without_a_network_and_moves(righting, cat_p
     wait_for(page, "page.clock.time > 0.1")
     assert [message for message in said if message[0] in ("error", "warning")] == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+def test_joints_that_follow_others_are_drawn_where_they_are(tmp_path, chromium, load_urdf):
+    """The page has the functions themselves: at shapes between knots, at one, and beyond them."""
+    body = load_urdf(LEG).with_couplings(couplings(TURN["spline"][0]))
+    path = sp.ShapePath.fourier([0.1, 0.0], [[0.3], [0.2]], [[0.2], [0.7]], 1.0)
+    motion_page(sp.reconstruct(sp.articulated(body, path), np.zeros(3)), tmp_path / "leg.html")
+    page, said, _ = opened(chromium, tmp_path / "leg.html")
+    for shape in ([0.3, -0.9], [0.1, -0.1], [0.2, KNOTS[2]], [-0.4, 0.5], [0.0, 1.2]):
+        poses = page.evaluate("shape => framePoses(page.figure.data.chain, shape)", shape)
+        for name, (frame, rest) in body.chain.link_frames.items():
+            found = np.reshape(poses[frame], (4, 4)).T @ rest
+            np.testing.assert_allclose(found, body.link_pose(shape, name), atol=1e-12, err_msg=name)
+    assert [message for message in said if message[0] in ("error", "warning")] == []
 
 
 def vermilion(picture):

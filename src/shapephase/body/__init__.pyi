@@ -1,6 +1,7 @@
 from .appearance import Visual, inertia_box, visuals
 from .body import Body
 from .catalog import example_file, example_names, load_body, robot_names, robots_folder
+from .couplings.coupling import Coupling
 from .family import BodyFamily
 from .joint_chain import JointChain
 from .moving_parts import MovingPart
@@ -9,6 +10,7 @@ from .plausibility import implausible
 __all__ = [
     "Body",
     "BodyFamily",
+    "Coupling",
     "JointChain",
     "MovingPart",
     "Visual",

@@ -38,8 +38,9 @@ def _sticks(body: Body) -> tuple[Array, Array]:
     """From each frame to the joints that hang on it, and to the centre of mass of what moves with it."""
     chain = body.chain
     places, turns = [np.zeros(3)], [np.eye(3)]
+    neutral = chain.follows.coordinates(np.zeros((1, body.n_shape)))[0]
     for k, parent in enumerate(chain.parents):
-        at, turned = chain.offset[k], turns[parent] @ chain.turns[k]
+        at, turned = neutral[k], turns[parent] @ chain.turns[k]
         places.append(places[parent] + turns[parent] @ chain.places[k] + turned @ chain.slides[k] * at)
         turns.append(turned @ so3.exp(at * chain.axes[k]))
     ends = np.array(places)

@@ -1,16 +1,20 @@
-"""A body as it is, but for its inertias."""
+"""A body as it is, but for its inertias, or for joints that follow others."""
 
 from __future__ import annotations
 
 # Pinocchio fills its namespace at import time, where a type checker cannot look.
 # pyright: reportAttributeAccessIssue=false
+from collections.abc import Mapping
 from copy import copy
 from typing import TYPE_CHECKING
 
 import pinocchio as pin
 
 from ..arrays import Array
+from ..errors import ShapeError, unknown_name
+from ..letters import what_came
 from ._model_tree import model_with
+from .couplings.coupling import Coupling
 
 if TYPE_CHECKING:
     from .body import Body
@@ -25,3 +29,17 @@ def changed_body(body: Body, masses: Array, centres: Array, tensors: Array) -> B
     # It is no longer what the file says.
     changed.sha256 = changed.file = None
     return changed
+
+
+def coupled_body(body: Body, couplings: Mapping[str, Coupling]) -> Body:
+    """A body some of whose joints follow others, as `Body.with_couplings` says."""
+    if not isinstance(couplings, Mapping):
+        raise ShapeError(
+            "couplings by joint are needed, such as {'knee': Coupling.linear('hip', 0.5)}, got " + what_came(couplings)
+        )
+    for name, coupling in couplings.items():
+        if name not in body.chain.names:
+            raise unknown_name(f"joint of {body.name}", name, body.chain.names)
+        if not isinstance(coupling, Coupling):
+            raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
+    return type(body)(body._model, body.name, {**body.couplings, **couplings})

@@ -33,7 +33,7 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
     expected = {name for name in tree.links if name not in tree.frames}
     moving = {joint.name for joint in tree.joints if joint.kind != "fixed"}
     _compare_names(set(body.link_names), expected, "links", where)
-    _compare_names(set(body.joint_names), moving - set(tree.mimics), "joints", where)
+    _compare_names(set(body.joint_names), moving - set(tree.couplings), "joints", where)
     mass = sum(link.mass for link in tree.links.values())
     if abs(body.mass - mass) > _TOLERANCE * mass:
         raise _differs(where, "mass", f"{body.mass!r} kg", f"{mass!r} kg")
@@ -72,12 +72,7 @@ def inertia_and_momentum(
     place = {name: number for number, name in enumerate(names)}
     parents = [place[joint.parent] for joint in tree.joints]
     children = [place[joint.child] for joint in tree.joints]
-    angles, rates = np.array(
-        [
-            [_coordinate(tree, joint.name, values, k == 0) for joint in tree.joints]
-            for k, values in enumerate((shape, rate))
-        ]
-    ).reshape(2, -1)
+    angles, rates = np.array(_coordinates(tree, shape, rate)).reshape(2, -1)
     sliding = np.array([joint.kind == "prismatic" for joint in tree.joints], dtype=bool)
     stacked = [np.array([getattr(j, what) for j in tree.joints]) for what in ("axis", "place", "after", "turn")]
     axes, places, afters = (each.reshape(-1, 3) for each in stacked[:3])
@@ -119,12 +114,22 @@ def inertia_and_momentum(
     return inertia, momentum, extent, motion
 
 
-def _coordinate(tree: LinkTree, name: str, values: dict[str, float], with_offset: bool) -> float:
-    """The coordinate or rate of a joint, followers by their rules; of a fixed joint zero."""
-    rule = tree.mimics.get(name)
-    if rule is None:
-        return values.get(name, 0.0)
-    return rule.multiplier * _coordinate(tree, rule.leader, values, with_offset) + (rule.offset if with_offset else 0.0)
+def _coordinates(tree: LinkTree, shape: dict[str, float], rate: dict[str, float]) -> tuple[list[float], list[float]]:
+    """Coordinates and rates of all joints, followers by their rules; of a fixed joint zero."""
+    where, speed = dict(shape), dict(rate)
+
+    def find(name: str) -> None:
+        if name in where or name not in tree.couplings:
+            return
+        rule = tree.couplings[name]
+        for driver in rule.drivers:
+            find(driver)
+        where[name], speed[name] = rule.at(where), rule.rate(where, speed)
+
+    for joint in tree.joints:
+        find(joint.name)
+    names = [joint.name for joint in tree.joints]
+    return [where.get(name, 0.0) for name in names], [speed.get(name, 0.0) for name in names]
 
 
 def _about(axes: Array, angles: Array) -> Array:

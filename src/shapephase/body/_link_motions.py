@@ -30,7 +30,7 @@ class LinkMotions:
 
 def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
     """With the base at rest: (N, n), (N, n) of the independent joints. Source: theory.md A7."""
-    all_coordinates, all_rates = shapes @ chain.matrix.T + chain.offset, rates @ chain.matrix.T
+    all_coordinates, all_rates = chain.follows.with_rates(shapes, rates)
     count, frames = len(shapes), len(chain.masses)
     turns = np.empty((count, frames, 3, 3))
     places, speeds, spins = np.zeros((3, count, frames, 3))

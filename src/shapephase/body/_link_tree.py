@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import ModelFileError, UnphysicalInertiaError, unknown_name
+from .couplings.coupling import Coupling
 
 MOST_LINKS = 2000
 """Links of a body, most of them fixed to others."""
@@ -35,15 +36,6 @@ _MOST_RADIUS = 10.0
 """Radius of gyration [m]; a larger one suggests lengths in millimetres."""
 _HEAVY = 1e5
 """Mass of a link [kg]; a larger one suggests grams."""
-
-
-@dataclass(frozen=True)
-class Mimic:
-    """A joint that follows another: angle = multiplier * (angle of `leader`) + offset."""
-
-    leader: str
-    multiplier: float
-    offset: float
 
 
 @dataclass(frozen=True)
@@ -99,7 +91,7 @@ class LinkTree:
     name : of the robot
     links : by name, the root first
     joints : in the order in which they were found on the way down from the root
-    mimics : the joints that follow others
+    couplings : of the joints that follow others, by name
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what the file says and is not taken up
     text : the URDF that was checked, written anew; None for other formats
@@ -108,7 +100,7 @@ class LinkTree:
     name: str
     links: dict[str, Link]
     joints: tuple[Joint, ...]
-    mimics: dict[str, Mimic] = field(default_factory=dict)
+    couplings: dict[str, Coupling] = field(default_factory=dict)
     frames: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
     text: str | None = None

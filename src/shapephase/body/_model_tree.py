@@ -4,15 +4,13 @@ from __future__ import annotations
 
 # Pinocchio fills its namespace at import time, where a type checker cannot look.
 # pyright: reportAttributeAccessIssue=false
-from collections.abc import Mapping
-
 import numpy as np
 import pinocchio as pin
 
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from ._link_tree import Link, LinkTree, Mimic, inertia_warnings
+from ._link_tree import Link, LinkTree, inertia_warnings
 
 # Name of the joint that lets the base move: no file is likely to have one of this name.
 _ROOT = "shapephase_free_flyer"
@@ -85,25 +83,6 @@ def moving_joints(model: pin.Model) -> dict[str, int]:
             )
         moving[model.names[number]] = number
     return moving
-
-
-def mimic_map(moving: list[str], independent: tuple[str, ...], mimics: Mapping[str, Mimic]) -> tuple[Array, Array]:
-    """S and q0 of full = S independent + q0, followers of followers resolved."""
-    place = {name: column for column, name in enumerate(independent)}
-    matrix = np.zeros((len(moving), len(independent)))
-    offset = np.zeros(len(moving))
-    for row, name in enumerate(moving):
-        factor, leader = 1.0, name
-        while leader in mimics:
-            rule = mimics[leader]
-            offset[row] += factor * rule.offset
-            factor *= rule.multiplier
-            leader = rule.leader
-        if leader in place:
-            matrix[row, place[leader]] = factor
-        elif leader != name:
-            raise ModelFileError(f"joint {name!r} mimics {leader!r}, which is fixed or not part of the body")
-    return matrix, offset
 
 
 def _built(tree: LinkTree, root: str) -> pin.Model:

@@ -21,19 +21,25 @@ from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
 from ..letters import what_came
 from ._card import body_card
-from ._changed_body import changed_body
+from ._centroidal_maps import (
+    angular_map,
+    angular_map_rate,
+    centres_of_mass,
+    full_map,
+    internal_momenta,
+    kinetic_energies,
+    momentum_gradients,
+)
+from ._changed_body import changed_body, coupled_body
 from ._given_inertias import Given, given_inertias
-from ._joint_map import JointMap
 from ._link_motions import link_motions
-from ._link_tree import Mimic
+from .couplings.coupling import Coupling
+from .couplings.joint_map import JointMap
 from .joint_chain import joint_chain
 from .moving_parts import MovingPart, moving_parts
 
 if TYPE_CHECKING:
     from .family import BodyFamily
-
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
 
 
 class Body:
@@ -56,6 +62,7 @@ class Body:
     joint_units : "rad" or "m" for each joint
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     chain : its links and joints as plain numbers
+    couplings : by the name of each joint that follows others, how it does
 
     Examples
     --------
@@ -64,15 +71,16 @@ class Body:
     (('waist_pitch', 'waist_yaw', 'waist_roll'), 2.0)
     """
 
-    def __init__(self, model: pin.Model, name: str, mimics: Mapping[str, Mimic] | None = None) -> None:
+    def __init__(self, model: pin.Model, name: str, couplings: Mapping[str, Coupling] | None = None) -> None:
         self._model = model
         self._local = threading.local()
         self.name = name
         self.sha256: str | None = None
         self.file: Path | None = None
         self.mass = float(pin.computeTotalMass(model))
-        self._joints = JointMap(model, pin.neutral(model), dict(mimics or {}))
-        self.chain = joint_chain(model, dict(mimics or {}))
+        self.couplings: Mapping[str, Coupling] = dict(couplings or {})
+        self._joints = JointMap(model, pin.neutral(model), self.couplings)
+        self.chain = joint_chain(model, self._joints.follows)
         self.joint_names, self.joint_units = self._joints.names, self._joints.units
         self.joint_limits, self.continuous = self._joints.limits, self._joints.continuous
         self.rate_limits, self.effort_limits = self._joints.rate_limits, self._joints.effort_limits
@@ -163,6 +171,34 @@ class Body:
         found = given_inertias(self.chain, parts, given, on_unphysical)
         return changed_body(self, *found) if found.masses.ndim == 1 else BodyFamily(self, *found)
 
+    def with_couplings(self, couplings: Mapping[str, Coupling]) -> Body:
+        """The same body with joints that follow others: their coordinates are functions of the others', and no longer
+        of the shape.
+
+        Joints that follow others already keep doing so, unless they are given another coupling here. Chains of joints
+        that follow each other are followed to their end. The knots of a function are breaks of every motion: times at
+        which a joint goes through one are found.
+
+        Parameters
+        ----------
+        couplings : by name of a joint of the body
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such joint.
+        ModelFileError
+            If joints follow each other in a circle, or one that the body does not have.
+
+        Examples
+        --------
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> bent = cat.with_couplings({"waist_roll": sp.body.Coupling.polynomial("waist_pitch", [0.0, 0.0, 1.5])})
+        >>> bent.joint_names, sp.mechanical_connection(bent, [0.2, 0.0]).shape
+        (('waist_pitch', 'waist_yaw'), (3, 2))
+        """
+        return coupled_body(self, couplings)
+
     def joint_index(self, name: str) -> int:
         """The place of a joint in the shape vector. Raises UnknownNameError."""
         if name not in self.joint_names:
@@ -190,7 +226,7 @@ class Body:
         Source: Cabrera 2006, section 2.3; theory.md A3.
         """
         r = self._checked(shape)
-        return self._angular_map(self._rows(r))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
+        return angular_map(*self._maps(), self._rows(r))[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def momentum_matrix(self, shape: ArrayLike) -> Array:
         """J(r), the angular momentum per unit joint rate with the base at rest: L_o = J(r) rate.
@@ -209,7 +245,7 @@ class Body:
         Source: theory.md A7.
         """
         r = self._checked(shape)
-        return self._angular_map(self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
+        return angular_map(*self._maps(), self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
 
     def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """Angular momentum of a joint motion about the centre of mass with the base at rest.
@@ -247,12 +283,12 @@ class Body:
         n = self.n_shape
         shapes = np.repeat(self._rows(r), n, axis=0)
         rates = np.tile(np.eye(n), (math.prod(r.shape[:-1]), 1))
-        return self._angular_map_rate(shapes, rates).reshape(*r.shape[:-1], n, 3, 3 + n)
+        return angular_map_rate(*self._maps(), shapes, rates).reshape(*r.shape[:-1], n, 3, 3 + n)
 
     def inertia_rate(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """dI/dt along a joint motion, exact: (..., n), (..., n) -> (..., 3, 3) [kg m^2/s]."""
         r, v = self._pair(shape, rate)
-        flat = self._angular_map_rate(self._rows(r), self._rows(v))
+        flat = angular_map_rate(*self._maps(), self._rows(r), self._rows(v))
         return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
@@ -277,25 +313,13 @@ class Body:
         if common_batch(shape=r.shape[:-1], base_rate=w.shape[:-1]) != r.shape[:-1]:
             raise ShapeError(f"base_rate: (3,) or one for each shape {r.shape} is needed, got {w.shape}")
         w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
-        model, data = self._model, self._data()
-        velocities = self._joints.velocities(self._rows(v))
-        velocities[:, 3:6] = w
-        none = np.zeros(model.nv)
-        gradients = np.empty((len(velocities), 3, model.nv))
-        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), velocities, strict=True)):
-            gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
-        joints = self._joints.columns(gradients[:, :, _BASE:])
-        return np.swapaxes(joints, -1, -2).reshape(*r.shape, 3)
+        gradients = momentum_gradients(*self._maps(), self._rows(r), self._rows(v), w)
+        return np.swapaxes(gradients, -1, -2).reshape(*r.shape, 3)
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
         """Centre of mass of the whole body from the base origin, base axes: (..., n) -> (..., 3) [m]."""
         r = self._checked(shape)
-        model, data = self._model, self._data()
-        configurations = self._joints.configurations(self._rows(r))
-        centres = np.empty((len(configurations), 3))
-        for row, q in enumerate(configurations):
-            centres[row] = pin.centerOfMass(model, data, q)
-        return centres.reshape(*r.shape[:-1], 3)
+        return centres_of_mass(*self._maps(), self._rows(r)).reshape(*r.shape[:-1], 3)
 
     def link_pose(self, shape: ArrayLike, link: str) -> Array:
         """Pose of a link in base axes from the base origin: (..., n) -> (..., 4, 4).
@@ -323,7 +347,7 @@ class Body:
         frame = self._link_frame(link)
         r, v = self._pair(shape, rate)
         model, data = self._model, self._data()
-        velocities = self._joints.velocities(self._rows(v))
+        velocities = self._joints.velocities(self._rows(r), self._rows(v))
         turning = np.empty((len(velocities), 3))
         for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), velocities, strict=True)):
             pin.forwardKinematics(model, data, q, full)
@@ -372,27 +396,20 @@ class Body:
         omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
         batch = common_batch(shape=r.shape[:-1], angular_velocity=omega.shape[:-1])
         r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
-        model, data = self._model, self._data()
-        rates = self._joints.velocities(self._rows(v))
-        rates[:, 3:6] = np.broadcast_to(omega, (*batch, 3)).reshape(-1, 3)
-        energies = np.empty(len(rates))
-        for row, (q, full) in enumerate(zip(self._joints.configurations(self._rows(r)), rates, strict=True)):
-            pin.ccrba(model, data, q, full)
-            whole = pin.computeKineticEnergy(model, data, q, full)
-            energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / self.mass
-        return energies.reshape(batch)
+        spins = np.broadcast_to(omega, (*batch, 3)).reshape(-1, 3)
+        return kinetic_energies(*self._maps(), self._rows(r), self._rows(v), spins).reshape(batch)
 
     def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
         """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3).
 
         Unchecked and in one pass: the library's own hot path.
         """
-        whole = self._full_map(shape)
-        return whole[:, :, :3], (whole[:, :, 3:] @ self._joints.velocities(rate)[:, _BASE:, None])[..., 0]
+        whole = full_map(*self._maps(), shape)
+        return whole[:, :, :3], internal_momenta(whole, self._joints, shape, rate)
 
     def sample_rates(self, shape: Array, rate: Array) -> tuple[Array, Array, Array, Array]:
         """I, J, dI/dt and dJ/dt along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3, n) and once more. Unchecked."""
-        whole, slope = self._angular_map(shape), self._angular_map_rate(shape, rate)
+        whole, slope = angular_map(*self._maps(), shape), angular_map_rate(*self._maps(), shape, rate)
         return whole[:, :, :3], whole[:, :, 3:], slope[:, :, :3], slope[:, :, 3:]
 
     def _link_frame(self, link: str) -> int:
@@ -420,31 +437,8 @@ class Body:
         """(..., n) -> (N, n); a body without joints has rows too."""
         return array.reshape(math.prod(array.shape[:-1]), self.n_shape)
 
-    def _angular_map(self, shapes: Array) -> Array:
-        """[I, J] for each shape: (N, n) -> (N, 3, 3 + n)."""
-        return self._independent(self._full_map(shapes))
-
-    def _full_map(self, shapes: Array) -> Array:
-        """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
-        model, data = self._model, self._data()
-        centroidal_map = pin.computeCentroidalMap
-        # Each call returns a copy: all at once are put together sooner than one by one.
-        maps = [centroidal_map(model, data, q) for q in self._joints.configurations(shapes)]
-        return np.array(maps).reshape(-1, 6, model.nv)[:, 3:, 3:]
-
-    def _angular_map_rate(self, shapes: Array, rates: Array) -> Array:
-        """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""
-        model, data = self._model, self._data()
-        velocities = self._joints.velocities(rates)
-        whole = np.empty((len(shapes), 3, model.nv - 3))
-        for row, (q, v) in enumerate(zip(self._joints.configurations(shapes), velocities, strict=True)):
-            pin.dccrba(model, data, q, v)
-            whole[row] = data.dAg[3:, 3:]
-        return self._independent(whole)
-
-    def _independent(self, whole: Array) -> Array:
-        """Columns of the full joints folded into those of the independent ones."""
-        return np.concatenate([whole[:, :, :3], self._joints.columns(whole[:, :, 3:])], axis=-1)
+    def _maps(self) -> tuple[pin.Model, pin.Data, JointMap]:
+        return self._model, self._data(), self._joints
 
     def _data(self) -> pin.Data:
         try:

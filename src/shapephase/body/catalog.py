@@ -224,7 +224,7 @@ def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, li
         root = xml_tree(content, where)
         tree = mjcf_tree(root) if root.tag == "mujoco" else urdf_tree(root)
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
-    body = Body(model_of(tree, where), path.stem, tree.mimics)
+    body = Body(model_of(tree, where), path.stem, tree.couplings)
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     check_against_file(body, tree, where)
     check_against_engine(body, tree, poses, where)

@@ -10,6 +10,7 @@ import pinocchio as pin
 from ..arguments import check_object
 from ..arrays import Array
 from .body import Body
+from .couplings.coordinate_map import check_smooth
 
 # Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
 _BASE = 6
@@ -40,8 +41,9 @@ def falling_efforts(
     """
     check_object(body, "Body", "body")
     model, data, joints = body._model, body._data(), body._joints
+    check_smooth(joints.follows, "torques need", kinks_only=True)
     configurations = joints.configurations(shapes)
-    velocities, slopes = joints.velocities(rates), joints.velocities(accelerations)
+    velocities, slopes = joints.velocities(shapes, rates), joints.accelerations(shapes, rates, accelerations)
     gravity = model.gravity.linear
     whole = np.empty_like(velocities)
     for row, (q, v, a) in enumerate(zip(configurations, velocities, slopes, strict=True)):
@@ -51,7 +53,7 @@ def falling_efforts(
         a[3:_BASE] = spin_rates[row]
         a[:3] = gravity - data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
         whole[row] = pin.rnea(model, data, q, v, a)
-    return joints.columns(whole[:, _BASE:]), whole[:, :_BASE]
+    return joints.columns(whole[:, _BASE:], shapes), whole[:, :_BASE]
 
 
 def _cross(first: Array, second: Array) -> Array:

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..display import short_repr
-from ._link_tree import Mimic
-from ._model_tree import mimic_map, moving_joints
+from ._model_tree import moving_joints
+from .couplings.coordinate_map import CoordinateMap
 from .link_rows import LinkRows, link_rows, rows_with
 
 # Pinocchio's number of the free-flyer: joint 0 is the universe.
@@ -35,7 +35,7 @@ class JointChain:
     slides : (k, 3) unit vector of one that slides, for a screw its lead along the axis [m/rad], else zero
     masses, centres, inertias : (k + 1,), (k + 1, 3), (k + 1, 3, 3) of what moves with each frame, in its axes; the
         inertia about the centre of mass [kg], [m], [kg m^2]
-    matrix, offset : (k, n), (k,) coordinates of all joints from the shape, matrix @ shape + offset
+    follows : coordinates of all joints from the shape: where none follows others by a curve, matrix @ shape + offset
     link_frames : number of the frame that each link moves with, and its pose there, (4, 4)
 
     Examples
@@ -54,11 +54,20 @@ class JointChain:
     masses: Array
     centres: Array
     inertias: Array
-    matrix: Array
-    offset: Array
+    follows: CoordinateMap
     link_frames: Mapping[str, tuple[int, Array]]
 
     __repr__ = short_repr
+
+    @property
+    def matrix(self) -> Array:
+        """(k, n) of the joints that depend on the shape by matrix @ shape + offset."""
+        return self.follows.matrix
+
+    @property
+    def offset(self) -> Array:
+        """(k,) [rad or m]."""
+        return self.follows.offset
 
     @cached_property
     def rows(self) -> LinkRows:
@@ -92,7 +101,7 @@ class JointChain:
         return changed
 
 
-def joint_chain(model: Any, mimics: Mapping[str, Mimic]) -> JointChain:
+def joint_chain(model: Any, follows: CoordinateMap) -> JointChain:
     """The numbers of a Pinocchio model with a free-flyer, whose joints have one axis each."""
     moving = moving_joints(model)
     names = tuple(moving)
@@ -108,8 +117,6 @@ def joint_chain(model: Any, mimics: Mapping[str, Mimic]) -> JointChain:
         screws.append(np.array(data.S).reshape(6))
     pose, screw = np.array(poses).reshape(-1, 4, 4), np.array(screws).reshape(-1, 6)
     carried = model.inertias.tolist()[_BASE:]
-    independent = tuple(name for name in names if name not in mimics)
-    matrix, offset = mimic_map(list(names), independent, mimics)
     return JointChain(
         names,
         tuple(int(model.parents[moving[name]]) - _BASE for name in names),
@@ -120,8 +127,7 @@ def joint_chain(model: Any, mimics: Mapping[str, Mimic]) -> JointChain:
         np.array([inertia.mass for inertia in carried]),
         np.array([inertia.lever for inertia in carried]),
         np.array([inertia.inertia for inertia in carried]),
-        matrix,
-        offset,
+        follows,
         {
             frame.name: (int(frame.parentJoint) - _BASE, np.array(frame.placement.homogeneous))
             for frame in model.frames

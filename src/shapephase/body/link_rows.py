@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..display import short_repr
+from .couplings.coordinate_map import CoordinateMap
 
 if TYPE_CHECKING:
     from .joint_chain import JointChain
@@ -33,7 +34,7 @@ class LinkRows:
     leads : (k,) by how much it slides, in units of q: 1, 0, or the lead of a screw [m/rad]
     rows : (k + 1, NUMBERS)
     mass : of all [kg]
-    matrix, offset : as in `JointChain`, or None where all joints are independent
+    follows : as in `JointChain`
     bases : (k + 1, 3, 3) the axes of each frame in those that it has in the chain, in more digits
     """
 
@@ -42,17 +43,15 @@ class LinkRows:
     leads: Array
     rows: Array
     mass: float
-    matrix: Array | None
-    offset: Array | None
+    follows: CoordinateMap
     bases: Any
 
     __repr__ = short_repr
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """Of all joints, followers included: (N, n), (N, n) -> (N, k), (N, k), each in one piece."""
-        if self.matrix is None or self.offset is None:
-            return np.ascontiguousarray(shapes), np.ascontiguousarray(rates)
-        return shapes @ self.matrix.T + self.offset, rates @ self.matrix.T
+        coordinates, speeds = self.follows.with_rates(shapes, rates)
+        return np.ascontiguousarray(coordinates), np.ascontiguousarray(speeds)
 
     def in_chain_axes(self, derivatives: Array) -> Array:
         """Derivatives by first moments and inertias of frames, (m, k + 1, 10) as `inertial_sums` has them, turned."""
@@ -92,16 +91,13 @@ def link_rows(chain: JointChain) -> LinkRows:
     rows[0, [0, 4, 8]] = 1.0
     axes = np.array(bases)
     rows[:, GEOMETRY:] = inertial_numbers(axes, chain.masses, chain.centres, chain.inertias)
-    independent = chain.matrix.shape == (count, count) and np.array_equal(chain.matrix, np.eye(count))
-    plain = independent and not chain.offset.any()
     return LinkRows(
         parents=np.array(chain.parents, dtype=np.uint32),
         turning=turning.astype(float),
         leads=leads,
         rows=rows,
         mass=float(chain.masses.sum()),
-        matrix=None if plain else chain.matrix,
-        offset=None if plain else chain.offset,
+        follows=chain.follows,
         bases=axes,
     )
 

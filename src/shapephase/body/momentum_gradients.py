@@ -16,7 +16,7 @@ from .joint_chain import JointChain
 
 
 def by_shape_and_rate(
-    chain: JointChain, links: LinkMotions, rates: Array, spins: Array, rows: Array
+    chain: JointChain, links: LinkMotions, shapes: Array, rates: Array, spins: Array, rows: Array
 ) -> tuple[Array, Array]:
     """Products of row . d(I w + J rate) by the shape, while w and the rates stay, and by the rates.
 
@@ -28,7 +28,7 @@ def by_shape_and_rate(
     Parameters
     ----------
     links : of the chain at N shapes and rates
-    rates : (N, n)
+    shapes, rates : (N, n)
     spins : (N, S, 3) w, several for each shape
     rows : (N, S, r, 3)
 
@@ -36,7 +36,10 @@ def by_shape_and_rate(
     -------
     (N, S r, n) each, by shapes and by rates
     """
-    sums, at = _carried(chain, _link_sums(chain, links)), _joint_axes(chain, links, rates @ chain.matrix.T)
+    sums, at = (
+        _carried(chain, _link_sums(chain, links)),
+        _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1]),
+    )
     count, several, each, _ = rows.shape
     arms = cross(at.axes, at.origins)
     by_rate = _turned(sums.inertia, at.axes) + cross(sums.moment, at.slides - arms)
@@ -52,7 +55,7 @@ def by_shape_and_rate(
         found += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
         np.matmul(rows[:, which], np.moveaxis(found, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
-    return by_shape.reshape(count, several * each, -1) @ chain.matrix, by_rates @ chain.matrix
+    return _by_independent(chain, by_shape.reshape(count, several * each, -1), by_rates, shapes, rates)
 
 
 def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -72,7 +75,7 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     """
     links = link_motions(chain, shapes, rates)
     each = _link_sums(chain, links)
-    sums, at = _carried(chain, each), _joint_axes(chain, links, rates @ chain.matrix.T)
+    sums, at = _carried(chain, each), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
     inertia, momentum = each[9:].sum(axis=-1), each[6:9].sum(axis=-1)
     tensors = np.moveaxis(inertia[[0, 5, 4, 5, 1, 3, 4, 3, 2]], 0, -1).reshape(-1, 3, 3)
     spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
@@ -82,7 +85,20 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     speeds = at.speeds + cross(spin, at.origins)
     by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
     by_rate = at.axes * about + at.slides * drift
-    return by_shape.sum(axis=0) @ chain.matrix, by_rate.sum(axis=0) @ chain.matrix
+    found = _by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
+    return found[0][:, 0], found[1][:, 0]
+
+
+def _by_independent(
+    chain: JointChain, by_shape: Array, by_rate: Array, shapes: Array, rates: Array
+) -> tuple[Array, Array]:
+    """From derivatives by coordinates and rates of all joints to those by the shape and its rate: (N, m, k), (N, m, k)
+    -> (N, m, n), (N, m, n)."""
+    follows = chain.follows
+    folded = follows.folded(by_shape, shapes)
+    if not follows.is_linear:
+        folded = folded + by_rate @ follows.slope_rates(shapes, rates)
+    return folded, follows.folded(by_rate, shapes)
 
 
 @dataclass(frozen=True, eq=False)

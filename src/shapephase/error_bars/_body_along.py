@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import check_smooth
 from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
 from ..body.momentum_gradients import by_shape_and_rate
 from ..integrator.fast import engine, gradients
@@ -44,14 +45,15 @@ class BodyAlong:
         (S r, m)
         """
         chain, closing = self.body.chain, samples.is_closing(self.times)
-        if engine.is_ready():
+        check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
+        if engine.is_ready() and chain.follows.is_linear:
             basis = samples.basis(self.times)
             sums = gradients.momentum_gradients(
                 chain.rows, self.shapes, self.rates, spins, rows, basis.pieces, basis.powers, basis.slopes, basis.total
             )
-            found = samples.by_knots_of(sums if chain.rows.matrix is None else sums @ chain.matrix)
+            found = samples.by_knots_of(sums if chain.follows.is_identity else sums @ chain.matrix)
         else:
-            parts = by_shape_and_rate(chain, self._links, self.rates, spins, rows)
+            parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
             found = samples.by_knots(self.times, *parts)
         if closing.any():
             by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import check_smooth
 from ..display import short_repr
 from ..errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ..integrator.casadi_calls import call_casadi
@@ -74,7 +75,9 @@ class Hamiltonian:
 
 
 def hamiltonian(body: Body, metric: str) -> Hamiltonian:
-    """The equations of a body; built at the first call for it, kept as long as the body is. Raises UnknownNameError.
+    """The equations of a body; built at the first call for it, kept as long as the body is.
+
+    Raises UnknownNameError, and ShapeError where a joint follows others by a function with knots.
 
     Examples
     --------
@@ -86,6 +89,7 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     check_object(body, "Body", "body")
     if not isinstance(metric, str) or metric not in _COSTS:
         raise unknown_name("metric", metric, _COSTS)
+    check_smooth(body.chain.follows, "the equations of extremals need")
     with _building:
         of_body = _built.setdefault(body, {})
         if not isinstance(metric, str) or metric not in of_body:

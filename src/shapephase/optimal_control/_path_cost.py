@@ -11,6 +11,7 @@ from ..arguments import check_object
 from ..body.body import Body
 from ..errors import AccuracyNotReached, unknown_name
 from ..shape_space.connection import mechanical_connection
+from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 
@@ -47,7 +48,7 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     check_object(path, "ShapePath", "path")
     if not isinstance(cost, str) or cost not in ("kinetic", "rate"):
         raise unknown_name("cost of a path", cost, ("kinetic", "rate"))
-    route = path.matched(body.joint_names, body.name)
+    route = route_along(body, path)
     before = _quadrature(body, route, cost, _FIRST_PANELS)
     for panels in _PANELS:
         now = _quadrature(body, route, cost, panels)

@@ -14,6 +14,7 @@ from ..body.body import Body
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import horizontal_lift
+from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
 from ._jacobi_fields import inverse_scale, jacobi_fields
@@ -179,7 +180,7 @@ def shoot(
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    route = path.matched(body.joint_names, body.name)
+    route = route_along(body, path)
     goal = tolerance_argument(tolerance)
     turn = horizontal_lift(body, route).end if target is None else so3.rotation_argument(target, "target")
     if turn.shape != (3, 3):

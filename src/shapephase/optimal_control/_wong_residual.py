@@ -16,6 +16,7 @@ from ..display import short_repr
 from ..errors import AccuracyNotReached
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
+from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
@@ -91,7 +92,7 @@ def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> Wo
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    route = path.matched(body.joint_names, body.name)
+    route = route_along(body, path)
     equations = hamiltonian(body, metric)
     lift = horizontal_lift(body, route)
     last: WongFit | None = None

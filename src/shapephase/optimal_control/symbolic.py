@@ -12,6 +12,7 @@ import numpy as np
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..body.couplings.functions import JointFunction
 from ..body.joint_chain import JointChain
 from ..display import short_repr
 from ..errors import unknown_name
@@ -185,6 +186,8 @@ def _symbolic(body: Body) -> SymbolicBody:
     full_linear = casadi.horzcat(none, *(linear for linear, _ in carried))
     full_angular = casadi.horzcat(none, *(angular - casadi.cross(centre, linear) for linear, angular in carried))
     fold = _constant(chain.matrix)
+    if not chain.follows.is_linear:
+        fold = casadi.jacobian(_coordinates(chain, shape), shape)
     linear, momentum_matrix = full_linear @ fold, full_angular @ fold
     connection = solve_linear(inertia, momentum_matrix)
     mass_matrix = fold.T @ _joint_mass_matrix(chain, speeds, carried) @ fold
@@ -214,7 +217,7 @@ def _frames(chain: JointChain, shape: Any) -> list[tuple[Any, Any]]:
     """Orientation and origin of each frame of the chain, base axes."""
     import casadi
 
-    joints = _constant(chain.matrix) @ shape + casadi.DM(chain.offset)
+    joints = _coordinates(chain, shape)
     frames = [(casadi.SX.eye(3), casadi.SX(3, 1))]
     for number, parent in enumerate(chain.parents):
         turn, place = frames[parent]
@@ -227,6 +230,32 @@ def _frames(chain: JointChain, shape: Any) -> list[tuple[Any, Any]]:
             turn = turn @ _rotation(chain.axes[number], coordinate)
         frames.append((turn, place))
     return frames
+
+
+def _coordinates(chain: JointChain, shape: Any) -> Any:
+    """Of all joints."""
+    import casadi
+
+    joints = _constant(chain.matrix) @ shape + casadi.DM(chain.offset)
+    for joint in chain.follows.curved:
+        joints[joint.row] = joint.start + sum(_followed(function, joints[k]) for k, function in joint.terms)
+    return joints
+
+
+def _followed(function: JointFunction, coordinate: Any) -> Any:
+    """A function of a coordinate: its derivatives are those of the piece that the coordinate is on."""
+    import casadi
+
+    def chosen(numbers: Array) -> Any:
+        found = casadi.SX(float(numbers[-1]))
+        for knot, number in zip(function.knots[::-1].tolist(), numbers[-2::-1].tolist(), strict=True):
+            found = casadi.if_else(coordinate < knot, number, found)
+        return found
+
+    since, value = coordinate - chosen(function.centres), casadi.SX(0.0)
+    for coefficients in function.coefficients[::-1]:
+        value = value * since + chosen(coefficients)
+    return value
 
 
 def _rotation(axis: Array, angle: Any) -> Any:

@@ -15,6 +15,7 @@ from ..integrator.fast.tree import tree_channels
 from ..integrator.recorded.knot_path import KnotPath, Slopes
 from ..integrator.sampling import Sampler, Samplers
 from .curves import PiecewisePolynomial, many_pieces
+from .knot_crossings import at_knots
 from .shape_path import CLOSED, ShapePath
 
 # [rad or m] the joint that moves farthest goes between times at which the slopes of a body's channels are computed.
@@ -78,15 +79,20 @@ def channels_at(body: Body, shapes: Array, rates: Array) -> Array | None:
 
 def recorded_path(body: Body, path: ShapePath) -> KnotPath | None:
     """A recorded path, whose columns are in the body's order, with how the body follows it; None: it is none."""
-    pieces = recorded_pieces(path)
-    if pieces is None:
+    pieces, follows = recorded_pieces(path), body.chain.follows
+    # Just at a knot where a slope jumps, rounding decides on which side a joint is.
+    if pieces is None or follows.has_kinks:
         return None
+    corners = np.zeros(0, dtype=np.int64)
+    if not follows.is_smooth:
+        corners = np.flatnonzero(at_knots(follows, path.curve, pieces.knots))
     return KnotPath(
         knots=pieces.knots,
         coefficients=pieces.coefficients,
         slopes=partial(_slopes, body, pieces),
         follow=body.sample,
         directly=partial(channels_at, body),
+        corners=corners,
     )
 
 

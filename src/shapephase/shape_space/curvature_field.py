@@ -12,6 +12,7 @@ from .. import so3
 from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import check_smooth
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -19,6 +20,7 @@ from ..integrator.sampling import sampler
 from ..letters import what_came
 from .body_path import check_closed
 from .connection import connection_slopes
+from .knot_crossings import route_along
 from .shape_path import CLOSED, ShapePath
 
 _EPS = float(np.finfo(float).eps)
@@ -178,7 +180,8 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
-    route = path.matched(body.joint_names, body.name)
+    check_smooth(body.chain.follows, "the theorem of Stokes needs")
+    route = route_along(body, path)
     check_closed(body, route)
     _check_no_turns(body, route)
     cone = _Cone(body, route, _mean_shape(route) if centre is None else _one_shape(body, centre, "centre"), goal)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 CLOSED = 1e-9
 """[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
 _WHOLE_TURN = 2.0 * np.pi
+# Of the last break: times nearer to each other than this are one, however a path was stretched or reversed.
+_SAME_TIME = 1e-12
 # Breaks of a loop from which on it is taken for a recording.
 _MANY_BREAKS = 64
 # Knots of a loop repeated that are still written out.
@@ -177,11 +179,31 @@ def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
 
 
 def many_pieces(curve: Curve, breaks: Array) -> PiecewisePolynomial | None:
-    """The first of those polynomials, between breaks (M,) that are many; else None."""
+    """Those polynomials between breaks (M,), knots and others, that are many and end with the first loop; else None."""
     found = polynomial_pieces(curve) if len(breaks) > _MANY_BREAKS else None
-    if found is None or len(found.knots) < len(breaks):
+    if found is None:
         return None
-    return PiecewisePolynomial(breaks, found.coefficients[:, : len(breaks) - 1])
+    # Breaks and knots that rounding has moved apart are the same.
+    near = _SAME_TIME * breaks[-1]
+    piece = np.searchsorted(found.knots, 0.5 * (breaks[:-1] + breaks[1:])) - 1
+    inner = found.knots[(found.knots > near) & (found.knots < breaks[-1] - near)]
+    place = np.clip(np.searchsorted(breaks, inner), 1, len(breaks) - 1)
+    apart = np.minimum(np.abs(breaks[place] - inner), np.abs(breaks[place - 1] - inner))
+    if apart.max(initial=0.0) > near or piece[-1] >= found.coefficients.shape[1]:
+        return None
+    since = breaks[:-1] - found.knots[piece]
+    return PiecewisePolynomial(breaks, _moved(found.coefficients[:, piece], np.where(since > near, since, 0.0)))
+
+
+def _moved(coefficients: Array, by: Array) -> Array:
+    """Polynomials (order, pieces, n) about centres that are moved: (pieces,)."""
+    if not by.any():
+        return coefficients
+    order, moved = len(coefficients), np.zeros_like(coefficients)
+    for power in range(order):
+        for k in range(power, order):
+            moved[power] += comb(k, power) * by[:, None] ** (k - power) * coefficients[k]
+    return moved
 
 
 def _joined_pieces(parts: list[PiecewisePolynomial], offsets: list[Array]) -> PiecewisePolynomial:

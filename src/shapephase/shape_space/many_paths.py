@@ -17,6 +17,7 @@ from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
 from ..letters import what_came
 from .body_path import path_samplers
+from .knot_crossings import route_along
 from .shape_path import ShapePath
 
 
@@ -95,7 +96,7 @@ def final_attitudes(
         check_object(path, "ShapePath", f"path {number}")
         mu, first = _of_path(spatial, 1, number), _of_path(start, 2, number)
         try:
-            samplers = path_samplers(body, path.matched(body.joint_names, body.name))
+            samplers = path_samplers(body, route_along(body, path))
             solution = rotations_of_each(samplers, (first.T @ mu)[None], goal)
         except ShapePhaseError as error:
             raise type(error)(f"path {number}: {error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..body.couplings.coupling import described
 from ..display import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap
@@ -79,6 +81,7 @@ class BodySummary:
     principal_axes : (3, 3), columns, base axes
     triangle_defect : by how much the largest moment is above the sum of the others, relative; not above 0 for real mass
     joints : the independent ones, in the order of the shape vector
+    followers : of each joint that follows others, in words, how
     links : all of them, by name
     parts : what moves as one, the base first
 
@@ -97,6 +100,7 @@ class BodySummary:
     principal_axes: Array
     triangle_defect: float
     joints: tuple[JointSummary, ...]
+    followers: Mapping[str, str]
     links: tuple[str, ...]
     parts: tuple[PartSummary, ...]
 
@@ -168,6 +172,7 @@ def body_summary(body: Body) -> BodySummary:
             JointSummary(name=name, kind=kind, lower=lower, upper=upper, unit=unit)
             for name, kind, (lower, upper), unit in joints
         ),
+        followers={name: described(coupling) for name, coupling in body.couplings.items()},
         links=body.link_names,
         parts=tuple(
             PartSummary(

@@ -10,6 +10,7 @@ from ..arrays import Array
 from ..body.body import Body
 from ..errors import TrajectoryWarning
 from .curves import Fourier, PiecewisePolynomial
+from .knot_crossings import route_along
 from .shape_path import ShapePath
 
 DEGREE = np.pi / 180.0
@@ -31,7 +32,7 @@ def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool
 
 
 def followed_by(body: Body, path: ShapePath) -> ShapePath:
-    """The path with its columns in the order of the body's joints; raises as `ShapePath.matched`.
+    """As `route_along`.
 
     Warns
     -----
@@ -39,7 +40,7 @@ def followed_by(body: Body, path: ShapePath) -> ShapePath:
         Where angles look like degrees: a joint goes more than half a turn beyond its limits, and in degrees all would
         stay within theirs. Of a recording this was asked when it was read.
     """
-    route = path.matched(body.joint_names, body.name)
+    route = route_along(body, path)
     if route.record is None and _farthest(route) > _HALF_TURN:
         _ask_of_degrees(body, route)
     return route

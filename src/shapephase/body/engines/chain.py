@@ -36,6 +36,7 @@ class Chain:
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what the file says and is not taken up
     poses : what the engine gives at random shapes, as `add_pose` takes it
+    couplings : of joints that follow others, by name, as `couple` takes them
     """
 
     name: str
@@ -44,6 +45,7 @@ class Chain:
     frames: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     poses: list[dict[str, Any]] = field(default_factory=list)
+    couplings: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def add_link(self, name: str, mass: float, centre: Array, inertia: Array, line: int = 1) -> None:
         """With its centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2], in its axes."""
@@ -85,14 +87,29 @@ class Chain:
             "limits": None if limits is None else [float(limits[0]), float(limits[1])],
         })  # fmt: skip
 
+    def couple(self, name: str, start: float, terms: list[tuple[str, Array, Array, Array]]) -> None:
+        """A joint that follows others: start + the sum of functions of one other joint each.
+
+        terms : name of the joint that is followed, knots (m,), centres (m + 1,) and coefficients (order, m + 1) of the
+            polynomials between the knots, by powers of the distance from the centres (`JointFunction`)
+        """
+        self.couplings[name] = {
+            "start": float(start),
+            "terms": [
+                [driver, *(np.asarray(one, dtype=float).tolist() for one in function)] for driver, *function in terms
+            ],
+        }  # fmt: skip
+
     def moving(self) -> list[str]:
-        """Names of the joints that move."""
-        return [joint["name"] for joint in self.joints if joint["kind"] != "fixed"]
+        """Names of the joints that have coordinates of their own."""
+        moving = (joint["name"] for joint in self.joints if joint["kind"] != "fixed")
+        return [name for name in moving if name not in self.couplings]
 
     def random_shapes(self) -> list[tuple[dict[str, float], dict[str, float]]]:
         """Coordinates and rates by joint, within a radian or metre, and within the limits."""
         random = np.random.default_rng(SEED)
-        limits = [joint["limits"] or (-1.0, 1.0) for joint in self.joints if joint["kind"] != "fixed"]
+        own = set(self.moving())
+        limits = [joint["limits"] or (-1.0, 1.0) for joint in self.joints if joint["name"] in own]
         lower, upper = np.clip(np.array(limits).reshape(-1, 2), -1.0, 1.0).T
         found = []
         for _ in range(POSES):

@@ -14,6 +14,8 @@ from ...errors import MissingExtraError, ModelFileError
 from .._cross_check import inertia_and_momentum
 from .._link_tree import Joint, Link, LinkTree, from_the_root
 from ..body import Body
+from ..couplings.coupling import Coupling
+from ..couplings.functions import JointFunction
 from .formats import FORMATS
 from .reading import MEMORY, MISSING, NO_MEMORY, REFUSED
 
@@ -81,8 +83,15 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
     # Parents before children, as every tree of links has them.
     sorted_links = {name: links[name] for name in (first, *(joint.child for joint in ordered))}
     notes = tuple(f"{where}:1: {note}" for note in said["notes"])
-    tree = LinkTree(said["name"], sorted_links, ordered, frames=frozenset(said["frames"]), notes=notes)
+    couplings = {name: _coupling(rule) for name, rule in said["couplings"].items()}
+    frames = frozenset(said["frames"])
+    tree = LinkTree(said["name"], sorted_links, ordered, couplings, frames=frames, notes=notes)
     return tree, said["poses"]
+
+
+def _coupling(rule: dict[str, Any]) -> Coupling:
+    terms = ((driver, JointFunction(*map(np.array, numbers))) for driver, *numbers in rule["terms"])
+    return Coupling(rule["start"], tuple(terms))
 
 
 def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:

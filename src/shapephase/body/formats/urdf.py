@@ -15,7 +15,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ModelFileError
-from .._link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, Mimic, from_the_root
+from .._link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, from_the_root
+from ..couplings.coupling import Coupling
 from .xml_text import (
     Node,
     child_of,
@@ -41,6 +42,15 @@ _FORMATS = {
     "mujocoinclude": "a part of an MJCF model; load the file that includes it",
     "COLLADA": "a mesh; load the robot's URDF",
 }
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint that follows another: angle = multiplier * (angle of `leader`) + offset."""
+
+    leader: str
+    multiplier: float
+    offset: float
 
 
 @dataclass
@@ -76,8 +86,10 @@ def urdf_tree(root: Node) -> LinkTree:
     _check_mimics(reading.mimics, joints)
     found = {first: links[first]} | {joint.child: links[joint.child] for joint in ordered}
     text = f"<robot name={quoteattr(name)}>{''.join(reading.text)}</robot>"
-    mimics = {key: rule for key, (_, rule) in reading.mimics.items()}
-    return LinkTree(name, found, ordered, mimics, notes=tuple(reading.notes), text=text)
+    couplings = {
+        key: Coupling.linear(rule.leader, rule.multiplier, rule.offset) for key, (_, rule) in reading.mimics.items()
+    }
+    return LinkTree(name, found, ordered, couplings, notes=tuple(reading.notes), text=text)
 
 
 def rpy_matrix(rpy: Array) -> Array:

@@ -98,6 +98,13 @@ def body_lines(summary: BodySummary) -> list[str]:
         limits = "".join(f"{_limit(value):>12}" for value in (joint.lower, joint.upper))
         span = _limit(joint.upper - joint.lower)
         lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {joint.unit:<3}{span:>12}")
+    if summary.followers:
+        width = max(map(len, ("follower", *summary.followers)))
+        lines += [
+            "",
+            f"{'follower':<{width}}  rule",
+            *(f"{k:<{width}}  {rule}" for k, rule in summary.followers.items()),
+        ]
     return [*lines, "", *_part_lines(summary)]
 
 

@@ -118,6 +118,7 @@ class KnotPath:
         slopes: Callable[[], Slopes],
         follow: Callable[[Array, Array], tuple[Array, Array]],
         directly: Callable[[Array, Array], Array | None],
+        corners: Integers | None = None,
     ) -> None:
         """A path and its body.
 
@@ -128,6 +129,7 @@ class KnotPath:
         slopes : called when first needed
         follow : shapes (N, n), rates (N, n) -> I (N, 3, 3), L_o (N, 3)
         directly : the same as channels (N, 9), or None where only `follow` will do
+        corners : knots that no panel spans, beside those at which the rate jumps
         """
         self.knots, self.follow, self.directly = knots, follow, directly
         self._pieces = np.moveaxis(coefficients, 0, 1)
@@ -137,8 +139,9 @@ class KnotPath:
         self._moves = np.abs(ends - self._pieces[:, 0])
         gaps = np.abs(self._pieces[1:, 1] - end_rates[:-1]).max(axis=1, initial=0.0)
         jumps = 1 + np.flatnonzero(gaps > _JUMP * np.abs(end_rates).max(initial=0.0))
+        jumps = jumps if corners is None else np.union1d(jumps, corners[(corners > 0) & (corners < len(steps))])
         self.corners: Integers = np.concatenate([[0], jumps, [len(steps)]])
-        """The knots at which the rate jumps, first and last the ends: (K,)."""
+        """The knots that no panel spans: where the rate jumps and those given, first and last the ends: (K,)."""
         self.plans: dict[tuple[float, float], FirstPanels] = {}
         """The last choice of panels, by tolerance and momentum."""
         still = ~self._pieces[:, 1:].any(axis=(1, 2))

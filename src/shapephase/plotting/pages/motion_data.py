@@ -12,6 +12,7 @@ from ... import so3
 from ...arrays import Array
 from ...body.appearance import Visual
 from ...body.body import Body
+from ...body.couplings.coordinate_map import CurvedJoint
 from .._moving_scene import MovingNode, MovingScene
 
 # Where a slider ends for a joint without a limit [rad or m], and from where on a limit is none.
@@ -61,10 +62,24 @@ def body_data(body: Body) -> dict[str, Any]:
         "chain": {
             "parents": list(chain.parents),
             **{name: np.asarray(getattr(chain, name), dtype=float) for name in names},
+            "curved": [_curved_joint(joint) for joint in chain.follows.curved],
         },
         "joints": [
             {"name": name, "unit": unit, "lower": float(lower), "upper": float(upper)}
             for name, unit, (lower, upper) in zip(body.joint_names, body.joint_units, limits, strict=True)
+        ],
+    }
+
+
+def _curved_joint(joint: CurvedJoint) -> dict[str, Any]:
+    """A joint that follows others by functions, as the page evaluates them."""
+    return {
+        "row": joint.row,
+        "start": joint.start,
+        "terms": [
+            {"source": source, "coefficients": function.coefficients.T.tolist()}
+            | {name: getattr(function, name).tolist() for name in ("knots", "centres")}
+            for source, function in joint.terms
         ],
     }
 

@@ -4,11 +4,25 @@
 // Coordinates of all joints, those that follow others included.
 function jointCoordinates(chain, shape) {
   const width = shape.length;
-  return Array.from(chain.offset, (offset, k) => {
+  const found = Array.from(chain.offset, (offset, k) => {
     let sum = offset;
     for (let n = 0; n < width; n++) sum += chain.matrix[k * width + n] * shape[n];
     return sum;
   });
+  // Each stands behind those that it follows.
+  for (const joint of chain.curved) {
+    found[joint.row] = joint.start;
+    for (const term of joint.terms) found[joint.row] += followed(term, found[term.source]);
+  }
+  return found;
+}
+
+// A function of a coordinate that is a polynomial between any two knots.
+function followed(term, coordinate) {
+  const behind = term.knots.findIndex((knot) => coordinate < knot);
+  const piece = behind < 0 ? term.knots.length : behind;
+  const since = coordinate - term.centres[piece];
+  return term.coefficients[piece].reduceRight((value, coefficient) => value * since + coefficient, 0);
 }
 
 // Of the base and of what each joint moves, in base axes.

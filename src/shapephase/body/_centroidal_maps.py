@@ -1,0 +1,85 @@
+"""Pinocchio's centroidal maps at many shapes, with a column for each independent joint."""
+
+from __future__ import annotations
+
+# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# pyright: reportAttributeAccessIssue=false
+import numpy as np
+import pinocchio as pin
+
+from ..arrays import Array
+from .couplings.joint_map import JointMap
+
+# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
+_BASE = 6
+
+
+def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
+    """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
+    centroidal_map = pin.computeCentroidalMap
+    # Each call returns a copy: all at once are put together sooner than one by one.
+    maps = [centroidal_map(model, data, q) for q in joints.configurations(shapes)]
+    return np.array(maps).reshape(-1, 6, model.nv)[:, 3:, 3:]
+
+
+def angular_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
+    """[I, J] for each shape: (N, n) -> (N, 3, 3 + n)."""
+    whole = full_map(model, data, joints, shapes)
+    return np.concatenate([whole[:, :, :3], joints.columns(whole[:, :, 3:], shapes)], axis=-1)
+
+
+def angular_map_rate(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array, rates: Array) -> Array:
+    """d/dt [I, J] for each shape and rate: (N, n), (N, n) -> (N, 3, 3 + n)."""
+    velocities = joints.velocities(shapes, rates)
+    whole = np.empty((len(shapes), 3, model.nv - 3))
+    for row, (q, v) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
+        pin.dccrba(model, data, q, v)
+        whole[row] = data.dAg[3:, 3:]
+    columns = joints.columns(whole[:, :, 3:], shapes)
+    if not joints.follows.is_linear:
+        columns += joints.bent_columns(full_map(model, data, joints, shapes)[:, :, 3:], shapes, rates)
+    return np.concatenate([whole[:, :, :3], columns], axis=-1)
+
+
+def momentum_gradients(
+    model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array, rates: Array, spins: Array
+) -> Array:
+    """d(I w + J rate)/dr_k while w and the rates stay: (N, n), (N, n), (N, 3) -> (N, 3, n)."""
+    velocities = joints.velocities(shapes, rates)
+    velocities[:, 3:6] = spins
+    none = np.zeros(model.nv)
+    gradients = np.empty((len(velocities), 3, model.nv))
+    for row, (q, full) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
+        gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
+    columns = joints.columns(gradients[:, :, _BASE:], shapes)
+    if not joints.follows.is_linear:
+        columns += joints.bent_columns(full_map(model, data, joints, shapes)[:, :, 3:], shapes, rates)
+    return columns
+
+
+def internal_momenta(whole: Array, joints: JointMap, shapes: Array, rates: Array) -> Array:
+    """L_o from full maps: (N, 3, 3 + joints), (N, n), (N, n) -> (N, 3)."""
+    return (whole[:, :, 3:] @ joints.velocities(shapes, rates)[:, _BASE:, None])[..., 0]
+
+
+def kinetic_energies(
+    model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array, rates: Array, spins: Array
+) -> Array:
+    """About the centre of mass, the base turning at (N, 3): (N,) [J]."""
+    velocities = joints.velocities(shapes, rates)
+    velocities[:, 3:6] = spins
+    energies, mass = np.empty(len(velocities)), float(pin.computeTotalMass(model))
+    for row, (q, full) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
+        pin.ccrba(model, data, q, full)
+        whole = pin.computeKineticEnergy(model, data, q, full)
+        energies[row] = whole - 0.5 * data.hg.linear @ data.hg.linear / mass
+    return energies
+
+
+def centres_of_mass(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
+    """From the base origin, base axes: (N, 3) [m]."""
+    configurations = joints.configurations(shapes)
+    centres = np.empty((len(configurations), 3))
+    for row, q in enumerate(configurations):
+        centres[row] = pin.centerOfMass(model, data, q)
+    return centres

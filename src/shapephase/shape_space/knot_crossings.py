@@ -1,0 +1,179 @@
+"""Times at which a motion takes joints through the knots of the functions that others follow them by.
+
+There the deformation of a body is less smooth than the path: they are breaks of the path as the body follows it. A path
+is taken as Chebyshev series on panels that halve until they follow it; zeros of series are eigenvalues.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from ..arguments import check_object
+from ..arrays import Array, Mask
+from ..body.body import Body
+from ..body.couplings.coordinate_map import CoordinateMap
+from ..chebyshev import inside, nodes_on, values_to_coefficients
+from .curves import Curve
+from .shape_path import ShapePath
+
+_DEGREE = 16
+"""Of the series on a panel: five times that of a spline's pieces."""
+_RESOLVED = 1e-13
+"""Of the largest coefficient: the last ones of a series that follows the path."""
+_LAST = 3
+"""Coefficients that tell."""
+_MOST_HALVINGS = 16
+"""Of a stretch between breaks; what is rougher is followed no better."""
+_ROUNDING = 64.0 * np.finfo(float).eps
+"""Of a coordinate's size: what rounding may leave of it where it goes through a knot."""
+_SAME_TIME = 1e-12
+"""Of the duration: times nearer to each other are one."""
+_AT_KNOT = 1e-9
+"""[rad or m, or of the largest knot] by which a joint may be off a knot at the time found."""
+_NEARLY_REAL = 1e-6
+"""Imaginary part of a zero, in halves of a panel: of a double zero rounding leaves its root."""
+_WHOLE = 1e-9
+"""[rad or m] by which a loop may end elsewhere and still be one."""
+
+
+def route_along(body: Body, path: ShapePath) -> ShapePath:
+    """The path with its columns in the order of the body's joints, and breaks where the body's motion is less smooth.
+
+    Raises as `ShapePath.matched`.
+    """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
+    route = path.matched(body.joint_names, body.name)
+    follows = body.chain.follows
+    if follows.is_linear:
+        return route
+    if route.loops > 1 and _winds(body, route):
+        # What follows by a curve is elsewhere in the next loop.
+        route = replace(route, breaks=_loop_ends(route), loops=1, smooth_loop=False, scanner=None)
+    if follows.is_smooth:
+        return route
+    known = _merged(route.smoothness.breaks, _loop_ends(route))
+    first_loop = known[known <= route.duration / route.loops * (1.0 + _SAME_TIME)]
+    found = crossing_times(follows, route.curve, first_loop)
+    if not len(found):
+        return route
+    starts = route.duration / route.loops * np.arange(route.loops)
+    breaks = _merged(known, (starts[:, None] + found).ravel())
+    return replace(route, breaks=breaks, smooth_loop=False, scanner=None)
+
+
+def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:
+    """Times between the edges, ascending, at which a joint goes through a knot of a function that others follow it by.
+
+    Where a slope jumps at the knot and the joint is slow, the two times just before and behind: between them rounding
+    may take it for on either side.
+
+    Parameters
+    ----------
+    edges : (M,) times between which the curve is smooth [s]
+    """
+    found = np.zeros(0)
+    for joint, knots, kinked in follows.knotted:
+
+        def followed(times: Array, joint: int = joint) -> tuple[Array, Array]:
+            coordinates, rates = follows.with_rates(*curve(times))
+            return coordinates[:, joint], rates[:, joint]
+
+        # A joint that follows others itself is smooth between their crossings only.
+        found = _merged(found, _crossings(followed, _merged(edges, found), knots, kinked=kinked))
+    return found
+
+
+def at_knots(follows: CoordinateMap, curve: Curve, times: Array) -> Mask:
+    """Whether a joint is on its way through a knot at times that may be crossings: (N,) -> (N,)."""
+    coordinates, rates = follows.with_rates(*curve(times))
+    found = np.zeros(len(times), dtype=bool)
+    for joint, knots, _ in follows.knotted:
+        apart = np.abs(coordinates[:, joint, None] - knots).min(axis=1)
+        found |= (apart <= _AT_KNOT * (1.0 + np.abs(knots).max())) & (rates[:, joint] != 0.0)
+    return found
+
+
+def _crossings(followed: Curve, edges: Array, knots: Array, *, kinked: bool) -> Array:
+    left, right, series = _resolved(followed, edges)
+    size = float(np.abs(series).sum(axis=1).max(initial=0.0))
+    reach = np.abs(series[:, 1:]).sum(axis=1)
+    moving = reach > _ROUNDING * size
+    near = moving[:, None] & (np.abs(series[:, :1] - knots) <= reach[:, None] + _ROUNDING * size)
+    times, where = [np.zeros(0)], [np.zeros(0)]
+    for panel, knot in np.argwhere(near):
+        zeros = _zeros(series[panel], float(knots[knot]))
+        times.append(0.5 * (left[panel] + right[panel]) + 0.5 * (right[panel] - left[panel]) * zeros)
+        where.append(np.full(len(zeros), knots[knot]))
+    found, at = np.clip(np.concatenate(times), edges[0], edges[-1]), np.concatenate(where)
+    width = float(np.min(right - left))
+    values, rates = followed(found)
+    step = np.divide(values - at, rates, out=np.zeros_like(found), where=rates != 0.0)
+    found = np.where(np.abs(step) <= 1e-6 * width, found - step, found)
+    if kinked:
+        slack = np.divide(_ROUNDING * size, np.abs(rates), out=np.zeros_like(found), where=rates != 0.0)
+        slow = (slack > 32.0 * np.spacing(edges[-1])) & (slack < 1e-6 * width)
+        found = np.concatenate([found[~slow], (found - slack)[slow], (found + slack)[slow]])
+    return np.sort(found[(found > edges[0]) & (found < edges[-1])])
+
+
+def _resolved(followed: Curve, edges: Array) -> tuple[Array, Array, Array]:
+    """Panels and the Chebyshev series of a coordinate on them: (P,), (P,), (P, _DEGREE + 1)."""
+    left, right = edges[:-1], edges[1:]
+    done: list[tuple[Array, Array, Array]] = []
+    size = 0.0
+    for halving in range(_MOST_HALVINGS + 1):
+        times = nodes_on(*inside(left, right), _DEGREE)
+        values = followed(times.ravel())[0].reshape(times.shape)
+        series = values @ values_to_coefficients(_DEGREE).T
+        size = max(size, float(np.abs(values).max(initial=0.0)))
+        fine = np.abs(series[:, -_LAST:]).max(axis=1) <= _RESOLVED * size
+        if halving == _MOST_HALVINGS:
+            fine[:] = True
+        done.append((left[fine], right[fine], series[fine]))
+        left, right = left[~fine], right[~fine]
+        if not len(left):
+            break
+        middle = 0.5 * (left + right)
+        left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
+    return tuple(np.concatenate(parts) for parts in zip(*done, strict=True))  # pyright: ignore[reportReturnType]
+
+
+def _zeros(series: Array, value: float) -> Array:
+    """Where a series has a value, in [-1, 1]."""
+    sizes = np.abs(series)
+    last = np.flatnonzero(sizes > _ROUNDING * sizes.max())[-1]
+    shifted = series[: last + 1].copy()
+    shifted[0] -= value
+    roots = chebyshev.chebroots(shifted)
+    real = roots.real[np.abs(roots.imag) < _NEARLY_REAL]
+    return np.clip(real[np.abs(real) < 1.0 + _NEARLY_REAL], -1.0, 1.0)
+
+
+def _winds(body: Body, route: ShapePath) -> bool:
+    """Whether a joint that others follow by a curve ends a loop whole turns from its start."""
+    ends, _ = route.curve(np.array([0.0, route.duration]))
+    moved = np.abs(ends[1] - ends[0])
+    return bool((moved[np.isin(np.array(body.joint_names, dtype=str), body.chain.follows.drivers)] > _WHOLE).any())
+
+
+def _loop_ends(route: ShapePath) -> Array:
+    return _merged(route.breaks, route.duration / route.loops * np.arange(1, route.loops))
+
+
+def _merged(known: Array, more: Any) -> Array:
+    """Times of both, ascending; of those that are nearly the same the known one."""
+    if not len(known):
+        known, more = more[:1], more[1:]
+    if not len(more):
+        return known
+    near = _SAME_TIME * max(float(known[-1]), float(np.max(more)))
+    place = np.searchsorted(known, more)
+    before, behind = known[np.maximum(place - 1, 0)], known[np.minimum(place, len(known) - 1)]
+    new = np.sort(more[(np.abs(more - before) > near) & (np.abs(more - behind) > near)])
+    kept = new[np.concatenate([[True], np.diff(new) > near])] if len(new) else new
+    return np.sort(np.concatenate([known, kept]))
