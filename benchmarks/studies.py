@@ -31,8 +31,8 @@ import shapephase as sp
 
 CHUNK = 500
 """Cases, as a study has them by default."""
-_FEW, _MANY = 2, 8
-"""Chunks of the short and of the long study of one process."""
+_FEW = 2
+"""Chunks of the short study of one process."""
 _SIDE_BY_SIDE = 12
 """Chunks that two processes share."""
 _MILLION = 1_000_000
@@ -45,10 +45,11 @@ _SMALL_MOMENTUM = sp.study.Normal([0.0, 0.0, 0.01], 0.004)
 
 @dataclass(frozen=True)
 class Workload:
-    """A study of so many cases, and the same cases in one call of the library."""
+    """A study of so many cases, the same cases in one call of the library, and chunks of the long study."""
 
     study: Callable[[int], sp.study.Study]
     batch: Callable[[list[sp.study.Case]], object]
+    many: int
 
 
 def _astronaut(draws: int) -> sp.study.Study:
@@ -88,27 +89,34 @@ def _paths(cases: list[sp.study.Case]) -> object:
 
 
 WORKLOADS = {
-    "astronauts, a family of bodies": Workload(_astronaut, _family),
-    "momenta of the cat": Workload(_cat, _momenta),
-    "paths of the cat of two halves": Workload(_bends, _paths),
+    "astronauts, a family of bodies": Workload(_astronaut, _family, 10),
+    "momenta of the cat": Workload(_cat, _momenta, 40),
+    "paths of the cat of two halves": Workload(_bends, _paths, 6),
 }
 
 
 def print_costs(turns: int) -> None:
-    """What a case costs in chunks of one process, beside one batch of as many (target: 1.3 times)."""
-    print(f"\nprocessor time of a case [ms], chunks of {CHUNK} in one process and one batch")
+    """What a case costs in chunks of one process, beside batches of the same size (target: 1.3 times), and one of all."""
+    print(f"\nprocessor time of a case [ms]: chunks of {CHUNK} in one process, batches of {CHUNK}, one batch of all")
     for name, workload in WORKLOADS.items():
-        cases = workload.study(CHUNK * (_MANY - _FEW)).some_cases(np.arange(CHUNK * (_MANY - _FEW)))
+        count = workload.many - _FEW
+        cases = workload.study(CHUNK * count).some_cases(np.arange(CHUNK * count))
         workload.batch(cases[:2])
         found = []
         for _ in range(turns):
-            few, many = (_study_seconds(workload.study(CHUNK * chunks)) for chunks in (_FEW, _MANY))
-            began = time.process_time()
-            workload.batch(cases)
-            found.append([many - few, time.process_time() - began])
-        ours, batch = 1e3 * np.median(found, axis=0) / len(cases)
-        ratios = np.divide(*np.transpose(found))
-        print(f"  {name:32}{ours:8.3f}{batch:8.3f}   {_spread(ratios)}", flush=True)
+            few, many = (_study_seconds(workload.study(CHUNK * chunks)) for chunks in (_FEW, workload.many))
+            in_parts = sum(_seconds(workload.batch, cases[k * CHUNK : (k + 1) * CHUNK]) for k in range(count))
+            found.append([many - few, in_parts, _seconds(workload.batch, cases)])
+        ours, parts, whole = np.transpose(found)
+        each = 1e3 * np.median(found, axis=0) / len(cases)
+        print(f"  {name:32}" + "".join(f"{one:8.3f}" for one in each), flush=True)
+        print(f"  {'':6}to batches: {_spread(ours / parts)};  to one batch: {_spread(ours / whole)}", flush=True)
+
+
+def _seconds(call: Callable[[list[sp.study.Case]], object], cases: list[sp.study.Case]) -> float:
+    began = time.process_time()
+    call(cases)
+    return time.process_time() - began
 
 
 def _study_seconds(study: sp.study.Study) -> float:

@@ -61,6 +61,12 @@ STUDIES = {
     "momenta": ("cat_two_halves", bend, {"momentum": MOMENTUM}, {"parameters": {"depth": 0.5}}),
     "attitudes": ("cat_two_halves", bend, {"attitude": room.Normal(0.0, 0.3)}, {"parameters": {"depth": 0.5}}),
     "paths": ("cat_two_halves", bend, {"depth": room.Uniform(0.3, 0.9), "gauge": ["base", "horizontal"]}, {}),
+    "own paths": (
+        "cat_two_halves",
+        bend,
+        {"depth": room.Uniform(0.3, 0.9), "momentum": MOMENTUM, "attitude": room.Normal(0.0, 0.3)},
+        {},
+    ),
     "inertias": (
         "cat_two_halves",
         bend,
@@ -89,7 +95,7 @@ def test_a_study_is_a_plain_loop_to_the_last_bit(name, outputs):
         np.testing.assert_array_equal(found.values[output], expected[output], err_msg=output)
 
 
-@pytest.mark.parametrize("name", ["momenta", "inertias", "paths"])
+@pytest.mark.parametrize("name", ["momenta", "inertias", "paths", "own paths"])
 def test_cases_do_not_depend_on_those_beside_them_nor_on_their_order(name):
     body, motion, over, more = STUDIES[name]
     study = room.Study(body, motion, over, ENDS, draws=12, momentum=[0.0, 0.0, 0.01], **more)
@@ -104,7 +110,7 @@ def test_cases_do_not_depend_on_those_beside_them_nor_on_their_order(name):
 
 @pytest.mark.full
 @pytest.mark.usefixtures("fast")
-@pytest.mark.parametrize("name", list(STUDIES)[:5])
+@pytest.mark.parametrize("name", list(STUDIES)[:-1])
 def test_machine_code_gives_cases_their_bits_too(name):
     body, motion, over, more = STUDIES[name]
     draws = 60 // (2 if name in ("paths", "centres") else 1)

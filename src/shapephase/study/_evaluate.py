@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import so3
 from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.catalog import load_body
@@ -115,7 +116,7 @@ class Evaluator:
         """All cases, by batches where that is possible."""
         values = self.study.axis_values(indices)
         found, cases = Results.empty(self.study, indices, values), self.study.some_cases(indices, values)
-        for rows in _groups(cases):
+        for rows in self._lots(cases):
             try:
                 self._group([cases[row] for row in rows], rows, found)
             except Exception:
@@ -140,7 +141,7 @@ class Evaluator:
             found.fail(row, RAISED, type(error).__name__, str(error))
 
     def _group(self, cases: list[Case], rows: list[int], found: Results) -> None:
-        """Cases of one body, motion, tolerance and gauge."""
+        """Cases of one body, motion, tolerance and gauge; of many motions where only the ends are asked for."""
         first = cases[0]
         momenta = np.array([case.momentum for case in cases])
         attitudes = None if first.attitude is None else np.array([case.attitude for case in cases])
@@ -151,7 +152,7 @@ class Evaluator:
         elif not ends_suffice(self.outputs):
             for case, row in zip(cases, rows, strict=True):
                 self._single(case, row, found)
-        elif isinstance(first.body, RigidBody) or first.joint_noise is None:
+        elif first.joint_noise is None and all(_path_key(case) == _path_key(first) for case in cases):
             motion = reconstruct(self._deformation(first), momenta, attitudes, tolerance=first.tolerance, threads=1)
             starts = motion.initial_attitude
             self._put_ends(rows, starts, motion.final_attitude, motion.error_estimate, found)
@@ -159,8 +160,20 @@ class Evaluator:
             body = self._body(first)
             paths = (self._path(case, body) for case in cases)
             ends = final_attitudes(body, paths, momenta, attitudes, tolerance=first.tolerance)
-            starts = np.eye(3) if attitudes is None else attitudes
+            starts = np.eye(3) if attitudes is None else so3.rotation_argument(attitudes, "attitude")
             self._put_ends(rows, starts, ends.attitude, ends.error_estimate, found)
+
+    def _lots(self, cases: list[Case]) -> list[list[int]]:
+        """Rows that a batch takes together: those of one path, or each of its own."""
+        found: list[list[int]] = []
+        alone: dict[Any, list[int]] = {}
+        for rows in _groups(cases):
+            first = cases[rows[0]]
+            if len(rows) > 1 or isinstance(first.body, RigidBody) or _has_inertias(first):
+                found.append(rows)
+            else:
+                alone.setdefault((id(first.body), first.tolerance), []).extend(rows)
+        return found + list(alone.values())
 
     def _families(
         self, cases: list[Case], rows: list[int], momenta: Array, attitudes: Array | None, found: Results
