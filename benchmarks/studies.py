@@ -96,7 +96,7 @@ WORKLOADS = {
 
 
 def print_costs(turns: int) -> None:
-    """What a case costs in chunks of one process, beside batches of the same size (target: 1.3 times), and one of all."""
+    """What a case costs in chunks of one process, beside batches of as many (target: 1.3 times), and one of all."""
     print(f"\nprocessor time of a case [ms]: chunks of {CHUNK} in one process, batches of {CHUNK}, one batch of all")
     for name, workload in WORKLOADS.items():
         count = workload.many - _FEW

@@ -102,6 +102,15 @@ def check_function(value: object, name: str, what: str) -> None:
         raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
 
 
+def check_executor(value: object) -> None:
+    """Raise WrongObjectError for what is no executor of `concurrent.futures`, nor None."""
+    if value is not None and not (callable(getattr(value, "map", None)) and callable(getattr(value, "submit", None))):
+        raise WrongObjectError(
+            "executor: one of concurrent.futures, or of a cluster (client.get_executor()), is needed, got "
+            f"{what_came(value)}"
+        )
+
+
 def check_choice(value: object, kind: str, choices: Collection[str]) -> None:
     """Raise UnknownNameError where an argument is none of some words; `kind` says of what."""
     if not isinstance(value, str) or value not in choices:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, whole_argument
+from ..arguments import check_executor, check_object, whole_argument
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..deformation.deformation import articulated
@@ -190,6 +190,7 @@ def sampled_uncertainty(
     """
     if inertias is not None:
         check_object(inertias, "InertiaErrors", "inertias")
+    check_executor(executor)
     draws, seed = whole_argument(draws, "draws", 2), whole_argument(seed, "seed", 0)
     body, path = described_by(motion)
     inputs, rng = inputs_of(motion, joints, inertias, momentum, attitude, start), np.random.default_rng(seed)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import pickle
+import threading
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
+from ..arguments import check_executor, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import PlanNotFound, ShapePhaseError, UnstatedLimitWarning
@@ -72,6 +76,7 @@ def plan_reorientation(
     limits: Limits | None = None,
     search: Search | None = None,
     iteration_callback: Callable[[Progress], Any] | None = None,
+    executor: Executor | None = None,
 ) -> Plan:
     """The cheapest motion of the joints that turns a free body to a goal: the falling cat's problem, for any body.
 
@@ -99,6 +104,9 @@ def plan_reorientation(
     iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
         there: with the cheapest plan of the starts that had ended, or else PlanNotFound with the best so far.
         Ctrl-C is raised as KeyboardInterrupt, and nothing is kept
+    executor : of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes search
+        from several starts (`Search.starts`) side by side; `iteration_callback` then hears of a start when it has
+        ended. None: one start after the other, here. Plans do not depend on it
 
     Raises
     ------
@@ -127,6 +135,7 @@ def plan_reorientation(
     0.000000 rad off
     """
     check_object(body, "Body", "body")
+    check_executor(executor)
     chosen = Search() if search is None else search
     task = reorientation(
         body,
@@ -146,20 +155,64 @@ def plan_reorientation(
     attempts: list[_Attempt] = []
     with heard_interrupts():
         basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
-        program = CollocationProgram(task, basis) if chosen.method == "collocation" else ReducedProgram(task, basis)
         reporter = _ProgressReporter(iteration_callback)
         starting_points = _starting_points(task, basis, chosen, reporter)
-        for guess in starting_points:
-            if reporter.stopped and attempts:
+        search = _searched_here if executor is None else partial(_searched_by, executor)
+        for attempt in search(task, basis, chosen, starting_points, reporter):
+            attempts.append(attempt)
+            if reporter.stopped:
                 break
-            report = reporter.solver_callback("search", len(attempts) + 1, len(starting_points))
-            attempts.append(_local_search(task, basis, program, guess, int(chosen.iterations), report))
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
     if best is None or plan is None or not best.report.converged:
         raise PlanNotFound(_failure_message(task, basis, attempts, best, reporter.stopped), plan)
     return plan
+
+
+def _searched_here(
+    task: Reorientation, basis: SplineBasis, search: Search, guesses: Sequence[Guess], reporter: _ProgressReporter
+) -> Iterator[_Attempt]:
+    """The local searches, one after the other."""
+    program = _program(task, basis, search.method)
+    for number, guess in enumerate(guesses):
+        report = reporter.solver_callback("search", number + 1, len(guesses))
+        yield _local_search(task, basis, program, guess, int(search.iterations), report)
+
+
+def _searched_by(
+    executor: Executor,
+    task: Reorientation,
+    basis: SplineBasis,
+    search: Search,
+    guesses: Sequence[Guess],
+    reporter: _ProgressReporter,
+) -> Iterator[_Attempt]:
+    """The local searches by an executor, in the order of the guesses."""
+    recipe = pickle.dumps((task, basis.pieces, search.method, int(search.iterations)))
+    for number, attempt in enumerate(executor.map(partial(_searched_elsewhere, recipe), guesses)):
+        end = attempt.report
+        reporter.solver_callback("search", number + 1, len(guesses))(end.iterations, end.cost, end.infeasibility)
+        yield attempt
+
+
+# What a thread of an executor has made of the last recipe that came: a program takes as long as some starts.
+_KEPT = threading.local()
+
+
+def _searched_elsewhere(recipe: bytes, guess: Guess) -> _Attempt:
+    """One of them, in another process or thread."""
+    if getattr(_KEPT, "recipe", None) != recipe:
+        task, pieces, method, iterations = pickle.loads(recipe)
+        basis = SplineBasis(pieces)
+        _KEPT.made = task, basis, _program(task, basis, method), iterations
+        _KEPT.recipe = recipe
+    task, basis, program, iterations = _KEPT.made
+    return _local_search(task, basis, program, guess, iterations, lambda *_: False)
+
+
+def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
+    return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
 
 
 def _warn_of_unstated_rates(task: Reorientation, limits: Limits | None) -> None:

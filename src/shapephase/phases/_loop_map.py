@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,26 +16,40 @@ from ..arrays import Array, Integers, Mask
 from ..deformation.deformation import Deformation
 from ..errors import OpenPathError
 from ..integrator.integrate import stepped_rotation
+from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.sampling import Sampler
 from ..integrator.stepped import SteppedRotation
 
-# Memory: directions that are run through the loop together.
+# Directions that are run through the loop together, for memory: more are taken in parts, each with samples of its own,
+# so that it does not matter who computes them.
 _ROWS_AT_ONCE = 2048
+# The same with derivatives, which cost some milliseconds a direction.
+_SLOPES_AT_ONCE = 128
+
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True)
 class MomentumLoop:
-    """A loop of shapes, sampled once for all that is asked of its map."""
+    """A loop of shapes, sampled once for all that is asked of its map, but for very many directions.
 
+    Attributes
+    ----------
+    goal : tolerance [rad]
+    executor : that computes parts of very many directions; None: here
+    """
+
+    deformation: Deformation
     sampler: Sampler
     goal: float
+    executor: Executor | None = None
 
     @classmethod
-    def of(cls, deformation: Deformation, tolerance: float) -> MomentumLoop:
+    def of(cls, deformation: Deformation, tolerance: float, executor: Executor | None = None) -> MomentumLoop:
         """Of a deformation whose shape closes. Raises OpenPathError, ShapeError."""
         if deformation.closure is None:
             raise OpenPathError(f"closed orbits need a loop of shapes; this one ends {deformation.shape_gap:.3g} off")
-        return cls(deformation.sampler(), tolerance_argument(tolerance))
+        return cls(deformation, deformation.sampler(), tolerance_argument(tolerance), executor)
 
     @property
     def accepted(self) -> float:
@@ -42,24 +60,65 @@ class MomentumLoop:
         """The motions that start with momenta of this magnitude along these directions (N, 3)."""
         return stepped_rotation(self.sampler, magnitude * points, tolerance or self.goal)
 
+    def run_all(self, magnitude: float, points: Array) -> SteppedRotation | GroupedRotations:
+        """The same of any number of directions."""
+        if len(points) <= _ROWS_AT_ONCE:
+            return self.run(magnitude, points)
+        found = self._in_parts(MomentumLoop.run, _ROWS_AT_ONCE, magnitude, points, None)
+        places = np.split(np.arange(len(points)), range(_ROWS_AT_ONCE, len(points), _ROWS_AT_ONCE))
+        parts = tuple(RotationPart(rows, part) for rows, part in zip(places, found, strict=True))
+        return GroupedRotations(parts, sum(part.interpolant.evaluations for part in found))
+
     def shift(self, magnitude: float, points: Array, tolerance: float) -> Array:
         """u(T) - u(0): (N, 3)."""
-        parts = [points[row : row + _ROWS_AT_ONCE] for row in range(0, len(points), _ROWS_AT_ONCE)]
-        return np.concatenate([ends_of(self.run(magnitude, part, tolerance), part) - part for part in parts])
+        if len(points) > _ROWS_AT_ONCE:
+            return np.concatenate(self._in_parts(MomentumLoop.shift, _ROWS_AT_ONCE, magnitude, points, tolerance))
+        return ends_of(self.run(magnitude, points, tolerance), points) - points
 
     def exactly(self, magnitude: float, points: Array, tolerance: float | None = None) -> tuple[Array, Array, Array]:
         """u(T) (N, 3), its derivatives by u(0) (N, 3, 3) and by the momentum's magnitude (N, 3)."""
+        if len(points) > _SLOPES_AT_ONCE:
+            found = self._in_parts(MomentumLoop.exactly, _SLOPES_AT_ONCE, magnitude, points, tolerance)
+            ends, by_start, by_magnitude = (np.concatenate(part) for part in zip(*found, strict=True))
+            return ends, by_start, by_magnitude
         solution = self.run(magnitude, points, tolerance)
         ends = ends_of(solution, points)
         return ends, *exact_slopes(solution, points, ends, magnitude)
 
+    def _in_parts(
+        self,
+        method: Callable[[MomentumLoop, float, Array, float], _Found],
+        most: int,
+        magnitude: float,
+        points: Array,
+        tolerance: float | None,
+    ) -> list[_Found]:
+        """What a method gives for at most so many directions at a time, each time with samples of their own."""
+        parts = [points[row : row + most] for row in range(0, len(points), most)]
+        compute = map if self.executor is None else self.executor.map
+        return list(compute(partial(_of_part, method, self.deformation, self.goal, magnitude, tolerance), parts))
 
-def ends_of(solution: SteppedRotation, points: Array) -> Array:
+
+def _of_part(
+    method: Callable[[MomentumLoop, float, Array, float], _Found],
+    deformation: Deformation,
+    goal: float,
+    magnitude: float,
+    tolerance: float | None,
+    points: Array,
+) -> _Found:
+    """One part, which may be computed in another process."""
+    return method(MomentumLoop.of(deformation, goal), magnitude, points, tolerance or goal)
+
+
+def ends_of(solution: SteppedRotation | GroupedRotations, points: Array) -> Array:
     """u(T) of u(0): (N, 3) -> (N, 3)."""
     return so3.apply(so3.transpose(solution.end), points)
 
 
-def exact_slopes(solution: SteppedRotation, points: Array, ends: Array, magnitude: float) -> tuple[Array, Array]:
+def exact_slopes(
+    solution: SteppedRotation | GroupedRotations, points: Array, ends: Array, magnitude: float
+) -> tuple[Array, Array]:
     """Derivatives of u(T) = S^T u(0), by u(0) (N, 3, 3) and by the momentum's magnitude (N, 3)."""
     turning = so3.hat(ends) @ solution.momentum_slope
     return so3.transpose(solution.end) + magnitude * turning, so3.apply(turning, points)

@@ -1,0 +1,87 @@
+"""Several starts searched from side by side, by threads, processes and a cluster: the same plans."""
+
+from __future__ import annotations
+
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.errors import PlanNotFound, WrongObjectError
+from shapephase.optimal_control import Limits, Search
+
+GOAL = sp.so3.exp(np.array([1.0, 0.0, 0.0]))
+OPTIONS = {"limits": Limits(rate_limits=None)}
+
+
+def planned(executor=None, *, method="collocation", starts=3, **more):
+    search = Search(pieces=8, starts=starts, seed=2, method=method)
+    return sp.plan_reorientation(
+        sp.load_body("cat_two_halves"), GOAL, search=search, executor=executor, **OPTIONS, **more
+    )
+
+
+def same(one, other):
+    np.testing.assert_array_equal(one.coefficients, other.coefficients)
+    np.testing.assert_array_equal(one.motion.final_attitude, other.motion.final_attitude)
+    assert one.cost == other.cost
+    for ours, theirs in zip(one.starts, other.starts, strict=True):
+        for name in ("status", "converged", "cost", "goal_error", "kkt_residual", "iterations"):
+            assert getattr(ours, name) == getattr(theirs, name), name
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("method", ["collocation", "reduced"])
+def test_plans_do_not_depend_on_who_searches(method):
+    alone = planned(method=method)
+    with ThreadPoolExecutor(2) as executor:
+        same(planned(executor, method=method), alone)
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
+        same(planned(executor, method=method), alone)
+
+
+@pytest.mark.full
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_finds_the_same_plan():
+    from distributed import Client, LocalCluster
+
+    alone = planned()
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        Client(cluster) as client,
+    ):
+        same(planned(client.get_executor()), alone)
+
+
+@pytest.mark.full
+def test_one_thread_finds_the_same_plan_and_a_callback_hears_of_every_start():
+    heard = []
+    with ThreadPoolExecutor(1) as executor:
+        found = planned(executor, starts=2, iteration_callback=heard.append)
+    same(found, planned(starts=2))
+    ends = [one for one in heard if one.stage == "search"]
+    assert [(one.start, one.starts, one.iteration) for one in ends] == [
+        (number + 1, 2, start.iterations) for number, start in enumerate(found.starts)
+    ]
+
+
+@pytest.mark.full
+def test_a_callback_ends_the_search_after_a_start():
+    with ThreadPoolExecutor(1) as executor:
+        found = planned(executor, starts=3, iteration_callback=lambda now: now.stage == "search")
+    assert len(found.starts) == 1
+
+
+def test_what_is_no_executor_is_said():
+    with pytest.raises(WrongObjectError, match=r"executor: .* is needed, got the class Search itself"):
+        planned(Search)
+
+
+def test_a_search_that_finds_nothing_says_so_from_there():
+    with ThreadPoolExecutor(1) as executor, pytest.raises(PlanNotFound, match="start 2"):
+        sp.plan_reorientation(
+            sp.load_body("cat_two_halves"), GOAL, search=Search(pieces=8, starts=2, iterations=1), executor=executor,
+            **OPTIONS,
+        )  # fmt: skip
