@@ -1,4 +1,4 @@
-"""Very many directions in parts, by other threads and processes: the same bits, and those of the whole to the tolerance."""
+"""Very many directions in parts, by threads and processes: the same bits, and those of the whole to the tolerance."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ def test_a_map_in_parts_is_that_of_the_whole(deformation, monkeypatch):
     assert len(found.solution.parts) == 3
 
 
+@pytest.mark.full
 def test_fixed_points_do_not_depend_on_who_computes_them(deformation, monkeypatch):
     whole = sp.fixed_points(deformation, 0.06)
     monkeypatch.setattr(_loop_map, "_ROWS_AT_ONCE", 100)
@@ -72,9 +73,7 @@ def test_processes_and_a_cluster_give_the_same(deformation):
         same(sp.stroboscopic_map(deformation, 0.05, directions, tolerance=1e-8, executor=executor), alone, "end")
 
 
-@pytest.mark.parametrize(
-    "function", [sp.fixed_points, lambda *words, **more: sp.stroboscopic_map(*words, np.eye(3), **more)]
-)
-def test_what_is_no_executor_is_said(deformation, function):
+@pytest.mark.parametrize(("function", "more"), [(sp.fixed_points, ()), (sp.stroboscopic_map, (np.eye(3),))])
+def test_what_is_no_executor_is_said(deformation, function, more):
     with pytest.raises(WrongObjectError, match=r"executor: .* is needed, got 3"):
-        function(deformation, 0.05, executor=3)
+        function(deformation, 0.05, *more, executor=3)

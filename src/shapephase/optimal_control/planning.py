@@ -157,8 +157,8 @@ def plan_reorientation(
         basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
         reporter = _ProgressReporter(iteration_callback)
         starting_points = _starting_points(task, basis, chosen, reporter)
-        search = _searched_here if executor is None else partial(_searched_by, executor)
-        for attempt in search(task, basis, chosen, starting_points, reporter):
+        searched = _searched_here if executor is None else partial(_searched_by, executor)
+        for attempt in searched(task, basis, chosen, starting_points, reporter):
             attempts.append(attempt)
             if reporter.stopped:
                 break
