@@ -11,10 +11,10 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._gauss import gauss_tableau
-from ._node_functions import node_functions
 from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
+from .nodes.node_functions import node_functions
 from .task import Reorientation
 
 # Gauss nodes of a piece: order six. On 12 pieces plans of the cat are off by some 1e-4 rad, which the Newton

@@ -32,7 +32,7 @@ from .task import Reorientation, reorientation
 
 # Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
 _FEW_JOINTS = 4
-# Many free joints: the symbolic Hessian of a node dominates, so the spline is coarse and no coarse search comes first.
+# Many free joints: the spline is coarse and no coarse search comes first.
 _MANY_JOINTS = 8
 # Pieces of the spline for few joints: paths of so many obey Wong's equations to 1e-4. For the acceleration cost they
 # would lose digits, as second derivatives of the basis grow with the square of the pieces; and from rest the joints

@@ -115,9 +115,9 @@ class SymbolicBody:
         if key not in self._made:
             shape = casadi.SX.sym("shape", self.n_shape)
             frame, pose = self.chain.link_frames[link]
-            turn, place = _frames(self.chain, shape)[frame]
+            turn, place = joint_frames(self.chain, joint_coordinates(self.chain, shape))[frame]
             last = casadi.SX([[0.0, 0.0, 0.0, 1.0]])
-            seen = casadi.horzcat(turn @ _constant(pose[:3, :3]), place + turn @ _constant(pose[:3, 3]))
+            seen = casadi.horzcat(turn @ constant(pose[:3, :3]), place + turn @ constant(pose[:3, 3]))
             self._made[key] = casadi.Function(key, [shape], [casadi.densify(casadi.vertcat(seen, last))])
         return self._made[key]
 
@@ -171,11 +171,11 @@ def _symbolic(body: Body) -> SymbolicBody:
 
     chain = body.chain
     shape = casadi.SX.sym("shape", body.n_shape)
-    frames = _frames(chain, shape)
+    frames = joint_frames(chain, joint_coordinates(chain, shape))
     masses, moments, tensors = _composites(chain, frames)
     centre = moments[0] / masses[0]
     inertia = _about(tensors[0], moments[0], centre)
-    speeds = [_joint_motion(chain, number, frames[number + 1]) for number in range(len(chain.parents))]
+    speeds = [joint_screw(chain, number, frames[number + 1]) for number in range(len(chain.parents))]
     # Linear and angular momentum, about the base origin, of what each joint carries at unit rate.
     carried = []
     for number, (turning, speed) in enumerate(speeds):
@@ -185,9 +185,9 @@ def _symbolic(body: Body) -> SymbolicBody:
     none = casadi.SX(3, 0)
     full_linear = casadi.horzcat(none, *(linear for linear, _ in carried))
     full_angular = casadi.horzcat(none, *(angular - casadi.cross(centre, linear) for linear, angular in carried))
-    fold = _constant(chain.matrix)
+    fold = constant(chain.matrix)
     if not chain.follows.is_linear:
-        fold = casadi.jacobian(_coordinates(chain, shape), shape)
+        fold = casadi.jacobian(joint_coordinates(chain, shape), shape)
     linear, momentum_matrix = full_linear @ fold, full_angular @ fold
     connection = solve_linear(inertia, momentum_matrix)
     mass_matrix = fold.T @ _joint_mass_matrix(chain, speeds, carried) @ fold
@@ -206,37 +206,36 @@ def _symbolic(body: Body) -> SymbolicBody:
     return SymbolicBody(name=body.name, joint_names=body.joint_names, chain=chain, **functions)
 
 
-def _constant(array: Array) -> Any:
+def constant(array: Array) -> Any:
     """A constant matrix whose zeros take part in no product."""
     import casadi
 
     return casadi.SX(casadi.sparsify(casadi.DM(array)))
 
 
-def _frames(chain: JointChain, shape: Any) -> list[tuple[Any, Any]]:
-    """Orientation and origin of each frame of the chain, base axes."""
+def joint_frames(chain: JointChain, joints: Any) -> list[tuple[Any, Any]]:
+    """Orientation and origin of each frame of the chain, base axes, from the coordinates of all joints."""
     import casadi
 
-    joints = _coordinates(chain, shape)
     frames = [(casadi.SX.eye(3), casadi.SX(3, 1))]
     for number, parent in enumerate(chain.parents):
         turn, place = frames[parent]
         coordinate = joints[number]
-        place = place + turn @ _constant(chain.places[number])
-        turn = turn @ _constant(chain.turns[number])
+        place = place + turn @ constant(chain.places[number])
+        turn = turn @ constant(chain.turns[number])
         if chain.slides[number].any():
-            place = place + turn @ (_constant(chain.slides[number]) * coordinate)
+            place = place + turn @ (constant(chain.slides[number]) * coordinate)
         if chain.axes[number].any():
             turn = turn @ _rotation(chain.axes[number], coordinate)
         frames.append((turn, place))
     return frames
 
 
-def _coordinates(chain: JointChain, shape: Any) -> Any:
-    """Of all joints."""
+def joint_coordinates(chain: JointChain, shape: Any) -> Any:
+    """Of all joints, from the shape."""
     import casadi
 
-    joints = _constant(chain.matrix) @ shape + casadi.DM(chain.offset)
+    joints = constant(chain.matrix) @ shape + casadi.DM(chain.offset)
     for joint in chain.follows.curved:
         joints[joint.row] = joint.start + sum(_followed(function, joints[k]) for k, function in joint.terms)
     return joints
@@ -262,8 +261,8 @@ def _rotation(axis: Array, angle: Any) -> Any:
     import casadi
 
     along = np.outer(axis, axis)
-    across = casadi.skew(_constant(axis))
-    return _constant(np.eye(3) - along) * casadi.cos(angle) + across * casadi.sin(angle) + _constant(along)
+    across = casadi.skew(constant(axis))
+    return constant(np.eye(3) - along) * casadi.cos(angle) + across * casadi.sin(angle) + constant(along)
 
 
 def _composites(chain: JointChain, frames: list[tuple[Any, Any]]) -> tuple[Array, list[Any], list[Any]]:
@@ -271,9 +270,9 @@ def _composites(chain: JointChain, frames: list[tuple[Any, Any]]) -> tuple[Array
     masses = chain.masses.copy()
     moments, tensors = [], []
     for (turn, place), mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True):
-        moment = mass * (place + turn @ _constant(centre))
+        moment = mass * (place + turn @ constant(centre))
         moments.append(moment)
-        own = turn @ _constant(inertia) @ turn.T
+        own = turn @ constant(inertia) @ turn.T
         tensors.append(own if mass == 0.0 else _about(own, -moment, moment / mass))
     for number in reversed(range(len(chain.parents))):
         parent = chain.parents[number]
@@ -290,13 +289,13 @@ def _about(tensor: Any, moment: Any, point: Any) -> Any:
     return tensor - (casadi.dot(moment, point) * casadi.SX.eye(3) - moment @ point.T)
 
 
-def _joint_motion(chain: JointChain, number: int, frame: tuple[Any, Any]) -> tuple[Any, Any]:
+def joint_screw(chain: JointChain, number: int, frame: tuple[Any, Any]) -> tuple[Any, Any]:
     """Motion of all that a joint carries at unit rate: angular velocity, and velocity at the base origin, base axes."""
     import casadi
 
     turn, place = frame
-    turning = turn @ _constant(chain.axes[number])
-    return turning, turn @ _constant(chain.slides[number]) + casadi.cross(place, turning)
+    turning = turn @ constant(chain.axes[number])
+    return turning, turn @ constant(chain.slides[number]) + casadi.cross(place, turning)
 
 
 def _joint_mass_matrix(chain: JointChain, speeds: list[tuple[Any, Any]], carried: list[tuple[Any, Any]]) -> Any:

@@ -1,0 +1,1 @@
+"""What one collocation node contributes to a plan's program."""

@@ -1,0 +1,171 @@
+"""What one collocation node contributes to the program: turning rate and cost density, and their derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ...body.body import Body
+from ..symbolic import joint_coordinates, solve_linear
+from ..task import Reorientation
+from .node_mechanics import SIZE, node_mechanics
+
+
+@dataclass(frozen=True, eq=False)
+class NodeFunctions:
+    """CasADi functions of a node's y = (r, u, q, T): shape, its derivative by place, quaternion, duration.
+
+    Attributes
+    ----------
+    values : y -> dq/ds (4,) and the density of the cost
+    jacobian : y -> derivative of dq/ds by y, (4, 2 m + 5)
+    hessian : y, multipliers of dq/ds (4,), factor of the density -> second derivatives of the weighted sum
+    """
+
+    values: Any
+    jacobian: Any
+    hessian: Any
+
+
+_built: WeakKeyDictionary[Body, dict[tuple[object, ...], NodeFunctions]] = WeakKeyDictionary()
+
+
+def node_functions(task: Reorientation) -> NodeFunctions:
+    """The functions of a task, kept as long as its body."""
+    kept = _built.setdefault(task.body, {})
+    key = (task.cost, task.coupling.shape, task.coupling.tobytes(), task.offset.tobytes(), task.momentum.tobytes())
+    if key not in kept:
+        kept[key] = _node_functions(task)
+    return kept[key]
+
+
+def _node_functions(task: Reorientation) -> NodeFunctions:
+    """The chain rule over three stages: coordinates and rates of joints, sixteen mechanical numbers, the turning."""
+    import casadi
+
+    m, chain = task.dimension, task.body.chain
+    mechanics, ends = node_mechanics(chain), _ends(task)
+    joints = _joints(task)
+    y = casadi.MX.sym("y", 2 * m + 5)
+    place, rate, onward, back = joints.values(y[: 2 * m])
+    numbers, by_place, by_rate = mechanics.values(place, rate)
+    bare = casadi.DM(task.coupling) @ y[m : 2 * m]
+    effort = 0.5 * casadi.dot(bare, bare)
+    seen = casadi.vertcat(numbers, effort, y[2 * m :])
+    turning, density = ends.values(seen)
+    # Derivatives of the sixteen by shape and rate; `onward` are those of the joints by the shape, `back` those of their
+    # rates by the shape, which is zero where joints follow others by straight lines only.
+    slopes = casadi.horzcat(by_place @ onward + by_rate @ back, by_rate @ onward)
+    at_rate = casadi.horzcat(casadi.MX(1, m), (casadi.DM(task.coupling.T @ task.coupling) @ y[m : 2 * m]).T)
+    through = casadi.diagcat(casadi.vertcat(slopes, at_rate), casadi.MX.eye(5))
+    by_seen, _ = ends.jacobian(seen)
+    jacobian = casadi.densify(by_seen @ through)
+    multipliers, factor = casadi.MX.sym("multipliers", 4), casadi.MX.sym("factor")
+    gradient, bend = ends.hessian(seen, multipliers, factor)
+    places, mixed, rates = mechanics.second(place, rate, gradient[:SIZE])
+    # Second derivatives by joints' coordinates and rates, seen from shape and its rate.
+    lower = mixed @ onward + rates @ back
+    corner = onward.T @ (places @ onward + mixed.T @ back) + back.T @ lower
+    beside = onward.T @ lower
+    square = onward.T @ rates @ onward + gradient[SIZE] * casadi.DM(task.coupling.T @ task.coupling)
+    block = casadi.vertcat(casadi.horzcat(corner, beside.T), casadi.horzcat(beside, square))
+    if joints.bend is not None:
+        block = block + joints.bend(y[: 2 * m], by_place.T @ gradient[:SIZE], by_rate.T @ gradient[:SIZE])
+    hessian = through.T @ bend @ through + casadi.diagcat(block, casadi.MX(5, 5))
+    return NodeFunctions(
+        values=casadi.Function("node", [y], [turning, density]),
+        jacobian=casadi.Function("node_jacobian", [y], [jacobian]),
+        hessian=casadi.Function("node_hessian", [y, multipliers, factor], [casadi.densify(hessian)]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Joints:
+    """Coordinates and rates of all joints from the shape and its rate, (2 m,).
+
+    Attributes
+    ----------
+    values : (2 m,) -> coordinates (k,), rates (k,), derivatives of the first by the shape, of the second by the shape
+    bend : (2 m,), factors of coordinates (k,) and of rates (k,) -> second derivatives (2 m, 2 m) of the weighted sum;
+        None: they are zero
+    """
+
+    values: Any
+    bend: Any
+
+
+def _joints(task: Reorientation) -> _Joints:
+    import casadi
+
+    m, chain = task.dimension, task.body.chain
+    both = casadi.SX.sym("both", 2 * m)
+    shape, rate = both[:m], both[m:]
+    place = joint_coordinates(chain, casadi.DM(task.coupling) @ shape + casadi.DM(task.offset))
+    onward = casadi.jacobian(place, shape)
+    rates = onward @ rate
+    back = casadi.jacobian(rates, shape)
+    values = casadi.Function("joints", [both], [casadi.densify(place), casadi.densify(rates), onward, back])
+    if chain.follows.is_linear:
+        return _Joints(values=values, bend=None)
+    of_place, of_rate = (casadi.SX.sym(name, len(chain.parents)) for name in ("of_place", "of_rate"))
+    bend, _ = casadi.hessian(casadi.dot(of_place, place) + casadi.dot(of_rate, rates), both)
+    return _Joints(values=values, bend=casadi.Function("joints_bend", [both, of_place, of_rate], [bend]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """Functions of the sixteen numbers, half the squared rate, quaternion and duration: (22,).
+
+    Attributes
+    ----------
+    values : -> dq/ds (4,), density
+    jacobian : -> derivatives of both, (4, 22) and (1, 22)
+    hessian : and multipliers (4,), factor -> gradient (22,) and second derivatives (22, 22) of the weighted sum
+    """
+
+    values: Any
+    jacobian: Any
+    hessian: Any
+
+
+def _ends(task: Reorientation) -> _Ends:
+    import casadi
+
+    seen, mass = casadi.SX.sym("seen", SIZE + 6), float(task.body.chain.masses.sum())
+    moment, entries, angular, linear = seen[:3], seen[3:9], seen[9:12], seen[12:15]
+    energy, effort, q, duration = seen[15], seen[16], seen[17:21], seen[21]
+    about_origin = casadi.vertcat(
+        casadi.horzcat(entries[0], entries[1], entries[2]),
+        casadi.horzcat(entries[1], entries[3], entries[4]),
+        casadi.horzcat(entries[2], entries[4], entries[5]),
+    )
+    inertia = about_origin - (casadi.dot(moment, moment) * casadi.SX.eye(3) - moment @ moment.T) / mass
+    momentum = angular - casadi.cross(moment, linear) / mass
+    answer = solve_linear(inertia, momentum)
+    turn, vector, scalar = -answer, q[:3], q[3]
+    if np.any(task.momentum):
+        mu = casadi.DM(task.momentum)
+        back = mu - 2.0 * scalar * casadi.cross(vector, mu) + 2.0 * casadi.cross(vector, casadi.cross(vector, mu))
+        turn = turn + duration * solve_linear(inertia, back)
+    turning = 0.5 * casadi.vertcat(scalar * turn + casadi.cross(vector, turn), -casadi.dot(vector, turn))
+    density = casadi.SX(1, 1)
+    if task.cost == "kinetic":
+        density = 0.5 * (energy - casadi.dot(linear, linear) / mass - casadi.dot(momentum, answer)) / duration
+    elif task.cost == "rate":
+        density = effort / duration
+    density = casadi.densify(density)
+    multipliers, factor = casadi.SX.sym("multipliers", 4), casadi.SX.sym("factor")
+    weighted = casadi.dot(multipliers, turning) + factor * density
+    bend, gradient = casadi.hessian(weighted, seen)
+    slopes = [casadi.densify(casadi.jacobian(part, seen)) for part in (turning, density)]
+    options = {"cse": True}
+    return _Ends(
+        values=casadi.Function("ends", [seen], [turning, density], options),
+        jacobian=casadi.Function("ends_jacobian", [seen], slopes, options),
+        hessian=casadi.Function(
+            "ends_hessian", [seen, multipliers, factor], [casadi.densify(gradient), casadi.densify(bend)], options
+        ),
+    )

@@ -1,0 +1,240 @@
+r"""Inertia, momentum and energy of a tree of links with their first and second derivatives, in time linear in joints.
+
+Of all links together, about the base origin in base axes, the program needs sixteen numbers
+
+    z = (first moment h, inertia J, angular momentum n and momentum p of the joint motion, twice its energy k),
+
+with the base held. CasADi's own second derivatives of them are expressions of some millions of operations for a human.
+But a joint moves all that hangs on it as one rigid body, along its screw s: so derivatives by two joints, of which the
+first carries the second, are products of a vector of the one and a vector of the other. With s x twists, s x* forces,
+V the twist of a joint's frame by the joint motion, I and P inertia and momentum of all that it carries, and
+
+    S = c_h h + C : J + eta (n, p) + c_k k
+
+any sum of the sixteen,
+
+    d2S/dr_i dr_j = h_j' alpha_i + J_j' : B_i - b_i g_j + a_i e_j,
+    d2S/dr_i du_j = - f_j t_i,    d2S/du_i dr_j = s_i g_j,    d2S/du_i du_j = 2 c_k s_i f_j,
+
+    a = s x eta,   b = s x V,   t = a + 2 c_k b,   f = I s,   e = I b - s x* P,   g = s x* (I eta + 2 c_k P) - I t,
+
+where h', J' are the derivatives of first moment and inertia along s, and alpha, B those of their factors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Array
+from ...body.joint_chain import JointChain
+from ..symbolic import constant, joint_frames, joint_screw
+
+SIZE = 16
+"""Of z."""
+_INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class NodeMechanics:
+    """CasADi functions of coordinates and rates of all k joints of a tree.
+
+    Attributes
+    ----------
+    values : coordinates (k,), rates (k,) -> z (16,), its derivatives by both, (16, k) each
+    second : coordinates, rates, factors (16,) -> second derivatives of their product with z: by coordinates (k, k), by
+        rates and coordinates (k, k), by rates (k, k)
+    """
+
+    values: Any
+    second: Any
+
+
+def node_mechanics(chain: JointChain) -> NodeMechanics:
+    """The functions of a tree, in symbols.
+
+    Source: composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2).
+    """
+    import casadi
+
+    count = len(chain.parents)
+    place, rate, factors = (casadi.SX.sym(name, size) for name, size in (("q", count), ("u", count), ("c", SIZE)))
+    tree = _Tree(chain, place, rate)
+    values = casadi.Function("mechanics", [place, rate], [*tree.values()], {"cse": True})
+    rows = casadi.Function("mechanics_rows", [place, rate, factors], [*tree.rows(factors)], {"cse": True})
+    q, u, c = (casadi.MX.sym(name, size) for name, size in (("q", count), ("u", count), ("c", SIZE)))
+    carrying, carried, screws, forces, turned, lent = rows(q, u, c)
+    above = casadi.DM(_carries(chain))
+    apart = casadi.DM(_carries(chain) - np.eye(count))
+    upper = above * (carrying.T @ carried)
+    places = upper + (apart * upper).T
+    mixed = (apart * (screws.T @ lent)) - (above * (turned.T @ forces)).T
+    energies = above * (screws.T @ forces)
+    rates = 2.0 * c[-1] * (energies + (apart * energies).T)
+    second = casadi.Function("mechanics_second", [q, u, c], [places, mixed, rates])
+    return NodeMechanics(values=values, second=second)
+
+
+def _carries(chain: JointChain) -> Array:
+    """(k, k) one where the first joint carries the second, or is the same, else zero."""
+    return chain.hanging[:, 1:]
+
+
+class _Tree:
+    """Screws, twists, inertias and momenta of a tree, as expressions."""
+
+    def __init__(self, chain: JointChain, place: Any, rate: Any) -> None:
+        import casadi
+
+        frames = joint_frames(chain, place)
+        joints = range(len(chain.parents))
+        self._screws = [_Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
+        none = casadi.SX(3, 1)
+        self._twists = [_Twist(none, none)]
+        for number, parent in enumerate(chain.parents):
+            self._twists.append(self._twists[parent] + self._screws[number] * rate[number])
+        bodies = [
+            _Inertia.of_link(float(mass), frame, centre, inertia)
+            for frame, mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True)
+        ]
+        momenta = [body.momentum(twist) for body, twist in zip(bodies, self._twists, strict=True)]
+        for number in reversed(joints):
+            parent = chain.parents[number]
+            bodies[parent] = bodies[parent] + bodies[number + 1]
+            momenta[parent] = momenta[parent] + momenta[number + 1]
+        self._bodies, self._momenta, self._rate = bodies, momenta, rate
+        self._forces = [bodies[number + 1].momentum(self._screws[number]) for number in joints]
+
+    def values(self) -> tuple[Any, Any, Any]:
+        """z and its derivatives by coordinates and rates."""
+        import casadi
+
+        whole, momentum = self._bodies[0], self._momenta[0]
+        energy = sum(screw.power(self._momenta[k + 1]) * self._rate[k] for k, screw in enumerate(self._screws))
+        entries = [whole.inertia[place] for place in _INERTIA_ENTRIES]
+        found = casadi.vertcat(whole.moment, *entries, momentum.angular, momentum.linear, energy)
+        by_place, by_rate = [], []
+        for number, screw in enumerate(self._screws):
+            body, carried = self._bodies[number + 1], self._momenta[number + 1]
+            moment, inertia = body.moved(screw)
+            swept = screw.cross(self._twists[number + 1])
+            change = screw.on_force(carried) - body.momentum(swept)
+            entries = [inertia[place] for place in _INERTIA_ENTRIES]
+            by_place.append(
+                casadi.vertcat(moment, *entries, change.angular, change.linear, -2.0 * swept.power(carried))
+            )
+            force = self._forces[number]
+            by_rate.append(casadi.vertcat(casadi.SX(9, 1), force.angular, force.linear, 2.0 * screw.power(carried)))
+        return casadi.densify(found), *(casadi.densify(casadi.horzcat(*rows)) for rows in (by_place, by_rate))
+
+    def rows(self, factors: Any) -> tuple[Any, ...]:
+        """The vectors whose products are the second derivatives, one column a joint: X, Y, s, f, t, g."""
+        import casadi
+
+        of_moment, of_energy = factors[:3], factors[15]
+        doubled = casadi.SX(3, 3)
+        for number, (a, b) in enumerate(_INERTIA_ENTRIES):
+            # Entries off the diagonal stand for both of their places.
+            doubled[a, b] = doubled[b, a] = factors[3 + number] * (1.0 if a == b else 0.5)
+        eta = _Twist(factors[9:12], factors[12:15])
+        columns: list[list[Any]] = [[] for _ in range(6)]
+        for number, screw in enumerate(self._screws):
+            body, carried, force = self._bodies[number + 1], self._momenta[number + 1], self._forces[number]
+            swept, lever = screw.cross(self._twists[number + 1]), screw.cross(eta)
+            turned = lever + swept * (2.0 * of_energy)
+            lent = screw.on_force(body.momentum(eta) + carried * (2.0 * of_energy)) - body.momentum(turned)
+            change = body.momentum(swept) - screw.on_force(carried)
+            moment, inertia = body.moved(screw)
+            spin = casadi.skew(screw.angular)
+            weight = doubled @ spin - spin @ doubled
+            along = casadi.cross(of_moment, screw.angular)
+            along = along + 2.0 * (casadi.trace(doubled) * screw.linear - doubled @ screw.linear)
+            entries = [(1.0 if a == b else 2.0) * inertia[a, b] for a, b in _INERTIA_ENTRIES]
+            weights = [weight[place] for place in _INERTIA_ENTRIES]
+            columns[0].append(casadi.vertcat(swept.stacked, lever.stacked, along, *weights))
+            columns[1].append(casadi.vertcat(-lent.stacked, change.stacked, moment, *entries))
+            for column, one in zip(columns[2:], (screw, force, turned, lent), strict=True):
+                column.append(one.stacked)
+        return tuple(casadi.densify(casadi.horzcat(*column)) for column in columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _Twist:
+    """Angular velocity and velocity at the base origin; or angular momentum about it and momentum."""
+
+    angular: Any
+    linear: Any
+
+    @property
+    def stacked(self) -> Any:
+        import casadi
+
+        return casadi.vertcat(self.angular, self.linear)
+
+    def __add__(self, other: _Twist) -> _Twist:
+        return _Twist(self.angular + other.angular, self.linear + other.linear)
+
+    def __sub__(self, other: _Twist) -> _Twist:
+        return _Twist(self.angular - other.angular, self.linear - other.linear)
+
+    def __mul__(self, factor: Any) -> _Twist:
+        return _Twist(self.angular * factor, self.linear * factor)
+
+    def power(self, force: _Twist) -> Any:
+        """Of a force on this twist."""
+        import casadi
+
+        return casadi.dot(self.angular, force.angular) + casadi.dot(self.linear, force.linear)
+
+    def cross(self, other: _Twist) -> _Twist:
+        """How another twist changes as it is carried along with this one."""
+        import casadi
+
+        linear = casadi.cross(self.angular, other.linear) + casadi.cross(self.linear, other.angular)
+        return _Twist(casadi.cross(self.angular, other.angular), linear)
+
+    def on_force(self, force: _Twist) -> _Twist:
+        """How a force, or a momentum, changes as it is carried along with this twist."""
+        import casadi
+
+        angular = casadi.cross(self.angular, force.angular) + casadi.cross(self.linear, force.linear)
+        return _Twist(angular, casadi.cross(self.angular, force.linear))
+
+
+@dataclass(frozen=True, eq=False)
+class _Inertia:
+    """Mass, first moment and inertia about the base origin."""
+
+    mass: float
+    moment: Any
+    inertia: Any
+
+    @classmethod
+    def of_link(cls, mass: float, frame: tuple[Any, Any], centre: Array, inertia: Array) -> _Inertia:
+        import casadi
+
+        turn, place = frame
+        seen = place + turn @ constant(centre)
+        own = turn @ constant(inertia) @ turn.T
+        return cls(mass, mass * seen, own + mass * (casadi.dot(seen, seen) * casadi.SX.eye(3) - seen @ seen.T))
+
+    def __add__(self, other: _Inertia) -> _Inertia:
+        return _Inertia(self.mass + other.mass, self.moment + other.moment, self.inertia + other.inertia)
+
+    def momentum(self, twist: _Twist) -> _Twist:
+        """Of this body moving with a twist."""
+        import casadi
+
+        linear = self.mass * twist.linear + casadi.cross(twist.angular, self.moment)
+        return _Twist(self.inertia @ twist.angular + casadi.cross(self.moment, twist.linear), linear)
+
+    def moved(self, screw: _Twist) -> tuple[Any, Any]:
+        """Derivatives of first moment and inertia along a screw."""
+        import casadi
+
+        spin, along = casadi.skew(screw.angular), self.moment @ screw.linear.T
+        turned = spin @ self.inertia
+        slid = 2.0 * casadi.dot(self.moment, screw.linear) * casadi.SX.eye(3) - along - along.T
+        return casadi.cross(screw.angular, self.moment) + self.mass * screw.linear, turned + turned.T + slid
