@@ -41,6 +41,7 @@ from .errors import (
 from .integrator.fast.engine import compile_steps
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
+from .phases.forced_split import ForcedSplit
 from .phases.phase_split import PhaseSplit
 from .phases.phases import (
     ArcPhases,
@@ -55,6 +56,8 @@ from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .plotting import plots
 from .plotting.viewer import motion_page, view
+from .reconstruction.external_torque import ExternalTorque, TorqueState
+from .reconstruction.forced_motion import ForcedMotion
 from .reconstruction.motion_family import MotionFamily
 from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
 from .reconstruction.recorded_base import BaseDifference, base_difference
@@ -87,8 +90,11 @@ __all__ = [
     "DeformationFamily",
     "Derivatives",
     "EulerTop",
+    "ExternalTorque",
     "FinalAttitudes",
     "FixedPoints",
+    "ForcedMotion",
+    "ForcedSplit",
     "HorizontalLift",
     "IgnoredElementWarning",
     "ImplausibleBodyWarning",
@@ -109,6 +115,7 @@ __all__ = [
     "Sensitivity",
     "ShapePath",
     "ShapePhaseError",
+    "TorqueState",
     "TrajectoryWarning",
     "Uncertainty",
     "UnphysicalInertiaWarning",

@@ -52,10 +52,9 @@ def torques_command(
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch)
         work.begin("inverse dynamics")
         found = joint_torques(flown.motion)
-        loads = found.loads
         if out is not None:
             found.write_csv(out)
             say_written(out)
-    text = torque_lines(loads, found, flown.body, motion)
-    data = torque_data(loads, found, flown.body, motion) | recording_data(flown.recorded)
+    text = torque_lines(found.loads, flown.motion, flown.body, motion)
+    data = torque_data(found, flown.motion, flown.body, motion) | recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

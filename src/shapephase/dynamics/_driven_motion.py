@@ -13,6 +13,7 @@ from ..body.body import Body
 from ..body.inverse_dynamics import falling_efforts
 from ..errors import WrongObjectError
 from ..inertia_tensor import inverse_inertia
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 
@@ -40,7 +41,7 @@ class Drive:
         return self.torque * self.rate
 
 
-def body_and_path(motion: Motion) -> tuple[Body, ShapePath]:
+def body_and_path(motion: Motion | ForcedMotion) -> tuple[Body, ShapePath]:
     """Of a motion of an articulated body, in whatever gauge. Raises WrongObjectError for another."""
     found: Any = motion.deformation.description
     while hasattr(found, "original"):
@@ -54,11 +55,11 @@ def body_and_path(motion: Motion) -> tuple[Body, ShapePath]:
     return body, path
 
 
-def drive(motion: Motion, times: Array, turned: Array | None = None) -> Drive:
+def drive(motion: Motion | ForcedMotion, times: Array, turned: Array | None = None) -> Drive:
     """Inverse dynamics along a motion.
 
     The base's acceleration is that of the reconstructed motion: from I omega + L_o = Pi and Pi' = Pi x omega follows
-    I omega' = Pi x omega - I' omega - L_o'.
+    I omega' = Pi x omega - I' omega - L_o'; a torque from outside, which acts on the base, adds to both.
 
     Parameters
     ----------
@@ -76,12 +77,16 @@ def drive(motion: Motion, times: Array, turned: Array | None = None) -> Drive:
     momenta = momenta.reshape(-1, len(times), 3)
     if turned is not None:
         momenta = so3.apply(so3.transpose(so3.exp(turned)), momenta)
+    push = np.zeros((len(times), 3))
+    if isinstance(motion, ForcedMotion):
+        push = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.torque(times))
     torques, wrenches, energies = [], [], []
     for pi in momenta:
         spins = so3.apply(inverse, pi - internal)
-        slopes = so3.apply(inverse, np.cross(pi, spins) - so3.apply(inertia_rate, spins) - internal_rate)
+        slopes = so3.apply(inverse, np.cross(pi, spins) + push - so3.apply(inertia_rate, spins) - internal_rate)
         torque, wrench = falling_efforts(body, shapes, rates, accelerations, spins, slopes)
         torques.append(torque)
+        wrench[:, 3:] -= push
         wrenches.append(wrench)
         energies.append(body.kinetic_energy(shapes, rates, spins))
     return Drive(torque=np.array(torques), rate=rates, wrench=np.array(wrenches), energy=np.array(energies))

@@ -15,6 +15,7 @@ from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..chebyshev import chebyshev
 from ..display import short_repr
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
 from ._driven_motion import Drive, body_and_path, drive
@@ -45,7 +46,8 @@ class JointLoads:
     peak_power : largest size [W]
     positive_work, negative_work : done by the joint, and taken up by it, the latter negative [J]
     energy_change : batch, of the kinetic energy [J]
-    energy_defect : batch, by how much the work of all joints misses it, of the work done back and forth [1]
+    energy_defect : batch, by how much the work of all joints, and of a torque from outside, misses it, of the work that
+        joints do back and forth [1]
     effort_limits, rate_limits : (n,) of the body, infinite where none is stated
 
     Notes
@@ -155,11 +157,13 @@ class _Panels:
         return np.einsum("p,m,bpmn->b", 0.5 * np.diff(self.edges), weights, np.abs(self.power))
 
 
-def joint_loads(motion: Motion) -> JointLoads:
+def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
-    check_object(motion, "Motion", "motion")
+    if not isinstance(motion, ForcedMotion):
+        check_object(motion, "Motion", "motion")
     body, _ = body_and_path(motion)
-    edges = np.union1d(motion.solution.times, motion.deformation.breaks)
+    breaks = motion.breaks if isinstance(motion, ForcedMotion) else motion.deformation.breaks
+    edges = np.union1d(motion.solution.times, breaks)
     edges = edges[np.append(True, np.diff(edges) > 1e-12 * motion.duration)]
     edges[-1] = motion.duration
     seen: list[_Panels] = []
@@ -172,6 +176,7 @@ def joint_loads(motion: Motion) -> JointLoads:
     found = settled(finer(), _difference, _SETTLED) or seen[0]
     ends = drive(motion, np.array([0.0, motion.duration]))
     change = ends.energy[:, 1] - ends.energy[:, 0]
+    from_outside = float(motion.work(motion.duration)) if isinstance(motion, ForcedMotion) else 0.0
     positive = np.array([[_positive(found, b, k) for k in range(body.n_shape)] for b in range(len(change))])
     positive = positive.reshape(len(change), body.n_shape)
     net, moved = found.work, found.moved
@@ -179,7 +184,7 @@ def joint_loads(motion: Motion) -> JointLoads:
     flat = np.abs(looked).reshape(len(change), at.size, body.n_shape)
     place = np.argmax(flat, axis=1)
     single = (*motion.batch, body.n_shape)
-    defect = np.abs(net.sum(axis=1) - change) / np.where(moved > 0.0, moved, 1.0)
+    defect = np.abs(net.sum(axis=1) + from_outside - change) / np.where(moved > 0.0, moved, 1.0)
     return JointLoads(
         joint_names=body.joint_names,
         joint_units=body.joint_units,
@@ -203,7 +208,7 @@ def _difference(last: _Panels, found: _Panels) -> float:
     return float(np.max(np.abs(found.work - last.work) / moved[:, None], initial=0.0))
 
 
-def _sampled(motion: Motion, edges: Array) -> _Panels:
+def _sampled(motion: Motion | ForcedMotion, edges: Array) -> _Panels:
     local, _, _ = _rule()
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * local
     found: Drive = drive(motion, times.ravel())

@@ -14,6 +14,7 @@ from ..arguments import check_object, times_argument
 from ..arrays import Array, lock_arrays
 from ..display import short_repr
 from ..errors import MissingExtraError, ShapeError
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ._driven_motion import body_and_path, drive
@@ -51,7 +52,7 @@ class JointTorques:
     ((2, 3), True)
     """
 
-    motion: Motion = field(repr=False)
+    motion: Motion | ForcedMotion = field(repr=False)
     times: Array
     joint_names: tuple[str, ...]
     joint_units: tuple[str, ...]
@@ -126,7 +127,7 @@ class JointTorques:
         return columns
 
 
-def joint_torques(motion: Motion, t: ArrayLike | None = None) -> JointTorques:
+def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> JointTorques:
     """The torques and forces that the joints of a free body need for a motion: inverse dynamics.
 
     The body floats, or falls: gravity, which moves all its parts alike, loads no joint. Followers load the joint that
@@ -134,7 +135,7 @@ def joint_torques(motion: Motion, t: ArrayLike | None = None) -> JointTorques:
 
     Parameters
     ----------
-    motion : of an articulated body, in any gauge
+    motion : of an articulated body, in any gauge; a torque from outside acts on the base
     t : times (...) [s]; None: 201 even times
 
     Returns
@@ -161,7 +162,8 @@ def joint_torques(motion: Motion, t: ArrayLike | None = None) -> JointTorques:
     >>> print(float(found.loads.energy_defect) < 1e-9)  # work of the joints against the change of energy
     True
     """
-    check_object(motion, "Motion", "motion")
+    if not isinstance(motion, ForcedMotion):
+        check_object(motion, "Motion", "motion")
     body, _ = body_and_path(motion)
     given = np.linspace(0.0, motion.duration, _ROWS) if t is None else t
     times = times_argument(given, motion.duration)

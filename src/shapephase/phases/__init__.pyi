@@ -1,5 +1,6 @@
 from .continuation import OrbitBranch, continued_orbits
 from .error_estimates import ArcErrors, RunningErrors, SplitErrors
+from .forced_split import ForcedSplit
 from .phase_split import PhaseSplit, SplitMotion
 from .phases import (
     ArcPhases,
@@ -18,6 +19,7 @@ __all__ = [
     "ArcPhases",
     "Crossings",
     "FixedPoints",
+    "ForcedSplit",
     "OrbitBranch",
     "PhaseSplit",
     "ReturnMap",

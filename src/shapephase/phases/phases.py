@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,7 @@ from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..letters import what_came
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
@@ -26,15 +27,31 @@ from ._deferred import Deferred
 from ._momentum_curve import Gauge, momentum_curve
 from ._motion_parts import array_by_parts, by_parts
 from .error_estimates import ArcErrors, RunningErrors
+from .forced_split import ForcedSplit, forced_split
 from .phase_split import PhaseSplit, SplitMotion
 
 CLOSINGS = ("start", "reference")
 """What closes the momentum's curve so far, for `running_phases`."""
 
 
+@overload
 def split(
     motion: Motion, gauge: Gauge = "horizontal", *, progress: Callable[[RunProgress], Any] | None = None
-) -> PhaseSplit:
+) -> PhaseSplit: ...
+
+
+@overload
+def split(
+    motion: ForcedMotion, gauge: Gauge = "horizontal", *, progress: Callable[[RunProgress], Any] | None = None
+) -> ForcedSplit: ...
+
+
+def split(
+    motion: Motion | ForcedMotion,
+    gauge: Gauge = "horizontal",
+    *,
+    progress: Callable[[RunProgress], Any] | None = None,
+) -> PhaseSplit | ForcedSplit:
     """Split the rotation of a motion into shape holonomy and Montgomery phase.
 
     Parameters
@@ -50,12 +67,14 @@ def split(
     UnknownNameError
         For another gauge.
     GaugeError
-        If the gauge's frame does not exist, or is not continuous.
+        If the gauge's frame does not exist, or is not continuous; with a torque from outside, if the momentum passes
+        through zero, where it has no direction.
     RunStopped
         If `progress` stopped it.
 
     Notes
     -----
+    Of a `ForcedMotion` it is a `ForcedSplit`, which has the solid angle of the momentum in space, too.
     Equations :eq:`split`, :eq:`closed-split` and :eq:`tilt` of the documentation.
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
 
@@ -66,6 +85,8 @@ def split(
     >>> print(f"{sp.split(motion, 'base').montgomery_angle:.9f}, {sp.so3.wrap(top.montgomery_phase):.9f}")
     2.523520948, 2.523520948
     """
+    if isinstance(motion, ForcedMotion):
+        return forced_split(motion, gauge)
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
         with watched(progress):

@@ -1,14 +1,19 @@
 from ._solvers import Solution
+from .external_torque import ExternalTorque, TorqueState
+from .forced_motion import ForcedMotion
 from .motion_family import MotionFamily
 from .reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
 from .recorded_base import BaseDifference, base_difference
 
 __all__ = [
     "BaseDifference",
+    "ExternalTorque",
+    "ForcedMotion",
     "Motion",
     "MotionFamily",
     "Sensitivity",
     "Solution",
+    "TorqueState",
     "base_difference",
     "load_motion",
     "momentum_from_rate",

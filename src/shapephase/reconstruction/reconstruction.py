@@ -36,6 +36,8 @@ from ._solvers import METHODS, SOLVERS, Solution, check_pieces
 from .motion_record import MotionRecord, read_motion_record, write_motion_record
 
 if TYPE_CHECKING:
+    from .external_torque import ExternalTorque, TorqueState
+    from .forced_motion import ForcedMotion
     from .motion_family import MotionFamily
 
 
@@ -326,7 +328,22 @@ def reconstruct(
     method: str = "auto",
     threads: int | None = None,
     progress: Callable[[RunProgress], Any] | None = None,
+    torque: None = None,
 ) -> Motion: ...
+
+
+@overload
+def reconstruct(
+    deformation: Deformation,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    *,
+    tolerance: float = 1e-9,
+    method: str = "auto",
+    threads: int | None = None,
+    progress: Callable[[RunProgress], Any] | None = None,
+    torque: ExternalTorque | Callable[[TorqueState], ArrayLike],
+) -> ForcedMotion: ...
 
 
 @overload
@@ -351,10 +368,11 @@ def reconstruct(
     method: str = "auto",
     threads: int | None = None,
     progress: Callable[[RunProgress], Any] | None = None,
-) -> Motion | MotionFamily:
+    torque: ExternalTorque | Callable[[TorqueState], ArrayLike] | None = None,
+) -> Motion | MotionFamily | ForcedMotion:
     """The motion of a free body with a known change of shape and a given angular momentum.
 
-    Solves R' = R hat(I^-1 (R^T momentum - L_o)).
+    Solves R' = R hat(I^-1 (R^T momentum - L_o)); with a torque from outside the momentum changes by R torque, too.
 
     Parameters
     ----------
@@ -369,6 +387,8 @@ def reconstruct(
     threads : at most, for many momenta or bodies; None: one for each processor. Results do not depend on it
     progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
         falls, and what is being done; if it returns something true, the run stops
+    torque : from outside, an `ExternalTorque` or a function of a `TorqueState` in base axes [N m]; None: none. With
+        one, attitude and momentum are integrated together, by SciPy's DOP853, to a `ForcedMotion`
 
     Raises
     ------
@@ -385,7 +405,7 @@ def reconstruct(
 
     Notes
     -----
-    Equations :eq:`reconstruction` and :eq:`euler` of the documentation.
+    Equations :eq:`reconstruction`, :eq:`euler` and :eq:`external-torque` of the documentation.
     Source: Cabrera 2006, equations (8) to (10); theory.md section 2.
 
     Examples
@@ -395,6 +415,12 @@ def reconstruct(
     -2.283185 = 4 - 2 pi
     """
     goal, workers = tolerance_argument(tolerance), threads_argument(threads)
+    if torque is not None:
+        from .forced_motion import reconstruct_forced
+
+        check_object(deformation, "Deformation", "deformation")
+        assert isinstance(deformation, Deformation)
+        return reconstruct_forced(deformation, momentum, attitude, torque, goal, method)
     if isinstance(deformation, DeformationFamily):
         from .motion_family import reconstruct_family
 

@@ -9,6 +9,7 @@ import numpy as np
 from ...body.body import Body
 from ...dynamics.loads import JointLoads
 from ...dynamics.torques import JointTorques
+from ...reconstruction.reconstruction import Motion
 from .result_text import split_heading
 
 # Of a limit, that is still printed.
@@ -16,11 +17,11 @@ _LEAST_SHARE = 1e-3
 _EFFORTS = {"rad": "N m", "m": "N"}
 
 
-def torque_lines(loads: JointLoads, found: JointTorques, body: Body, motion_name: str) -> list[str]:
+def torque_lines(loads: JointLoads, flown: Motion, body: Body, motion_name: str) -> list[str]:
     """Peaks, limits, power and work of each joint for people."""
     width = max(map(len, ("joint", *loads.joint_names)))
     lines = [
-        split_heading(body, motion_name, found.motion),
+        split_heading(body, motion_name, flown),
         "",
         f"{'joint':<{width}}{'peak':>15}{'at [s]':>10}{'per kg':>12}{'of limit':>10}{'peak rate':>17}{'of limit':>10}"
         f"{'peak [W]':>12}{'work [J]':>13}",
@@ -45,16 +46,16 @@ def torque_lines(loads: JointLoads, found: JointTorques, body: Body, motion_name
     ]
 
 
-def torque_data(loads: JointLoads, found: JointTorques, body: Body, motion_name: str) -> dict[str, Any]:
+def torque_data(found: JointTorques, flown: Motion, body: Body, motion_name: str) -> dict[str, Any]:
     """The same for programs."""
     return {
         "body": body.name,
         "motion": motion_name,
-        "duration_s": found.motion.duration,
-        "momentum_kg_m2_s": found.motion.momentum.tolist(),
-        **loads.to_dict(),
+        "duration_s": flown.duration,
+        "momentum_kg_m2_s": flown.momentum.tolist(),
+        **found.loads.to_dict(),
         "largest_base_wrench": float(np.abs(found.base_wrench).max(initial=0.0)),
-        "error_estimate_rad": float(found.motion.error_estimate),
+        "error_estimate_rad": float(flown.error_estimate),
     }
 
 

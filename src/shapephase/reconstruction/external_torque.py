@@ -1,0 +1,97 @@
+"""Torques from outside: what a body feels that is not free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import breaks_argument, check_choice, check_function
+from ..arrays import Array
+from ..display import short_repr
+from ..errors import ShapeError
+from ..letters import what_came
+
+AXES = ("body", "space")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TorqueState:
+    """What a torque may depend on, at one time.
+
+    Attributes
+    ----------
+    time : [s]
+    attitude : (3, 3) base axes to inertial axes
+    rate : (3,) angular velocity of the base, base axes [rad/s]
+    shape : (n,) joint coordinates [rad or m]; empty where the deformation has no joints
+    inertia : (3, 3) locked, base axes [kg m^2]
+    momentum : (3,) of the body about its centre of mass, base axes [kg m^2/s]
+
+    Examples
+    --------
+    >>> def drag(state):
+    ...     return -0.5 * state.rate
+    >>> top = sp.rigid(np.diag([1.0, 1.0, 2.0]), 2.0)
+    >>> print(sp.reconstruct(top, [0.0, 0.0, 2.0], torque=drag).momentum(2.0).round(9))  # 2 exp(-0.5 2/2)
+    [0.         0.         1.21306132]
+    """
+
+    time: float
+    attitude: Array
+    rate: Array
+    shape: Array
+    inertia: Array
+    momentum: Array
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, eq=False)
+class ExternalTorque:
+    """A torque from outside about the centre of mass, which acts on the base.
+
+    Attributes
+    ----------
+    function : `TorqueState` -> (3,) [N m], smooth between the breaks
+    axes : "body", those of the base, or "space", inertial ones
+    breaks : interior times where it jumps, as a thruster's pulse begins and ends [s]
+
+    Examples
+    --------
+    >>> pulse = sp.ExternalTorque(lambda state: [0.0, 0.0, 0.5 * (0.3 < state.time < 0.7)], breaks=[0.3, 0.7])
+    >>> motion = sp.reconstruct(sp.rigid(np.eye(3), 1.0), [0.0, 0.0, 1.0], torque=pulse)
+    >>> print(motion.momentum(1.0).round(9))
+    [0.  0.  1.2]
+    """
+
+    function: Callable[[TorqueState], ArrayLike]
+    axes: str = "body"
+    breaks: ArrayLike = ()
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Check the arguments. Raises ShapeError, UnknownNameError."""
+        check_function(self.function, "torque", "a function of a TorqueState that gives a torque (3,)")
+        check_choice(self.axes, "axes", AXES)
+
+    def edges(self, duration: float) -> Array:
+        """The breaks with both ends: (M,) [s]. Raises TrajectoryError for one that is outside."""
+        return breaks_argument(self.breaks, duration)
+
+    def in_base_axes(self, state: TorqueState) -> Array:
+        """(3,) [N m]. Raises ShapeError where the function returns something else."""
+        given = np.asarray(self.function(state), dtype=np.float64)
+        if given.shape != (3,) or not np.isfinite(given).all():
+            raise ShapeError(
+                f"torque: three finite numbers [N m] are needed, at t = {state.time:.9g} s it gave {what_came(given)}"
+            )
+        return given if self.axes == "body" else state.attitude.T @ given
+
+
+def torque_argument(torque: ExternalTorque | Callable[[TorqueState], ArrayLike]) -> ExternalTorque:
+    """A torque as it is given: a function alone is one in base axes, without breaks."""
+    return torque if isinstance(torque, ExternalTorque) else ExternalTorque(torque)
