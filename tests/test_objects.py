@@ -52,9 +52,10 @@ def objects():
 
 
 def kind_of(parameter):
-    """Of the object that an argument is; one for which a family will also do is that one."""
+    """Of the object that an argument is; one for which a family or particles will also do is that one."""
     first, *others = str(parameter.annotation).split(" | ")
-    return first if others in ([], [f"{first}Family"]) else str(parameter.annotation)
+    also = {f"{first}Family", "ParticleBody"}
+    return first if also.issuperset(others) else str(parameter.annotation)
 
 
 def public_functions():

@@ -22,6 +22,7 @@ from . import (
 from .body.body import Body
 from .body.catalog import load_body, robot_names
 from .body.family import BodyFamily
+from .body.point_masses import ParticleBody, particle_body
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .dynamics.loads import JointLoads
@@ -74,6 +75,8 @@ from .shape_space.connection import (
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
+from .shape_space.reach.holonomy_algebra import Reach, reachable
+from .shape_space.reach.perturbation_frames import MinimumPerturbation, minimum_perturbation
 from .shape_space.shape_path import ShapePath
 from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_summary
 
@@ -101,11 +104,14 @@ __all__ = [
     "InertiaErrors",
     "JointLoads",
     "JointTorques",
+    "MinimumPerturbation",
     "Motion",
     "MotionFamily",
     "OrbitBranch",
+    "ParticleBody",
     "PathSummary",
     "PhaseSplit",
+    "Reach",
     "RecordedMomentum",
     "RecordedMotion",
     "ResultDerivative",
@@ -155,6 +161,7 @@ __all__ = [
     "load_motion",
     "mean_body_gauge",
     "mechanical_connection",
+    "minimum_perturbation",
     "momentum_crossings",
     "momentum_from_rate",
     "momentum_from_recording",
@@ -162,6 +169,7 @@ __all__ = [
     "motion_page",
     "optimal_control",
     "parallel_transport",
+    "particle_body",
     "particles",
     "path_summary",
     "phases",
@@ -170,6 +178,7 @@ __all__ = [
     "plotting",
     "prescribed",
     "principal_gauge",
+    "reachable",
     "read_recorded_motion",
     "read_shape_path",
     "reconstruct",

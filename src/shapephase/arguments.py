@@ -80,15 +80,19 @@ _WAYS = {
     "EulerTop": {"": "make it with EulerTop(inertia, momentum)"},
     "Extremal": {"": "make it with optimal_control.extremal(...)"},
     "SurfaceOfRevolution": {"": "make it with geodesics.spheroid(...) or surface_of_metric(...)"},
+    "Reach": {"": "make it with reachable(body, shape)"},
     "InertiaErrors": {"": "make it with InertiaErrors(masses=0.05), for example"},
 }
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
 
 
-def check_object(value: object, kind: str, name: str) -> None:
-    """Raise WrongObjectError where an argument is none of our class `kind`; the message says how to make one."""
-    if any(parent.__name__ == kind for parent in type(value).__mro__):
+def check_object(value: object, kind: str, name: str, *, or_kind: str = "") -> None:
+    """Raise WrongObjectError where an argument is none of our class `kind`; the message says how to make one.
+
+    One of the class `or_kind` will also do.
+    """
+    if any(parent.__name__ in (kind, or_kind) for parent in type(value).__mro__):
         return
     came = type(value).__name__
     shown = what_came(value) if isinstance(value, type) else f"{article(came)} {came}"

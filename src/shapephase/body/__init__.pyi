@@ -6,6 +6,7 @@ from .family import BodyFamily
 from .joint_chain import JointChain
 from .moving_parts import MovingPart
 from .plausibility import implausible
+from .point_masses import ParticleBody, particle_body
 
 __all__ = [
     "Body",
@@ -13,12 +14,14 @@ __all__ = [
     "Coupling",
     "JointChain",
     "MovingPart",
+    "ParticleBody",
     "Visual",
     "example_file",
     "example_names",
     "implausible",
     "inertia_box",
     "load_body",
+    "particle_body",
     "robot_names",
     "robots_folder",
     "visuals",

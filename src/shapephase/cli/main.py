@@ -30,6 +30,7 @@ from .orbits import orbits_command
 from .outcome import Outcome
 from .pictures import plot_command, view_command
 from .plan import plan_command
+from .reach import reach_command
 from .split import split_command
 from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
@@ -54,6 +55,7 @@ app.command(plot_app)
 app.command(explore_command, name="explore")
 app.command(plan_command, name="plan")
 app.command(conjugate_command, name="conjugate")
+app.command(reach_command, name="reach")
 app.command(check_command, name="check")
 app.command(orbits_command, name="orbits")
 app.command(sweep_app)

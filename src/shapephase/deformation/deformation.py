@@ -22,6 +22,7 @@ from ..arguments import (
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.family import BodyFamily
+from ..body.point_masses import ParticleBody
 from ..display import card_html, card_text, short_repr
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
@@ -40,6 +41,7 @@ from .descriptions import (
     Description,
     ParticleDescription,
     ParticlePath,
+    ParticlesAlong,
     PrescribedDescription,
     RigidDescription,
     SampledDescription,
@@ -261,17 +263,17 @@ class DeformationFamily(Sequence[Deformation]):
 
 
 @overload
-def articulated(body: Body, path: ShapePath) -> Deformation: ...
+def articulated(body: Body | ParticleBody, path: ShapePath) -> Deformation: ...
 
 
 @overload
 def articulated(body: BodyFamily, path: ShapePath) -> DeformationFamily: ...
 
 
-def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | DeformationFamily:
+def articulated(body: Body | ParticleBody | BodyFamily, path: ShapePath) -> Deformation | DeformationFamily:
     """The deformation of a body whose joints follow a path; of a `BodyFamily` those of all its bodies.
 
-    Joints are matched by name where the path has names, else by order.
+    Joints are matched by name where the path has names, else by order. Of a `ParticleBody` it is one of `particles`.
 
     Raises
     ------
@@ -293,8 +295,11 @@ def articulated(body: Body | BodyFamily, path: ShapePath) -> Deformation | Defor
     if isinstance(body, BodyFamily):
         check_object(path, "ShapePath", "path")
         return DeformationFamily(body, followed_by(body.body, path))
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
+    if isinstance(body, ParticleBody):
+        route = followed_by(body, path)
+        return particles(body.masses, ParticlesAlong(body, route), route.duration, route.breaks)
     route = followed_by(body, path)
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None

@@ -14,6 +14,7 @@ from .. import so3
 from ..arguments import check_picklable, inertia_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
+from ..body.point_masses import ParticleBody
 from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coefficients
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
@@ -340,6 +341,20 @@ class ParticlePath:
         points, speeds = self.path.curve(times)
         expected_shape = (len(times), self.path.n_shape // 3, 3)
         return points.reshape(expected_shape), speeds.reshape(expected_shape)
+
+
+@dataclass(frozen=True, eq=False)
+class ParticlesAlong:
+    """The positions of a body of particles whose parameters follow a path, in its order."""
+
+    body: ParticleBody
+    path: ShapePath
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """Positions and velocities: (N,) -> (N, m, 3), (N, m, 3)."""
+        shapes, rates = self.path.curve(times)
+        places, slopes = self.body.places(shapes)
+        return places, np.einsum("nkma,nk->nma", slopes, rates)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polho
 from .regime_plots import plot_bounds, plot_crown
 from .report import write_report
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
-from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
+from .shape_plots import plot_curvature, plot_reach, plot_shape_path, plot_shape_plane
 from .torque_plots import plot_torques
 from .viewer import LiveView, motion_html, motion_page, motion_video, view
 
@@ -44,6 +44,7 @@ __all__ = [
     "plot_momentum_curve",
     "plot_phases",
     "plot_polhodes",
+    "plot_reach",
     "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",

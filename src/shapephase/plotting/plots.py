@@ -16,7 +16,7 @@ from .plot_style import column_axes
 from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
-from .shape_plots import plot_curvature, plot_shape_path, plot_shape_plane
+from .shape_plots import plot_curvature, plot_reach, plot_shape_path, plot_shape_plane
 from .torque_plots import plot_torques
 
 __all__ = [
@@ -38,6 +38,7 @@ __all__ = [
     "plot_momentum_curve",
     "plot_phases",
     "plot_polhodes",
+    "plot_reach",
     "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",

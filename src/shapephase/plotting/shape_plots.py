@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
+from ..arguments import check_object, whole_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ..shape_space.curvature_field import curvature_on_plane
+from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
 from ._joint_looks import both_sides, joint_looks
 from ._letters import plain_text
@@ -235,6 +236,49 @@ def plot_curvature(
     per = f"{units[i]}²" if units[i] == units[j] else f"({units[i]} {units[j]})"
     bar.set_label(f"curvature, {name}\n[{scale}rad/{per}]", fontsize=SMALL)
     bar.ax.tick_params(labelsize=SMALL)
+    return ax
+
+
+def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
+    """The pairs of joints whose small loops turn the body most, in degrees per square radian.
+
+    The colour says which base axis the turn is mostly about.
+
+    Parameters
+    ----------
+    ax : flat axes
+    found : what `reachable` gives
+    count : of pairs, 1 or more
+
+    Notes
+    -----
+    Raises MissingExtraError, ShapeError.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> found = sp.reachable(sp.load_body("cat_two_halves"))
+    >>> len(sp.plotting.plot_reach(Figure().subplots(), found).patches)  # one bar for each pair
+    3
+    """
+    check_object(found, "Reach", "found")
+    check_flat_axes(ax)
+    shown = found.pairs[: whole_argument(count, "count", 1)]
+    if not shown:
+        raise ShapeError("found: there are no pairs of joints to draw; the body has one joint or none")
+    for place, pair in enumerate(shown):
+        about = int(np.argmax(np.abs(pair.axis)))
+        ax.barh(place, pair.degrees, color=(BLUE, GREEN, GREY)[about], label=f"about {_AXES[about]}")
+    ax.set_yticks(range(len(shown)), [plain_text(" × ".join(pair.joints)) for pair in shown])
+    ax.set_ylim(len(shown) - 0.5, -0.5)
+    units = {pair.units for pair in shown}
+    ax.set_xlabel("turn [deg/rad²]" if units == {"rad^2"} else "turn [deg/rad², deg/(rad m), deg/m²]", fontsize=SMALL)
+    ax.tick_params(labelsize=SMALL)
+    handles, labels = ax.get_legend_handles_labels()
+    named = dict(zip(labels, handles, strict=True))
+    order = sorted(named)
+    place = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    finish(ax, handles=[named[one] for one in order], labels=order, **place)
     return ax
 
 

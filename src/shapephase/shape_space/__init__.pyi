@@ -1,4 +1,4 @@
-from . import files
+from . import files, reach
 from .connection import (
     HorizontalLift,
     connection_slopes,
@@ -33,5 +33,6 @@ __all__ = [
     "is_flat",
     "mechanical_connection",
     "path_summary",
+    "reach",
     "stokes_holonomy",
 ]

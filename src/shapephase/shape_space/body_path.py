@@ -10,6 +10,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
+from ..body.point_masses import ParticleBody
 from ..errors import OpenPathError
 from ..integrator.fast.tree import tree_channels
 from ..integrator.recorded.knot_path import KnotPath, Slopes
@@ -29,13 +30,13 @@ _LEAST_CHANGES = 3
 _VOIGT = [0, 4, 8, 5, 2, 1]
 
 
-def path_gap(body: Body, path: ShapePath) -> Array:
+def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:
     """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,)."""
     gap = path.gap
     return np.where(body.continuous, so3.wrap(gap), gap)
 
 
-def check_closed(body: Body, path: ShapePath) -> None:
+def check_closed(body: Body | ParticleBody, path: ShapePath) -> None:
     """Raise `OpenPathError` where the path is no loop; continuous joints may end whole turns from their start."""
     gap = path_gap(body, path)
     worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
@@ -46,12 +47,12 @@ def check_closed(body: Body, path: ShapePath) -> None:
         )
 
 
-def path_sampler(body: Body, path: ShapePath) -> Sampler:
+def path_sampler(body: Body | ParticleBody, path: ShapePath) -> Sampler:
     """A sampler of the body along a path whose columns are in the body's order."""
     return path_samplers(body, path).fresh()
 
 
-def path_samplers(body: Body, path: ShapePath) -> Samplers:
+def path_samplers(body: Body | ParticleBody, path: ShapePath) -> Samplers:
     """The same, as many as are needed."""
 
     def evaluate(times: Array) -> tuple[Array, Array]:
@@ -64,7 +65,7 @@ def path_samplers(body: Body, path: ShapePath) -> Samplers:
     return Samplers(evaluate, **vars(smoothness), directly=directly)
 
 
-def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
+def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> Array | None:
     """I^-1 (xx yy zz yz xz xy) and I^-1 L_o along a path, in machine code: (N,) -> (N, 9).
 
     None where a tensor is nearly singular or a number is not finite.
@@ -72,19 +73,21 @@ def channels_along(body: Body, path: ShapePath, times: Array) -> Array | None:
     return channels_at(body, *path.at_samples(times))
 
 
-def channels_at(body: Body, shapes: Array, rates: Array) -> Array | None:
-    """The same at shapes and rates (N, n)."""
+def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:
+    """The same at shapes and rates (N, n); None for particles, too, which have no links."""
+    if isinstance(body, ParticleBody):
+        return None
     return tree_channels(body.chain.rows, shapes, rates)
 
 
-def recorded_path(body: Body, path: ShapePath) -> KnotPath | None:
+def recorded_path(body: Body | ParticleBody, path: ShapePath) -> KnotPath | None:
     """A recorded path, whose columns are in the body's order, with how the body follows it; None: it is none."""
-    pieces, follows = recorded_pieces(path), body.chain.follows
+    pieces, follows = recorded_pieces(path), None if isinstance(body, ParticleBody) else body.chain.follows
     # Just at a knot where a slope jumps, rounding decides on which side a joint is.
-    if pieces is None or follows.has_kinks:
+    if pieces is None or (follows is not None and follows.has_kinks):
         return None
     corners = np.zeros(0, dtype=np.int64)
-    if not follows.is_smooth:
+    if follows is not None and not follows.is_smooth:
         corners = np.flatnonzero(at_knots(follows, path.curve, pieces.knots))
     return KnotPath(
         knots=pieces.knots,
@@ -101,7 +104,7 @@ def recorded_pieces(path: ShapePath) -> PiecewisePolynomial | None:
     return many_pieces(path.curve, path.breaks[path.breaks <= path.duration / path.loops * (1.0 + 1e-12)])
 
 
-def _slopes(body: Body, pieces: PiecewisePolynomial) -> Slopes:
+def _slopes(body: Body | ParticleBody, pieces: PiecewisePolynomial) -> Slopes:
     """How a body's channels follow its joints, at times between which these move little."""
     shapes = pieces.coefficients[0]
     ends = np.concatenate([shapes, pieces(pieces.knots[-1:])[0]])

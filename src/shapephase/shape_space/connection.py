@@ -13,6 +13,7 @@ from .. import so3
 from ..arguments import check_function, check_object, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.point_masses import ParticleBody
 from ..display import short_repr
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
@@ -29,7 +30,7 @@ _GAUSS_RULE = np.polynomial.legendre.leggauss(16)
 _PIECES = (2, 4, 8, 16, 32, 64)
 
 
-def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
+def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike) -> Array:
     """Rotation rate of the base that cancels the angular momentum of a joint motion.
 
     A(r) = I(r)^-1 J(r): with zero momentum the base turns at omega = -A(r) rate [rad/s, base axes].
@@ -58,11 +59,11 @@ def mechanical_connection(body: Body, shape: ArrayLike) -> Array:
     >>> sp.mechanical_connection(cat, np.zeros(3)).round(6).tolist()
     [[0.0, 0.0, 0.5], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     return inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
 
 
-def curvature(body: Body, shape: ArrayLike) -> Array:
+def curvature(body: Body | ParticleBody, shape: ArrayLike) -> Array:
     """Curvature of the mechanical connection, F_ij = d_i A_j - d_j A_i - A_i x A_j.
 
     A small square of side e in the joints i, j, gone round from i to j, turns the body by exp(-e^2 F_ij).
@@ -86,13 +87,13 @@ def curvature(body: Body, shape: ArrayLike) -> Array:
     >>> sp.curvature(cat, np.zeros(3))[1, 2].round(6).tolist()  # of waist_pitch and waist_yaw
     [0.0, 0.0625, 0.0]
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
     return slopes - np.swapaxes(slopes, -2, -3) - bracket
 
 
-def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
+def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Array, Array]:
     """Columns A_j of the connection and their exact derivatives d_i A_j: (..., n) -> (..., n, 3), (..., n, n, 3).
 
     Examples
@@ -102,7 +103,7 @@ def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
     >>> print(columns.round(6).tolist(), slopes.shape)
     [[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]] (3, 3, 3)
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     connection = mechanical_connection(body, shape)
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
@@ -112,7 +113,7 @@ def connection_slopes(body: Body, shape: ArrayLike) -> tuple[Array, Array]:
     return np.swapaxes(connection, -1, -2), np.swapaxes(gradient, -1, -2)
 
 
-def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
+def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9) -> Array:
     """The rotation of a body with zero angular momentum whose joints go once round a loop.
 
     Parameters
@@ -141,7 +142,7 @@ def holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Array:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = followed_by(body, path)
@@ -166,7 +167,7 @@ class HorizontalLift:
     [ 0.    70.454] degrees
     """
 
-    body: Body
+    body: Body | ParticleBody
     path: ShapePath
     solution: SteppedRotation
 
@@ -199,7 +200,7 @@ class HorizontalLift:
         return -so3.apply(mechanical_connection(self.body, shapes), rates).reshape(*times.shape, 3)
 
 
-def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> HorizontalLift:
+def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9) -> HorizontalLift:
     """The attitude of a body with zero angular momentum along a path, open or closed: R' = R hat(-A rate), R(0) = 1.
 
     Parameters
@@ -225,24 +226,24 @@ def horizontal_lift(body: Body, path: ShapePath, tolerance: float = 1e-9) -> Hor
     >>> print(f"{np.degrees(sp.so3.angle(lift.attitude(loop.duration))):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = followed_by(body, path)
     return HorizontalLift(body, route, _lift(body, route, goal))
 
 
-def _lift(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
+def _lift(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> SteppedRotation:
     return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
 
 
-def _lift_of_loop(body: Body, route: ShapePath, tolerance: float) -> SteppedRotation:
+def _lift_of_loop(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> SteppedRotation:
     check_closed(body, route)
     return _lift(body, route, tolerance)
 
 
 def holonomy_derivative(
-    body: Body, path: ShapePath, variation: Callable[[Array], ArrayLike], tolerance: float = 1e-9
+    body: Body | ParticleBody, path: ShapePath, variation: Callable[[Array], ArrayLike], tolerance: float = 1e-9
 ) -> tuple[Array, Array]:
     """The holonomy of a loop, and its exact derivative by parameters that the loop may depend on.
 
@@ -284,7 +285,7 @@ def holonomy_derivative(
     >>> slope.shape
     (1, 3)
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
     goal = tolerance_argument(tolerance)

@@ -13,6 +13,7 @@ from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
+from ..body.point_masses import ParticleBody
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -42,7 +43,7 @@ _ROWS = 2000
 _SHARE = 0.01
 
 
-def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
+def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
     """Whether the curvature vanishes, so that small loops of the joints do not turn the body.
 
     Parameters
@@ -67,7 +68,7 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
     >>> sp.is_flat(sp.load_body("cat_two_halves"))
     False
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     goal = finite_array(tolerance, "tolerance")
     if goal.ndim or goal <= 0.0:
         raise ShapeError(f"tolerance: a number above 0 is needed, got {what_came(tolerance)}")
@@ -83,7 +84,7 @@ def is_flat(body: Body, shapes: ArrayLike | None = None, tolerance: float = 1e-1
 
 
 def curvature_on_plane(
-    body: Body,
+    body: Body | ParticleBody,
     joints: Sequence[str | int],
     first: ArrayLike,
     second: ArrayLike,
@@ -120,7 +121,7 @@ def curvature_on_plane(
     >>> print(found[0, 0].round(6))
     [1.75 0.   0.  ]
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     i, j = _two_joints(body, joints)
     across, along = (_row(values, name) for values, name in ((first, "first"), (second, "second")))
     shapes = np.empty((len(across), len(along), body.n_shape))
@@ -132,7 +133,9 @@ def curvature_on_plane(
     return field.reshape(len(across), len(along), 3)
 
 
-def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre: ArrayLike | None = None) -> Array:
+def stokes_holonomy(
+    body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9, centre: ArrayLike | None = None
+) -> Array:
     """The holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
 
     The loop is spanned by the cone of straight rays from a centre c to its shapes p(t). With T(x, t) the horizontal
@@ -177,10 +180,11 @@ def stokes_holonomy(body: Body, path: ShapePath, tolerance: float = 1e-9, centre
     >>> print(np.abs(sp.stokes_holonomy(cat, loop) - sp.holonomy(cat, loop)).max().round(8))
     0.0
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
-    check_smooth(body.chain.follows, "the theorem of Stokes needs")
+    if isinstance(body, Body):
+        check_smooth(body.chain.follows, "the theorem of Stokes needs")
     route = route_along(body, path)
     check_closed(body, route)
     _check_no_turns(body, route)
@@ -205,7 +209,7 @@ class _Cone:
     worst : the largest change left when the pieces of a ray were halved, as a turn of the whole loop [rad]
     """
 
-    def __init__(self, body: Body, route: ShapePath, centre: Array, tolerance: float) -> None:
+    def __init__(self, body: Body | ParticleBody, route: ShapePath, centre: Array, tolerance: float) -> None:
         self._body, self._route, self._centre, self._tolerance = body, route, centre, tolerance
         self.worst = 0.0
         try:
@@ -283,7 +287,7 @@ class _Cone:
 
 
 def _curvature_along(
-    body: Body, shapes: Array, first: Array, second: Array, times: Array | None = None
+    body: Body | ParticleBody, shapes: Array, first: Array, second: Array, times: Array | None = None
 ) -> tuple[Array, Array, Array]:
     """F(u, v) for two directions at each shape, A u, and the magnitude of what F is the difference of.
 
@@ -315,7 +319,7 @@ def _mean_shape(route: ShapePath) -> Array:
     return route.curve(times)[0].mean(axis=0)
 
 
-def _check_no_turns(body: Body, route: ShapePath) -> None:
+def _check_no_turns(body: Body | ParticleBody, route: ShapePath) -> None:
     turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
     if len(turned):
         joint = int(turned[0])
@@ -325,7 +329,7 @@ def _check_no_turns(body: Body, route: ShapePath) -> None:
         )
 
 
-def _random_shapes(body: Body) -> Array:
+def _random_shapes(body: Body | ParticleBody) -> Array:
     lower, upper = body.joint_limits.T
     open_below, open_above = ~(lower > -_NO_LIMIT), ~(upper < _NO_LIMIT)
     least = np.where(open_below, np.where(open_above, -np.pi, upper - 2.0 * np.pi), lower)
@@ -333,7 +337,7 @@ def _random_shapes(body: Body) -> Array:
     return np.random.default_rng(_SEED).uniform(least, most, (_SHAPES, body.n_shape))
 
 
-def _rounding_of_slopes(body: Body, shapes: Array) -> Array:
+def _rounding_of_slopes(body: Body | ParticleBody, shapes: Array) -> Array:
     """What rounding may leave of the curvature: (..., n) -> (..., n, n).
 
     A joint motion of kinetic energy T_0 has an angular momentum of at most sqrt(2 T_0 I), I the largest moment, taken
@@ -351,7 +355,7 @@ def _rounding_of_slopes(body: Body, shapes: Array) -> Array:
     return _ROUNDING * (by_pair + np.swapaxes(by_pair, -1, -2))
 
 
-def _two_joints(body: Body, joints: Sequence[str | int]) -> tuple[int, int]:
+def _two_joints(body: Body | ParticleBody, joints: Sequence[str | int]) -> tuple[int, int]:
     if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
         raise ShapeError(f"joints: two joints of {body.name} are needed, got {what_came(joints)}")
     i, j = (_joint_place(body, joint) for joint in joints)
@@ -360,7 +364,7 @@ def _two_joints(body: Body, joints: Sequence[str | int]) -> tuple[int, int]:
     return i, j
 
 
-def _joint_place(body: Body, joint: str | int) -> int:
+def _joint_place(body: Body | ParticleBody, joint: str | int) -> int:
     if isinstance(joint, str):
         return body.joint_index(joint)
     if isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < body.n_shape:
@@ -368,7 +372,7 @@ def _joint_place(body: Body, joint: str | int) -> int:
     return int(joint)
 
 
-def _one_shape(body: Body, value: ArrayLike, name: str) -> Array:
+def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
     shape = finite_array(value, name)
     if shape.shape != (body.n_shape,):
         raise ShapeError(

@@ -16,6 +16,7 @@ from ..arguments import check_object
 from ..arrays import Array, Mask
 from ..body.body import Body
 from ..body.couplings.coordinate_map import CoordinateMap
+from ..body.point_masses import ParticleBody
 from ..chebyshev import inside, nodes_on, values_to_coefficients
 from .curves import Curve
 from .shape_path import ShapePath
@@ -40,14 +41,16 @@ _WHOLE = 1e-9
 """[rad or m] by which a loop may end elsewhere and still be one."""
 
 
-def route_along(body: Body, path: ShapePath) -> ShapePath:
+def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     """The path with its columns in the order of the body's joints, and breaks where the body's motion is less smooth.
 
     Raises as `ShapePath.matched`.
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     route = path.matched(body.joint_names, body.name)
+    if isinstance(body, ParticleBody):
+        return route
     follows = body.chain.follows
     if follows.is_linear:
         return route

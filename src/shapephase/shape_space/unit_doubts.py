@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..body.body import Body
+from ..body.point_masses import ParticleBody
 from ..errors import TrajectoryWarning
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import route_along
@@ -31,7 +32,7 @@ def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool
     return far and factor * lowest >= lower - room and factor * highest <= upper + room
 
 
-def followed_by(body: Body, path: ShapePath) -> ShapePath:
+def followed_by(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     """As `route_along`.
 
     Warns
@@ -46,7 +47,7 @@ def followed_by(body: Body, path: ShapePath) -> ShapePath:
     return route
 
 
-def _ask_of_degrees(body: Body, path: ShapePath) -> None:
+def _ask_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
     times = _looked_at(path)
     shapes, _ = path.curve(times)
     limited = np.isfinite(body.joint_limits).all(axis=1) & (np.array(body.joint_units) == "rad")

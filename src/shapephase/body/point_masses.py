@@ -1,0 +1,345 @@
+"""A body of point masses whose places are functions of a few parameters: shapes without a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_picklable, names_argument
+from ..arrays import Array, check_reach, common_batch, finite_array, lock_arrays
+from ..display import short_repr
+from ..errors import ShapeError, WrongObjectError, unknown_name
+from ..letters import what_came
+from ._casadi_positions import CasadiPositions, is_casadi_function
+
+_Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
+_STEP = 0.02
+"""[unit of the parameter] of the differences that give second derivatives: their errors are some 1e-13 of places that
+swing once in a radian."""
+_DIFFERENCES = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
+"""Weights of f(h k) - f(-h k), k = 1 to 4, of the central difference of eighth order."""
+_BROAD_STEP = 1e-4
+"""[unit of the parameter] of the differences by which given derivatives are compared with the places."""
+_NOT_DERIVATIVES = 1e-5
+"""Relative to the places: what those differences leave of true derivatives is a thousandth of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleBody:
+    """Point masses whose places in a frame are functions of a shape: polygons, n bodies, a hub with a cord.
+
+    It stands wherever a `Body` stands for its inertia and momentum alone: `mechanical_connection`, `curvature`,
+    `holonomy` and the like, `reachable`, and `articulated`, which makes a deformation of particles. Made by
+    `particle_body`.
+
+    Attributes
+    ----------
+    masses : (m,) [kg]
+    joint_names : of the parameters
+    joint_units : their units, "rad" or "m"
+    joint_limits : (n, 2), infinite where there are none
+    continuous : (n,) True where values 2 pi apart are the same shape
+    name : for people
+    places : shapes (N, n) -> places (N, m, 3) [m] and their derivatives (N, n, m, 3)
+
+    Examples
+    --------
+    >>> def places(shapes):
+    ...     return np.stack([[[r, 0, 0], [-r, 0, 0], [0, 1, 0]] for (r,) in shapes]), np.tile(
+    ...         [[[1.0, 0, 0], [-1, 0, 0], [0, 0, 0]]], (len(shapes), 1, 1, 1)
+    ...     )
+    >>> body = sp.particle_body([1.0, 1.0, 1.0], places, ["half_width"], units="m")
+    >>> body.locked_inertia([2.0])[2, 2].round(6).item()  # 2 r^2 + 2/3
+    8.666667
+    """
+
+    masses: Array
+    joint_names: tuple[str, ...]
+    joint_units: tuple[str, ...]
+    joint_limits: Array
+    continuous: Array
+    name: str
+    places: Callable[[Array], tuple[Array, Array]]
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled. Raises LocalFunctionError for places given by a lambda."""
+        given = self.places
+        check_picklable(given.function if isinstance(given, _Given) else given, "a body of particles")
+        return self.__dict__
+
+    @property
+    def n_shape(self) -> int:
+        """The number of parameters."""
+        return len(self.joint_names)
+
+    @property
+    def mass(self) -> float:
+        """[kg]."""
+        return float(self.masses.sum())
+
+    @property
+    def sha256(self) -> None:
+        """It comes from no file."""
+        return
+
+    def joint_index(self, name: str) -> int:
+        """The place of a parameter in the shape vector. Raises UnknownNameError."""
+        if name not in self.joint_names:
+            raise unknown_name(f"parameter of {self.name}", name, self.joint_names)
+        return self.joint_names.index(name)
+
+    def shape(self, joints: Mapping[str, float] | None = None) -> Array:
+        """The shape with the named parameters at these values, all others 0: -> (n,). Raises UnknownNameError."""
+        shape = np.zeros(self.n_shape)
+        for name, value in (joints or {}).items():
+            shape[self.joint_index(name)] = finite_array(value, f"parameter {name}")
+        return shape
+
+    def positions(self, shape: ArrayLike) -> Array:
+        """Where the particles are, from their centre of mass: (..., n) -> (..., m, 3) [m]."""
+        r = self._checked(shape)
+        return self._centred(self._rows(r))[0].reshape(*r.shape[:-1], len(self.masses), 3)
+
+    def locked_inertia(self, shape: ArrayLike) -> Array:
+        """Inertia frozen in a shape, about the centre of mass: (..., n) -> (..., 3, 3) [kg m^2]. As `Body`."""
+        r = self._checked(shape)
+        return self._inertia(self._centred(self._rows(r))[0]).reshape(*r.shape[:-1], 3, 3)
+
+    def momentum_matrix(self, shape: ArrayLike) -> Array:
+        """J(r), angular momentum per unit rate: (..., n) -> (..., 3, n) [kg m^2/s per unit]. As `Body`."""
+        r = self._checked(shape)
+        return self._matrix(*self._centred(self._rows(r))).reshape(*r.shape[:-1], 3, self.n_shape)
+
+    def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """L_o = J(r) rate: (..., n), (..., n) -> (..., 3) [kg m^2/s]. As `Body`."""
+        r, v = self._pair(shape, rate)
+        return so3.apply(self.momentum_matrix(r), v)
+
+    def inertia_gradient(self, shape: ArrayLike) -> Array:
+        """dI/dr_k: (..., n) -> (..., n, 3, 3) [kg m^2 per unit]. As `Body`."""
+        return self.angular_map_gradient(shape)[..., :3]
+
+    def momentum_matrix_gradient(self, shape: ArrayLike) -> Array:
+        """dJ/dr_k: (..., n) -> (..., n, 3, n), the first n counts k. As `Body`.
+
+        Its part that is symmetric in both joints needs second derivatives of the places, which are central
+        differences of eighth order where CasADi does not give the places. No curvature depends on that part.
+        """
+        return self.angular_map_gradient(shape)[..., 3:]
+
+    def angular_map_gradient(self, shape: ArrayLike) -> Array:
+        """d[I, J]/dr_k, both side by side: (..., n) -> (..., n, 3, 3 + n)."""
+        r = self._checked(shape)
+        rows = self._rows(r)
+        places, slopes = self._centred(rows)
+        cross = np.einsum("m,nkmi,nmj->nkij", self.masses, slopes, places)
+        moment = cross + np.swapaxes(cross, -1, -2)
+        inertia = np.trace(moment, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - moment
+        turning = np.cross(slopes[:, :, None], slopes[:, None]) + np.cross(places[:, None, None], self._bends(rows))
+        matrix = np.einsum("m,nkjma->nkaj", self.masses, turning)
+        return np.concatenate([inertia, matrix], axis=-1).reshape(*r.shape[:-1], self.n_shape, 3, 3 + self.n_shape)
+
+    def inertia_rate(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """dI/dt along a motion of the parameters: (..., n), (..., n) -> (..., 3, 3) [kg m^2/s]."""
+        r, v = self._pair(shape, rate)
+        return np.einsum("...kab,...k->...ab", self.inertia_gradient(r), v)
+
+    def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
+        """dI/dr_k w + dJ/dr_k rate: three times (..., n or 3) -> (..., n, 3) [kg m^2/s per unit]. As `Body`."""
+        r, v = self._pair(shape, rate)
+        w = np.broadcast_to(finite_array(base_rate, "base_rate", (3,), unit="rad/s"), (*r.shape[:-1], 3))
+        return np.einsum("...kab,...b->...ka", self.angular_map_gradient(r), np.concatenate([w, v], axis=-1))
+
+    def centre_of_mass(self, shape: ArrayLike) -> Array:
+        """From the origin of the places: (..., n) -> (..., 3) [m]."""
+        r = self._checked(shape)
+        return ((self.masses / self.mass) @ self.places(self._rows(r))[0]).reshape(*r.shape[:-1], 3)
+
+    def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """About the centre of mass, while the frame turns: -> (...) [J]. As `Body`."""
+        r, v = self._pair(shape, rate)
+        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
+        batch = common_batch(shape=r.shape[:-1], angular_velocity=omega.shape[:-1])
+        r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+        places, slopes = self._centred(self._rows(r))
+        moving = np.einsum("nkma,nk->nma", slopes, self._rows(v))
+        moving += np.cross(np.broadcast_to(omega, (*batch, 3)).reshape(-1, 1, 3), places)
+        return (0.5 * np.einsum("m,nma,nma->n", self.masses, moving, moving)).reshape(batch)
+
+    def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
+        """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3). Unchecked."""
+        places, slopes = self._centred(shape)
+        return self._inertia(places), so3.apply(self._matrix(places, slopes), rate)
+
+    def sample_rates(self, shape: Array, rate: Array) -> tuple[Array, Array, Array, Array]:
+        """I, J, dI/dt and dJ/dt along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3, n) and once more. Unchecked."""
+        places, slopes = self._centred(shape)
+        change = np.einsum("nkab,nk->nab", self.angular_map_gradient(shape), rate)
+        return self._inertia(places), self._matrix(places, slopes), change[..., :3], change[..., 3:]
+
+    def _centred(self, rows: Array) -> tuple[Array, Array]:
+        """Places and their derivatives from the centre of mass: (N, n) -> (N, m, 3), (N, n, m, 3)."""
+        places, slopes = self.places(rows)
+        share = self.masses / self.mass
+        return places - (share @ places)[:, None], slopes - (share @ slopes)[:, :, None]
+
+    def _bends(self, rows: Array) -> Array:
+        """Second derivatives of the places, exactly symmetric: (N, n) -> (N, n, n, m, 3)."""
+        if isinstance(self.places, CasadiPositions):
+            bends = self.places.bends(rows)
+        else:
+            count = self.n_shape
+            moved = _STEP * np.arange(1, len(_DIFFERENCES) + 1)[:, None, None] * np.eye(count)
+            at = rows[:, None, None, None] + np.stack([moved, -moved], axis=0)
+            slopes = self.places(at.reshape(-1, count))[1].reshape(*at.shape[:-1], count, len(self.masses), 3)
+            bends = np.einsum("d,ndk...->nk...", np.array(_DIFFERENCES) / _STEP, slopes[:, 0] - slopes[:, 1])
+        bends = 0.5 * (bends + np.swapaxes(bends, 1, 2))
+        return bends - ((self.masses / self.mass) @ bends)[..., None, :]
+
+    def _inertia(self, places: Array) -> Array:
+        moment = np.einsum("m,nmi,nmj->nij", self.masses, places, places)
+        return np.trace(moment, axis1=-2, axis2=-1)[:, None, None] * np.eye(3) - moment
+
+    def _matrix(self, places: Array, slopes: Array) -> Array:
+        return np.einsum("m,nkma->nak", self.masses, np.cross(places[:, None], slopes))
+
+    def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
+        array = finite_array(shape, name)
+        if array.ndim == 0 or array.shape[-1] != self.n_shape:
+            raise ShapeError(
+                f"{name}: expected (..., {self.n_shape}), one entry per parameter of {self.name} "
+                f"({', '.join(self.joint_names)}), got shape {array.shape}"
+            )
+        check_reach(array, name)
+        return array
+
+    def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
+        r, v = self._checked(shape), self._checked(rate, "rate")
+        batch = common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
+        return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+
+    def _rows(self, array: Array) -> Array:
+        return array.reshape(-1, self.n_shape)
+
+
+def particle_body(
+    masses: ArrayLike,
+    places: Callable[[Array], tuple[ArrayLike, ArrayLike]] | Any,
+    parameters: Sequence[str],
+    *,
+    units: str | Sequence[str] = "rad",
+    continuous: Sequence[str] = (),
+    name: str = "particles",
+) -> ParticleBody:
+    """A body of point masses from their places as a function of a shape.
+
+    Parameters
+    ----------
+    masses : (m,) [kg], positive, two or more
+    places : shapes (N, n) -> places (N, m, 3) [m], which need not be centred, and their derivatives by each parameter
+        (N, n, m, 3); or a `casadi.Function` of one shape (n) that gives (m, 3), or (m, 2) in a plane: CasADi then
+        finds the derivatives
+    parameters : names of the n entries of a shape
+    units : of all, or of each: "rad" or "m"
+    continuous : names of those that turn without end, so that values 2 pi apart are the same shape
+    name : for people
+
+    Raises
+    ------
+    ShapeError
+        If masses are not positive, arrays have other shapes, or derivatives are not those of the places.
+    WrongObjectError
+        If `places` cannot be called.
+
+    Notes
+    -----
+    Source: Cabrera 2006, sections 2.1 to 2.3; theory.md A1 to A3, B1.
+
+    Examples
+    --------
+    >>> import casadi as ca
+    >>> r = ca.SX.sym("r", 2)
+    >>> corners = ca.vertcat(ca.horzcat(0, 0), ca.horzcat(1, 0), ca.horzcat(ca.cos(r[0]), ca.sin(r[0])) * r[1])
+    >>> triangle = sp.particle_body([1, 1, 1], ca.Function("corners", [r], [corners]), ["angle", "side"])
+    >>> sp.curvature(triangle, [1.0, 1.0])[0, 1].round(6).tolist()
+    [0.0, 0.0, -0.5]
+    """
+    weights = finite_array(masses, "masses", (None,), unit="kg").copy()
+    if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
+        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {what_came(weights)}")
+    names = names_argument(parameters, "parameters", "names of the parameters in a list")
+    of_each = (units,) * len(names) if isinstance(units, str) else names_argument(units, "units", "a unit for each")
+    if len(of_each) != len(names) or not set(of_each) <= {"rad", "m"}:
+        raise ShapeError(f'units: "rad" or "m", of all or of each of {len(names)}, are needed, got {what_came(units)}')
+    endless = names_argument(continuous, "continuous", "names of parameters in a list")
+    for one in endless:
+        if one not in names:
+            raise unknown_name("parameter", one, names)
+    if is_casadi_function(places):
+        function = CasadiPositions(places, len(names), len(weights))
+    elif callable(places) and not isinstance(places, type):
+        function = _Given(cast("_Places", places), len(weights))
+    else:
+        raise WrongObjectError(
+            f"places: a function of shapes that gives places and derivatives is needed, got {what_came(places)}"
+        )
+    limits = np.tile([-np.inf, np.inf], (len(names), 1))
+    turning = np.array([one in endless for one in names], dtype=bool)
+    return ParticleBody(
+        masses=weights,
+        joint_names=names,
+        joint_units=of_each,
+        joint_limits=limits,
+        continuous=turning,
+        name=str(name),
+        places=function,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """A user's places and derivatives, of the shapes they must have, and compared with each other."""
+
+    function: _Places
+    particles: int
+
+    def __call__(self, rows: Array) -> tuple[Array, Array]:
+        places, slopes = self._returned(rows)
+        if len(rows):
+            self._compare(rows[:1], places[:1], slopes[:1])
+        return places, slopes
+
+    def _returned(self, rows: Array) -> tuple[Array, Array]:
+        found = self.function(rows)
+        if not isinstance(found, tuple | list) or len(found) != 2:
+            raise ShapeError(
+                f"places: a pair, places and their derivatives, must be returned for shapes, got {what_came(found)}"
+            )
+        places, slopes = finite_array(found[0], "places", unit="m"), finite_array(found[1], "derivatives of places")
+        expected = (len(rows), self.particles, 3), (len(rows), rows.shape[1], self.particles, 3)
+        if (places.shape, slopes.shape) != expected:
+            raise ShapeError(
+                f"places: for shapes {rows.shape} places {expected[0]} and derivatives {expected[1]} are needed, got "
+                f"{places.shape} and {slopes.shape}"
+            )
+        return places, slopes
+
+    def _compare(self, row: Array, places: Array, slopes: Array) -> None:
+        step = _BROAD_STEP * np.eye(row.shape[1])
+        ahead, behind = (self._returned(row + sign * step)[0] for sign in (1.0, -1.0))
+        wrong = np.abs((ahead - behind) / (2.0 * _BROAD_STEP) - slopes[0]).max(axis=(1, 2), initial=0.0)
+        size = 1.0 + np.abs(places).max(initial=0.0) + np.abs(slopes).max(initial=0.0)
+        if wrong.max(initial=0.0) > _NOT_DERIVATIVES * size:
+            worst = int(np.argmax(wrong))
+            raise ShapeError(
+                f"places: the derivatives by parameter {worst} are not those of the places: at {what_came(row[0])} "
+                f"they are off by {wrong[worst]:.3g}"
+            )

@@ -1,0 +1,75 @@
+"""`shapephase reach`: which rotations loops of a body's joints reach, by which loops, and which joints do most."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from ..errors import ShapeError
+from .options import AS_TEXT, BodyArgument, PrintOptions
+from .outcome import Outcome, check_writable
+from .terminal import say_written
+
+if TYPE_CHECKING:
+    from ..shape_space.reach.holonomy_algebra import Reach
+
+_ENDINGS = (".svg", ".pdf", ".png")
+
+
+def reach_command(
+    body: BodyArgument,
+    /,
+    *,
+    at: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)] = (),
+    pairs: int = 10,
+    out: Path | None = None,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """List which rotations loops of the joints reach, the smallest loops about each axis, and the best pairs of joints.
+
+    The body has no angular momentum.
+
+    Parameters
+    ----------
+    at
+        Where the loops begin: JOINT=VALUE, in rad or m; joints that are not named are at zero. For example
+        `--at waist_pitch=0.3`.
+    pairs
+        How many pairs of joints are listed, without unit; for example `--pairs 20`.
+    out
+        Write a figure of the best pairs to this file, .svg, .pdf or .png; without it none is drawn. For example
+        `--out reach.svg`.
+    """
+    from ..shape_space.reach.holonomy_algebra import reachable
+    from .motion import body_argument
+    from .texts.reach_text import reach_data, reach_lines
+
+    aside = check_writable(out, "--out", *_ENDINGS)
+    if pairs < 0:
+        raise ShapeError(f"--pairs: a whole number, 0 or more, is needed, got {pairs}")
+    loaded = body_argument(body)
+    found = reachable(loaded, loaded.shape(dict(_coordinate(word) for word in at)))
+    if out is not None:
+        _draw(out, found)
+    data = reach_data(found, pairs) | {"figure": None if out is None else str(out)}
+    return Outcome("\n".join(reach_lines(found, pairs)), data, aside=aside)
+
+
+def _coordinate(word: str) -> tuple[str, float]:
+    name, equals, value = word.partition("=")
+    try:
+        return name, float(value if equals else "?")
+    except ValueError:
+        raise ShapeError(f"--at: JOINT=VALUE, in rad or m, is needed, got {word!r}") from None
+
+
+def _draw(out: Path, found: Reach) -> None:
+    from ..files import write_whole
+    from ..plotting.plot_style import axes_image, column_axes
+    from ..plotting.shape_plots import plot_reach
+
+    image = axes_image(plot_reach(column_axes(2.8), found), out.suffix[1:].lower())
+    write_whole(out, lambda stream: stream.write(image))
+    say_written(out)

@@ -1,0 +1,373 @@
+"""Which rotations loops of the joints reach: the holonomy algebra, from the curvature and its covariant derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...arguments import check_object, number_argument, whole_argument
+from ...arrays import Array, finite_array, lock_arrays
+from ...body.body import Body
+from ...body.couplings.coordinate_map import check_smooth
+from ...body.point_masses import ParticleBody
+from ...display import short_repr
+from ...errors import ShapeError
+from ..connection import connection_slopes, curvature, horizontal_lift
+from ..shape_path import ShapePath
+from .smallest_loops import AxisLoop, loops_of_second_order, loops_of_third_order
+
+_NODES = 25
+"""Chebyshev points along a ray, odd so that the shape is one of them: they resolve a curvature that swings some six
+times there."""
+_HALF_WIDTH = 0.4
+"""[strokes] of those rays. Rounding of the m-th derivative grows as (25/0.4)^m."""
+_RAYS = 4
+"""Random directions of the higher derivatives. These are polynomials in the direction with values in three dimensions,
+so that three directions in general position span what all span."""
+_FAR_SHAPES = 6
+"""Random shapes to whose curvature the body is carried along straight paths."""
+_LOOKS = (0.25, 0.5, 0.75, 1.0)
+"""Where on those paths."""
+_FAR = 0.6
+"""[strokes] of such a shape from the shape, in each joint, at most."""
+_SEED = 26
+"""Any seed serves; a fixed one gives the same answer each time."""
+_LIFT_TOLERANCE = 1e-12
+"""[rad] of what carries a curvature back."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrderReach:
+    """What loops small to some order of their stroke turn the body about.
+
+    Attributes
+    ----------
+    order : in the stroke: 2 by the curvature, 3 by its first covariant derivatives, and so on
+    rank : of all axes up to this order
+    axes : (rank, 3) orthonormal, those of lower orders first, base axes
+    singular_values : (3,) of what this order alone gives [rad per stroke^order]
+
+    Examples
+    --------
+    >>> first = sp.reachable(sp.load_body("cat_two_halves")).orders[0]
+    >>> first.order, first.rank
+    (2, 3)
+    """
+
+    order: int
+    rank: int
+    axes: Array
+    singular_values: Array
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, eq=False)
+class PairTurn:
+    """What a small loop of two joints turns the body by.
+
+    Attributes
+    ----------
+    joints : their names
+    rate : |F_ij| [rad per product of the joints' units]
+    axis : (3,) of the turn of a loop that goes from the first joint to the second, base axes
+    units : of the product, as "rad^2"
+
+    Examples
+    --------
+    >>> best = sp.reachable(sp.load_body("cat_two_halves")).pairs[0]
+    >>> best.joints, round(best.degrees, 3), best.units
+    (('waist_pitch', 'waist_yaw'), 100.268, 'rad^2')
+    """
+
+    joints: tuple[str, str]
+    rate: float
+    axis: Array
+    units: str
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    @property
+    def degrees(self) -> float:
+        """Degrees per square radian, or per product of the joints' units."""
+        return float(np.degrees(self.rate))
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """The rotations that loops of the joints reach from a shape. Made by `reachable`.
+
+    Attributes
+    ----------
+    name : of the body
+    joint_names : of the body
+    shape : (n,) where the loops begin [rad or m]
+    strokes : (n,) what counts as a stroke of 1: a radian, and for what slides the body's radius of gyration [rad or m]
+    rank : of the holonomy algebra: 0, 1 or 3
+    singular_values : (3,) of the curvature at and around the shape, carried back to it [rad per square stroke], which
+        `rank` counts
+    noise : below which a singular value is taken for zero [the same]
+    orders : what is reached at each order of the stroke, up to the first at which `rank` is complete
+    loops : for each axis the smallest loop that turns about it, of second or third order
+    pairs : of joints, those that turn the body most first
+
+    Examples
+    --------
+    >>> found = sp.reachable(sp.load_body("diver"))
+    >>> found.rank, [(each.order, each.rank) for each in found.orders]
+    (3, [(2, 1), (3, 3)])
+    """
+
+    name: str
+    joint_names: tuple[str, ...]
+    shape: Array
+    strokes: Array
+    rank: int
+    singular_values: Array
+    noise: float
+    orders: tuple[OrderReach, ...]
+    loops: tuple[AxisLoop, ...]
+    pairs: tuple[PairTurn, ...]
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    @property
+    def gap(self) -> float:
+        """The least singular value that counts over the largest that does not, or over the noise where that is more."""
+        if not self.rank:
+            return np.inf
+        counted = self.singular_values[: self.rank]
+        rest = self.singular_values[self.rank :].max(initial=0.0)
+        return float(counted.min() / max(rest, self.noise))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every rotation can be reached."""
+        return self.rank == 3
+
+
+def reachable(
+    body: Body | ParticleBody, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
+) -> Reach:
+    """Which rotations loops of the joints reach from a shape, by which smallest loops, and which joints do most.
+
+    Loops of a body without angular momentum turn it by the group whose algebra the curvature of the connection spans,
+    taken at all shapes and carried back (Ambrose and Singer). At one shape its covariant derivatives
+
+        D_k F_ij = d_k F_ij - A_k x F_ij
+
+    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 say what loops do at order m of
+    their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the derivatives.
+    What whole turns of a joint without end add to that, as of a reaction wheel, is not looked at.
+
+    Parameters
+    ----------
+    shape : (n,) where the loops begin [rad or m]; None: neutral
+    most_orders : the highest order of the stroke that is looked at, 2 to 6
+    tolerance : of singular values, relative to the size of the terms that the curvature is a difference of
+
+    Raises
+    ------
+    ShapeError
+        If the shape is not one of the body, or `most_orders` or the tolerance is out of range.
+    SingularInertiaError
+        If at that shape or around it all mass is on one line.
+
+    Notes
+    -----
+    Source: theory.md B6; Ambrose and Singer 1953; Shapere and Wilczek 1989; Montgomery 2002, chapter 12.
+
+    Examples
+    --------
+    >>> found = sp.reachable(sp.load_body("cat_two_halves"))
+    >>> found.rank, found.pairs[0].joints
+    (3, ('waist_pitch', 'waist_yaw'))
+    """
+    check_object(body, "Body", "body", or_kind="ParticleBody")
+    if isinstance(body, Body):
+        check_smooth(body.chain.follows, "derivatives of the curvature need")
+    least = number_argument(tolerance, "tolerance")
+    highest = whole_argument(most_orders, "most_orders", 2)
+    if highest > 6 or not 0.0 < least < 1.0:
+        raise ShapeError(
+            f"most_orders and tolerance: 2 to 6, and a number between 0 and 1, are needed, got {highest} and {least:g}"
+        )
+    place = body.shape() if shape is None else finite_array(shape, "shape").copy()
+    if place.shape != (body.n_shape,):
+        raise ShapeError(
+            f"shape: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
+            f"got shape {place.shape}"
+        )
+    strokes = _strokes(body, place)
+    field = _Field(body, place, strokes)
+    noise = least * field.magnitude
+    values = np.linalg.svd(_carried_curvature(field), full_matrices=False)[1]
+    values = np.pad(values, (0, 3 - len(values)))
+    # Two axes have a third for their bracket.
+    rank = (0, 1, 3, 3)[int(np.sum(values > noise))]
+    orders = _orders(field, rank, highest, noise)
+    loops = loops_of_second_order(field.here, place, strokes, orders[0].axes, noise) if orders else ()
+    if len(orders) > 1:
+        new = orders[1].axes[orders[0].rank :]
+        loops += loops_of_third_order(field.here, field.slopes, place, strokes, orders[0].axes, new)
+    return Reach(
+        name=body.name,
+        joint_names=body.joint_names,
+        shape=place,
+        strokes=strokes,
+        rank=rank,
+        singular_values=values,
+        noise=noise,
+        orders=orders,
+        loops=loops,
+        pairs=_ranked_pairs(body, field.here, strokes),
+    )
+
+
+class _Field:
+    """The curvature of a body around a shape, in strokes.
+
+    Attributes
+    ----------
+    here : (n, n, 3) F_ij at the shape
+    slopes : (n, n, n, 3) D_k F_ij there, k first
+    magnitude : of the terms that F is the difference of
+    """
+
+    def __init__(self, body: Body | ParticleBody, shape: Array, strokes: Array) -> None:
+        self.body, self.shape, self.strokes = body, shape, strokes
+        columns, slopes = connection_slopes(body, shape)
+        norms = np.linalg.norm(columns, axis=-1) * strokes
+        terms = 2.0 * np.linalg.norm(slopes, axis=-1) * np.outer(strokes, strokes) + np.outer(norms, norms)
+        self.magnitude = float(terms.max(initial=0.0))
+        self.here = self.at(shape[None])[0]
+        count = len(shape)
+        self.slopes = np.zeros((count, *self.here.shape))
+        for k in range(count if count > 1 else 0):
+            self.slopes[k] = self.derivatives(np.eye(count)[k], 1)[0]
+
+    def at(self, shapes: Array) -> Array:
+        """F at other shapes: (N, n) -> (N, n, n, 3)."""
+        return curvature(self.body, shapes) * np.outer(self.strokes, self.strokes)[..., None]
+
+    def derivatives(self, direction: Array, count: int) -> list[Array]:
+        """D_v F, D_v D_v F, ... at the shape: `count` of (n, n, 3), by differentiation on Chebyshev points."""
+        angles = np.pi * np.arange(_NODES) / (_NODES - 1)
+        points, matrix = np.cos(angles), _differentiation(angles) / _HALF_WIDTH
+        shapes = self.shape + np.outer(_HALF_WIDTH * points, direction * self.strokes)
+        field = self.at(shapes)
+        turning = np.einsum("pka,k->pa", connection_slopes(self.body, shapes)[0], direction * self.strokes)
+        found = []
+        for _ in range(count):
+            field = np.einsum("pq,q...->p...", matrix, field) - np.cross(turning[:, None, None], field)
+            found.append(field[_NODES // 2])
+        return found
+
+
+def _differentiation(angles: Array) -> Array:
+    """The matrix that differentiates at the Chebyshev points cos(angles) (Trefethen 2000, chapter 6).
+
+    Differences of the points by products of sines, and each row sums to zero, so that rounding stays small.
+    """
+    count = len(angles)
+    signs = (-1.0) ** np.arange(count)
+    signs[[0, -1]] *= 2.0
+    half_sum, half_difference = (0.5 * (angles[:, None] + sign * angles) for sign in (1.0, -1.0))
+    gaps = -2.0 * np.sin(half_sum) * np.sin(half_difference)
+    matrix = np.outer(signs, 1.0 / signs) / np.where(gaps == 0.0, 1.0, gaps)
+    np.fill_diagonal(matrix, 0.0)
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    return matrix
+
+
+def _strokes(body: Body | ParticleBody, shape: Array) -> Array:
+    radius = float(np.sqrt(0.5 * np.trace(body.locked_inertia(shape)) / body.mass))
+    return np.array([radius if unit == "m" else 1.0 for unit in body.joint_units])
+
+
+def _pairs_of(field: Array) -> Array:
+    """The values for i < j side by side: (..., n, n, 3) -> (3, K)."""
+    first, second = np.triu_indices(field.shape[-2], 1)
+    return field[..., first, second, :].reshape(-1, 3).T
+
+
+def _carried_curvature(field: _Field) -> Array:
+    """The curvature at the shape and at others around it, carried back along straight paths: (3, K)."""
+    body, start = field.body, field.shape
+    if body.n_shape < 2:
+        return np.zeros((3, 1))
+    random = np.random.default_rng(_SEED)
+    parts = [_pairs_of(field.here)]
+    for _ in range(_FAR_SHAPES):
+        end = start + _FAR * field.strokes * random.uniform(-1.0, 1.0, body.n_shape)
+        path = ShapePath.waypoints([0.0, 1.0], [start, end])
+        lift = horizontal_lift(body, path, _LIFT_TOLERANCE)
+        turned, values = lift.attitude(_LOOKS), field.at(path.shape(_LOOKS))
+        parts.append(_pairs_of(np.einsum("pab,pijb->pija", turned, values)))
+    return np.concatenate(parts, axis=1)
+
+
+def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[OrderReach, ...]:
+    """What each order adds, until all axes are reached."""
+    if field.body.n_shape < 2:
+        return ()
+    random = np.random.default_rng(_SEED)
+    rays = random.normal(size=(_RAYS, field.body.n_shape))
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    along = [field.derivatives(ray, highest - 2) for ray in rays] if rank and highest > 3 else []
+    spans: list[Array] = []
+    found: list[OrderReach] = []
+    axes = np.zeros((0, 3))
+    for order in range(2, highest + 1):
+        if order == 2:
+            own = _pairs_of(field.here)
+        elif order == 3:
+            own = _pairs_of(field.slopes)
+        else:
+            own = np.concatenate([_pairs_of(ray[order - 3]) for ray in along] or [np.zeros((3, 1))], axis=1)
+        # Derivatives in another order of the joints differ by brackets with the curvature.
+        brackets = [np.cross(a, b) for k in range(2, order - 1) for a in _basis(spans[k - 2], noise)
+                    for b in _basis(spans[order - k - 2], noise)]  # fmt: skip
+        spans.append(np.concatenate([own, *(np.array(one)[:, None] for one in brackets)], axis=1))
+        axes = _extended(axes, spans[-1], noise)
+        found.append(
+            OrderReach(
+                order=order, rank=len(axes), axes=axes, singular_values=np.linalg.svd(own, full_matrices=False)[1][:3]
+            )
+        )
+        if len(axes) >= rank:
+            break
+    return tuple(found)
+
+
+def _basis(span: Array, noise: float) -> Array:
+    """Its left singular vectors times their singular values, where these are no noise: (k, 3)."""
+    left, values, _ = np.linalg.svd(span, full_matrices=False)
+    return (left * values).T[values > noise]
+
+
+def _extended(axes: Array, span: Array, noise: float) -> Array:
+    """The axes with those of a span that are new: (k, 3), (3, K) -> (k + new, 3)."""
+    rest = span - axes.T @ (axes @ span)
+    left, values, _ = np.linalg.svd(rest, full_matrices=False)
+    return np.concatenate([axes, left.T[: len(values)][values > noise]])[:3]
+
+
+def _ranked_pairs(body: Body | ParticleBody, here: Array, strokes: Array) -> tuple[PairTurn, ...]:
+    found: list[tuple[float, PairTurn]] = []
+    for i, j in combinations(range(body.n_shape), 2):
+        turn = -here[i, j]
+        size = float(np.linalg.norm(turn))
+        axis = turn / size if size > 0.0 else np.zeros(3)
+        units = sorted((body.joint_units[i], body.joint_units[j]), reverse=True)
+        product = f"{units[0]}^2" if units[0] == units[1] else " ".join(units)
+        joints = body.joint_names[i], body.joint_names[j]
+        pair = PairTurn(joints=joints, rate=size / float(strokes[i] * strokes[j]), axis=axis + 0.0, units=product)
+        found.append((size, pair))
+    return tuple(pair for _, pair in sorted(found, key=lambda one: -one[0]))
