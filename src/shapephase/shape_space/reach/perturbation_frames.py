@@ -193,9 +193,9 @@ def _even_points(count: int, points: int) -> Array:
     ratio = 2.0
     for _ in range(60):
         ratio = (1.0 + ratio) ** (1.0 / (count + 1.0))
-    steps = ratio ** -np.arange(1.0, count + 1.0)
+    steps = np.array([ratio**-power for power in range(1, count + 1)])
     places = np.mod(0.5 + np.arange(points)[:, None] * steps, 1.0)
-    return np.array(2.0 * places - 1.0, dtype=np.float64)
+    return 2.0 * places - 1.0
 
 
 def _powers(count: int, degree: int) -> Array:
@@ -248,4 +248,4 @@ def _correction(values: Array, slopes: Array, columns: Array) -> Array:
     rows = slopes[..., None, :, None] * np.eye(3)[:, None, :] + spin[..., :, None, :] * values[:, None, None, :, None]
     matrix = rows.reshape(-1, 3 * values.shape[1])
     found = np.linalg.lstsq(matrix, -np.swapaxes(columns, -1, -2).reshape(-1), rcond=1e-12)[0]
-    return found.reshape(-1, 3)
+    return np.asarray(found, dtype=np.float64).reshape(-1, 3)
