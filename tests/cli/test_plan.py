@@ -13,8 +13,8 @@ import pytest
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.cli import plan as cli_plan
 from shapephase.cli.main import main
+from shapephase.cli.plans import plan as cli_plan
 from shapephase.cli.progress import steps
 from shapephase.optimal_control.plan import Progress
 
@@ -48,6 +48,21 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("cat_two_halves", "--rotate", 90, "--somersaults", 1), 2, "--rotate"),
         (("cat_two_halves", "--rotate", 90, "--about", "w"), 2, "--about"),
         (("cat_two_halves", "--rotate", 90, "--cost", "beauty"), 2, "kinetic, rate"),
+        (("cat_two_halves", "--rotate", 90, "--turn", "90 about x"), 2, "--turn and --rotate"),
+        (("cat_two_halves", "--turn", "90"), 2, "90 about y"),
+        (("cat_two_halves", "--turn", "90 about w"), 2, "--turn"),
+        (("cat_two_halves", "--turn", "nan about x"), 2, "--turn"),
+        (("cat_two_halves", "--point", "0 0", "0 0 1"), 2, "--point"),
+        (("cat_two_halves", "--point", "tail 0 0 1", "0 0 1"), 2, "tail"),
+        (("cat_two_halves", "--point", "front 0 0 1", "0 0 1", "--to", "free"), 2, "--to free"),
+        (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw"), 2, "waist_yaw"),
+        (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw=1,2"), 2, "NAME=VALUE"),
+        (("cat_two_halves", "--turn", "9 about x", "--to", "waist_yaw=1rad"), 2, "--to"),
+        (("cat_two_halves", "--turn", "9 about x", "--to", "waist_bend=1"), 2, "waist_bend"),
+        (("cat_two_halves", "--turn", "9 about x", "--joints", "a", "--hold", "b"), 2, "--hold"),
+        (("cat_two_halves", "--turn", "9 about x", "--mirror", "waist_yaw"), 2, "--mirror"),
+        (("cat_two_halves", "--turn", "9 about x", "--workers", 0), 2, "--workers"),
+        (("cat_two_halves", "--turn", "9 about x", "--time-limit", 0), 2, "--time-limit"),
         (("cat_two_halves", "--rotate", 90, "--out", "plan.txt"), 2, "--out"),
         (("no_such_cat", "--rotate", 90), 2, "no_such_cat"),
     ],
@@ -59,6 +74,65 @@ def test_what_cannot_be_planned_is_refused_in_one_line(arguments, code, words, c
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
+
+
+def planned(*arguments, capsys, out):
+    """What the command says of a plan on few pieces, and its path's shapes at 101 times."""
+    main(["plan", *map(str, arguments), "--pieces", "8", "--out", str(out), "--json"])
+    body = sp.load_body(arguments[0])
+    path = sp.read_shape_path(out, body)
+    return json.loads(capsys.readouterr().out), path.shape(np.linspace(0.0, path.duration, 101)), body
+
+
+def test_a_link_is_pointed(tmp_path, capsys):
+    """By the attitude printed and the link's frame as the body has it at the posture asked for."""
+    direction = np.array([0.3, -1.0, 2.5])
+    arguments = ("cat_two_halves", "--point", "rear 0 0 1", "0.3 -1.0 2.5", "--to", "waist_pitch=0.4,waist_yaw=20deg")
+    data, shapes, body = planned(*arguments, "--hold", "waist_roll", capsys=capsys, out=tmp_path / "plan.csv")
+    end = np.zeros(3)
+    end[[body.joint_index("waist_pitch"), body.joint_index("waist_yaw")]] = 0.4, np.radians(20.0)
+    assert np.abs(shapes[-1] - end).max() < 1e-9
+    attitude = so3.matrix_from_quat(np.array(data["final_attitude_quat_xyzw"]))
+    seen = attitude @ body.link_pose(end, "rear")[:3, :3] @ [0.0, 0.0, 1.0]
+    assert np.abs(seen - direction / np.linalg.norm(direction)).max() < 1e-8
+    assert not shapes[:, body.joint_index("waist_roll")].any()
+
+
+def test_postures_lists_and_mirrors(tmp_path, capsys):
+    """A plan ends where another ended, and a joint moves against its leader."""
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    knots = np.array([[0.0, 0.0, 0.0], [0.1, -0.2, 0.0], [0.0, 0.2, 0.1]])
+    times, names = np.array([0.0, 0.5, 1.0]), sp.load_body("cat_two_halves").joint_names
+    sp.write_shape_path(sp.ShapePath.spline(times, knots, joint_names=names), first)
+    turn = ("cat_two_halves", "--turn", "10 about 0,1,1", "--from", "waist_roll=0.1", "--to", first)
+    _, onward, _ = planned(*turn, capsys=capsys, out=second)
+    assert np.abs(onward[-1] - knots[-1]).max() < 1e-12
+    assert np.abs(onward[0] - [0.0, 0.0, 0.1]).max() < 1e-12
+    follow = ("--joints", "waist_pitch,waist_yaw,waist_roll", "--mirror", "waist_yaw=-waist_pitch")
+    data, bound, body = planned("cat_two_halves", "--turn", "5 about x", *follow, capsys=capsys, out=second)
+    pitch, yaw = body.joint_index("waist_pitch"), body.joint_index("waist_yaw")
+    assert np.abs(bound[:, pitch] + bound[:, yaw]).max() < 1e-12
+    assert np.ptp(bound[:, pitch]) > 0.01
+    assert data["miss_rad"] < 1e-8
+
+
+def test_a_time_limit_ends_the_search_with_the_best_so_far(monkeypatch, capsys):
+    """The clock is a counter: the time is over when it is asked for the fourth time."""
+    ticks = iter(range(1000))
+    monkeypatch.setattr(cli_plan.time, "monotonic", lambda: float(next(ticks)))
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "2.5", "--json"])
+    assert ended.value.code == 7
+    assert "stopped" in json.loads(capsys.readouterr().out)["warnings"][0]
+
+
+@pytest.mark.full
+def test_workers_find_what_one_process_finds(tmp_path, capsys):
+    arguments = ("cat_two_halves", "--turn", "70 about x", "--starts", 3)
+    alone, shapes, _ = planned(*arguments, capsys=capsys, out=tmp_path / "one.csv")
+    beside, same, _ = planned(*arguments, "--workers", 2, capsys=capsys, out=tmp_path / "two.csv")
+    assert alone["cost"] == beside["cost"]
+    assert np.array_equal(shapes, same)
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
@@ -100,7 +174,7 @@ def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
 
 def test_pressed_twice_gives_it_up():
     with steps(1) as work:
-        search = cli_plan._InterruptibleSearch(work)
+        search = cli_plan._InterruptibleSearch(work, None)
         search.report(Progress(stage="search", start=1, starts=1, iteration=0, cost=1.0, infeasibility=0.0))
         search.interrupted()
         assert search.stopped

@@ -29,7 +29,7 @@ from .library import compile_command, robots_command
 from .orbits import orbits_command
 from .outcome import Outcome
 from .pictures import plot_command, view_command
-from .plan import plan_command
+from .plans.plan import plan_command
 from .reach import reach_command
 from .split import split_command
 from .sweep import plot_study_command, sweep_app

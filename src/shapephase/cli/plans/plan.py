@@ -3,45 +3,60 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
 import signal
 import threading
+import time
 import warnings
 from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
-from ..errors import PlanNotFound, ShapeError
-from .exit_codes import ExitCode
-from .options import AS_TEXT, BodyArgument, Momentum, PrintOptions, ReportFile
-from .outcome import Outcome, check_writable
-from .progress import Steps, steps
-from .terminal import say_written
+from cyclopts import Parameter
+
+from ...errors import PlanNotFound, ShapeError
+from ..exit_codes import ExitCode
+from ..options import AS_TEXT, BodyArgument, Momentum, PrintOptions, ReportFile
+from ..outcome import Outcome, check_writable
+from ..progress import Steps, steps
+from ..terminal import say_written
+from .goals import GoalWords
+from .postures import mirrored, moving_joints, posture
 
 if TYPE_CHECKING:
-    from ..arrays import Array
-    from ..body.body import Body
-    from ..optimal_control.plan import Plan, Progress
+    from ...arrays import Array
+    from ...body.body import Body
+    from ...optimal_control.plan import Plan, Progress
 
 # Samples of the file written: at 1 s they are 0.5 ms apart, far below the pieces of a plan.
 _SAMPLES = 2001
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def plan_command(
     body: BodyArgument,
     /,
     *,
+    turn: str | None = None,
+    point: Annotated[tuple[str, str] | None, Parameter(negative_iterable="")] = None,
     rotate: float | None = None,
     about: str | None = None,
     momentum: Momentum = (0.0, 0.0, 0.0),
     duration: float = 1.0,
     somersaults: float | None = None,
     half_twists: float | None = None,
+    from_: Annotated[str | None, Parameter(name="--from")] = None,
+    to: str | None = None,
+    joints: str | None = None,
+    hold: str | None = None,
+    mirror: str | None = None,
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     rate_limit: float | None = None,
     starts: int = 1,
+    workers: int | None = None,
+    time_limit: float | None = None,
     seed: int = 0,
     pieces: int | None = None,
     iterations: int = 300,
@@ -49,15 +64,22 @@ def plan_command(
     html: ReportFile = None,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
-    """Find the cheapest motion of the joints that turns a body by a rotation, and compute the resulting motion.
+    """Find the cheapest motion of the joints that turns a body to a goal, and compute the resulting motion.
 
     Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130. If the search finds
     nothing, its best try is printed and written, and the exit code is 7.
 
     Parameters
     ----------
+    turn
+        The turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas
+        between them). For example `--turn "90 about y"`.
+    point
+        Two vectors instead: an axis of the base, or behind its name of a link as it is at the end, and the direction
+        that this has to have at the end, in inertial axes, of any length; the turn about it is free. For example
+        `--point "dish 0 0 1" "0 1 0"`.
     rotate
-        Angle of the turn, in degrees; either this or --somersaults is needed. For example `--rotate 180`.
+        Angle of the turn, in degrees, as with --turn. For example `--rotate 180`.
     about
         Axis of the turn: x, y or z of the base at the start, or three numbers with commas between them; x where
         --rotate is given without it. For example `--about 0,1,1`.
@@ -69,6 +91,20 @@ def plan_command(
     half_twists
         Half turns about the z axis of the base, with --somersaults; 0 where only that is given. For example
         `--half-twists 2`.
+    from_
+        Posture at the start: NAME=VALUE pairs with commas between them, in rad or m, or in degrees with deg behind the
+        number, or the first row of a motion file; without it zero, or as near as the limits permit. For example
+        `--from waist_pitch=30deg,waist_yaw=0.1`.
+    to
+        Posture at the end, like --from, of a file the last row; or free; without it as at the start. For example
+        `--to free`.
+    joints
+        Those that may move, with commas between their names; without it all. For example
+        `--joints waist_pitch,waist_yaw`.
+    hold
+        Those that rest at the posture of the start, instead. For example `--hold head_yaw`.
+    mirror
+        Joints that follow others, or with a minus move against them. For example `--mirror hip_left=-hip_right`.
     cost
         What is made least: kinetic, rate, acceleration or time; for example `--cost rate`.
     rates_at_ends
@@ -79,6 +115,11 @@ def plan_command(
         `--rate-limit 3`.
     starts
         Searches from different guesses, of which the cheapest plan is kept; for example `--starts 4`.
+    workers
+        Processes of this machine that search side by side, without unit; without it one search after the other. For
+        example `--workers 4`.
+    time_limit
+        In s: when so much time has passed, the search ends with the best so far. For example `--time-limit 60`.
     seed
         Of the random guesses, a whole number; for example `--seed 7`.
     pieces
@@ -91,14 +132,15 @@ def plan_command(
     """
     import numpy as np
 
-    from .. import so3
-    from ..body.catalog import load_body
-    from ..optimal_control.plan_options import Goal, Limits, Search
-    from ..optimal_control.planning import plan_reorientation
-    from ..phases.phases import split
-    from ..shape_space.files.read import write_shape_path
+    from ...body.catalog import load_body
+    from ...optimal_control.plan_options import Limits, Search
+    from ...optimal_control.planning import plan_reorientation
+    from ...phases.phases import split
+    from ...shape_space.files.read import write_shape_path
 
-    _check_goal(rotate, about, somersaults, half_twists)
+    words = GoalWords(turn, rotate, about, point, somersaults, half_twists)
+    words.check()
+    _check_search(workers, time_limit)
     if not 0.0 < duration < math.inf:
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
     aside = check_writable(out, "--out", ".csv")
@@ -106,25 +148,28 @@ def plan_command(
     with steps(12 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, isolate=True)
-        goal = (
-            Goal(somersaults=somersaults, half_twists=half_twists)
-            if rotate is None
-            else Goal(rotation=so3.exp(np.radians(rotate) * _axis(about or "x")))
-        )
+        start = None if from_ is None else posture(loaded, from_, "--from", first=True)
+        end = to if to in (None, "free") else posture(loaded, to, "--to", first=False)
+        goal = words.goal(loaded, _shape_at_end(loaded, start, end))
         code, status = ExitCode.DONE, ""
         work.begin("searching")
-        with _stoppable(work) as search:
+        with _stoppable(work, time_limit) as search, _executor(workers) as executor:
             try:
                 found = plan_reorientation(
                     loaded,
                     goal,
                     momentum=momentum,
                     duration=duration,
+                    start=start,
+                    end=end,
                     cost=cost,
                     rates_at_ends=rates_at_ends,
+                    joints=moving_joints(loaded, joints, hold),
+                    symmetric=mirrored(mirror),
                     limits=None if rate_limit is None else Limits(rate_limits=rate_limit),
                     search=Search(starts=starts, seed=seed, pieces=pieces, iterations=iterations),
                     iteration_callback=search.report,
+                    executor=executor,
                 )
             except PlanNotFound as failure:
                 if failure.best is None:
@@ -139,7 +184,7 @@ def plan_command(
             write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
             say_written(out)
         if html is not None:
-            from ..plotting.report import write_report
+            from ...plotting.report import write_report
 
             title = f"{loaded.name} turns itself"
             write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
@@ -150,23 +195,38 @@ def plan_command(
     )
 
 
-def _check_goal(rotate: float | None, about: str | None, somersaults: float | None, half_twists: float | None) -> None:
-    """Raise ShapeError for options that exclude or need one another, or are no numbers."""
-    winding = {"--somersaults": somersaults, "--half-twists": half_twists}
-    given = [option for option, value in winding.items() if value is not None]
-    if rotate is not None and given:
-        raise ShapeError(f"--rotate and {given[0]} each say how the body turns; give one of them")
-    if rotate is None and about is not None:
-        raise ShapeError("--about: the axis of --rotate DEGREES, which is not given")
-    if rotate is None and not given:
-        raise ShapeError("give either --rotate DEGREES --about AXIS, or --somersaults and --half-twists")
-    for option, value in {"--rotate": rotate, **winding}.items():
-        if value is not None and not math.isfinite(value):
-            raise ShapeError(f"{option}: a finite number is needed, got {value:g}")
+def _check_search(workers: int | None, time_limit: float | None) -> None:
+    """Raise ShapeError for numbers that no search can keep to."""
+    if workers is not None and workers < 1:
+        raise ShapeError(f"--workers: a whole number above 0 is needed, got {workers}")
+    if time_limit is not None and not 0.0 < time_limit < math.inf:
+        raise ShapeError(f"--time-limit: a time in s above 0 is needed, got {time_limit:g}")
+
+
+def _shape_at_end(body: Body, start: Array | None, end: Array | str | None) -> Array | None:
+    """The shape that a plan ends with; None: any."""
+    import numpy as np
+
+    if isinstance(end, str):
+        return None
+    if end is not None:
+        return end
+    return np.clip(np.zeros(body.n_shape), *body.joint_limits.T) if start is None else start
+
+
+@contextmanager
+def _executor(workers: int | None) -> Iterator[Executor | None]:
+    """Processes that search side by side; None where one is enough."""
+    if workers is None or workers == 1:
+        yield None
+        return
+    # A process that was forked beside threads of the solver may hang.
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as processes:
+        yield processes
 
 
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
-    from ..phases.split_text import rotation_line
+    from ...phases.split_text import rotation_line
 
     return "\n".join(
         [
@@ -187,7 +247,7 @@ def _searches(count: int) -> str:
 
 
 def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict[str, object]:
-    from .. import so3
+    from ... import so3
 
     return {
         "body": body.name,
@@ -207,7 +267,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
 
 
 class _InterruptibleSearch:
-    """A search on the terminal, which Ctrl-C ends after the iteration in progress.
+    """A search on the terminal, which Ctrl-C, or its time limit, ends after the iteration in progress.
 
     Attributes
     ----------
@@ -215,8 +275,9 @@ class _InterruptibleSearch:
     stopped : whether Ctrl-C has been pressed since
     """
 
-    def __init__(self, work: Steps) -> None:
+    def __init__(self, work: Steps, time_limit: float | None) -> None:
         self._work = work
+        self._end = math.inf if time_limit is None else time.monotonic() + time_limit
         self.reported = self.stopped = False
 
     def report(self, now: Progress) -> bool:
@@ -226,7 +287,7 @@ class _InterruptibleSearch:
             f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
         )
         self.reported = True
-        return self.stopped
+        return self.stopped or time.monotonic() > self._end
 
     def interrupted(self, *_: Any) -> None:
         """Ctrl-C: the search ends after this iteration; pressed again, at once."""
@@ -237,9 +298,9 @@ class _InterruptibleSearch:
 
 
 @contextmanager
-def _stoppable(work: Steps) -> Iterator[_InterruptibleSearch]:
+def _stoppable(work: Steps, time_limit: float | None) -> Iterator[_InterruptibleSearch]:
     """A search that Ctrl-C stops."""
-    search = _InterruptibleSearch(work)
+    search = _InterruptibleSearch(work, time_limit)
     if threading.current_thread() is not threading.main_thread():
         # Python hands Ctrl-C to the main thread alone.
         yield search
@@ -254,19 +315,3 @@ def _stoppable(work: Steps) -> Iterator[_InterruptibleSearch]:
 def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:
     numbers = " ".join(f"{value:g}" for value in momentum)
     return f"{body.name}: {duration:g} s, {body.n_shape} joints, momentum ({numbers}) kg m^2/s"
-
-
-def _axis(text: str) -> Array:
-    import numpy as np
-
-    from .. import so3
-
-    if text in _AXES:
-        return np.array(_AXES[text])
-    try:
-        axis = np.array([float(part) for part in text.split(",")])
-    except ValueError:
-        axis = np.zeros(0)
-    if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
-        raise ShapeError(f"--about: x, y, z or three numbers such as 1,0,0 are needed, got {text!r}")
-    return so3.normalised(axis)

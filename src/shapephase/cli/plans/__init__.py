@@ -1,0 +1,1 @@
+"""`shapephase plan`: a search for the joint motion that turns a body to a goal."""
