@@ -36,8 +36,8 @@ GIVEN: dict[str, Any] = {
 }
 # They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
 MAKERS = (
-    "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "sampler", "samplers", "plot",
-    "view", "to_dataframe",
+    "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "sampler",
+    "samplers", "plot", "view", "to_dataframe",
 )  # fmt: skip
 
 
