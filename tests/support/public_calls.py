@@ -98,6 +98,10 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "curvature": lambda: sp.curvature(body, shape),
         "curvature_on_plane": lambda: sp.curvature_on_plane(body, body.joint_names[:2], TIMES, TIMES),
         "is_flat": lambda: sp.is_flat(body),
+        "joint_torques": lambda: sp.joint_torques(motion, TIMES),
+        "minimum_perturbation": lambda: sp.minimum_perturbation(body, shape, 0.2, 2),
+        "reachable": lambda: sp.reachable(body, shape),
+        "particle_body": lambda: sp.curvature(sp.particle_body([1.0, 2.0, 3.0], corners, ["angle"]), [0.4]),
         "final_attitudes": lambda: sp.final_attitudes(body, [path, path.reversed()], MOMENTUM),
         "horizontal_gauge": lambda: sp.reconstruct(sp.horizontal_gauge(deformation), MOMENTUM),
         "link_gauge": lambda: sp.link_gauge(deformation, given["link"]).inertia(TIMES),
@@ -118,6 +122,15 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "recorded": lambda: recorded(path, body),
         "robot_names": lambda: sp.robot_names(),
     }
+
+
+def corners(shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A triangle that opens, and its derivative by the angle."""
+    sine, cosine, none = np.sin(shapes[:, 0]), np.cos(shapes[:, 0]), np.zeros(len(shapes))
+    fixed = np.broadcast_to([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], (len(shapes), 2, 3))
+    places = np.concatenate([fixed, np.stack([cosine, sine, none], axis=1)[:, None]], axis=1)
+    moved = np.concatenate([0.0 * fixed, np.stack([-sine, cosine, none], axis=1)[:, None]], axis=1)
+    return places, moved[:, None]
 
 
 def flown(name: str, path: sp.ShapePath) -> sp.PhaseSplit:

@@ -270,7 +270,7 @@ def particle_body(
     >>> corners = ca.vertcat(ca.horzcat(0, 0), ca.horzcat(1, 0), ca.horzcat(ca.cos(r[0]), ca.sin(r[0])) * r[1])
     >>> triangle = sp.particle_body([1, 1, 1], ca.Function("corners", [r], [corners]), ["angle", "side"])
     >>> sp.curvature(triangle, [1.0, 1.0])[0, 1].round(6).tolist()
-    [0.0, 0.0, -0.5]
+    [0.0, 0.0, -0.703988]
     """
     weights = finite_array(masses, "masses", (None,), unit="kg").copy()
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
