@@ -48,9 +48,10 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
 
     Parameters
     ----------
-    source : a path to a URDF or MJCF file, a bioMod model (`shapephase[biomod]`), or a file of measurements for
-        Yeadon's human (`shapephase[yeadon]`); a name from `robot_names()` such as "cat"; "example:human", a body of the
-        installed example-robot-data; or a `pinocchio.Model` whose root joint is a free-flyer
+    source : a path to a URDF or MJCF file, an OpenSim model (`shapephase[opensim]`), a bioMod model
+        (`shapephase[biomod]`), or a file of measurements for Yeadon's human (`shapephase[yeadon]`); a name from
+        `robot_names()` such as "cat"; "example:human", a body of the installed example-robot-data; or a
+        `pinocchio.Model` whose root joint is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted

@@ -20,6 +20,7 @@ class Format(NamedTuple):
 
 FORMATS = {
     "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading"),
+    "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading"),
     "yeadon": Format("measurements for Yeadon's model", "yeadon", "yeadon", ".yeadon_reading"),
 }
 """By our name."""
@@ -34,6 +35,8 @@ def format_of(content: bytes) -> str | None:
         start = found.end()
     if re.match(rb"version\s+\d", head[start:], re.IGNORECASE):
         return "biomod"
+    if re.search(rb"<OpenSimDocument[\s>]", head):
+        return "opensim"
     if re.search(rb"^\s*measurementconversionfactor\s*:", head, re.MULTILINE):
         return "yeadon"
     return None

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+import tempfile
 from importlib import import_module
 from importlib.util import find_spec
+from typing import TextIO
 
 from ...child_process import limit_this_process
 from .chain import UnusableModelError
@@ -27,17 +30,29 @@ def read_in_this_process() -> None:
     known = FORMATS[name]
     if find_spec(known.engine) is None:
         sys.exit(MISSING)
-    # Engines print what they have to say; standard output is for the answer alone.
-    answer, sys.stdout = sys.stdout, sys.stderr
-    reader = import_module(known.module, __package__)
+    # Engines print what they have to say, from C++ too; standard output is for the answer alone.
+    answer = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    # Some write a log into the folder that they are imported in.
+    sys.path[:] = map(os.path.abspath, sys.path)
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        code = _answered(path, known.module, answer)
+        os.chdir(os.path.sep)
+    answer.flush()
+    sys.exit(code)
+
+
+def _answered(path: str, module: str, answer: TextIO) -> int:
+    """Write what the reader says; the exit code."""
+    reader = import_module(module, __package__)
     limit_this_process(MEMORY)
     try:
         chain = reader.chain_of(path)
     except MemoryError:
-        sys.exit(NO_MEMORY)
+        return NO_MEMORY
     except UnusableModelError as error:
         answer.write(json.dumps({"message": str(error), "line": error.line}))
-        answer.flush()
-        sys.exit(REFUSED)
+        return REFUSED
     answer.write(json.dumps(chain.spoken()))
-    answer.flush()
+    return 0

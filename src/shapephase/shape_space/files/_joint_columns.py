@@ -153,6 +153,8 @@ def _why_left_out(text: str, target: str, recording: Recording, body: Body, choi
     if text not in choices.names:
         if choices.ignore_extra:
             return "no joint of the body"
+        if target in body.couplings:
+            return f"follows {' and '.join(body.couplings[target].drivers) or 'nothing: it is locked'}"
         if table.format.startswith("OpenSim") and np.isfinite(values := table.columns[text]).all():
             if np.ptp(values) <= _STILL:
                 return f"locked at {values[0]:.6g}"

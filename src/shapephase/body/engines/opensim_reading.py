@@ -1,0 +1,443 @@
+"""OpenSim models (Seth and others 2018), as OpenSim itself reads them.
+
+A custom joint becomes a chain of joints of one axis: three slides, then three turns. A coordinate that an axis follows
+one to one is the joint of that axis; all other axes follow the coordinates by the functions of the file, exactly.
+Coordinates of the joint to the ground are the free base.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import opensim
+
+from ...arrays import Array
+from ...errors import ShapeError
+from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
+from .chain import Chain, UnusableModelError
+
+_EXACT = 1e-12
+"""Share of the largest terms by which the engine's numbers may differ from ours."""
+_MOST_BYTES = 64 << 20
+"""Of a file; a full body with muscles has a few million."""
+_CUBIC = 3
+_FREE = 6
+"""Coordinates of a body that floats."""
+_X, _Y, _Z = np.eye(3)
+_TURN = "revolute"
+_SLIDE = "prismatic"
+_KNOWN = {
+    "WeldJoint": (),
+    "PinJoint": ((_TURN, _Z, 0),),
+    "SliderJoint": ((_SLIDE, _X, 0),),
+    "UniversalJoint": ((_TURN, _X, 0), (_TURN, _Y, 1)),
+    "GimbalJoint": ((_TURN, _X, 0), (_TURN, _Y, 1), (_TURN, _Z, 2)),
+    "PlanarJoint": ((_SLIDE, _X, 1), (_SLIDE, _Y, 2), (_TURN, _Z, 0)),
+}
+"""Of OpenSim's joints their axes in order, and which coordinate each has."""
+
+
+class _Rule(NamedTuple):
+    """start + the sum of functions of one coordinate each."""
+
+    start: float
+    terms: tuple[tuple[str, JointFunction], ...]
+
+
+class _Axis(NamedTuple):
+    """One axis of a joint; `name` is for a joint that follows coordinates."""
+
+    name: str
+    kind: str
+    direction: Array
+    rule: _Rule
+
+
+class _Coordinate(NamedTuple):
+    """Of the shape: with its limits; locked at a value; or as it follows others."""
+
+    kind: str
+    limits: tuple[float, float]
+    locked: float | None
+    rule: _Rule | None
+
+
+def chain_of(path: str) -> Chain:
+    """Links and joints of an .osim file, on the body that is joined to the ground."""
+    opensim.Logger.setLevelString("Off")
+    opensim.Logger.removeFileSink()
+    content = Path(path).read_bytes()
+    if len(content) > _MOST_BYTES:
+        raise UnusableModelError(f"it has {len(content) >> 20} MiB; up to {_MOST_BYTES >> 20} MiB are read")
+    return _Reading(path, content.decode("utf-8", "replace")).chain()
+
+
+class _Reading:
+    """A file on its way to a chain."""
+
+    def __init__(self, path: str, text: str) -> None:
+        self._path, self._text = path, text
+        self._model = _loaded(path)
+        self._joints = [self._model.getJointSet().get(k) for k in range(self._model.getNumJoints())]
+        self._chain = Chain(Path(path).stem)
+        self._base = self._base_joint()
+        self._coordinates = self._known_coordinates()
+
+    def chain(self) -> Chain:
+        """All of it, with what OpenSim computes at some shapes."""
+        bodies = [self._model.getBodySet().get(k) for k in range(self._model.getNumBodies())]
+        base = _ends(self._base)[1]
+        for body in sorted(bodies, key=lambda one: one.getName() != base):
+            self._add_body(body)
+        axes = {joint.getName(): self._axes(joint) for joint in self._joints if joint is not self._base}
+        carriers = self._carriers(axes)
+        self._add_bare_coordinates(base, axes, carriers)
+        for joint in self._joints:
+            if joint is not self._base:
+                self._add_joint(joint, axes[joint.getName()], carriers)
+        for name, coordinate in self._coordinates.items():
+            if coordinate.rule is not None and any(name == joint["name"] for joint in self._chain.joints):
+                self._couple(name, coordinate.rule)
+        self._add_poses(base)
+        return self._chain
+
+    def _fault(self, message: str, name: str) -> UnusableModelError:
+        """A fault at the first line that has an object of this name."""
+        before, found, _ = self._text.partition(f'name="{name}"')
+        return UnusableModelError(message, before.count("\n") + 1 if found else 1)
+
+    def _base_joint(self) -> Any:
+        """The one joint to the ground. Raises UnusableModelError where there are several or none."""
+        grounded = [joint for joint in self._joints if "ground" in _ends(joint)]
+        if len(grounded) != 1:
+            named = ", ".join(repr(joint.getName()) for joint in grounded[:20]) or "none"
+            raise self._fault(
+                f"one joint to the ground is needed, which is the base's, got {named}",
+                grounded[1].getName() if grounded else "ground",
+            )
+        joint = grounded[0]
+        name, count, body = joint.getName(), joint.numCoordinates(), _ends(joint)[1]
+        if count < _FREE:
+            said = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
+            self._chain.notes.append(said)
+        return joint
+
+    def _known_coordinates(self) -> dict[str, _Coordinate]:
+        """By name; those of the base are not among them."""
+        found: dict[str, _Coordinate] = {}
+        couplers = self._couplers()
+        for joint in self._joints:
+            for k in range(joint.numCoordinates() if joint is not self._base else 0):
+                coordinate = joint.get_coordinates(k)
+                name = coordinate.getName()
+                if name in found:
+                    raise self._fault(f"two coordinates are named {name!r}; give each a name of its own", name)
+                if coordinate.getDefaultIsPrescribed():
+                    self._chain.notes.append(f"coordinate {name!r} is prescribed in the file: it is free to move here")
+                clamped = coordinate.getDefaultClamped()
+                limits = (coordinate.getRangeMin(), coordinate.getRangeMax()) if clamped else (-np.inf, np.inf)
+                locked = coordinate.getDefaultValue() if coordinate.getDefaultLocked() else None
+                sliding = coordinate.getMotionType() == opensim.Coordinate.Translational
+                rule = None if locked is not None else couplers.get(name)
+                found[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
+        for name, rule in couplers.items():
+            for driver, _ in rule.terms:
+                if driver not in found:
+                    raise self._fault(f"coordinate {name!r} follows {driver!r}, which is the base's or unknown", name)
+        return found
+
+    def _couplers(self) -> dict[str, _Rule]:
+        """How coordinates follow others."""
+        found = {}
+        constraints = self._model.getConstraintSet()
+        for k in range(constraints.getSize()):
+            constraint = constraints.get(k)
+            if not constraint.get_isEnforced():
+                continue
+            coupler = opensim.CoordinateCouplerConstraint.safeDownCast(constraint)
+            if coupler is None:
+                kind = constraint.getConcreteClassName()
+                self._chain.notes.append(
+                    f"{kind} {constraint.getName()!r} is not taken up: its joints are free to move"
+                )
+                continue
+            names = coupler.getIndependentCoordinateNames()
+            drivers = [names.get(place) for place in range(names.getSize())]
+            found[coupler.getDependentCoordinateName()] = self._rule(coupler.getFunction(), drivers, coupler.getName())
+        return found
+
+    def _axes(self, joint: Any) -> list[_Axis]:
+        """In the order in which they move what is behind them, with rules of coordinates that are not locked."""
+        name, kind = joint.getName(), joint.getConcreteClassName()
+        if kind == "CustomJoint":
+            transform = opensim.CustomJoint.safeDownCast(joint).getSpatialTransform()
+            found = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
+        elif kind in _KNOWN:
+            found = [
+                _Axis(f"{name}_{k}", moves, axis, _Rule(0.0, ((joint.get_coordinates(place).getName(), _SAME),)))
+                for k, (moves, axis, place) in enumerate(_KNOWN[kind])
+            ]
+        else:
+            raise self._fault(f"joint {name!r} is a {kind}; {', '.join(_KNOWN)} and CustomJoint are supported", name)
+        return [axis._replace(rule=self._unlocked(axis.rule)) for axis in found]
+
+    def _custom_axis(self, joint: str, axis: Any, number: int) -> _Axis:
+        names = axis.getCoordinateNames()
+        drivers = [names.getValue(place) for place in range(names.size())]
+        label = f"{joint}_{axis.getName() or number}"
+        rule = _Rule(0.0, ()) if not axis.hasFunction() else self._rule(axis.getFunction(), drivers, joint)
+        for driver, _ in rule.terms:
+            if driver not in self._coordinates:
+                raise self._fault(
+                    f"joint {joint!r} follows coordinate {driver!r}, which is the base's or unknown", joint
+                )
+        return _Axis(label, _SLIDE if number > 2 else _TURN, _vector(axis.getAxis()), rule)
+
+    def _unlocked(self, rule: _Rule) -> _Rule:
+        """With the values of locked coordinates."""
+        start, kept = rule.start, []
+        for driver, function in rule.terms:
+            locked = self._coordinates[driver].locked
+            if locked is None:
+                kept.append((driver, function))
+            else:
+                start += float(function(np.array(locked)).value)
+        return _Rule(start, tuple(kept))
+
+    def _rule(self, function: Any, drivers: list[str], owner: str) -> _Rule:
+        """A function of OpenSim as functions of one coordinate each."""
+        kind = function.getConcreteClassName()
+        if kind == "MultiplierFunction":
+            multiplier = opensim.MultiplierFunction.safeDownCast(function)
+            inner, factor = self._rule(multiplier.getFunction(), drivers, owner), multiplier.getScale()
+            return _Rule(factor * inner.start, tuple((name, one.scaled(factor)) for name, one in inner.terms))
+        if kind == "Constant":
+            return _Rule(opensim.Constant.safeDownCast(function).getValue(), ())
+        if kind == "LinearFunction":
+            numbers = _numbers(opensim.LinearFunction.safeDownCast(function).getCoefficients())
+            if len(numbers) != len(drivers) + 1:
+                raise self._fault(f"{owner!r}: {len(numbers)} coefficients for {len(drivers)} coordinates", owner)
+            slopes = zip(drivers, numbers, strict=False)
+            return _Rule(numbers[-1], tuple((name, polynomial(np.array([0.0, slope]))) for name, slope in slopes))
+        if len(drivers) != 1:
+            raise self._fault(f"{owner!r}: a {kind} of one coordinate is supported, not of {len(drivers)}", owner)
+        try:
+            return _Rule(0.0, ((drivers[0], self._single(function, kind, owner)),))
+        except ShapeError as error:
+            raise self._fault(f"{owner!r}: its {kind}: {error}", owner) from None
+
+    def _single(self, function: Any, kind: str, owner: str) -> JointFunction:
+        """A function of one coordinate, exactly."""
+        if kind == "PolynomialFunction":
+            highest_first = opensim.PolynomialFunction.safeDownCast(function).getCoefficients()
+            return polynomial(np.array(_vector(highest_first, highest_first.size()))[::-1])
+        if kind == "PiecewiseLinearFunction":
+            lines = opensim.PiecewiseLinearFunction.safeDownCast(function)
+            return piecewise_linear(*np.array([(lines.getX(k), lines.getY(k)) for k in range(lines.getSize())]).T)
+        spline = opensim.SimmSpline.safeDownCast(function)
+        if kind == "GCVSpline" and opensim.GCVSpline.safeDownCast(function).getDegree() == _CUBIC:
+            spline = opensim.GCVSpline.safeDownCast(function)
+        if spline is None:
+            raise self._fault(
+                f"{owner!r}: a {kind} cannot be taken over exactly; Constant, LinearFunction, PolynomialFunction, "
+                "PiecewiseLinearFunction, SimmSpline, cubic GCVSpline and MultiplierFunction can",
+                owner,
+            )
+        knots = np.array([spline.getX(k) for k in range(spline.getSize())])
+        return hermite(knots, *np.array([_value_and_slope(function, [knot]) for knot in knots]).T)
+
+    def _carriers(self, axes: dict[str, list[_Axis]]) -> dict[str, str]:
+        """The axis, by its name, that is the joint of a coordinate: the first that goes as it does, or against it."""
+        found: dict[str, str] = {}
+        for axis in (axis for own in axes.values() for axis in own):
+            terms = axis.rule.terms
+            kind = self._coordinates[terms[0][0]].kind if len(terms) == 1 else ""
+            if kind == axis.kind and _sign(terms[0][1]) and terms[0][0] not in found:
+                found[terms[0][0]] = axis.name
+        return found
+
+    def _add_bare_coordinates(self, base: str, axes: dict[str, list[_Axis]], carriers: dict[str, str]) -> None:
+        """Joints that move nothing, on the base, of coordinates that others follow by curves alone."""
+        rules = [axis.rule for own in axes.values() for axis in own]
+        rules += [one.rule for one in self._coordinates.values() if one.rule is not None]
+        followed = {driver for rule in rules for driver, _ in rule.terms}
+        for name, coordinate in self._coordinates.items():
+            if name in followed and name not in carriers and coordinate.locked is None:
+                self._step(base, f"{base}__{name}", (np.eye(3), np.zeros(3)), name, coordinate.kind, _Z)
+
+    def _add_body(self, body: Any) -> None:
+        inertia = body.getInertia()
+        (xx, yy, zz), (xy, xz, yz) = _vector(inertia.getMoments()), _vector(inertia.getProducts())
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        name = body.getName()
+        line = self._fault("", name).line
+        self._chain.add_link(name, body.getMass(), _vector(body.getMassCenter()), tensor, line)
+
+    def _add_joint(self, joint: Any, axes: list[_Axis], carriers: dict[str, str]) -> None:
+        """Steps from the parent to the child: fixed frames, and joints of one axis between them."""
+        above, child = _ends(joint)
+        pose = _pose(joint.getParentFrame().findTransformInBaseFrame())
+        for axis in axes:
+            rule, direction = axis.rule, axis.direction / np.linalg.norm(axis.direction)
+            name, sign = axis.name, 1.0
+            driver = rule.terms[0][0] if rule.terms else ""
+            if carriers.get(driver) == axis.name:
+                function = rule.terms[0][1]
+                name, sign = driver, _sign(function)
+                rule = _Rule(rule.start + float(function(np.zeros(())).value), ())
+            if not rule.terms:
+                # Along the same axis, so that it does not matter which comes first.
+                pose = _after(pose, *_moved(axis.kind, direction, rule.start))
+            if name == axis.name and not rule.terms:
+                continue
+            below = f"{child}__{name}"
+            self._step(above, below, pose, name, axis.kind, sign * direction)
+            if rule.terms:
+                self._couple(name, rule)
+            above, pose = below, (np.eye(3), np.zeros(3))
+        turn, place = _pose(joint.getChildFrame().findTransformInBaseFrame())
+        turn, place = _after(pose, turn.T, -turn.T @ place)
+        self._chain.add_joints(above, child, place, turn, [])
+
+    def _step(self, above: str, below: str, pose: tuple[Array, Array], name: str, kind: str, axis: Array) -> None:
+        self._chain.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
+        self._chain.frames.append(below)
+        known = self._coordinates.get(name)
+        limits = (-np.inf, np.inf) if known is None else known.limits
+        self._chain.add_joints(above, below, pose[1], pose[0], [(name, kind, axis, list(limits))])
+
+    def _couple(self, name: str, rule: _Rule) -> None:
+        plain = self._unlocked(rule)
+        terms = [(driver, one.knots, one.centres, one.coefficients) for driver, one in plain.terms]
+        self._chain.couple(name, plain.start, terms)
+
+    def _add_poses(self, base: str) -> None:
+        """What OpenSim computes with the base at rest."""
+        bare = _loaded(self._path)
+        for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
+            components.clearAndDestroy()
+        coordinates = bare.updCoordinateSet()
+        everything = {coordinates.get(k).getName(): coordinates.get(k) for k in range(coordinates.getSize())}
+        for coordinate in everything.values():
+            coordinate.setDefaultLocked(False)
+            coordinate.setDefaultClamped(False)
+            coordinate.setDefaultIsPrescribed(False)
+        try:
+            state = bare.initSystem()
+        except RuntimeError as error:
+            raise _refused(error) from None
+        matter, root = bare.getMatterSubsystem(), bare.getBodySet().get(base)
+        for shape, rate in self._chain.random_shapes():
+            for name, (value, speed) in self._of_all(shape, rate).items():
+                everything[name].setValue(state, value, False)
+                everything[name].setSpeedValue(state, speed)
+            bare.realizeVelocity(state)
+            turn, _ = _pose(root.getTransformInGround(state))
+            whole = matter.calcSystemCentralInertiaInGround(state)
+            (xx, yy, zz), (xy, xz, yz) = _vector(whole.getMoments()), _vector(whole.getProducts())
+            inertia = turn.T @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn
+            # A part of it does not live longer than the whole.
+            both = matter.calcSystemCentralMomentum(state)
+            self._chain.add_pose(shape, rate, inertia, turn.T @ _vector(both.get(0)), (_EXACT, _EXACT))
+
+    def _of_all(self, shape: dict[str, float], rate: dict[str, float]) -> dict[str, tuple[float, float]]:
+        """Values and speeds of all coordinates but the base's; dependent ones by OpenSim's own functions."""
+        functions = {}
+        constraints = self._model.getConstraintSet()
+        for k in range(constraints.getSize()):
+            coupler = opensim.CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
+            if coupler is not None and coupler.get_isEnforced():
+                names = coupler.getIndependentCoordinateNames()
+                drivers = [names.get(place) for place in range(names.getSize())]
+                functions[coupler.getDependentCoordinateName()] = (coupler.getFunction(), drivers)
+        found: dict[str, tuple[float, float]] = {}
+
+        def find(name: str) -> tuple[float, float]:
+            if name not in found:
+                locked = self._coordinates[name].locked
+                if locked is not None:
+                    found[name] = locked, 0.0
+                elif name in functions:
+                    function, drivers = functions[name]
+                    there = [find(driver) for driver in drivers]
+                    value, *slopes = _value_and_slope(function, [value for value, _ in there])
+                    found[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, there, strict=True))
+                else:
+                    found[name] = shape.get(name, 0.0), rate.get(name, 0.0)
+            return found[name]
+
+        for name in self._coordinates:
+            find(name)
+        return found
+
+
+_SAME = polynomial(np.array([0.0, 1.0]))
+
+
+def _loaded(path: str) -> Any:
+    try:
+        model = opensim.Model(path)
+        model.finalizeConnections()
+    except RuntimeError as error:
+        raise _refused(error) from None
+    return model
+
+
+def _refused(error: Exception) -> UnusableModelError:
+    said = " ".join(str(error).split("Thrown at")[0].split())
+    return UnusableModelError(f"OpenSim does not accept it: {said.removeprefix('std::exception in ')}")
+
+
+def _ends(joint: Any) -> tuple[str, str]:
+    """Names of the bodies that a joint joins, the ground's is 'ground'."""
+    frames = [frame.findBaseFrame() for frame in (joint.getParentFrame(), joint.getChildFrame())]
+    first, second = ("ground" if one.getAbsolutePathString() == "/ground" else one.getName() for one in frames)
+    return (second, first) if second == "ground" else (first, second)
+
+
+def _sign(function: JointFunction) -> float:
+    """1 or -1 where a function goes as its coordinate, or against it; else 0."""
+    straight = not len(function.knots) and not function.coefficients[2:].any() and len(function.coefficients) > 1
+    slope = float(function.coefficients[1, 0]) if straight else 0.0
+    return slope if abs(slope) == 1.0 else 0.0
+
+
+def _value_and_slope(function: Any, places: list[float]) -> list[float]:
+    """The value of a function of OpenSim, and its derivative by each argument."""
+    where = opensim.Vector(len(places), 0.0)
+    for k, place in enumerate(places):
+        where.set(k, place)
+    found = [function.calcValue(where)]
+    for k in range(len(places)):
+        which = opensim.StdVectorInt()
+        which.append(k)
+        found.append(function.calcDerivative(which, where))
+    return found
+
+
+def _moved(kind: str, axis: Array, by: float) -> tuple[Array, Array]:
+    """A fixed turn or slide."""
+    if kind == _SLIDE:
+        return np.eye(3), by * axis
+    x, y, z = np.sin(by) * axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.cos(by) * np.eye(3) + (1.0 - np.cos(by)) * np.outer(axis, axis) + skew, np.zeros(3)
+
+
+def _after(pose: tuple[Array, Array], turn: Array, place: Array) -> tuple[Array, Array]:
+    return pose[0] @ turn, pose[1] + pose[0] @ place
+
+
+def _pose(transform: Any) -> tuple[Array, Array]:
+    matrix = transform.R().asMat33()
+    return np.array([[matrix.get(i, j) for j in range(3)] for i in range(3)]), _vector(transform.p())
+
+
+def _vector(entries: Any, count: int = 3) -> Array:
+    return np.array([entries.get(k) for k in range(count)])
+
+
+def _numbers(entries: Any) -> list[float]:
+    return [entries.get(k) for k in range(entries.getSize())]
