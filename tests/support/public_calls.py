@@ -109,6 +109,9 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "principal_gauge": lambda: sp.principal_gauge(deformation).inertia(TIMES),
         "fixed_points": lambda: sp.fixed_points(deformation, 0.02),
         "stroboscopic_map": lambda: sp.stroboscopic_map(deformation, 0.02, [[0.0, 0.0, 1.0]]),
+        "joint_torques": lambda: sp.joint_torques(motion),
+        "minimum_perturbation": lambda: sp.minimum_perturbation(body, np.zeros(body.n_shape), 0.5),
+        "reachable": lambda: sp.reachable(body),
         "uncertainty": lambda: sp.uncertainty(motion, momentum=0.001),
         "body_summary": lambda: sp.body_summary(body),
         "path_summary": lambda: sp.path_summary(body, path),
@@ -121,6 +124,7 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "saved": lambda: saved(motion),
         "recorded": lambda: recorded(path, body),
         "robot_names": lambda: sp.robot_names(),
+        "study": studied,
     }
 
 
@@ -151,6 +155,16 @@ def recorded(path: sp.ShapePath, body: sp.Body) -> Any:
         file = Path(folder) / "path.csv"
         sp.write_shape_path(path, file, np.linspace(0.0, 1.0, 21))
         return file.read_text(), sp.read_shape_path(file, body).shape(TIMES)
+
+
+def studied() -> Any:
+    """What a study of a few cats has stored, and the numbers of its last case."""
+    over = {"momentum_z": [0.0, 0.01], "masses": sp.study.LogNormal(0.1)}
+    more = {"parameters": {"alpha": 0.0, "beta": 0.5}}
+    study = sp.study.Study("cat_two_halves", "kane_scher", over, ("final_attitude", "holonomy"), **more)
+    with tempfile.TemporaryDirectory() as folder:
+        store = study.run(f"{folder}/out.zarr", workers=0)
+        return store.values("final_attitude"), store.values("holonomy"), study.case(1).masses
 
 
 def numbers(thing: Any, depth: int = 0) -> list[Any]:
