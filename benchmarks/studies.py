@@ -2,7 +2,7 @@
 
 Costs are processor time of all processes taken together, in turns. A study of one process is run with few and with many
 cases, and the difference counts, so that starting a process is not in it; so is the store. Two processes are measured
-by the clock between chunks, side by side with two that know nothing of each other.
+by the clock between chunks, at the same time as two that know nothing of each other.
 
     --turns N    how often everything is measured (default 5)
     --million    also 10^6 cases of a rigid body, and the memory of the process that runs them
@@ -34,7 +34,9 @@ CHUNK = 500
 _FEW = 2
 """Chunks of the short study of one process."""
 _SIDE_BY_SIDE = 12
-"""Chunks that two processes share."""
+"""Chunks of two processes that are counted."""
+_SETTLED = 4
+"""Chunks before those."""
 _MILLION = 1_000_000
 _CHUNK_OF_MILLION = 5000
 _SPREAD = 0.1
@@ -137,52 +139,54 @@ def _used() -> float:
 
 def print_two_processes(turns: int) -> None:
     """Cases in a second of a study by two processes, beside two processes on their own (target: 0.85)."""
-    print("\ncases in a second by the clock: a study by two processes, and two that know nothing of each other")
+    print("\ncases in a second: a study by two processes, and two that know nothing of each other, at the same time")
     for name in WORKLOADS:
-        found = [[_rate_of_study(name), _rate_on_their_own(name)] for _ in range(turns)]
+        found = [_rates(name) for _ in range(turns)]
         ours, theirs = np.median(found, axis=0)
         print(f"  {name:32}{ours:8.0f}{theirs:8.0f}   {_spread(np.divide(*np.transpose(found)))}", flush=True)
 
 
-def _rate_of_study(name: str) -> float:
-    """From when both have given a chunk until the last but one is stored: what one does alone is left out."""
-    study = WORKLOADS[name].study(CHUNK * (_SIDE_BY_SIDE + 4))
+def _rates(name: str) -> tuple[float, float]:
+    """Of both within the same seconds: from when all are at work until the study's last chunk but one is stored."""
+    command = [sys.executable, "-m", "benchmarks.studies", "--alone", name]
+    pair = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     stored: list[float] = []
 
     def note(_: sp.study.StudyProgress) -> None:
+        if not stored:
+            for process in pair:
+                process.stdin.write("go\n")  # type: ignore[union-attr]
+                process.stdin.flush()  # type: ignore[union-attr]
         stored.append(time.perf_counter())
 
-    with tempfile.TemporaryDirectory() as folder:
-        study.run(Path(folder) / "out.zarr", workers=2, progress=note)
-    return CHUNK * _SIDE_BY_SIDE / (stored[-2] - stored[-2 - _SIDE_BY_SIDE])
-
-
-def _rate_on_their_own(name: str) -> float:
-    """Each says that it is ready, waits for the other, and computes half of the chunks by batches."""
-    command = [sys.executable, "-m", "benchmarks.studies", "--alone", name]
-    pair = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    try:
+        for process in pair:
+            process.stdout.readline()  # type: ignore[union-attr]
+        with tempfile.TemporaryDirectory() as folder:
+            WORKLOADS[name].study(CHUNK * (_SETTLED + _SIDE_BY_SIDE + 1)).run(
+                Path(folder) / "out.zarr", workers=2, progress=note
+            )
+    finally:
+        for process in pair:
+            process.kill()
+    first, last = stored[_SETTLED - 1], stored[-2]
+    theirs = 0.0
     for process in pair:
-        assert process.stdout is not None
-        process.stdout.readline()
-    for process in pair:
-        assert process.stdin is not None
-        process.stdin.write("go\n")
-        process.stdin.flush()
-    taken = [float(process.communicate()[0]) for process in pair]
-    return sum(CHUNK * _SIDE_BY_SIDE / 2 / seconds for seconds in taken)
+        ends = [float(line) for line in process.communicate()[0].splitlines()]
+        theirs += float(np.diff(np.interp([first, last], ends, np.arange(len(ends))))[0])
+    return CHUNK * _SIDE_BY_SIDE / (last - first), CHUNK * theirs / (last - first)
 
 
 def alone(name: str) -> None:
-    """One of those two."""
+    """One of those two: it waits until it is needed, and says when each chunk is done, until it is killed."""
     workload = WORKLOADS[name]
-    study = workload.study(CHUNK * _SIDE_BY_SIDE)
+    study = workload.study(CHUNK)
     workload.batch(study.some_cases(np.arange(CHUNK)))
     print("ready", flush=True)
     sys.stdin.readline()
-    began = time.perf_counter()
-    for number in range(_SIDE_BY_SIDE // 2):
-        workload.batch(study.some_cases(np.arange(*study.chunk_range(number))))
-    print(time.perf_counter() - began)
+    while True:
+        print(time.perf_counter(), flush=True)
+        workload.batch(study.some_cases(np.arange(CHUNK)))
 
 
 def print_million() -> None:

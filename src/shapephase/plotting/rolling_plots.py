@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, Mask, finite_array
+from ..arguments import number_argument
+from ..arrays import Array, Mask
 from ..errors import ShapeError
 from ..rigid_body.euler_top import EulerTop
 from ..rigid_body.poinsot import Poinsot, cones
@@ -85,8 +86,8 @@ def plot_rolling_ellipsoid(
     'polhode'
     """
     check_axes(ax)
-    moment = float(finite_array(time, "time", (), unit="s"))
-    count = float(finite_array(periods, "periods"))
+    moment = number_argument(time, "time", "s")
+    count = number_argument(periods, "periods")
     if not count > 0.0:
         raise ShapeError(f"periods: a positive number of them is drawn, got {periods}")
     poinsot = Poinsot(top)
@@ -154,7 +155,7 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
     'oblate: the space cone is inside the body cone'
     """
     check_axes(ax)
-    moment = float(finite_array(time, "time", (), unit="s"))
+    moment = number_argument(time, "time", "s")
     found = cones(top)
     poinsot = Poinsot(top)
     frame = np.vstack([poinsot.plane_axes, poinsot.normal])

@@ -115,7 +115,7 @@ def reconstruct_family(
     threads: int | None,
 ) -> MotionFamily:
     """As `reconstruct`, with tolerance and threads already checked."""
-    if method not in _METHODS:
+    if not isinstance(method, str) or method not in _METHODS:
         raise unknown_name("method for a family of bodies", method, _METHODS)
     count = len(deformations)
     spatial, start = initial_state_arguments(momentum, attitude)

@@ -341,6 +341,8 @@ def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...
     >>> lie.complex_or_real([1.0, 2.0j], "z", (2,)).tolist()
     [(1+0j), 2j]
     """
+    if not isinstance(trailing, tuple):
+        raise ShapeError(f"trailing: a tuple of lengths is needed, got {what_came(trailing)}")
     try:
         # asanyarray keeps the mask of a masked array, which `finite_array` refuses.
         entries = np.asanyarray(value)

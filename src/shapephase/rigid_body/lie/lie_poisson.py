@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_object, check_pair, inverse_inertia_argument
+from ...arguments import check_function, check_object, check_pair, inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
 from .._flow import ascending_times, flow
@@ -154,6 +154,7 @@ def lie_poisson_motion(
     """
     check_object(algebra, "LieAlgebra", "algebra")
     start, instants = _momentum(momentum, algebra), ascending_times(times)
+    check_function(hamiltonian, "hamiltonian", "a function that gives the gradient")
     gradient_at(hamiltonian, "hamiltonian", start)
 
     def rate(mu: Array) -> Array:
@@ -341,7 +342,7 @@ def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 
 def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
-    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError.
+    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError, WrongObjectError.
 
     Examples
     --------
@@ -349,6 +350,8 @@ def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
     >>> lie.gradient_at(lambda mu: 2.0 * mu, "gradient", np.array([1.0, 2.0, 3.0])).tolist()
     [2.0, 4.0, 6.0]
     """
+    if callable(gradient):
+        check_function(gradient, name, "a gradient, or a function that gives it,")
     value = gradient(mu) if callable(gradient) else gradient
     return finite_array(value, f"{name} gradient", mu.shape[-1:])
 
