@@ -1,9 +1,9 @@
 # The checks of .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test deaths times notebooks docs full lowest fuzz bench
+.PHONY: check lint types imports test deaths goals times notebooks docs full lowest fuzz bench
 
-check: lint types imports test deaths docs
+check: lint types imports test deaths goals docs
 
 lint:
 	$(BIN)/ruff check .
@@ -22,6 +22,10 @@ test:
 # A study of 2,000 cases whose worker, scheduler and driver are killed, in a minute of processor time.
 deaths:
 	$(BIN)/pytest -n 0 tests/study/test_cluster.py -k two_thousand
+
+# Six turns of four small bodies, planned from rest to rest.
+goals:
+	$(BIN)/pytest -n auto tests/optimal_control/test_plan_goals.py
 
 # What each quick test takes of the processor, and the budget.
 times:
