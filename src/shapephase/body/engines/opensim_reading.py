@@ -25,7 +25,9 @@ _MOST_BYTES = 64 << 20
 _CUBIC = 3
 _FREE = 6
 """Coordinates of a body that floats."""
-_X, _Y, _Z = np.eye(3)
+_X = np.array([1.0, 0.0, 0.0])
+_Y = np.array([0.0, 1.0, 0.0])
+_Z = np.array([0.0, 0.0, 1.0])
 _TURN = "revolute"
 _SLIDE = "prismatic"
 _KNOWN = {
