@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import UnknownNameError
+from shapephase.errors import ShapePhaseError, UnknownNameError, WrongObjectError
 from shapephase.letters import what_came
 from support.example_calls import TRUSTING, example_calls, fault_of, trusts, works, wrong_things
 from support.long_runs import full_but
@@ -18,6 +18,10 @@ QUICK = ("shapephase.articulated", "shapephase.reconstruct", "shapephase.momentu
          "shapephase.holonomy", "shapephase.final_attitudes", "shapephase.base_difference", "shapephase.ShapePath",
          "shapephase.bounds.return_time_bounds", "shapephase.link_gauge", "shapephase.examples.kane_scher",
          "shapephase.load_motion", "shapephase.rigid_body.cones")  # fmt: skip
+# Arguments of a study, and what each may be.
+WRONG_OF_A_STUDY = {"body": ("str",), "motion": ("str", "builtin_function_or_method"), "over": (), "outputs": ("str",),
+                    "draws": (), "seed": (), "chunk": (), "momentum": (), "attitude": ("NoneType", "ndarray"),
+                    "tolerance": (), "gauge": (), "parameters": (), "time_limit": ("NoneType", "float")}  # fmt: skip
 # A function is what is wanted, whatever it then does.
 FUNCTIONS = ("Callable", "Gauge", "Profile", "Meridian", "Stretch", "ClosedArcs")
 # What may be given as well as what the example gives.
@@ -67,3 +71,47 @@ def test_a_name_that_is_none_is_shown_by_its_kind():
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 0.0, 0.0])
     with pytest.raises(UnknownNameError, match=r"^unknown method \(a name is needed\): a Motion. Valid: "):
         sp.reconstruct(motion.deformation, [1.0, 0.0, 0.0], method=motion)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("call", [sp.reconstruct, sp.split])
+def test_a_wrong_first_object_is_named_before_what_is_missing(call):
+    """Python's own word for a missing argument would come before ours."""
+    path = sp.examples.kane_scher(0.3, 1.0)
+    with pytest.raises(WrongObjectError, match=r"(Deformation|Motion) is needed, got a ShapePath; make it with "):
+        call(path)
+
+
+def test_a_momentum_that_is_left_out_is_asked_for():
+    with pytest.raises(TypeError, match=r"^momentum: three numbers \[kg m\^2/s\] are needed, nothing came"):
+        sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0))  # type: ignore[call-overload]
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("argument", WRONG_OF_A_STUDY)
+def test_a_study_says_what_it_needs(argument, monkeypatch, tmp_path):
+    """A study takes names and numbers: of objects of ours, and of what is no number, one line names the argument."""
+    monkeypatch.chdir(tmp_path)
+    good = {
+        "body": "cat_two_halves",
+        "motion": "kane_scher",
+        "over": {"beta": [0.3, 0.4]},
+        "parameters": {"alpha": 0.1},
+    }
+    taken = WRONG_OF_A_STUDY[argument]
+    for kind, thing in {**wrong_things(), "list of objects": [object()], "dict": {1: 2.0}}.items():
+        if kind in taken:
+            continue
+        with pytest.raises(ShapePhaseError) as caught:
+            sp.study.Study(**{**good, argument: thing})
+        said = str(caught.value)
+        assert argument.rstrip("s") in said, said
+        assert "\n" not in said, said
+        assert len(said) < 500, said
+
+
+@pytest.mark.parametrize(
+    "call", [sp.study.open_study, sp.study.read_study, lambda it: sp.study.export_study(it, "a.csv")]
+)
+def test_what_is_no_store_or_file_of_a_study_is_named(call):
+    with pytest.raises(WrongObjectError, match="is needed, got a Body"):
+        call(sp.load_body("cat_two_halves"))

@@ -123,6 +123,12 @@ def test_a_base_without_mass_of_its_own(tmp_path):
             r":\d\d: segment 'Thorax': biorbd does not accept it",
         ),
         ("RT 0.1 -0.2 0.3 xyz", "RT 0.1 -0.2 0.3 abc", "biorbd does not accept it"),
+        ("RT 0.1 -0.2 0.3 xyz", "RT 0.1 -0.2 xyz", r":\d+: segment 'RightArm': RT is three angles.*got 6 values"),
+        ("com 0 0 0.2", "com 0 0 0.2 7", r":\d+: segment 'Thorax': com has 4 values, not 3"),
+        ("com 0 0 0.2", "com 0 0,2 0", r":\d+: segment 'Thorax': com: '0,2' is no number"),
+        ("mass 30", "mass 0x10", r":\d+: segment 'Thorax': mass: '0x10' is no number"),
+        ("mass 30", "mass 30\n\tmass 40", r":\d+: segment 'Thorax': 'mass' stands twice"),
+        ("rangesQ -0.5 0.9", "rangesQ -0.5 0.9 0.1 0.2", r":\d+: segment 'Thorax': rangesQ has 6 values of 2 coord"),
     ],
 )
 def test_a_biomod_that_cannot_be_used(tmp_path, old, new, message):
@@ -182,10 +188,13 @@ def test_a_perimeter_that_is_a_little_too_long_makes_a_circle(tmp_path):
     ("text", "message"),
     [
         (measured(Ls3w=-0.3), r":\d+: Ls3w: a number above zero is needed, got -0.3"),
-        (measured(Ls3w=".nan"), r":\d+: Ls3w: a number above zero is needed, got nan"),
+        (measured(Ls3w=".nan"), r":\d+: Ls3w: a number above zero is needed, got .nan"),
         (measured(Ls3w="wide"), r":\d+: Ls3w: a number above zero is needed, got 'wide'"),
         (measured(Ls3w=None), "the file lacks Ls3w"),
         (measured(Ls9w=0.3), "has Ls9w, which are no measurements"),
+        (measured(Ls3w="1:30"), r":\d+: Ls3w: a number above zero is needed, got 1:30"),
+        (measured(Ls3w="012"), r":\d+: Ls3w: for YAML 012 is not this number; write 12.0$"),
+        (measured() + "Ls3w: 0.4\n", r":98: Ls3w stands twice"),
         (measured(totalmass=0), r":\d+: totalmass: a number above zero is needed, got 0"),
         (measured(Ls0w=3.0), "level 'Ls0: hip joint centre': its perimeter is 0.3167 times its width"),
         (measured() + "a: [", r":\d+: it is no YAML file of measurements"),

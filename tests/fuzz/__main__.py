@@ -64,6 +64,7 @@ def _note(find: Find | None, grammar: str, faulty: dict[str, Find], folder: Path
     place = folder / grammar
     place.mkdir(parents=True, exist_ok=True)
     for name, content in find.trial.files.items():
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
         (place / name).write_bytes(content)
     trial = find.trial
     print(f"\n{grammar}: {trial.kind} {trial.main} {dict(trial.options)} {list(trial.arguments)}")

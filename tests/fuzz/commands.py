@@ -8,10 +8,11 @@ from random import Random
 from support.odd_values import ODD_WORDS
 
 from .bodies import mjcf, urdf
+from .engine_bodies import biomod, yeadon
 from .pieces import BODY, ODD_NAMES, Trial, odd_one, rarely
+from .studies import GOOD_MOTION, store_files, store_trial, study_file
 from .text_motions import delimited, number_text, opensim
 
-_GOOD_MOTION = "time,hip,wrist,boom\n0,0,0,0\n0.25,0.2,0.1,0.05\n0.5,0.3,0.3,0.1\n0.75,0.1,0.2,0.02\n1,0,0,0\n"
 _ODD_VALUES = (*ODD_WORDS, "-", "x", "a=b", "[", "1,2,3", "@", "%s", "\n")
 _SMALL_SEARCH = ("--pieces", "12", "--iterations", "30", "--duration", "10")
 """What a plan takes of the processor grows with the first two; in so many seconds the rates of the body suffice."""
@@ -52,6 +53,10 @@ _RECORDING: Mapping[str, Callable[[Random], list[str]]] = {
     "--smooth": lambda c: [_number(c, "0.01")],
     "--close": lambda c: [c.choice(("3deg", "0.1", "3deg,5mm", "-1", "nan", "x", "1e400deg", "1s"))],
     "--close-by": lambda c: [c.choice(("drift", "smooth", "geodesic", "x"))],
+    "--smooth-penalty": lambda c: [_number(c, "1e-6")],
+    "--base-order": lambda c: [c.choice(("zyx", "xyz", "xx", "", "zyxz"))],
+    "--base-axes": lambda c: [c.choice(("x,-z,y", "x,y,z", "x,x,y", "estimate", "", "w"))],
+    "--flight": lambda c: c.choice((["auto"], ["all"], [_number(c, "0"), _number(c, "1")], ["x"], ["1"])),
 }
 _FLIGHT: Mapping[str, Callable[[Random], list[str]]] = {
     "--momentum": _three,
@@ -59,6 +64,7 @@ _FLIGHT: Mapping[str, Callable[[Random], list[str]]] = {
         c, ["0", "0", "0", "1"], (["0"] * 4, ["nan"] * 4, ["1", "1"], ["1e200"] * 4, ["1e-320"] * 4), 3
     ),
 }
+_UP = ("y", "-z", "x", "", "w", "--y")
 _GAUGES = ("horizontal", "base", "principal", "mean_body", "link:hand", "link:", "link:none", "x", "")
 _GAUGE: Mapping[str, Callable[[Random], list[str]]] = {"--gauge": lambda c: [c.choice(_GAUGES)]}
 _TOLERANCE: Mapping[str, Callable[[Random], list[str]]] = {
@@ -74,7 +80,17 @@ _ERRORS: Mapping[str, Callable[[Random], list[str]]] = {
 }
 _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
     "check": _RECORDING,
-    "split": _RECORDING | _FLIGHT | _GAUGE | _TOLERANCE | _ERRORS | {"--out": lambda c: _file(c, "out.npz")},
+    "split": _RECORDING
+    | _FLIGHT
+    | _GAUGE
+    | _TOLERANCE
+    | _ERRORS
+    | {
+        "--out": lambda c: _file(c, "out.npz"),
+        "--html": lambda c: _file(c, "report.html"),
+        "--phases": lambda _: [],
+        "--up": lambda c: [c.choice(_UP)],
+    },
     "torques": _RECORDING | _FLIGHT | _TOLERANCE | {"--out": lambda c: _file(c, "out.csv")},
     "plot": _RECORDING | _FLIGHT | _GAUGE | {"--out": lambda c: _file(c, "out.png")},
     "view": _RECORDING
@@ -83,8 +99,9 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--trail": lambda c: [c.choice(("hand", "none", ""))],
         "--speed": lambda c: [_number(c, "1")],
         "--video": lambda c: [c.choice(("film.webm", "", "no/such/film.gif"))],
+        "--up": lambda c: [c.choice(_UP)],
     },
-    "explore": {"--up": lambda c: [c.choice(("y", "-z", "", "w"))]},
+    "explore": {"--up": lambda c: [c.choice(_UP)]},
     "orbits": _RECORDING | _GAUGE | _TOLERANCE,
     "plan": {
         "--rotate": lambda c: [_number(c, "5")],
@@ -100,14 +117,42 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--seed": lambda c: [_number(c, "1")],
         "--pieces": lambda c: [_number(c, "6")],
         "--iterations": lambda c: [_number(c, "3")],
+        "--rate-limit": lambda c: [c.choice(("2", "hip=2", "none=1", "-1", "nan", "hip", "hip=", "1e400", "90deg"))],
+        "--rates-at-ends": lambda c: [c.choice(("zero", "free", "x", ""))],
+        "--html": lambda c: _file(c, "plan.html"),
         "--out": lambda c: _file(c, "out.csv"),
     },
+    "sweep": {
+        "--workers": lambda c: [odd_one(c, "1", ("0", "-1", "1.5", "x", ""), 2)],
+        "--scheduler": lambda c: [c.choice(("", "x", "tcp://", "tcp://127.0.0.1:1", "http://[", "127.0.0.1:99999"))],
+        "--resume": lambda _: [],
+    },
+    "sweep status": {},
+    "sweep export": {"--out": lambda c: _file(c, "table.csv")},
     "conjugate": {"--momenta": _three, "--order": lambda c: [_number(c, "2")], "--out": lambda c: _file(c, "out.svg")},
     "robots": {},
     "doctor": {},
     "": {},
 }
 """Command -> option -> its values; `compile` takes nothing in, and longer than an input may."""
+
+
+_MADE: Mapping[str, Callable[[Random], Trial]] = {"body.xml": mjcf, "body.bioMod": biomod, "body.txt": yeadon}
+"""Bodies that are no URDF."""
+_STORES = ("no.zarr", "", ".", "folder", "study.toml", "motion.csv", "x" * 300, "no/such/out.zarr", "\x01.zarr")
+
+
+def _sweep(chance: Random, name: str) -> tuple[dict[str, bytes], list[str]]:
+    """The files and the words of a study: it is new, goes on, or meets another's store."""
+    made = odd_one(chance, store_trial, (study_file,), 2)(chance)
+    files = dict(made.files)
+    if name != "sweep":
+        return files, [odd_one(chance, "out.zarr", _STORES, 5)] + ["--out", "table.csv"] * (name == "sweep export")
+    if made.kind == "study" and rarely(chance, 4):
+        files |= {other: data for other, data in store_files().items() if other != "study.toml"}
+    study = odd_one(chance, "study.toml", ("no.toml", "motion.csv", "", "folder", "out.zarr"), 10)
+    store = odd_one(chance, chance.choice(("out.zarr", "new.zarr")), _STORES, 8)
+    return files, [study, "--store", store, "--workers", "1"] + ["--resume"] * chance.randrange(2)
 
 
 def _word(chance: Random) -> str:
@@ -127,10 +172,10 @@ def command(chance: Random, only: str | None = None) -> Trial:
     body = odd_one(
         chance,
         "body.urdf",
-        (*known, "nobody", "", "example:none", "body.xml", "folder", "motion.csv", "x" * 5000),
+        (*known, "nobody", "", "example:none", *_MADE, "folder", "motion.csv", "x" * 5000),
         8,
     )
-    made = mjcf(chance) if body == "body.xml" else urdf(chance)
+    made = _MADE.get(body, urdf)(chance)
     files[made.main] = BODY.encode() if made.main == "body.urdf" and not rarely(chance, 4) else made.files[made.main]
     motion = odd_one(
         chance, "motion.csv", ("circle", "cat_righting", "-", "none", "no.csv", "", ".csv", "body.urdf", "a.bvh"), 10
@@ -138,7 +183,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
     if name not in ("plan", "explore"):
         fuzzed = opensim(chance) if rarely(chance, 4) else delimited(chance)
         use = rarely(chance, 2) and motion == "motion.csv"
-        files["motion.csv"] = _GOOD_MOTION.encode()
+        files["motion.csv"] = GOOD_MOTION.encode()
         if use:
             files, motion = files | fuzzed.files, fuzzed.main
     words = {
@@ -154,6 +199,8 @@ def command(chance: Random, only: str | None = None) -> Trial:
         "doctor": [],
         "": [],
     }.get(name, [body, motion])
+    if name.startswith("sweep"):
+        files, words = _sweep(chance, name)
     if name == "explore":
         words = [body, "--joints", "hip", odd_one(chance, "wrist", ("hip", "boom", *ODD_NAMES), 3)]
     if name in ("view", "explore"):
@@ -171,7 +218,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
         words.pop(chance.randrange(len(words)))
     if name == "plan":
         words += [word for k, word in enumerate(_SMALL_SEARCH) if _SMALL_SEARCH[k - k % 2] not in words]
-    arguments = [word.replace("\x00", "") for word in ([name] if name else []) + words]
+    arguments = [word.replace("\x00", "") for word in name.split() + words]
     if not rarely(chance, 4):
         arguments.append("--json")
     return Trial(kind="command", source=f"shapephase {name}".strip(), files=files, arguments=arguments)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import io
+import json
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from support.engine_files import ACROBAT, measured
+
 from .array_motions import BOOK
-from .pieces import Trial
+from .pieces import BODY, Trial
+from .studies import GOOD_MOTION, RIGID, store_files
 
 _BLOCK = 2**24
 """Zeros of which a packed file is made [bytes]."""
@@ -32,6 +36,31 @@ class Case:
 def _motion(name: str, content: bytes | str, **options: object) -> Trial:
     data = content.encode() if isinstance(content, str) else content
     return Trial(kind="motion", source="find", files={name: data}, main=name, options=options)
+
+
+def _body(name: str, text: str) -> Trial:
+    return Trial(kind="body", source="find", files={name: text.encode()}, main=name)
+
+
+def _study(text: str) -> Trial:
+    return Trial(kind="study", source="find", files={"study.toml": text.encode()}, main="study.toml")
+
+
+def _store(others: Mapping[str, bytes]) -> Trial:
+    return Trial(kind="store", source="find", files={**store_files(), **others}, main="out.zarr")
+
+
+def _attribute(name: str, value: object) -> bytes:
+    said = json.loads(store_files()["out.zarr/zarr.json"])
+    said["attributes"][name] = value
+    return json.dumps(said).encode()
+
+
+def _reshaped(name: str, shape: list[int]) -> bytes:
+    """The metadata of a store, which has those of its arrays, with another shape of one."""
+    said = json.loads(store_files()["out.zarr/zarr.json"])
+    said["consolidated_metadata"]["metadata"][name]["shape"] = shape
+    return json.dumps(said).encode()
 
 
 def _table(rows: str) -> Trial:
@@ -74,6 +103,14 @@ def _large_structure() -> Trial:
     packed = _zeros(size, zlib.compressobj(9), start)
     head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
     return _motion("motion.mat", head + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def _unknown_element() -> Trial:
+    """A `.mat` file of one vector, whose numbers are said to be of type 521."""
+    numbers = struct.pack("<II", 0x0209, 24) + bytes(24)
+    array = _matrix(6, (1, 3), b"time") + numbers
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    return _motion("motion.mat", head + _element(14, array))
 
 
 def _long_words() -> Trial:
@@ -158,6 +195,59 @@ CASES = {
         said="finite numbers are needed",
     ),
     "an archive that lies about its size": Case(make=_lying_archive, said="no NPZ file"),
+    "an element of a type that does not exist, which SciPy looks up outside its table": Case(
+        make=_unknown_element, said="no MATLAB file that can be read"
+    ),
+    "a number after the nine of an inertia, which biorbd passes over": Case(
+        make=lambda: _body("body.bioMod", ACROBAT.replace("0 0.002 0.15", "0 0.002 0.15 7")),
+        outcome="ModelFileError",
+        said="inertia has 10 values, not 9",
+        slow=True,
+    ),
+    "a measurement that stands twice": Case(
+        make=lambda: _body("body.txt", measured() + "Ls1L: 0.9\n"),
+        outcome="ModelFileError",
+        said="Ls1L stands twice",
+    ),
+    "a measurement of 12, which is 10 for YAML": Case(
+        make=lambda: _body("body.txt", measured(totalmass="012")), outcome="ModelFileError", said="write 12.0"
+    ),
+    "a parameter of a motion that a rigid body does not have": Case(
+        make=lambda: _study('parameters = {beta = "x"}\n' + RIGID), outcome="StudyError", said="a rigid body has no"
+    ),
+    "a parameter that is a text": Case(
+        make=lambda: _study('body = "cat_two_halves"\nmotion = "kane_scher"\nparameters = {alpha = 0, beta = "x"}\n'),
+        outcome="StudyError",
+        said="parameters.beta",
+    ),
+    "a chunk of a store that is no chunk": Case(
+        make=lambda: _store({"out.zarr/status/c/1": b"x"}),
+        outcome="StudyStoreError",
+        said="array 'status' cannot be used",
+        slow=True,
+    ),
+    "a store whose status is of more cases": Case(
+        make=lambda: _store({"out.zarr/zarr.json": _reshaped("status", [10**10])}),
+        outcome="StudyStoreError",
+        said="has the shape (10000000000,), where the first axis has 6",
+        slow=True,
+    ),
+    "a store that says another number of cases": Case(
+        make=lambda: _store({"out.zarr/zarr.json": _attribute("cases", 7)}),
+        outcome="StudyStoreError",
+        said="do not give 7 cases",
+        slow=True,
+    ),
+    "a loop whose ends rounding leaves apart, closed by a geodesic": Case(
+        make=lambda: Trial(
+            kind="command",
+            source="find",
+            files={"body.urdf": BODY.encode(), "motion.csv": GOOD_MOTION.encode()},
+            arguments=("check", "body.urdf", "motion.csv", "--close", "3deg", "--close-by", "geodesic"),
+        ),
+        outcome="exit 0",
+        slow=True,
+    ),
     "a structure of three GiB": Case(make=_large_structure, said="no MATLAB file that can be read", slow=True),
     "a column of four GiB of words": Case(make=_long_words, said="no Parquet file that can be read"),
     "a row of 20 million cells": Case(

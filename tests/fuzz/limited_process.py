@@ -21,6 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from fuzz.forked_reader import fork_readers
 from fuzz.pieces import BODY, Trial
 from support.asked_process import Answers, AskedProcess, requests
 
@@ -36,7 +37,7 @@ _TRIES = 40
 """Inputs of one child: a fork costs as much as twenty small files."""
 _PATIENCE = 300
 """A child that has not ended after so long hangs [s of the clock]; it has used next to no processor time."""
-_CODES = (0, 2, 3, 4, 5, 6, 7)
+_CODES = (0, 2, 3, 4, 5, 6, 7, 8, 9)
 """Exit codes that a command may have here: neither 1, a fault of the program, nor those of signals."""
 _LONGEST_MESSAGE = 6000
 """Characters of an error: names of a body's joints are listed, and up to 200 columns of a file."""
@@ -68,6 +69,7 @@ class LimitedProcess(AskedProcess):
         shutil.rmtree(place, ignore_errors=True)
         (place / "folder").mkdir(parents=True)
         for name, content in trial.files.items():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
             (place / name).write_bytes(content)
         return self.ask(
             kind="process" if by_command_line else trial.kind,
@@ -286,6 +288,25 @@ def _record(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield _checked(record_faults(motion))
 
 
+def _study(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    from fuzz.study_rules import study_faults
+    from shapephase.study.study_file import read_study
+
+    study, _, told = _outcome(request, read_study)
+    yield told
+    if study is not None:
+        yield _checked(study_faults(Path(request["folder"]) / request["main"], study))
+
+
+def _store(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    from fuzz.study_rules import looked_at, store_faults
+
+    found, _, told = _outcome(request, looked_at)
+    yield told
+    if found is not None:
+        yield _checked(store_faults(Path(request["folder"]) / request["main"], found))
+
+
 def _command(request: dict[str, Any]) -> int:
     from shapephase.cli.main import main
 
@@ -349,10 +370,9 @@ def _warm_up(long: bool) -> None:
     path = sp.read_shape_path(file, body)
     if not long:
         return
-    import yaml  # noqa: F401
-
     from shapephase.cli.main import main
 
+    fork_readers()
     sp.reconstruct(sp.articulated(body, path), [0.0, 0.1, 0.2], tolerance=1e-6).save("good.npz")
     sp.load_motion("good.npz").attitude([0.0, 1.0])
     with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
@@ -374,6 +394,8 @@ _TRIALS = {
     "motion": _motion,
     "names": _names,
     "record": _record,
+    "study": _study,
+    "store": _store,
     "command": _command,
     "crash": _crash,
     "escape": _escape,

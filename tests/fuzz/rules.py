@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from .engine_rules import biomod_faults, yeadon_faults
 from .plain_readers import NotPlain, plain_columns, strict_number
 
 FARTHEST = 1e6
@@ -121,6 +122,10 @@ def body_faults(file: Path, body: Any, warned: Sequence[str], options: Mapping[s
         yield f"limits {body.joint_limits}"
     if file.suffix == ".urdf":
         yield from _urdf_faults(file, body, warned, allowed)
+    elif file.suffix == ".bioMod":
+        yield from biomod_faults(file, body)
+    elif file.suffix == ".txt":
+        yield from yeadon_faults(file, body)
     else:
         yield from _mjcf_faults(file, body)
 

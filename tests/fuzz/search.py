@@ -11,7 +11,7 @@ from typing import Any
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from . import array_motions, bodies, commands, text_motions
+from . import array_motions, bodies, commands, engine_bodies, studies, text_motions
 from .limited_process import LimitedProcess
 from .pieces import Trial
 
@@ -30,6 +30,10 @@ GRAMMARS: Mapping[str, Callable[[Random], Trial]] = {
     "record": array_motions.record,
     "urdf": bodies.urdf,
     "mjcf": bodies.mjcf,
+    "biomod": engine_bodies.biomod,
+    "yeadon": engine_bodies.yeadon,
+    "study": studies.study_file,
+    "store": studies.store_trial,
     "command": commands.command,
 }
 SHARES: Mapping[str, int] = {
@@ -47,6 +51,10 @@ SHARES: Mapping[str, int] = {
     "record": 4,
     "urdf": 10,
     "mjcf": 7,
+    "biomod": 3,
+    "yeadon": 3,
+    "study": 8,
+    "store": 5,
     "command": 8,
 }
 """How often each grammar is used, of a hundred or so."""

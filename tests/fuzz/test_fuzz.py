@@ -13,7 +13,18 @@ from fuzz.limited_process import LimitedProcess
 from fuzz.pieces import Trial
 from fuzz.search import GRAMMARS, SHARES, Tally, searched
 
-QUICK = {"delimited": 6, "opensim": 3, "yaml": 4, "names": 3, "npz": 5, "matlab": 2, "excel": 3, "urdf": 5, "mjcf": 3}
+QUICK = {
+    "delimited": 6,
+    "opensim": 3,
+    "yaml": 4,
+    "names": 3,
+    "npz": 5,
+    "matlab": 2,
+    "excel": 3,
+    "urdf": 5,
+    "mjcf": 3,
+    "study": 5,
+}
 FULL = 20
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 
@@ -14,7 +15,7 @@ import zarr
 
 import shapephase as sp
 from shapephase import study as room
-from shapephase.errors import OutputFileError, RunStopped, StudyError, StudyStoreError
+from shapephase.errors import OutputFileError, RunStopped, StudyError, StudyStoreError, UnknownNameError
 from support.study_functions import bend, counted, logged
 
 MOMENTUM = room.Normal([0.0, 0.0, 0.01], 0.004)
@@ -174,3 +175,34 @@ def test_a_time_limit_needs_a_process(tmp_path):
         rigid(time_limit=1.0).run(tmp_path / "out.zarr", workers=0)
     with pytest.raises(StudyError, match="workers"):
         rigid().run(tmp_path / "out.zarr", workers=-1)
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "said"),
+    [
+        ("status/c/1", b"x", "array 'status' cannot be used"),
+        ("turn/c/0", b"\x28\xb5\x2f\xfd", "array 'turn' cannot be used"),
+        ("zarr.json", ("study_hash", "0"), "its study is not the one with its hash"),
+        ("zarr.json", ("cases", 13), "its grids and draws do not give 13 cases"),
+        ("zarr.json", ("cases", True), "cases is True, a whole number from 1"),
+        ("zarr.json", ("units", {}), "its units are not those of its study"),
+        ("zarr.json", ("seed", 8), "chunk, draws or seed are not those of its study"),
+    ],
+)
+def test_a_damaged_store_is_named_as_one(filled, tmp_path, file, content, said):
+    _, store = filled
+    place = tmp_path / "damaged.zarr"
+    shutil.copytree(store.path, place)
+    if isinstance(content, tuple):
+        whole = json.loads((place / file).read_text())
+        whole["attributes"][content[0]] = content[1]
+        content = json.dumps(whole).encode()
+    (place / file).write_bytes(content)
+    with pytest.raises(StudyStoreError, match=f"damaged.zarr: the store is damaged: {said}"):
+        (lambda found: (found.counts(), found.values("turn")))(room.open_study(place))
+
+
+def test_an_array_that_a_store_does_not_have_is_named(filled):
+    _, store = filled
+    with pytest.raises(UnknownNameError, match=r"no_such.*Valid: status, momentum_z, masses, final_attitude, turn"):
+        store.values("no_such")

@@ -23,7 +23,7 @@ from ..arguments import (
 from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..display import short_repr
-from ..errors import unknown_name
+from ..errors import WrongObjectError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
@@ -361,7 +361,7 @@ def reconstruct(
 
 def reconstruct(
     deformation: Deformation | DeformationFamily,
-    momentum: ArrayLike,
+    momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
     *,
     tolerance: float = 1e-9,
@@ -415,10 +415,16 @@ def reconstruct(
     -2.283185 = 4 - 2 pi
     """
     goal, workers = tolerance_argument(tolerance), threads_argument(threads)
+    if torque is not None or not isinstance(deformation, DeformationFamily):
+        check_object(deformation, "Deformation", "deformation")
+    if momentum is None:
+        # It may be left out for this: what is no deformation is named first.
+        raise WrongObjectError(
+            "momentum: three numbers [kg m^2/s] are needed, nothing came; of a body at rest they are [0.0, 0.0, 0.0]"
+        )
     if torque is not None:
         from .forced_motion import reconstruct_forced
 
-        check_object(deformation, "Deformation", "deformation")
         assert isinstance(deformation, Deformation)
         return reconstruct_forced(deformation, momentum, attitude, torque, goal, method)
     if isinstance(deformation, DeformationFamily):
@@ -426,7 +432,6 @@ def reconstruct(
 
         with watched(progress):
             return reconstruct_family(deformation, momentum, attitude, goal, method, workers)
-    check_object(deformation, "Deformation", "deformation")
     if not isinstance(method, str) or method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     spatial, start = initial_state_arguments(momentum, attitude)

@@ -27,6 +27,7 @@ from ..provenance import provenance
 from ._axes import OF_PARTS
 from ._evaluate import DIED, DONE, NAME_LENGTH, RAISED, TEXT_LENGTH, TIMED_OUT, Results
 from ._processor import processor_text
+from ._stored import array_of, check_attributes, damaged, faults_of
 
 if TYPE_CHECKING:
     from .study import Study
@@ -76,12 +77,24 @@ class StudyStore:
         return int(self.attributes["cases"])
 
     def values(self, name: str) -> Any:
-        """An array of the store, of all cases, in memory. Raises UnknownNameError."""
-        return self._array(name)[...]
+        """An array of the store, of all cases, in memory.
+
+        Raises
+        ------
+        UnknownNameError
+            If it has none of this name.
+        StudyStoreError
+            If it is damaged.
+        """
+        with faults_of(self.path, f"array {name!r}"):
+            return self._array(name)[...]
 
     def statuses(self) -> Any:
         """(cases,) whole numbers as in `STATUS`."""
-        return self.values("status")
+        found = self.values("status")
+        if found.ndim != 1 or found.dtype != np.uint8 or found.max() > max(STATUS.values()):
+            raise damaged(self.path, "status has other numbers than there are")
+        return found
 
     def counts(self) -> dict[str, int]:
         """How many cases have which status."""
@@ -98,8 +111,10 @@ class StudyStore:
         """The first cases without results: index, name of the error, what it said."""
         found = []
         for index in np.flatnonzero(self.statuses() > DONE)[:most].tolist():
-            said = (bytes(np.asarray(self._array(name)[index])).rstrip(b"\0") for name in ("error_name", "error_text"))
-            found.append((index, *(text.decode(errors="ignore") for text in said)))
+            with faults_of(self.path, f"the error of case {index}"):
+                said = [np.asarray(self._array(name)[index]) for name in ("error_name", "error_text")]
+            kind, text = (bytes(letters).rstrip(b"\0").decode(errors="ignore") for letters in said)
+            found.append((index, kind, text))
         return found
 
     def dataset(self) -> Any:
@@ -116,6 +131,10 @@ class StudyStore:
             raise MissingExtraError(
                 "a data set needs xarray; install it with: pip install 'shapephase[study]'"
             ) from None
+        with faults_of(self.path, "it"):
+            return self._dataset(xarray)
+
+    def _dataset(self, xarray: Any) -> Any:
         flat = xarray.open_zarr(self.path).load()
         grids = {name: list(values) for name, values in self.attributes["grids"].items()}
         draws = int(self.attributes["draws"])
@@ -139,7 +158,7 @@ class StudyStore:
         """Store a chunk; the status comes last. Raises OutputFileError."""
         first = number * int(self.attributes["chunk"])
         part = slice(first, first + len(results.status))
-        with _disk_faults(self.path):
+        with _disk_faults(self.path), faults_of(self.path, f"chunk {number}"):
             for name, values in {**results.values, **results.axes}.items():
                 self._array(name)[part] = values
             if np.any(results.status > DONE):
@@ -163,7 +182,8 @@ class StudyStore:
         """One array of the store, opened once."""
         if not isinstance(name, str) or name not in self._arrays:
             check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
-            self._arrays[name] = self._group[name]
+            first = -(-self.cases // int(self.attributes["chunk"])) if name == "processor" else self.cases
+            self._arrays[name] = array_of(self.path, self._group, name, first)
         return self._arrays[name]
 
     @cached_property
@@ -204,6 +224,7 @@ def open_study(path: str | os.PathLike[str]) -> StudyStore:
         attributes = {}
     if attributes.get("format") != FORMAT:
         raise StudyStoreError(f"{place}: what is there is no store of a study")
+    check_attributes(place, attributes)
     return StudyStore(place, attributes)
 
 

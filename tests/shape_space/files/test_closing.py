@@ -148,3 +148,15 @@ def test_a_loop_stays_what_it_is():
     np.testing.assert_allclose(found.path.shape(t), plain.path.shape(t), rtol=0.0, atol=1e-15)
     assert plain.closing is None
     assert plain.record["closing"] is None
+
+
+def test_a_loop_whose_ends_rounding_leaves_apart_has_no_way_back():
+    """A spline ends at its last sample but for rounding: a way of 1e-17 rad would take no time."""
+    samples = LOOP.copy()
+    samples[-1] = samples[0]
+    # Knots of 1/60 s have rounding at the end; so have those of a body that keeps one joint at zero.
+    found = read_recorded_motion(take(samples, 1.1 * T), DIVER, close="3deg", close_by="geodesic")
+    assert found.closing.by == "geodesic"
+    assert found.closing.seconds_added == 0.0
+    assert found.path.duration == found.closing.opened.duration
+    assert np.isfinite(found.closing.holonomy_change).all()

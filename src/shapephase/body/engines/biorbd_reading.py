@@ -25,6 +25,16 @@ _WORDS = (
     *("meshrtinmatrix", "patch", "externalforceindex", "forceplate"),
 )
 """That a segment may have, in lower case, as biorbd 1.12 knows them."""
+_COUNTS = {"parent": 1, "translations": 1, "rotations": 1, "rtinmatrix": 1, "mass": 1, "com": 3, "inertia": 9}
+"""How many values follow a word; biorbd passes over those beyond, and over the last letters of `1,5`."""
+_FRAME = 16
+"""Values of a frame as a matrix; otherwise three angles, the order of their axes, and three coordinates."""
+_OPERATORS = re.compile(r"[-+*/^()]")
+_OPERAND = re.compile(
+    r"|\$\w+|pi|nan|inf(inity)?|cos|sin|tan|acos|asin|atan|exp|log|sqrt|abs|(\d+\.?\d*|\.\d+)(e\d*)?",
+    re.IGNORECASE | re.ASCII,
+)
+"""What stands between operators; of `1e-3` the operator is the exponent's sign."""
 _DROPPED = ("meshfile",)
 """A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
 _NO_ROOT = ("root", "base")
@@ -102,6 +112,7 @@ def _refused(said: str, starts: dict[str, int]) -> UnusableModelError:
 def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
     """The text without meshes. Raises UnusableModelError for what biorbd would pass over."""
     kept, segment, meshes, constraints = [], None, 0, 0
+    said: list[tuple[str, int]] = []
     without_blocks = re.sub(r"/\*.*?\*/", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(without_blocks.splitlines(), 1):
         words = line.split("//")[0].split()
@@ -115,13 +126,16 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
             segment = words[1] if len(words) > 1 else ""
             if segment in starts:
                 raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
-            starts[segment] = number
+            starts[segment], said = number, [(text, number) for text in words[2:]]
         elif word == "endsegment":
+            if segment is not None:
+                _check_values(segment, said)
             segment = None
         elif word == "loopconstraint" and segment is None:
             constraints += 1
         elif segment is not None and word:
             _check_word(words, word, segment, number)
+            said += [(text, number) for text in words]
     if meshes:
         notes.append(f"{meshes} mesh files are not read: they have no part in how the body turns")
     if constraints:
@@ -139,6 +153,49 @@ def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
         raise UnusableModelError(
             f"segment {segment!r}: of `{written}` biorbd reads {words[1]!r} alone; write `{meant}`", line
         )
+
+
+def _check_values(segment: str, said: list[tuple[str, int]]) -> None:
+    """Raise UnusableModelError for values of a segment that biorbd would pass over, or read in part."""
+    found: dict[str, list[str]] = {}
+    word, start = "", 1
+    for text, line in [*said, ("", said[-1][1] if said else 1)]:
+        named = text.lower() in _WORDS and not (word == "parent" and not found["parent"])
+        if text and not named:
+            if not word:
+                raise UnusableModelError(f"segment {segment!r}: {text!r} follows no word", line)
+            found[word].append(text)
+            continue
+        _check_count(segment, word, found, start)
+        word, start = text.lower(), line
+        if found.setdefault(word, []):
+            raise UnusableModelError(f"segment {segment!r}: {text!r} stands twice", line)
+
+
+def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int) -> None:
+    """Raise UnusableModelError where a word has too few or too many values, or one that is no number."""
+    values = found.get(word, [])
+    numbers = values
+    if word == "rt" and len(values) == 7:
+        numbers = values[:3] + values[4:]
+    elif word == "rt" and len(values) != _FRAME:
+        raise UnusableModelError(
+            f"segment {segment!r}: RT is three angles, an order such as xyz and three coordinates, or a matrix of 16 "
+            f"numbers; got {len(values)} values",
+            line,
+        )
+    elif word in _COUNTS and len(values) != _COUNTS[word]:
+        raise UnusableModelError(f"segment {segment!r}: {word} has {len(values)} values, not {_COUNTS[word]}", line)
+    elif word == "rangesq":
+        axes = sum(len("".join(found.get(one, ()))) for one in ("translations", "rotations"))
+        if len(values) != 2 * axes:
+            raise UnusableModelError(
+                f"segment {segment!r}: rangesQ has {len(values)} values of {axes} coordinates", line
+            )
+    if word in ("rt", "mass", "com", "inertia", "rangesq"):
+        for text in numbers:
+            if not all(_OPERAND.fullmatch(part) for part in _OPERATORS.split(text)):
+                raise UnusableModelError(f"segment {segment!r}: {word}: {text!r:.40} is no number", line)
 
 
 def _base(model: Any, segments: dict[str, int], starts: dict[str, int]) -> tuple[str, list[str]]:

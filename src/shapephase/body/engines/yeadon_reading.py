@@ -51,6 +51,11 @@ _BY_DIFFERENCES = 1e-11
 """The same of a momentum by differences."""
 _SLIP = 0.1
 """By which a perimeter may miss what is possible for its width: tapes slip, and the package then takes a circle."""
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+"""As people write them; for YAML `1:30` is 90, `1_0` and `012` are 10, and `1e3` is a text."""
+_OF_NUMBERS = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
+_LONGEST = 60
+"""Letters of an entry in a message."""
 _MOST_BYTES = 1 << 20
 """A file of measurements has three thousand."""
 
@@ -107,21 +112,28 @@ def _rounded(level: str, ratio: float) -> str:
 
 
 def _check_numbers(content: bytes) -> None:
-    """That every entry is a number that exists; the package multiplies what it gets."""
+    """That every entry stands once, and is a number as it is written; the package multiplies what it gets."""
     try:
-        read = yaml.safe_load(content.decode("utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        root = yaml.compose(content.decode("utf-8"), Loader=yaml.SafeLoader)
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark is not None else 1
         raise UnusableModelError("it is no YAML file of measurements, `name: number` a line", line) from None
-    if not isinstance(read, dict):
+    if not isinstance(root, yaml.MappingNode):
         raise UnusableModelError("it is no YAML file of measurements, `name: number` a line")
-    lines = content.decode("utf-8").splitlines()
-    for name, value in read.items():
-        plain = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-        if not plain or (value <= 0.0 and not (name == "totalmass" and value == -1)):
-            line = next((k for k, text in enumerate(lines, 1) if text.lstrip().startswith(f"{name}:")), 1)
-            raise UnusableModelError(f"{name}: a number above zero is needed, got {value!r}", line)
+    read: dict[str, float] = {}
+    for key, value in root.value:
+        name, line = str(key.value)[:_LONGEST], key.start_mark.line + 1
+        if name in read:
+            raise UnusableModelError(f"{name} stands twice", line)
+        text = value.value if isinstance(value, yaml.ScalarNode) and value.style is None else ""
+        number = float(text) if _NUMBER.fullmatch(text) else math.nan
+        if _NUMBER.fullmatch(text) and yaml.safe_load(text) != number:
+            raise UnusableModelError(f"{name}: for YAML {text} is not this number; write {number!r}", line)
+        if not math.isfinite(number) or (number <= 0.0 and not (name == "totalmass" and number == -1.0)):
+            shown = value.value if value.tag in _OF_NUMBERS else repr(value.value)
+            raise UnusableModelError(f"{name}: a number above zero is needed, got {shown:.{_LONGEST}}", line)
+        read[name] = number
     names = {*yeadon.Human.measnames, "measurementconversionfactor"}
     missing, unknown = sorted(names - set(read)), sorted(map(str, set(read) - names - {"totalmass"}))
     if missing or unknown:

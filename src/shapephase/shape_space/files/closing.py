@@ -145,7 +145,8 @@ def _with_geodesic(opened: ShapePath, turns: Array, gap: Array, body: Body) -> t
     """The open path, and from its end to its start a geodesic, as fast as the path itself, rms."""
     first, last = opened.curve(np.array([0.0, opened.duration]))[0]
     arc = ClosingArc(body, opened, shape_geodesic(body, last, first + turns))
-    if arc.way.length == 0.0 or arc.speed == 0.0:
+    # What rounding leaves between the ends is no way that takes time.
+    if np.abs(last - first - turns).max(initial=0.0) <= CLOSED or arc.speed == 0.0:
         return opened, Closing(by="geodesic", gap=gap, opened=opened, closed=opened, body=body)
     closed = closed_by_arc(arc)
     return closed, Closing(by="geodesic", gap=gap, opened=opened, closed=closed, body=body)

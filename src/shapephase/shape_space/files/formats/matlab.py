@@ -6,8 +6,9 @@ import io
 import threading
 import warnings
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,6 +34,10 @@ _PLAIN = (
 """Classes of arrays whose size SciPy knows before it reads them."""
 _COMPRESSED = 15
 """The type of a packed element of a `.mat` file of version 5."""
+_MATRIX = 14
+"""The type of an element that is an array, of elements of its own."""
+_KINDS = frozenset((*range(1, 8), 9, 12, 13, 16, 17, 18))
+"""The types of elements of an array of numbers; SciPy looks up one that does not exist beyond the end of its table."""
 _HEAD = 128
 """Bytes before the first element there."""
 
@@ -101,7 +106,7 @@ def _with_truths(plain: Any, typed: Any) -> Any:
 
 
 def _may_be_large(data: bytes) -> bool:
-    """Whether arrays may take more memory than a few times the file."""
+    """Whether arrays may take more memory than a few times the file, or their elements are damaged."""
     import scipy.io
 
     if len(data) > _SMALL or _unpacks_far(data):
@@ -113,20 +118,40 @@ def _may_be_large(data: bytes) -> bool:
 
 
 def _unpacks_far(data: bytes) -> bool:
-    """Whether packed elements are large when unpacked, or damaged."""
-    room, place = _SMALL, _HEAD
-    order = "big" if data[_HEAD - 2 : _HEAD] == b"MI" else "little"
-    while place + 8 <= len(data):
-        kind, size = (int.from_bytes(data[k : k + 4], order) for k in (place, place + 4))
-        if kind == _COMPRESSED:
+    """Whether packed elements are large when unpacked, or any are damaged."""
+    room = _SMALL
+    mark = data[_HEAD - 2 : _HEAD]
+    if mark not in (b"IM", b"MI"):
+        return False
+    order: Literal["big", "little"] = "little" if mark == b"IM" else "big"
+    for kind, element in _elements(data, _HEAD, order):
+        if kind != _COMPRESSED:
+            found = [(kind, element)]
+        else:
             try:
-                room -= len(zlib.decompressobj().decompress(data[place + 8 : place + 8 + size], room + 1))
+                unpacked = zlib.decompressobj().decompress(element, room + 1)
             except zlib.error:
                 return True
-            if room < 0:
+            room -= len(unpacked)
+            found = list(_elements(unpacked, 0, order))
+        for whole, parts in found:
+            inside = [inner for inner, _ in _elements(parts, 0, order)] if whole == _MATRIX else [whole]
+            if room < 0 or not _KINDS.issuperset(inside):
                 return True
-        place += 8 + size
     return False
+
+
+def _elements(data: bytes, place: int, order: Literal["big", "little"]) -> Iterator[tuple[int, bytes]]:
+    """The elements from a place on: their types, and what is in them."""
+    while place + 8 <= len(data):
+        kind, size = (int.from_bytes(data[k : k + 4], order) for k in (place, place + 4))
+        small = kind >> 16
+        if small:
+            # Of up to four bytes type and size share a word.
+            kind &= 0xFFFF
+        yield kind, b"" if small else data[place + 8 : place + 8 + size]
+        packed = kind == _COMPRESSED
+        place += 8 if small else 8 + (size if packed else -(-size // 8) * 8)
 
 
 def _plain(value: Any, depth: int) -> Any:
