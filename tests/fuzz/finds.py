@@ -183,6 +183,10 @@ CASES = {
         make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, 0.1, 0.1) + _row(0, 2, 0, 0, 0)),
         said="row 0 comes after row 3",
     ),
+    "a row of a number below zero, which openpyxl leaves out, too": Case(
+        make=lambda: _workbook(_HEADER + _FIRST + _row(-1, 1, 0.1, 0.1, 0.1) + _row(4, 2, 0, 0, 0)),
+        said="a row has the number b'-1'",
+    ),
     "a workbook without styles, of which openpyxl warned": Case(
         make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 0.1, 0.1, 0.1)), outcome="accepted"
     ),

@@ -31,7 +31,8 @@ _SMALL = 2**22
 """A workbook's parts, unpacked [bytes], that are read in this process; a Parquet file's list of its columns."""
 _FLAT = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
 """Types of Parquet whose values take no more memory than is known before they are read."""
-_ROW = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["'](\d+)["']""")
+_ROW = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["']([^"']*)["']""")
+_PLAIN_ROW = re.compile(rb"[0-9]{1,18}")
 _SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
 _WARNINGS = threading.Lock()
 
@@ -87,10 +88,12 @@ def _no_workbook(where: Path, error: Exception) -> TrajectoryError:
 
 
 def _check_rows(part: bytes, where: Path) -> None:
-    """Raise TrajectoryError for rows whose numbers do not ascend, which openpyxl would leave out."""
+    """Raise TrajectoryError for rows whose numbers are none or do not ascend, which openpyxl would leave out."""
     before = 0
     for found in _ROW.finditer(part):
-        number = int(found[1][:18])
+        if not _PLAIN_ROW.fullmatch(found[1]):
+            raise TrajectoryError(f"{where}: a row has the number {found[1][:40]!r}; the file is damaged, save it anew")
+        number = int(found[1])
         if number <= before:
             raise TrajectoryError(f"{where}: row {number} comes after row {before}; the file is damaged, save it anew")
         before = number
