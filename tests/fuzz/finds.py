@@ -217,7 +217,7 @@ CASES = {
         make=lambda: _body("body.txt", measured(totalmass="012")), outcome="ModelFileError", said="write 12.0"
     ),
     "a parameter of a motion that a rigid body does not have": Case(
-        make=lambda: _study('parameters = {beta = "x"}\n' + RIGID), outcome="StudyError", said="a rigid body has no"
+        make=lambda: _study("parameters = {beta = 0.5}\n" + RIGID), outcome="StudyError", said="a rigid body has no"
     ),
     "a parameter that is a text": Case(
         make=lambda: _study('body = "cat_two_halves"\nmotion = "kane_scher"\nparameters = {alpha = 0, beta = "x"}\n'),

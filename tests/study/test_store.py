@@ -185,7 +185,7 @@ def test_a_time_limit_needs_a_process(tmp_path):
         ("zarr.json", ("study_hash", "0"), "its study is not the one with its hash"),
         ("zarr.json", ("cases", 13), "its grids and draws do not give 13 cases"),
         ("zarr.json", ("cases", True), "cases is True, a whole number from 1"),
-        ("zarr.json", ("units", {}), "its units are not those of its study"),
+        ("zarr.json", ("units", {}), "its units or versions are not those of its study"),
         ("zarr.json", ("seed", 8), "chunk, draws or seed are not those of its study"),
     ],
 )
@@ -204,5 +204,5 @@ def test_a_damaged_store_is_named_as_one(filled, tmp_path, file, content, said):
 
 def test_an_array_that_a_store_does_not_have_is_named(filled):
     _, store = filled
-    with pytest.raises(UnknownNameError, match=r"no_such.*Valid: status, momentum_z, masses, final_attitude, turn"):
+    with pytest.raises(UnknownNameError, match=r"no_such.*Valid: momentum_z, masses, final_attitude, turn, status, "):
         store.values("no_such")

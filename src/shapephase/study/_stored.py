@@ -37,10 +37,9 @@ def check_attributes(path: Path, attributes: Mapping[str, Any]) -> None:
     if math.prod(map(len, grids.values())) * attributes["draws"] != attributes["cases"]:
         raise damaged(path, f"its grids and draws do not give {attributes['cases']} cases")
     names = {*study["over"], *(output[0] for output in study["outputs"])}
-    for name, wanted in (("units", names), ("versions", None)):
-        found = attributes.get(name)
-        if not isinstance(found, Mapping) or (wanted is not None and set(found) != wanted):
-            raise damaged(path, f"its {name} are not those of its study")
+    units, versions = attributes.get("units"), attributes.get("versions")
+    if not isinstance(units, Mapping) or set(units) != names or not isinstance(versions, Mapping):
+        raise damaged(path, "its units or versions are not those of its study")
 
 
 def array_of(path: Path, group: Any, name: str, first: int) -> Any:

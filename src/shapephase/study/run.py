@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_file_name, check_object
+from ..arguments import check_file_name, check_flag, check_object
 from ..arrays import Integers
 from ..errors import MissingExtraError, RunStopped, StudyError, StudyStoreError
 from ..integrator.fast.switch import is_allowed
@@ -50,6 +50,7 @@ def run_study(
 ) -> StudyStore:
     """As `Study.run`."""
     check_file_name(store, "store")
+    check_flag(resume, "resume")
     if client is not None:
         check_object(client, "Client", "client")
     if workers is not None and (client is not None or not isinstance(workers, int) or workers < 0):

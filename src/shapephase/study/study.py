@@ -345,6 +345,8 @@ class Study:
     def _check_motions(self) -> None:
         if isinstance(self.body, RigidBody) != (self.motion is None):
             raise StudyError("motion: a body of joints needs one, a rigid body none")
+        if self.motion is None and self.parameters:
+            raise StudyError(f"parameters.{next(iter(self.parameters))}: a rigid body has no motion to give it to")
         for source in self._motions:
             given = (*self.parameters, *self.over)
             missing = unset_parameters(source, given)
