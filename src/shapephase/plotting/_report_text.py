@@ -29,6 +29,8 @@ CONVENTIONS = (
 _NO_TURN = 1e-12
 # [rad or m] A limit beyond this is none: some models write the largest number there is.
 _NO_LIMIT = 1e6
+# Of the joints' works one by one: all together that is less is rounding, or the quadrature's.
+_NO_WORK = 1e-9
 
 Row = tuple[str, str, str]
 
@@ -86,7 +88,10 @@ def torque_words(motion: Motion) -> str:
                 f"{loads.peak_time[most]:.3g} s{limit}"
             )
     words = f"Of the joints {'; '.join(parts)}. " if parts else ""
-    return f"{words}All joints together do a work of {loads.work.sum():.3g} J, the change of the kinetic energy."
+    whole = float(loads.work.sum())
+    if abs(whole) <= _NO_WORK * float(np.abs(loads.work).sum()):
+        return f"{words}All joints together do no work: the kinetic energy is at the end what it was at the start."
+    return f"{words}All joints together do a work of {whole:.3g} J, the change of the kinetic energy."
 
 
 def accuracy(motion: Motion, error_bars: Sequence[str]) -> str:
