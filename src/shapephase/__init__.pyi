@@ -64,6 +64,7 @@ from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, mom
 from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop
+from .rigid_body.gyrostat import Gyrostat
 from .shape_space.connection import (
     HorizontalLift,
     curvature,
@@ -98,6 +99,7 @@ __all__ = [
     "FixedPoints",
     "ForcedMotion",
     "ForcedSplit",
+    "Gyrostat",
     "HorizontalLift",
     "IgnoredElementWarning",
     "ImplausibleBodyWarning",

@@ -6,6 +6,7 @@ from ._momentum_orbit import MomentumOrbit, momentum_orbit, separatrix_solid_ang
 from ._nutation import Nutation, nutation
 from .euler_angles import ZXZ, ZYZ, EulerChart, canonical_bracket, precession_rate
 from .euler_top import EulerTop
+from .gyrostat import Gyrostat
 from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, heavy_top_steps, semidirect_bracket
 from .lagrange_top import (
     LagrangeTop,
@@ -24,6 +25,13 @@ from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, ri
 from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
 from .stability import SteadyRotation, steady_rotation, steady_rotations
+from .steady_gyrostats import (
+    DualSpinTurn,
+    GyrostatEquilibrium,
+    bifurcation_rotors,
+    dual_spin_turn,
+    gyrostat_equilibria,
+)
 
 __all__ = [
     "ZXZ",
@@ -31,9 +39,12 @@ __all__ = [
     "AndoyerPendulum",
     "Closure",
     "Cones",
+    "DualSpinTurn",
     "Equilibrium",
     "EulerChart",
     "EulerTop",
+    "Gyrostat",
+    "GyrostatEquilibrium",
     "HalfTwist",
     "HeavyTop",
     "HeavyTopMotion",
@@ -49,14 +60,17 @@ __all__ = [
     "SteadyRotation",
     "andoyer_pendulum",
     "ascending_times",
+    "bifurcation_rotors",
     "canonical_bracket",
     "casimirs",
     "characteristic_polynomial",
     "cones",
+    "dual_spin_turn",
     "e_quadratic",
     "equilibria",
     "flow",
     "geodesics",
+    "gyrostat_equilibria",
     "half_twist",
     "half_twist_from_tilt",
     "heavy_top_steps",

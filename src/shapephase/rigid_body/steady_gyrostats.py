@@ -1,0 +1,286 @@
+"""Steady rotations of a gyrostat: how many, how stable, and at which rotors their number changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import brentq
+
+from ..arguments import inertia_argument, positive_argument, whole_argument
+from ..arrays import Array, finite_array, lock_arrays
+from ..display import short_repr
+from ..errors import ShapeError
+from .euler_top import _array, _principal
+
+_EPS = float(np.finfo(float).eps)
+_ABSENT = 4.0 * _EPS
+"""Part of the rotor along an axis, relative to all of it, that is rounding."""
+_SAME = 4.0 * _EPS
+"""Relative difference of inverse moments that is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class GyrostatEquilibrium:
+    """A steady rotation of a gyrostat about its momentum.
+
+    Attributes
+    ----------
+    direction : (3,) of the momentum, body axes
+    rate : of the body about it, negative where it turns backward [rad/s]
+    energy : omega.I omega/2 [J]
+    stability : "least energy", "most energy" or "saddle"; only the first withstands friction
+    frequency : of small oscillations about a stable one, or the rate of growth from a saddle [rad/s]
+
+    Examples
+    --------
+    >>> found = sp.rigid_body.gyrostat_equilibria(np.diag([1.0, 2.0, 3.0]), [0.1, 0.1, 0.1], 1.0)
+    >>> [each.stability for each in found]
+    ['least energy', 'least energy', 'saddle', 'saddle', 'most energy', 'most energy']
+    """
+
+    direction: Array
+    rate: float
+    energy: float
+    stability: str
+    frequency: float
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+
+def gyrostat_equilibria(inertia: ArrayLike, rotor: ArrayLike, magnitude: float) -> tuple[GyrostatEquilibrium, ...]:
+    """The steady rotations with |Pi| = `magnitude`, by ascending energy: 6, 4 or 2 of them.
+
+    There omega = r Pi/|Pi|, and with c = r/|Pi| and b = h/|Pi| the direction is x_i = a_i b_i/(a_i - c), a = 1/I, where
+    the sum of x_i^2 is 1. Where a symmetric body has whole circles of them, two of each circle are given.
+
+    Parameters
+    ----------
+    inertia : (3, 3) [kg m^2]
+    rotor : (3,) momentum of the rotor, body axes [kg m^2/s]
+    magnitude : of the momentum, above 0 [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        For arrays of the wrong shape, or a magnitude that is not above 0.
+
+    Notes
+    -----
+    Source: Wittenburg 1977, section 4.6.2; Hughes 1986, chapter 6.
+
+    Examples
+    --------
+    >>> len(sp.rigid_body.gyrostat_equilibria(np.diag([1.0, 2.0, 3.0]), [1.0, 2.0, 1.0], 1.0))
+    2
+    """
+    tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
+    momentum = _array(rotor, "rotor", (3,), "kg m^2/s")
+    size = positive_argument(magnitude, "magnitude", "a momentum in kg m^2/s")
+    moments, axes = _principal(tensor)
+    a, b = 1.0 / moments, axes.T @ momentum / size
+    b = np.where(np.abs(b) <= _ABSENT * np.abs(b).max(), 0.0, b)
+    found = [_described(a, b, x, size, axes) for x in _directions(a, b)]
+    return tuple(sorted(found, key=lambda one: one.energy))
+
+
+def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
+    """Momenta of a rotor about an axis, over |Pi|, at which the number of steady rotations changes: (k,) ascending.
+
+    Parameters
+    ----------
+    inertia : (3, 3) [kg m^2]
+    rotor_axis : (3,) not zero, body axes
+
+    Notes
+    -----
+    Source: the equation of `gyrostat_equilibria`, whose left side is convex between two of its poles.
+
+    Examples
+    --------
+    >>> sp.rigid_body.bifurcation_rotors(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 1.0])  # |1 - I3/I|
+    array([1., 3.])
+    """
+    tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
+    moments, axes = _principal(tensor)
+    n = axes.T @ _unit(rotor_axis)
+    n = np.where(np.abs(n) <= _ABSENT, 0.0, n)
+    a = 1.0 / moments
+    weights, poles = _poles(a, n)
+    found = []
+    for left, right in pairwise(poles):
+        found.append(1.0 / np.sqrt(_sum(_least(weights, poles, left, right), weights, poles)))
+    for place in _bare(a, n):
+        found.append(1.0 / np.sqrt(_sum(place, weights, poles)))
+    return np.sort(np.array(found))
+
+
+@dataclass(frozen=True, eq=False)
+class DualSpinTurn:
+    """The turn of a body whose rotor slowly takes up all momentum. Made by `dual_spin_turn`.
+
+    Attributes
+    ----------
+    rotor : (N,) momentum of the rotor, from 0 to all of it [kg m^2/s]
+    direction : (N, 3) of the momentum in the body, from the axis of the largest moment to that of the rotor
+    rate : (N,) of the body about it [rad/s]
+
+    Examples
+    --------
+    >>> turn = sp.rigid_body.dual_spin_turn(np.diag([1.0, 2.0, 3.0]), [1.0, 0.0, 1.0], 1.0)
+    >>> print(f"{np.degrees(np.arccos(turn.direction[0] @ turn.direction[-1])):.6f} degrees")
+    45.000000 degrees
+    """
+
+    rotor: Array
+    direction: Array
+    rate: Array
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+
+def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, count: int = 101) -> DualSpinTurn:
+    """How a body turns whose rotor slowly takes up all momentum, from a spin about the axis of the largest moment.
+
+    The body stays in its steady rotation of least energy, which friction favours, and ends at rest with the rotor's
+    axis along the momentum.
+
+    Parameters
+    ----------
+    inertia : (3, 3) [kg m^2]
+    rotor_axis : (3,) body axes, not at right angles to the axis of the largest moment
+    magnitude : of the momentum [kg m^2/s]
+    count : of steps, 2 or more, evenly spaced in the body's rate
+
+    Raises
+    ------
+    ShapeError
+        If the rotor's axis is zero, or at right angles to that of the largest moment.
+
+    Notes
+    -----
+    Source: Kaplan 1976, section 5.4; Hughes 1986, chapter 6.
+
+    Examples
+    --------
+    >>> turn = sp.rigid_body.dual_spin_turn(np.diag([1.0, 2.0, 3.0]), [1.0, 0.0, 1.0], 1.0, 3)
+    >>> turn.rotor.round(6).tolist()
+    [0.0, 0.697486, 1.0]
+    """
+    tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
+    size = positive_argument(magnitude, "magnitude", "a momentum in kg m^2/s")
+    steps = whole_argument(count, "count", 2)
+    moments, axes = _principal(tensor)
+    n, a = axes.T @ _unit(rotor_axis), 1.0 / moments
+    if abs(n[2]) <= _ABSENT:
+        raise ShapeError("rotor_axis: it is at right angles to the axis of the largest moment, and nothing turns it")
+    c = a[2] * np.linspace(1.0, 0.0, steps)
+    # x_i = k a_i n_i/(a_i - c); both divided by the term that is infinite at the start.
+    direction = a * n * (a[2] - c)[:, None] / np.where(np.arange(3) == 2, 1.0, a - c[:, None])
+    direction[:, 2] = a[2] * n[2]
+    length = np.linalg.norm(direction, axis=1)
+    return DualSpinTurn(
+        rotor=size * (a[2] - c) / length, direction=(direction / length[:, None]) @ axes.T, rate=size * c
+    )
+
+
+def _unit(axis: ArrayLike) -> Array:
+    vector = finite_array(axis, "rotor_axis", (3,))
+    length = float(np.linalg.norm(vector))
+    if vector.shape != (3,) or not length:
+        raise ShapeError(f"rotor_axis: one direction (3,), not zero, is needed, got shape {vector.shape}")
+    return vector / length
+
+
+def _poles(a: Array, b: Array) -> tuple[Array, Array]:
+    """Where terms (a_i b_i)^2/(a_i - c)^2 are infinite, ascending, equal ones together: their weights, and places."""
+    weights: list[float] = []
+    poles: list[float] = []
+    for k in np.argsort(a):
+        if b[k] == 0.0:
+            continue
+        if poles and abs(a[k] - poles[-1]) <= _SAME * a[k]:
+            weights[-1] += float((a[k] * b[k]) ** 2)
+        else:
+            weights.append(float((a[k] * b[k]) ** 2))
+            poles.append(float(a[k]))
+    return np.array(weights), np.array(poles)
+
+
+def _bare(a: Array, b: Array) -> list[float]:
+    """Inverse moments of axes along which the rotor has no part, where these are none of the poles."""
+    poles = a[b != 0.0]
+    return [float(a[k]) for k in range(3) if b[k] == 0.0 and np.all(np.abs(poles - a[k]) > _SAME * a[k])]
+
+
+def _sum(place: float, weights: Array, poles: Array) -> float:
+    return float(np.sum(weights / (poles - place) ** 2))
+
+
+def _root(function: Callable[[float], float], left: float, right: float) -> float:
+    found: Any = brentq(function, left, right, xtol=1e-300, rtol=np.float64(4.0 * _EPS))
+    return float(found)
+
+
+def _least(weights: Array, poles: Array, left: float, right: float) -> float:
+    """Where the sum is least between two poles: its slope ascends there."""
+
+    def slope(place: float) -> float:
+        return float(np.sum(weights / (poles - place) ** 3))
+
+    inset = 1e-9 * (right - left)
+    return _root(slope, left + inset, right - inset)
+
+
+def _directions(a: Array, b: Array) -> list[Array]:
+    """All x with x_i = a_i b_i/(a_i - c) and |x| = 1."""
+    found: list[Array] = []
+    weights, poles = _poles(a, b)
+    for place in _bare(a, b):
+        others = np.abs(a - place) > _SAME * a
+        x = np.where(others, a * b / np.where(others, a - place, 1.0), 0.0)
+        rest = 1.0 - float(x @ x)
+        if rest > 0.0:
+            free = int(np.argmin(np.abs(a - place)))
+            found += [x + sign * np.sqrt(rest) * np.eye(3)[free] for sign in (1.0, -1.0)]
+    if not len(poles):
+        return found
+    reach = float(np.sqrt(weights.sum()))
+    # Each root by its distance from a pole, which has all digits: sides outside, and both sides of the least between.
+    sides = [(poles[0], -1.0, reach), (poles[-1], 1.0, reach)]
+    for left, right in pairwise(poles):
+        middle = _least(weights, poles, left, right)
+        if _sum(middle, weights, poles) < 1.0:
+            sides += [(left, 1.0, middle - left), (right, -1.0, right - middle)]
+    for pole, side, far in sides:
+        near = float(np.sqrt(weights[poles == pole][0]))
+        gaps = poles - pole
+
+        def excess(distance: float, gaps: Array = gaps, side: float = side) -> float:
+            return float(np.sum(weights / (gaps - side * distance) ** 2)) - 1.0
+
+        at = near if excess(near) <= 0.0 else _root(excess, near, far * (1.0 + 4.0 * _EPS))
+        x = a * b / np.where(b == 0.0, 1.0, (a - pole) - side * at)
+        found.append(x / np.linalg.norm(x))
+    return found
+
+
+def _described(a: Array, b: Array, x: Array, magnitude: float, axes: Array) -> GyrostatEquilibrium:
+    turning = a * (x - b)
+    c = float(turning @ x)
+    plane = np.linalg.svd(x[None])[2][1:]
+    low, high = np.linalg.eigvalsh(plane @ np.diag(a - c) @ plane.T)
+    stability = "saddle" if low * high < 0.0 else "least energy" if low + high > 0.0 else "most energy"
+    return GyrostatEquilibrium(
+        direction=axes @ x,
+        rate=magnitude * c,
+        energy=0.5 * magnitude**2 * float(np.sum(a * (x - b) ** 2)),
+        stability=stability,
+        frequency=magnitude * float(np.sqrt(abs(low * high))),
+    )
