@@ -78,6 +78,21 @@ def compiled(monkeypatch):
     monkeypatch.setenv("SHAPEPHASE_FAST", "1")
 
 
+@pytest.fixture(scope="session")
+def _warm_engine():
+    from support.warm_engines import WarmEngine
+
+    started = WarmEngine()
+    yield started
+    started.stop()
+
+
+@pytest.fixture
+def warm_mujoco(_warm_engine, monkeypatch):
+    """MuJoCo without the time of its imports, for tests that load many MJCF files."""
+    monkeypatch.setattr("shapephase.body.engines.engine_tree.run_alone", _warm_engine)
+
+
 @pytest.fixture
 def heard_ctrl_c():
     """Ctrl-C as on a terminal: a process that a script starts in the background is told to ignore it."""

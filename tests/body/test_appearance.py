@@ -380,6 +380,7 @@ def test_collada_meshes_count_in_their_unit_and_keep_their_axes_and_colour(tmp_p
 
 # ---- MJCF -----------------------------------------------------------------------------------------------------------
 
+with_mujoco = pytest.mark.usefixtures("warm_mujoco")
 MJCF = """
 <mujoco model="toy">
   <compiler angle="radian" eulerseq="zyx"/>
@@ -412,6 +413,7 @@ MJCF = """
 """
 
 
+@with_mujoco
 def test_the_geoms_of_an_mjcf_are_where_mujoco_has_them(tmp_path):
     import mujoco
 
@@ -438,6 +440,7 @@ def test_the_geoms_of_an_mjcf_are_where_mujoco_has_them(tmp_path):
         assert shape.link == carrier
 
 
+@with_mujoco
 def test_the_moving_parts_of_an_mjcf_are_in_the_axes_of_their_links(tmp_path, rng):
     """Joints beside the origin of their body: the parts, put where `link_pose` says, have the locked inertia."""
     path = tmp_path / "toy.xml"
@@ -455,6 +458,7 @@ def test_the_moving_parts_of_an_mjcf_are_in_the_axes_of_their_links(tmp_path, rn
         np.testing.assert_allclose(inertia, body.locked_inertia(shape), rtol=1e-10, atol=1e-12 * body.mass)
 
 
+@with_mujoco
 def test_what_an_mjcf_shows_not_is_a_box(tmp_path):
     """The last body has an inertia and no geom."""
     path = tmp_path / "toy.xml"
@@ -464,6 +468,7 @@ def test_what_an_mjcf_shows_not_is_a_box(tmp_path):
     np.testing.assert_allclose(boxes[0].dimensions, math.sqrt(0.6), rtol=1e-12)
 
 
+@with_mujoco
 def test_materials_of_an_mjcf(tmp_path):
     path = tmp_path / "toy.xml"
     path.write_text(MJCF.replace(' rgba="1 0 0 1"', "").replace('<geom rgba="0.2 0.4 0.6 1"/>', ""))
@@ -472,18 +477,25 @@ def test_materials_of_an_mjcf(tmp_path):
     assert second.colour == (0.5, 0.5, 0.5, 1.0)
 
 
-def test_the_meshes_of_an_mjcf_give_way_to_its_primitives(tmp_path):
+@with_mujoco
+def test_the_meshes_of_an_mjcf_are_where_the_file_puts_them(tmp_path):
+    """MuJoCo moves a mesh to its centre, and turns it to its principal axes."""
     write_wedge(tmp_path / "wedge.stl")
-    text = """<mujoco><asset><mesh name="wedge" file="wedge.stl"/></asset><worldbody><body name="base">
-      <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/><geom type="mesh" mesh="wedge" mass="0"/>{}
-      <body name="arm"><joint/><inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>
-      </body></worldbody></mujoco>"""
     path = tmp_path / "toy.xml"
-    path.write_text(text.format('<geom size="0.3" group="3"/>'))
-    assert [shape.kind for shape in visuals.visuals(sp.load_body(path))] == ["sphere", "box"]
-    path.write_text(text.format(""))
-    with pytest.warns(VisualWarning, match="body 'base': a geom that is a mesh"):
-        assert [shape.kind for shape in visuals.visuals(sp.load_body(path))] == ["box", "box"]
+    path.write_text("""<mujoco><asset><mesh name="wedge" file="wedge.stl" scale="1 2 1"/></asset><worldbody>
+      <body name="base">
+      <inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/><geom size="0.3" group="3"/>
+      <geom type="mesh" mesh="wedge" pos="0.1 0 0" rgba="0 1 0 1"/>
+      <body name="arm"><joint/><inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>
+      </body></worldbody></mujoco>""")
+    mesh, box = visuals.visuals(sp.load_body(path))
+    assert (mesh.kind, box.kind, mesh.colour) == ("mesh", "box", (0.0, 1.0, 0.0, 1.0))
+    corners = mesh.pose[:3, :3] @ mesh.vertices[mesh.faces.ravel()].T + mesh.pose[:3, 3:]
+    trimesh = pytest.importorskip("trimesh")
+    written = trimesh.load_mesh(tmp_path / "wedge.stl")
+    expected = np.array(written.vertices)[written.faces.ravel()] * [1.0, 2.0, 1.0] + [0.1, 0.0, 0.0]
+    ours, theirs = (np.array(sorted(each.round(5).tolist())) for each in (corners.T, expected))
+    np.testing.assert_allclose(ours, theirs, atol=2e-5, rtol=0)
 
 
 @pytest.mark.parametrize("name", BODIES)

@@ -167,7 +167,7 @@ GIBBERISH = {
     "json": (b'{"robot": 1}', "XML"),
     "latin-1": ('<robot name="é"/>'.encode("latin-1"), "UTF-8.*byte 13"),
     "utf-16": (GOOD.encode("utf-16"), "UTF-8"),
-    "mjcf": (b"<mujoco/>", "<mujoco> has no <worldbody>"),
+    "mjcf": (b"<mujoco/>", "<worldbody>: there is no <body>"),
     "sdf": (b"<sdf/>", "SDF"),
     "html": (b"<html/>", "HTML"),
     "doctype": (b'<!DOCTYPE robot [<!ENTITY m "1">]>' + GOOD.encode(), "DOCTYPE"),

@@ -121,7 +121,8 @@ def _case(
 def _faulty(name: str, old: str, new: str, said: str | None = None, at: str | None = None, **rest: Any) -> Case:
     """A good file with one thing replaced, which the message must name in its line."""
     base = rest.pop("base", GOOD)
-    return _case(name, edit((old, new), base=base), said, at or (new.strip() if said else None), **rest)
+    also = (pair,) if (pair := rest.pop("also", None)) else ()
+    return _case(name, edit((old, new), *also, base=base), said, at or (new.strip() if said else None), **rest)
 
 
 def _mjcf(name: str, old: str, new: str, said: str | None = None, at: str | None = None, **rest: Any) -> Case:
@@ -576,132 +577,133 @@ def _mjcfs() -> Iterator[Case]:
     def mjcf(name: str, content: str, said: str | None = None, at: str | None = None, **rest: Any) -> Case:
         return _case(f"mjcf {name}", content, said, at, suffix=".xml", **rest)
 
+    def refused(name: str, old: str, new: str, said: str, at: str | None = None, **rest: Any) -> Case:
+        return _mjcf(name, old, new, said.replace(": ", ": MuJoCo does not accept it: .*", 1), at, **rest)
+
     yield mjcf("good", GOOD_MJCF)
-    yield mjcf("empty", "<mujoco/>", "<mujoco> has no <worldbody>", line=1)
+    yield mjcf("empty", "<mujoco/>", "<worldbody>: there is no <body>", line=1)
     yield mjcf("no body", "<mujoco>\n<worldbody/>\n</mujoco>", "there is no <body>", line=2)
     yield mjcf("doctype", "<!DOCTYPE m>" + GOOD_MJCF, "DOCTYPE", line=1)
     yield mjcf("cut", GOOD_MJCF[:400], "XML", line=14)
+    for name, file, said in (
+        ("include", "/etc/passwd", "XML parse error"),
+        ("include of itself", "mjcf_include_of_itself.xml", "already included"),
+        ("include of nothing", "nowhere.xml", "Error opening file"),
+    ):
+        yield refused(name, "<worldbody>", f'<worldbody><include file="{file}"/>', f"<include>: {said}")
+    yield _mjcf("another body without joints", "</worldbody>", '<body name="b"/></worldbody>')
     yield _mjcf(
-        "include",
-        "<worldbody>",
-        '<worldbody><include file="/etc/passwd"/>',
-        "<include>: other files are not read.*mj_saveLastXML",
-    )
-    yield _mjcf(
-        "two bodies",
+        "furniture",
         "</worldbody>",
-        '<body name="b"/></worldbody>',
-        "body 'b': 2 bodies in the world.*'trunk', 'b'",
-        '<body name="b"/>',
+        '<body name="b"><geom size="1"/></body></worldbody>',
+        warned="what stands still in the world is left out: 'b'",
     )
-    yield _mjcf("two worlds", "</worldbody>", "</worldbody>\n<worldbody/>", "2 <worldbody>", "<worldbody/>")
-    yield _mjcf("ball", 'type="slide" axis="1 0 1"', 'type="ball"', "joint 'slide': type 'ball'.*three hinges in a row")
+    ball = '<body name="b"><freejoint/><geom size="1"/></body>'
+    several = "body 'b': 2 bodies in the world.*'trunk', 'b'; say which one by root_body='trunk'"
+    yield _mjcf("a free ball", "</worldbody>", f"{ball}</worldbody>", several, '<body name="b"')
+    yield _mjcf("a free ball left out", "</worldbody>", f"{ball}</worldbody>", options=(("root_body", "trunk"),))
     yield _mjcf(
-        "free joint inside",
-        '<joint name="twist" axis="1 0 0"/>',
-        "<freejoint/>",
-        "body 'arm': a free joint inside",
-        line=16,
+        "unknown root body",
+        "</worldbody>",
+        f"{ball}</worldbody>",
+        "<worldbody>: root_body: no body is named 'trun'; there is 'trunk'",
+        "<worldbody>",
+        options=(("root_body", "trun"),),
     )
-    yield _mjcf("free by type inside", 'type="slide" axis="1 0 1"', 'type="free"', "joint 'slide': type 'free'")
-    yield _mjcf("unknown type", 'type="slide"', 'type="screw"', "joint 'slide': type 'screw'.*hinge or slide")
+    yield _mjcf("two worlds", "</worldbody>", "</worldbody>\n<worldbody/>")
+    yield _mjcf("ball", 'type="slide" axis="1 0 1"', 'type="ball"', "joint 'slide': a ball joint; .*three hinges")
+    yield refused(
+        "free joint inside", '<joint name="twist" axis="1 0 0"/>', "<freejoint/>", "body 'arm': more than 6", line=14
+    )
+    yield refused(
+        "free by type inside", 'type="slide" axis="1 0 1"', 'type="free"', "body 'hand': free joint can only", line=18
+    )
+    yield refused("unknown type", 'type="slide"', 'type="screw"', "<joint>: invalid keyword: 'screw'")
+    hinge = '<joint name="j"/>'
     yield _mjcf(
         "hinge to the world",
         "<freejoint/>",
-        '<joint name="j"/>',
-        "body 'trunk': a joint between the world and the body.*freejoint",
+        hinge,
+        "body 'trunk': a joint between the world and the body that floats, 'j'.*root=\"free\"",
+        '<body name="trunk"',
     )
-    yield _mjcf(
-        "two free joints",
-        "<freejoint/>",
-        '<freejoint/><joint type="free"/>',
-        "body 'trunk': more than one free joint",
-        line=11,
-    )
+    yield _mjcf("hinge to the world removed", "<freejoint/>", hinge, options=(("root", "free"),))
+    yield refused("two free joints", "<freejoint/>", '<freejoint/><joint type="free"/>', "body 'trunk': more", line=11)
     yield _mjcf("no free joint", "<freejoint/>", "")
-    yield _mjcf("aligned free joint", "<freejoint/>", '<freejoint align="true"/>', "align=.*turns the axes")
-    yield _mjcf("mocap", '<body name="hand"', '<body name="hand" mocap="true"', "body 'hand': a mocap body")
+    yield _mjcf("aligned free joint", "<freejoint/>", '<freejoint align="true"/>')
+    yield refused("mocap", '<body name="hand"', '<body name="hand" mocap="true"', "body 'hand': mocap body 'hand' is")
+    yield _mjcf(
+        "mocap base",
+        "<freejoint/>",
+        "",
+        "body 'trunk': a mocap body is moved from outside",
+        line=11,
+        options=(("root_body", "trunk"),),
+        also=('<body name="trunk"', '<body mocap="true" name="trunk"'),
+    )
     yield _mjcf("joint without name", 'name="twist" ', "")
     yield _mjcf("body without name", 'name="arm" ', "")
-    yield _mjcf("joint twice", 'name="twist"', 'name="hip"', "joint 'hip': two joints", line=16)
-    yield _mjcf("joint twice in two bodies", 'name="slide"', 'name="hip"', "joint 'hip': two joints", line=19)
-    yield _mjcf("body twice", '<body name="hand"', '<body name="arm"', "body 'arm': this name is taken", line=18)
-    yield _mjcf("body called world", '<body name="hand"', '<body name="world"', "body 'world': this name is taken")
-    yield _mjcf("reference", 'axis="1 0 0"', 'axis="1 0 0" ref="0.1"', "joint 'twist': ref is not zero")
-    yield _mjcf("axis zero", 'axis="1 0 0"', 'axis="0 0 0"', "joint 'twist': the axis .*nowhere")
-    yield _mjcf("axis of two", 'axis="1 0 0"', 'axis="1 0"', "joint 'twist': <joint> axis=.*3 finite")
-    yield _mjcf("range exchanged", 'range="-1 1"', 'range="1 -1"', "joint 'hip': range: the lower limit")
-    yield _mjcf("limited without range", 'axis="1 0 0"', 'axis="1 0 0" limited="true"', "joint 'twist': range")
+    yield refused("joint twice", 'name="twist"', 'name="hip"', "<joint>: repeated name 'hip'", line=16)
+    yield refused("joint twice in two bodies", 'name="slide"', 'name="hip"', "<joint>: repeated name", line=19)
+    yield refused("body twice", '<body name="hand"', '<body name="arm"', "<body>: repeated name 'arm'", line=18)
+    yield refused("body called world", '<body name="hand"', '<body name="world"', "<body>: repeated name 'world'")
     yield _mjcf(
-        "range without autolimits",
+        "joint with a name made for another",
+        'name="twist"',
+        'name="arm_joint1"',
+        "joint 'arm_joint1': two joints have this name",
+        line=16,
+        also=('name="hip" ', ""),
+    )
+    yield _mjcf("reference", 'axis="1 0 0"', 'axis="1 0 0" ref="0.1"')
+    yield refused("axis zero", 'axis="1 0 0"', 'axis="0 0 0"', "joint 'twist': axis too small")
+    yield refused("axis of two", 'axis="1 0 0"', 'axis="1 0"', "<joint>: attribute 'axis' does not have enough")
+    yield _mjcf("range exchanged", 'range="-1 1"', 'range="1 -1"', "joint 'hip': range: the lower limit 1 is above")
+    yield refused("limited without range", 'axis="1 0 0"', 'axis="1 0 0" limited="true"', "joint 'twist': range")
+    yield refused(
+        "range without autolimits", 'angle="radian"', 'angle="radian" autolimits="false"', "joint 'hip': ", line=15
+    )
+    yield refused("limited misspelt", 'axis="1 0 0"', 'axis="1 0 0" limited="yes"', "<joint>: invalid keyword: 'yes'")
+    yield refused("attribute misspelt", 'mass="1"', 'mas="1"', "<inertial>: unrecognized attribute: 'mas'")
+    yield refused("diagonal with a capital", "diaginertia", "diagInertia", "<inertial>: unrecognized attribute: 'diagI")
+    for value, said in (
+        ("nan", "body 'arm': mass and inertia of moving bodies"),
+        ("-1", "body 'arm': mass and inertia of moving bodies"),
+        ("1e400", "<inertial>: number is too large in attribute 'mass'"),
+        ("1kg", "<inertial>: bad format in attribute 'mass'"),
+        ("1,5", "<inertial>: bad format in attribute 'mass'"),
+        ("", "<inertial>: required attribute missing: 'mass'"),
+    ):
+        line = 14 if said.startswith("body") else 17
+        yield refused(f"mass {value}", 'mass="1"', f'mass="{value}"', said, line=line)
+    for value in ("inf", "1e300"):
+        yield _mjcf(f"mass {value}", 'mass="1"', f'mass="{value}"', "body 'arm': .*too large", line=14)
+    yield _mjcf("far away", 'pos="0.1 0 0" mass', 'pos="1e7 0 0" mass', "body 'arm': its places.*1e\\+06", line=14)
+    yield refused("mass missing", ' mass="1"', "", "<inertial>: required attribute missing: 'mass'", line=17)
+    yield refused("inertia missing", ' diaginertia="0.2 0.3 0.4"', "", "body 'trunk': mass and inertia", line=11)
+    yield refused("two inertias", 'mass="3"', 'mass="3" fullinertia="1 1 1 0 0 0"', "body 'trunk': full", line=11)
+    yield refused(
+        "inertia of two", 'diaginertia="0.2 0.3 0.4"', 'diaginertia="0.2 0.3"', "<inertial>: attribute 'diaginertia'"
+    )
+    yield refused(
+        "full inertia turned", 'pos="0.1 0 0" mass', 'pos="0.1 0 0" quat="1 0.1 0 0" mass', "<inertial>: at most one of"
+    )
+    for name, value in (("inertia negative", "-0.4"), ("triangle broken", "0.6")):
+        said = r"body 'trunk': inertia must satisfy A \+ B >= C; use 'balanceinertia'"
+        yield refused(name, 'diaginertia="0.2 0.3 0.4"', f'diaginertia="0.2 0.3 {value}"', said, line=11)
+    yield _mjcf(
+        "triangle mended",
         'angle="radian"',
-        'angle="radian" autolimits="false"',
-        "joint 'hip': range without limited",
-        line=15,
+        'angle="radian" balanceinertia="true"',
+        also=('diaginertia="0.2 0.3 0.4"', 'diaginertia="0.2 0.3 0.6"'),
     )
-    yield _mjcf(
-        "limited misspelt", 'axis="1 0 0"', 'axis="1 0 0" limited="yes"', "joint 'twist': <joint> limited='yes'"
-    )
-    yield _mjcf(
-        "attribute misspelt", 'mass="1"', 'mas="1"', "body 'arm': <inertial> mas= is not read; did you mean mass"
-    )
-    yield _mjcf(
-        "diagonal with a capital",
-        "diaginertia",
-        "diagInertia",
-        "body 'trunk': <inertial> diagInertia= is not read; did you mean diaginertia",
-    )
-    for value in ("nan", "inf", "1e400", "-1", "1kg", ""):
-        said = "negative mass" if value == "-1" else "<inertial> mass=.*finite"
-        yield _mjcf(f"mass {value}", 'mass="1"', f'mass="{value}"', f"body 'arm': {said}")
-    yield _mjcf("mass missing", ' mass="1"', "", "body 'arm': <inertial> has no mass", line=17)
-    yield _mjcf("mass huge", 'mass="1"', 'mass="1e300"', "body 'arm': .*too large")
-    yield _mjcf("inertia missing", ' diaginertia="0.2 0.3 0.4"', "", "body 'trunk': <inertial> needs one of", line=13)
-    yield _mjcf(
-        "two inertias", 'mass="3"', 'mass="3" fullinertia="1 1 1 0 0 0"', "body 'trunk': <inertial> needs one of"
-    )
-    yield _mjcf(
-        "inertia of two",
-        'diaginertia="0.2 0.3 0.4"',
-        'diaginertia="0.2 0.3"',
-        "body 'trunk': <inertial> diaginertia=.*3 finite",
-    )
-    yield _mjcf(
-        "full inertia turned",
-        'pos="0.1 0 0" mass',
-        'pos="0.1 0 0" quat="1 0.1 0 0" mass',
-        "body 'arm': <inertial> has fullinertia and an orientation",
-    )
-    yield _mjcf(
-        "inertia negative",
-        'diaginertia="0.2 0.3 0.4"',
-        'diaginertia="0.2 0.3 -0.4"',
-        "link 'trunk'.*negative",
-        line=11,
-        error="UnphysicalInertiaError",
-    )
-    yield _mjcf(
-        "inertia negative allowed",
-        'diaginertia="0.2 0.3 0.4"',
-        'diaginertia="0.2 0.3 -0.4"',
-        warned="link 'trunk': a negative",
-        options=(("on_unphysical", "warn"),),
-    )
-    yield _mjcf(
-        "triangle broken", 'diaginertia="0.2 0.3 0.4"', 'diaginertia="0.2 0.3 0.6"', warned="link 'trunk'.*triangle"
-    )
-    yield _mjcf(
-        "orientation twice",
-        'euler="0.1 0.2 0.3"',
-        'euler="0.1 0.2 0.3" quat="1 0 0 0"',
-        "body 'arm': <body> has quat and euler",
-    )
-    yield _mjcf("quaternion zero", 'euler="0.1 0.2 0.3"', 'quat="0 0 0 0"', "body 'arm': <body> quat=.*nowhere")
-    yield _mjcf("axes parallel", 'euler="0.1 0.2 0.3"', 'xyaxes="1 0 0 2 0 0"', "body 'arm': <body> xyaxes=.*nowhere")
-    yield _mjcf("euler sequence", 'angle="radian"', 'angle="radian" eulerseq="xyw"', "<compiler>: eulerseq='xyw'")
-    yield _mjcf(
-        "angle unit", 'angle="radian"', 'angle="grad"', "<compiler>: <compiler> angle='grad'; valid are degree, radian"
-    )
+    turn = 'euler="0.1 0.2 0.3"'
+    yield refused("orientation twice", turn, f'{turn} quat="1 0 0 0"', "<body>: multiple orientation")
+    yield refused("quaternion zero", turn, 'quat="0 0 0 0"', "<body>: zero quaternion")
+    yield refused("axes parallel", turn, 'xyaxes="1 0 0 2 0 0"', "body 'arm': error 'yaxis too small'")
+    angle = 'angle="radian"'
+    yield refused("euler sequence", angle, f'{angle} eulerseq="xyw"', "body 'arm': .*euler sequence can only", line=14)
+    yield refused("angle unit", angle, 'angle="grad"', "<compiler>: invalid keyword: 'grad'")
     for setting in (
         'boundmass="1"',
         'boundinertia="0.1"',
@@ -709,112 +711,69 @@ def _mjcfs() -> Iterator[Case]:
         'balanceinertia="true"',
         'inertiagrouprange="0 2"',
         'alignfree="true"',
-        'coordinate="global"',
     ):
+        yield _mjcf(f"compiler {setting}", angle, f"{angle} {setting}")
+    yield refused("compiler coordinate", angle, f'{angle} coordinate="global"', "<compiler>: global coordinates")
+    yield refused("compiler unknown", angle, 'angles="radian"', "<compiler>: unrecognized attribute: 'angles'")
+    line = 'fromto="0 0 0 0.1 0.1 0.2"'
+    yield refused("mesh that is nowhere", line, 'type="mesh" mesh="palm"', "geom 'palm': mesh 'palm' not found")
+    palm, at = "geom 'palm': ", '<geom name="palm"'
+    yield refused("geom without size", 'size="0.05"', "", palm + "size 0 must be positive", at)
+    yield refused("geom of negative size", 'size="0.05"', 'size="-0.05"', palm + "size 0 must be positive", at)
+    yield refused("geom of no length", line, 'fromto="1 0 0 1 0 0"', palm + "fromto points too close")
+    yield refused("geom of two places", line, f'{line} pos="1 0 0"', palm + "both pos and fromto")
+    yield refused("geom of negative density", 'name="palm"', 'name="palm" density="-1"', palm + "mass, inertia or")
+    yield _mjcf("geom as a shell", 'name="palm"', 'name="palm" shellinertia="true"')
+    slide = '<joint name="slide"'
+    yield refused("class unknown", slide, f'{slide} class="thick"', "<joint>: unknown default class name 'thick'")
+    yield refused("class unknown for children", 'childclass="thin"', 'childclass="thick"', "<body>: unknown", line=18)
+    thin = '<default class="thin">'
+    yield refused("class twice", thin, f'<default class="thin"/>\n{thin}', "<default>: repeated default", line=6)
+    yield refused("class without name", thin, "<default>", "<default>: empty class name", line=5)
+    for tag, said in (
+        ("replicate", "required attribute missing: 'count'"),
+        ("composite", "unrecognized element"),
+        ("flexcomp", "required attribute missing: 'name'"),
+        ("attach", "required attribute missing: 'prefix'"),
+    ):
+        yield refused(f"{tag} of nothing", slide, f"<{tag}/>{slide}", f"<{tag}>: {said}")
+    for tag, name, near in (("frame", "poss", "pos"), ("replicate", "offsett", "offset")):
         yield _mjcf(
-            f"compiler {setting}",
-            'angle="radian"',
-            f'angle="radian" {setting}',
-            f"<compiler>: {setting.split('=')[0]}=.*changes masses or axes",
+            f"{tag} misspelt",
+            slide,
+            f'<{tag} {name}="0 0 1" count="1"/>{slide}' if tag == "replicate" else f'<{tag} {name}="0 0 1"/>{slide}',
+            f"<{tag}>: MuJoCo passes over '{name}'; did you mean {near}=",
         )
-    yield _mjcf("compiler unknown", 'angle="radian"', 'angles="radian"', "<compiler>: unknown setting 'angles'")
+    yield _mjcf("empty frame", slide, f"<frame/>{slide}")
+    yield _mjcf("joint in a frame", slide, f'<frame><joint name="x"/></frame>{slide}')
+    yield _mjcf("nothing soft", "<worldbody>", "<deformable/><worldbody>")
+    soft = '<flexcomp name="f" type="grid" dim="3" count="2 2 2" spacing="1 1 1" radius="0.01" mass="1"/>'
     yield _mjcf(
-        "mesh with mass",
-        'fromto="0 0 0 0.1 0.1 0.2"',
-        'type="mesh" mesh="palm"',
-        "body 'hand', geom 'palm': a geom of type 'mesh' with mass.*<inertial>",
-    )
-    yield _mjcf(
-        "mesh without mass",
-        'fromto="0 0 0 0.1 0.1 0.2"',
-        'type="mesh" mesh="palm" mass="0"',
-        warned="'hand'.*without mass",
-    )
-    yield _mjcf(
-        "geom without size", 'size="0.05"', "", "body 'hand', geom 'palm': size='': 1 numbers", '<geom name="palm"'
-    )
-    yield _mjcf(
-        "geom of negative size",
-        'size="0.05"',
-        'size="-0.05"',
-        "body 'hand', geom 'palm': .*positive",
-        '<geom name="palm"',
-    )
-    yield _mjcf(
-        "geom of no length", 'fromto="0 0 0 0.1 0.1 0.2"', 'fromto="1 0 0 1 0 0"', "geom 'palm': fromto: both ends"
-    )
-    yield _mjcf(
-        "geom of two places",
-        'fromto="0 0 0 0.1 0.1 0.2"',
-        'fromto="0 0 0 0.1 0.1 0.2" pos="1 0 0"',
-        "geom 'palm': fromto with pos",
-    )
-    yield _mjcf(
-        "geom of negative density", 'name="palm"', 'name="palm" density="-1"', "geom 'palm': negative mass or density"
-    )
-    yield _mjcf("geom as a shell", 'name="palm"', 'name="palm" shellinertia="true"', "geom 'palm': inertia of a shell")
-    yield _mjcf(
-        "class unknown",
-        '<joint name="slide"',
-        '<joint name="slide" class="thick"',
-        "joint 'slide': there is no default class 'thick'",
-    )
-    yield _mjcf(
-        "class unknown for children",
-        'childclass="thin"',
-        'childclass="thick"',
-        "there is no default class 'thick'",
-        line=20,
-    )
-    yield _mjcf(
-        "class twice",
-        '<default class="thin">',
-        '<default class="thin"/>\n<default class="thin">',
-        "default class 'thin': two classes",
-        line=6,
-    )
-    yield _mjcf("class without name", '<default class="thin">', "<default>", "<default>: has no class", line=5)
-    for tag in ("replicate", "composite", "flexcomp", "attach"):
-        yield _mjcf(
-            f"{tag} in a body",
-            '<joint name="slide"',
-            f'<{tag}/><joint name="slide"',
-            f"body 'hand': <{tag}> is not supported.*mj_saveLastXML",
-        )
-    yield _mjcf(
-        "composite in the world",
-        '<body name="trunk"',
-        '<composite/><body name="trunk"',
-        "<worldbody>: <composite> is not supported",
-    )
-    yield _mjcf("empty frame", '<joint name="slide"', '<frame/><joint name="slide"')
-    yield _mjcf(
-        "joint in a frame",
-        '<joint name="slide"',
-        '<frame><joint name="x"/></frame><joint name="slide"',
-        "body 'hand': <joint> is not supported in <frame>",
-    )
-    yield _mjcf(
-        "frame misspelt",
-        '<joint name="slide"',
-        '<frame poss="0 0 1"/><joint name="slide"',
-        "<frame> poss= is not read; did you mean pos",
-    )
-    yield _mjcf("soft body", "<worldbody>", "<deformable/><worldbody>", "<deformable>: soft bodies")
-    equality = '<equality><joint joint1="hip" joint2="twist"/></equality>'
-    yield _mjcf(
-        "equality",
+        "soft body",
         "</worldbody>",
-        f"</worldbody>{equality}",
-        warned=r":24: <equality>: 1 constraints \(joint\) are ignored",
+        f'<body name="jelly">{soft}</body></worldbody>',
+        "body 'f_0': soft bodies",
+        line=1,
+        also=(' damping="1"', ""),
+        options=(("root_body", "jelly"),),
+    )
+    yield from _equalities(refused)
+    world = "</worldbody>"
+    yield refused("tendon", world, f'{world}<tendon><fixed name="t"/></tendon>', "fixed 't': .*path cannot be empty")
+    yield _mjcf(
+        "tendon over joints",
+        world,
+        f'{world}<tendon><fixed name="t"><joint joint="hip" coef="1"/></fixed></tendon>',
+        warned="tendons are ignored, every joint moves on its own: 't'",
     )
     yield _mjcf(
-        "tendon",
-        "</worldbody>",
-        '</worldbody><tendon><fixed name="t"/></tendon>',
-        warned=r"<tendon>: 1 constraints \(fixed\)",
+        "contact",
+        world,
+        f'{world}<contact><pair name="p" geom1="palm" geom2="back"/></contact>',
+        warned="contacts are ignored: 'p'",
+        also=("<freejoint/>", '<freejoint/><geom name="back" size="0.1" mass="0"/>'),
     )
-    yield _mjcf("actuator", "</worldbody>", '</worldbody><actuator><motor joint="hip"/></actuator>')
+    yield _mjcf("actuator", world, f'{world}<actuator><motor joint="hip"/></actuator>')
     deep = '<body><joint/><geom size="0.1"/>' * 150 + "</body>" * 150
     yield mjcf("deep", f"<mujoco>\n<worldbody>\n{deep}</worldbody></mujoco>", "<.*100 deep", line=3)
     wide = '<body><joint/><geom size="0.1"/></body>' * 400
@@ -824,3 +783,66 @@ def _mjcfs() -> Iterator[Case]:
         "400 moving joints; up to 200",
         line=1,
     )
+    yield from _bombs(mjcf)
+
+
+def _equalities(refused: Callable[..., Case]) -> Iterator[Case]:
+    """Joints that follow others, and bodies that are held together."""
+
+    def held(name: str, inside: str, **rest: Any) -> Case:
+        return _mjcf(name, "</worldbody>", f"</worldbody><equality>{inside}</equality>", **rest)
+
+    follows = '<joint joint1="hip" joint2="twist" polycoef="0.1 2 0 0 0"/>'
+    yield held("equality", follows)
+    yield held("equality with nothing", '<joint joint1="hip" polycoef="0.1 0 0 0 0"/>')
+    yield held("equality that is off", '<joint joint1="hip" joint2="twist" active="false"/>')
+    yield held(
+        "equality of second degree",
+        '<joint joint1="hip" joint2="twist" polycoef="0 1 0.5 0 0"/>',
+    )
+    yield held("equalities of one joint", follows * 2, said="joint 'hip': two equalities hold it", line=15)
+    yield held(
+        "equalities in a circle",
+        f'{follows}<joint joint1="twist" joint2="hip"/>',
+        said="joint '(hip|twist)': by equalities joints follow each other in a circle",
+        line=15,
+    )
+    yield held(
+        "loop",
+        '<connect name="c" body1="trunk" body2="hand" anchor="0 0 0"/>',
+        warned="equality 'c' .connect. of 'trunk' and 'hand' is ignored, every joint moves on its own",
+    )
+    yield held(
+        "weld to the world",
+        '<weld body1="hand"/>',
+        warned=r"equality 0 \(weld\) of 'hand' and 'world' is ignored, the body is free",
+    )
+    yield _mjcf(
+        "weld to another body",
+        "</worldbody>",
+        '<body name="b"><freejoint/><geom size="1"/></body></worldbody>'
+        '<equality><weld name="w" body1="hand" body2="b"/></equality>',
+        "body 'hand': the equality 'w' .weld. makes it carry 'b'",
+        line=18,
+        options=(("root_body", "trunk"),),
+    )
+    yield refused(
+        "equality of an unknown joint",
+        "</worldbody>",
+        '</worldbody><equality><joint joint1="knee"/></equality>',
+        "<mujoco>: unknown element 'knee'",
+        line=24,
+    )
+
+
+def _bombs(mjcf: Callable[..., Case]) -> Iterator[Case]:
+    """What asks for more memory than there is."""
+    start, end = "<mujoco>\n<asset>", '</asset><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
+    for name, inside in (
+        ("a mesh without end", '<mesh name="m" file="/dev/zero" content_type="model/stl"/>'),
+        ("a field of heights", '<hfield name="h" nrow="100000" ncol="100000" size="1 1 1 1"/>'),
+        ("a texture", '<texture name="t" type="2d" builtin="flat" width="100000" height="100000"/>'),
+    ):
+        yield mjcf(name, f"{start}{inside}{end}", "MuJoCo does not accept it")
+    user = '<mujoco>\n<size nuser_body="2000000000"/><worldbody><body><geom size="1"/></body></worldbody></mujoco>'
+    yield mjcf("room for a user's numbers", user, "MuJoCo does not accept it")

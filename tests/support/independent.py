@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -26,6 +26,9 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.body.catalog import example_file
 from support.places import ROBOTS
+
+if TYPE_CHECKING:
+    from support.floating_mujoco import FloatingMujoco
 
 Array = NDArray[np.float64]
 RTOL = 1e-12
@@ -505,6 +508,14 @@ class MujocoBody:
     def base_mass(self) -> Array:
         return np.array([self.mass_times(row)[:6] for row in self._base_axes])
 
+    def carried(self, rate: ArrayLike) -> Array:
+        """The base's momenta (6,) that the joints' rates carry."""
+        return self.mass_times(self.full(np.zeros(6), rate))[:6]
+
+    def base_force(self, bend: ArrayLike) -> Array:
+        """What would keep the base from accelerating while the joints do (6,)."""
+        return self.data.qfrc_bias[:6] + self.carried(bend)
+
     def momentum_about_centre(self) -> Array:
         """Angular momentum about the centre of mass, world axes, as MuJoCo sums it over the links."""
         self.mujoco.mj_subtreeVel(self.model, self.data)
@@ -535,7 +546,17 @@ def mujoco_motion(
 
     The centre of mass starts at rest at the origin; the momentum enters only through the initial velocity.
     """
-    body = MujocoBody(name, joint_names)
+    return simulated_motion(MujocoBody(name, joint_names), loop, momentum, attitude, times)
+
+
+def simulated_motion(
+    body: MujocoBody | FloatingMujoco,
+    loop: FourierLoop,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    times: ArrayLike | None = None,
+) -> SimulatedMotion:
+    """The same of a body that is made."""
     start = np.eye(3) if attitude is None else np.asarray(attitude, dtype=float)
     body.place(np.zeros(3), start, loop.shape(0.0))
     position = -body.centre_of_mass()
@@ -543,19 +564,18 @@ def mujoco_motion(
     # Of the base's six generalised momenta the last three are angular, about the base origin in base axes: without
     # linear momentum that is the momentum about the centre of mass.
     wanted = np.concatenate([np.zeros(3), start.T @ np.asarray(momentum, dtype=float)])
-    carried = body.mass_times(body.full(np.zeros(6), loop.rate(0.0)))[:6]
-    velocity = np.linalg.solve(body.base_mass(), wanted - carried)
+    velocity = np.linalg.solve(body.base_mass(), wanted - body.carried(loop.rate(0.0)))
 
     def slope(t: float, y: Array) -> Array:
         quat = y[3:7]
         body.put(y[:3], quat / norm(quat), loop.shape(t))
         body.move(y[7:10], y[10:13], loop.rate(t))
-        force = body.data.qfrc_bias + body.mass_times(body.full(np.zeros(6), loop.acceleration(t)))
+        force = body.base_force(loop.acceleration(t))
         return np.concatenate(
             [
                 y[7:10],
                 quaternion_rate(quat, y[10:13]),
-                np.linalg.solve(body.base_mass(), -force[:6]),
+                np.linalg.solve(body.base_mass(), -force),
             ]
         )
 

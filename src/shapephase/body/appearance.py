@@ -6,6 +6,7 @@ import hashlib
 import importlib.util
 import math
 import warnings
+from base64 import b64decode
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,14 +18,13 @@ import numpy as np
 from ..arguments import check_object, number_argument
 from ..arrays import Array, Integers
 from ..display import short_repr
-from ..errors import InputFileNotFoundError, ModelFileError, VisualWarning
+from ..errors import InputFileNotFoundError, MissingExtraError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
 from ._drawing_limits import within_limits
 from .body import Body, MovingPart
 from .catalog import example_folder
-from .engines.formats import format_of
-from .formats.mjcf import Placed, contents_of, settings_of, with_defaults
-from .formats.mjcf_geometry import placed_geom
+from .engines.engine_tree import engine_shapes
+from .engines.formats import MJCF, format_of
 from .formats.urdf import rpy_matrix
 from .formats.xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
 
@@ -34,7 +34,6 @@ _Piece = tuple[Array, Integers, Colour | None]
 PLAIN: Colour = (0.72, 0.74, 0.78, 1.0)
 BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)
 """Of what the file gives no colour, and of inertia boxes (the sky blue of Okabe and Ito)."""
-_MUJOCO_GREY: Colour = (0.5, 0.5, 0.5, 1.0)
 _MESHES = (".stl", ".obj", ".dae", ".ply")
 _MOST_BYTES = 64 * 2**20
 """Size of a mesh file [bytes]."""
@@ -48,8 +47,6 @@ _WATER = 1000.0
 """Density of the ball that stands for a point mass [kg/m^3]."""
 _CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, 8).T
 """Of the cube [-1, 1]^3: (8, 3)."""
-# MuJoCo's own viewer shows these groups of geoms; the others are for collisions.
-_SHOWN_GROUPS = (0.0, 1.0, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +103,7 @@ class Visual:
 def visuals(body: Body) -> tuple[Visual, ...]:
     """The shapes to draw of a body, by link.
 
-    From its file, read anew: the <visual> elements of a URDF, the primitive geoms of an MJCF. A moving part with mass
+    From its file, read anew: the <visual> elements of a URDF, the geoms of an MJCF. A moving part with mass
     that has nothing to show there, and every one of a body made from a `pinocchio.Model`, gets the box of uniform
     density that has the same mass and inertia.
 
@@ -138,7 +135,7 @@ def drawn_shapes(body: Body) -> tuple[list[Visual], list[str]]:
     looks = _Looks(body.file.parent if body.file else Path())
     root = _unchanged(body, looks.doubts)
     if root is not None:
-        (_read_mjcf if root.tag == "mujoco" else _read_urdf)(root, looks)
+        _read_mjcf(body, looks) if root.tag == "mujoco" else _read_urdf(root, looks)
     if looks.unread:
         looks.doubts.append(f"{looks.unread} meshes are not read: all have more than {_MOST_BYTES_IN_ALL >> 20} MiB")
     shapes, simplified = within_limits(looks.found)
@@ -206,7 +203,7 @@ def _unchanged(body: Body, doubts: list[str]) -> Node | None:
         doubts.append(f"{body.file} has changed since {body.name} was loaded from it; load it again to see it")
         return None
     # What engines own is drawn as boxes: a file of measurements has no shapes, and meshes of bioMod are not read.
-    return xml_tree(content, str(body.file)) if format_of(content) is None else None
+    return xml_tree(content, str(body.file)) if format_of(content) in (None, MJCF) else None
 
 
 def _part_box(part: MovingPart) -> Visual:
@@ -378,64 +375,29 @@ def _own_colour(mesh: Any) -> Colour | None:
 # ---- MJCF -----------------------------------------------------------------------------------------------------------
 
 
-def _read_mjcf(root: Node, looks: _Looks) -> None:
-    """The primitive geoms that MuJoCo's viewer would show; of a body that has none of those, the others."""
-    reading = settings_of(root)
-    colours = {
-        material.get("name"): material
-        for asset in root.all("asset")
-        for material in asset.all("material")
-        if material.get("rgba") is not None
+def _read_mjcf(body: Body, looks: _Looks) -> None:
+    """The geoms that MuJoCo's viewer would show; of a link that has none of those, the others."""
+    assert body.file is not None
+    try:
+        said = engine_shapes(body.file, MJCF)
+    except (ModelFileError, MissingExtraError) as error:
+        looks.doubts.append(str(error))
+        return
+    meshes = {
+        number: (_unpacked(mesh["vertices"], "<f4").astype(float), _unpacked(mesh["faces"], "<i4").astype(np.int64))
+        for number, mesh in said["meshes"].items()
     }
-    world = needed_child(root, "worldbody", "<mujoco>")
-    start = Placed(world, np.zeros(3), np.eye(3), "main")
-    held = contents_of(reading, world, start, "<worldbody>", ("body", "geom"))
-    waiting = [each for each in held if each.node.tag == "body"]
-    count = 0
-    while waiting:
-        placed = waiting.pop(0)
-        node, count = placed.node, count + 1
-        name = name_of(node) if node.get("name") else f"body{count}"
-        owner = f"body {name!r}"
-        own = Placed(node, np.zeros(3), np.eye(3), node.get("childclass") or placed.surrounding)
-        held = contents_of(reading, node, own, owner, ("inertial", "joint", "freejoint", "geom", "body"))
-        geoms = [
-            (each, with_defaults(reading, each.node, each.surrounding, owner))
-            for each in held
-            if each.node.tag == "geom"
-        ]
-        for drawn in _drawn(geoms, owner):
-            looks.attempt(lambda drawn=drawn, name=name: [_geom_shape(*drawn, name, reading.orientation, colours)])
-        # Depth first, as the bodies without a name are counted.
-        waiting[:0] = [each for each in held if each.node.tag == "body"]
+    links = set(body.link_names)
+    for shape in said["shapes"]:
+        if shape["link"] not in links:
+            continue
+        pose = _pose(np.array(shape["place"]), np.array(shape["turn"]).reshape(3, 3))
+        plain = Visual(shape["link"], shape["kind"], tuple(shape["dimensions"]), pose, tuple(shape["colour"]))
+        if shape["kind"] == "mesh":
+            vertices, faces = meshes[shape["mesh"]]
+            plain = replace(plain, dimensions=(1.0, 1.0, 1.0), vertices=vertices, faces=faces)
+        looks.found.append(plain)
 
 
-def _drawn(geoms: list[tuple[Any, Node]], owner: str) -> list[tuple[Any, Node]]:
-    """Of the geoms of a body, those to be shown."""
-    solid = [pair for pair in geoms if pair[1].get("type", "sphere") not in ("plane", "hfield")]
-    seen = [pair for pair in solid if number(pair[1], "group", owner, default="0") in _SHOWN_GROUPS]
-    primitive = [pair for pair in seen if not _is_mesh(pair[1])]
-    # Meshes are not read: the collision shapes are drawn in their place.
-    return primitive or [pair for pair in solid if not _is_mesh(pair[1])] or seen
-
-
-def _is_mesh(geom: Node) -> bool:
-    return geom.get("mesh") is not None or geom.get("type") in ("mesh", "sdf")
-
-
-def _geom_shape(placed: Any, geom: Node, link: str, orientation: Any, colours: dict[str | None, Node]) -> Visual:
-    owner = f"body {link!r}"
-    kind = geom.get("type", "sphere") or "sphere"
-    if _is_mesh(geom):
-        raise geom.fault(owner, "a geom that is a mesh is not shown")
-    if kind not in ("sphere", "capsule", "cylinder", "box", "ellipsoid"):
-        raise geom.fault(owner, f"a geom of type {quoted(kind)!r} is not shown")
-    place, turn, dimensions = placed_geom(geom, kind, orientation, owner)
-    if kind == "box":
-        dimensions = [2.0 * value for value in dimensions]
-    elif kind in ("capsule", "cylinder"):
-        dimensions = [dimensions[0], 2.0 * dimensions[1]]
-    source = geom if geom.get("rgba") is not None else colours.get(geom.get("material"))
-    colour = _MUJOCO_GREY if source is None else _rgba(source, owner)
-    pose = _pose(placed.place + placed.turn @ place, placed.turn @ turn)
-    return Visual(link, kind, tuple(float(value) for value in dimensions), pose, colour)
+def _unpacked(text: str, kind: str) -> Array:
+    return np.frombuffer(b64decode(text), kind).reshape(-1, 3)

@@ -11,23 +11,25 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..arguments import check_flag
+from ..arguments import check_choice, check_flag
 from ..child_process import limit_this_process, run_alone
 from ..errors import (
     IgnoredElementWarning,
     MissingExtraError,
     ModelFileError,
+    ShapeError,
     ShapePhaseError,
     UnphysicalInertiaWarning,
+    WrongObjectError,
     unknown_name,
 )
+from ..letters import what_came
 from ._cross_check import check_against_file
 from ._link_tree import inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree
-from .engines.formats import format_of
-from .formats.mjcf import mjcf_tree
+from .engines.formats import MJCF, format_of
 from .formats.urdf import urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 
@@ -40,7 +42,14 @@ _NO_MEMORY = 3
 """Exit code of a child that ran out of memory: neither 1, an uncaught error, nor 2, a wrong command line."""
 
 
-def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "error", isolate: bool = False) -> Body:
+def load_body(
+    source: str | os.PathLike[str] | Any,
+    *,
+    on_unphysical: str = "error",
+    isolate: bool = False,
+    root: str | None = None,
+    root_body: str | None = None,
+) -> Body:
     """Load a free-floating body.
 
     What comes back has been compared with the numbers of the file: mass, links, joints, and the locked inertia and
@@ -48,13 +57,16 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
 
     Parameters
     ----------
-    source : a path to a URDF or MJCF file, an OpenSim model (`shapephase[opensim]`), a bioMod model
-        (`shapephase[biomod]`), or a file of measurements for Yeadon's human (`shapephase[yeadon]`); a name from
+    source : a path to a URDF, an MJCF file (`shapephase[mjcf]`), an OpenSim model (`shapephase[opensim]`), a bioMod
+        model (`shapephase[biomod]`), or a file of measurements for Yeadon's human (`shapephase[yeadon]`); a name from
         `robot_names()` such as "cat"; "example:human", a body of the installed example-robot-data; or a
         `pinocchio.Model` whose root joint is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted
+    root : "free" removes the hinges and slides between the world and an MJCF's body, as planar walkers have them; None:
+        they are an error
+    root_body : the body of an MJCF that floats, with all that hangs on it; needed where the file has several trees
 
     Raises
     ------
@@ -62,6 +74,8 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
         If there is no such file, or no such name.
     ModelFileError, UnphysicalInertiaError
         If the file cannot be used, or a link cannot exist; the message begins with file and line.
+    ShapeError
+        If `root` or `root_body` is given for what is no MJCF.
     MissingExtraError
         For "example:..." without example-robot-data, and for a format whose engine is not installed.
 
@@ -79,8 +93,12 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
     ('cat', 4.0, 23)
     """
     check_flag(isolate, "isolate")
-    if not isinstance(on_unphysical, str) or on_unphysical not in ("error", "warn"):
-        raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
+    check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
+    if root is not None:
+        check_choice(root, "value of root", ("free",))
+    if not isinstance(root_body, str | None):
+        raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
+    given = {name: value for name, value in (("root", root), ("root_body", root_body)) if value is not None}
     if isinstance(source, str | os.PathLike):
         path, installed = _path_of(os.fspath(source))
         content = read_file(path)
@@ -88,10 +106,11 @@ def load_body(source: str | os.PathLike[str] | Any, *, on_unphysical: str = "err
         if isolate and not installed and format_of(content) is None:
             _try_in_child(content, str(path), on_unphysical)
         try:
-            body, doubts = _from_file(content, path, on_unphysical)
+            body, doubts = _from_file(content, path, on_unphysical, given)
         except MemoryError:
             raise ModelFileError(f"{path}:1: there is not enough memory to load it") from None
     else:
+        _check_unused(given, "a pinocchio.Model")
         body, doubts = _from_model(source, on_unphysical)
     for category, message in doubts:
         warnings.warn(message, category, stacklevel=2)
@@ -208,7 +227,7 @@ def load_from_input() -> None:
     where, on_unphysical = sys.argv[1:3]
     limit_this_process(_CHILD_MEMORY)
     try:
-        _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical)
+        _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical, {})
     except MemoryError:
         sys.exit(_NO_MEMORY)
     except ShapePhaseError:
@@ -216,14 +235,21 @@ def load_from_input() -> None:
         pass
 
 
-def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:
+def _from_file(
+    content: bytes, path: Path, on_unphysical: str, given: dict[str, str]
+) -> tuple[Body, list[tuple[type[Warning], str]]]:
     where, poses = str(path), []
     owned = format_of(content)
-    if owned is not None:
-        tree, poses = engine_tree(path, owned)
+    # What makes XML dangerous ends here, whoever reads it.
+    root = xml_tree(content, where) if owned in (None, MJCF) else None
+    if root is not None and root.tag == "mujoco":
+        owned = MJCF
+    if owned != MJCF:
+        _check_unused(given, where)
+    if root is None or owned == MJCF:
+        tree, poses = engine_tree(path, owned or MJCF, given)
     else:
-        root = xml_tree(content, where)
-        tree = mjcf_tree(root) if root.tag == "mujoco" else urdf_tree(root)
+        tree = urdf_tree(root)
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.couplings)
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
@@ -234,6 +260,11 @@ def _from_file(content: bytes, path: Path, on_unphysical: str) -> tuple[Body, li
     if tree.notes:
         found.append((IgnoredElementWarning, "; ".join(tree.notes)))
     return body, found
+
+
+def _check_unused(given: dict[str, str], where: str) -> None:
+    if given:
+        raise ShapeError(f"{next(iter(given))} is for MJCF files; {quoted(where)} has one root, which floats")
 
 
 def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import warnings
 
 from ..errors import ImplausibleBodyWarning
-from .options import AS_RECORDED, AS_TEXT, BodyArgument, MotionArgument, PrintOptions, RecordingOptions
+from .options import (
+    AS_RECORDED,
+    AS_TEXT,
+    AS_WRITTEN,
+    BodyArgument,
+    BodyOptions,
+    MotionArgument,
+    PrintOptions,
+    RecordingOptions,
+)
 from .outcome import Outcome
 
 
@@ -14,6 +23,7 @@ def check_command(
     motion: MotionArgument | None = None,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
@@ -24,7 +34,7 @@ def check_command(
     from .texts.recording_text import recording_data, recording_lines
     from .texts.result_text import body_lines, path_data, path_lines, plain, record_data
 
-    loaded = body_argument(body)
+    loaded = body_argument(body, floating)
     for doubt in implausible(loaded):
         warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)

@@ -17,6 +17,7 @@ _PACKAGES = (
         "pillow",
         "imageio-ffmpeg",
         "example-robot-data",
+        "mujoco",
         "rosbags",
         "pyyaml",
         "numba",

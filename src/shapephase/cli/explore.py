@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .options import AS_TEXT, BodyArgument, PrintOptions, UpAxis
+from .options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, PrintOptions, UpAxis
 from .outcome import Outcome, check_writable
 from .terminal import put, say_written
 
@@ -16,6 +16,7 @@ def explore_command(
     body: BodyArgument,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     joints: Annotated[tuple[str, str], Parameter(negative_iterable="")],
     html: Path | None = None,
     up: UpAxis = None,
@@ -41,7 +42,7 @@ def explore_command(
     from ..plotting.viewer import LiveView
 
     aside = check_writable(html, "--html", ".html")
-    loaded = load_body(body, isolate=True)
+    loaded = load_body(body, isolate=True, **vars(floating))
     page, series = explore_html(loaded, joints, up=up)
     if html is not None:
         write_whole(html, lambda stream: stream.write(page.encode()))

@@ -24,7 +24,7 @@ from ..shape_space.files._base_columns import ESTIMATE
 from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
-from .options import AS_RECORDED, AT_REST, FlightOptions, RecordingOptions
+from .options import AS_RECORDED, AS_WRITTEN, AT_REST, BodyOptions, FlightOptions, RecordingOptions
 
 if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
@@ -69,6 +69,7 @@ def flight(
     *,
     gauge: str = "base",
     trail: str | None = None,
+    floating: BodyOptions = AS_WRITTEN,
 ) -> Flight:
     """The motion that the arguments and options of a command describe.
 
@@ -78,7 +79,7 @@ def flight(
     start = so3.quat_argument(options.attitude, "attitude")
     goal = tolerance_argument(tolerance)
     momentum = finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
-    loaded = body_argument(body)
+    loaded = body_argument(body, floating)
     for link in (gauge_link(gauge), trail):
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
@@ -105,14 +106,14 @@ def flight(
     return Flight(motion=fitted.motion, body=loaded, path=path, recorded=recorded, fitted=fitted)
 
 
-def body_argument(body: str) -> Body:
+def body_argument(body: str, floating: BodyOptions) -> Body:
     """The body that a command names. Raises what `load_body` raises, and ShapeError for what is rather a motion."""
     is_file = os.path.isfile(body)
     if (body in MOTIONS and not is_file) or (is_file and Path(body).suffix.lower() in _OF_MOTIONS):
         raise ShapeError(
             f"{body[:_LONGEST_SHOWN]} is a motion; the body comes before it, as in `shapephase split cat cat_righting`"
         )
-    return load_body(body, isolate=True)
+    return load_body(body, isolate=True, **vars(floating))
 
 
 def joint_motion(

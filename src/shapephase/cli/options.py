@@ -100,6 +100,29 @@ class PrintOptions:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
+class BodyOptions:
+    """What floats, of an MJCF file; each is an argument of `load_body`."""
+
+    root: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Of an MJCF file: free removes the hinges and slides between the world and the body, as planar "
+            "walkers have them, without unit; without it they are an error. For example `--root free`.",
+        ),
+    ] = None
+    root_body: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Of an MJCF file: the body that floats, with all that hangs on it, without unit; needed where the "
+            "file has several. For example `--root-body torso`.",
+        ),
+    ] = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
 class FlightOptions:
     """How the body flies: its momentum, and its attitude at the start."""
 
@@ -297,6 +320,7 @@ class ErrorOptions:
 
 
 AS_TEXT = PrintOptions()
+AS_WRITTEN = BodyOptions()
 EXACT = ErrorOptions()
 AT_REST = FlightOptions()
 AS_RECORDED = RecordingOptions()

@@ -6,7 +6,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .options import AS_RECORDED, AS_TEXT, BodyArgument, MotionArgument, PrintOptions, RecordingOptions
+from .options import (
+    AS_RECORDED,
+    AS_TEXT,
+    AS_WRITTEN,
+    BodyArgument,
+    BodyOptions,
+    MotionArgument,
+    PrintOptions,
+    RecordingOptions,
+)
 from .outcome import Outcome
 from .progress import steps
 
@@ -28,6 +37,7 @@ def orbits_command(
         ),
     ] = "horizontal",
     tolerance: float | None = None,
+    floating: BodyOptions = AS_WRITTEN,
     recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
@@ -62,7 +72,7 @@ def orbits_command(
     link = gauge_link(gauge)
     with steps(3) as work:
         work.begin("loading")
-        loaded = body_argument(body)
+        loaded = body_argument(body, floating)
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
         path, recorded = joint_motion(motion, loaded, recording)

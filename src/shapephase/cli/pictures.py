@@ -9,8 +9,10 @@ from ..errors import ShapeError, unknown_name
 from .options import (
     AS_RECORDED,
     AS_TEXT,
+    AS_WRITTEN,
     AT_REST,
     BodyArgument,
+    BodyOptions,
     FigureFile,
     FlightOptions,
     Gauge,
@@ -29,6 +31,7 @@ def view_command(
     motion: MotionArgument,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     flight: FlightOptions = AT_REST,
     html: Path | None = None,
     video: Path | None = None,
@@ -69,7 +72,7 @@ def view_command(
         check_video(video, FILM_SIZE)
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail)
+        flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail, floating=floating)
         if html is not None or video is not None:
             work.begin("recording the animation")
             if html is not None:
@@ -97,6 +100,7 @@ def plot_command(
     /,
     *,
     out: FigureFile,
+    floating: BodyOptions = AS_WRITTEN,
     flight: FlightOptions = AT_REST,
     gauge: Gauge = "horizontal",
     recording: RecordingOptions = AS_RECORDED,
@@ -121,7 +125,7 @@ def plot_command(
         raise ShapeError(f"the figure {kind!r} needs an angular momentum: give one by --momentum")
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, progress=work.watch, gauge=gauge)
+        flown = motions.flight(body, motion, flight, recording, progress=work.watch, gauge=gauge, floating=floating)
         work.begin(f"drawing {kind.replace('_', ' ')}")
         write_figure(kind, flown.motion, out, flown.path, gauge)
         say_written(out)

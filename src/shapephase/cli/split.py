@@ -7,9 +7,11 @@ from pathlib import Path
 from .options import (
     AS_RECORDED,
     AS_TEXT,
+    AS_WRITTEN,
     AT_REST,
     EXACT,
     BodyArgument,
+    BodyOptions,
     ErrorOptions,
     FlightOptions,
     Gauge,
@@ -33,6 +35,7 @@ def split_command(
     motion: MotionArgument,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     flight: FlightOptions = AT_REST,
     gauge: Gauge = "horizontal",
     tolerance: Tolerance = 1e-9,
@@ -73,7 +76,7 @@ def split_command(
         up_axis(up, None)
     with steps(13 if html else 2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge)
+        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge, floating=floating)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
         bars = error_bars(flown.motion, errors, flown.recorded, flown.fitted)

@@ -7,8 +7,10 @@ from pathlib import Path
 from .options import (
     AS_RECORDED,
     AS_TEXT,
+    AS_WRITTEN,
     AT_REST,
     BodyArgument,
+    BodyOptions,
     FlightOptions,
     MotionArgument,
     PrintOptions,
@@ -25,6 +27,7 @@ def torques_command(
     motion: MotionArgument,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     flight: FlightOptions = AT_REST,
     tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = AS_RECORDED,
@@ -49,7 +52,7 @@ def torques_command(
     aside = check_writable(out, "--out", ".csv")
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch)
+        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, floating=floating)
         work.begin("inverse dynamics")
         found = joint_torques(flown.motion)
         if out is not None:

@@ -16,6 +16,7 @@ POSES = 3
 """Random shapes and rates at which the engine's inertia and momentum are compared with ours."""
 SEED = 20060518
 """Any number: the random shapes are the same at every loading."""
+_NO_OFFSET = np.zeros(3)
 
 
 class UnusableModelError(Exception):
@@ -63,19 +64,32 @@ class Chain:
         axes : name, "revolute" or "prismatic", axis (3,), limits [rad or m]; none: the links are fixed to each other
         """
         if not axes:
-            self._join(f"{child}_fixed", "fixed", parent, child, place, turn, np.array([1.0, 0.0, 0.0]), None)
+            self.add_joint(f"{child}_fixed", "fixed", parent, child, place, turn, np.array([1.0, 0.0, 0.0]), None)
         for number, (name, kind, axis, limits) in enumerate(axes):
             last = number == len(axes) - 1
             below = child if last else f"{child}__{name}"
             if not last:
                 self.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
                 self.frames.append(below)
-            self._join(name, kind, parent, below, place, turn, axis, limits)
+            self.add_joint(name, kind, parent, below, place, turn, axis, limits)
             parent, place, turn = below, np.zeros(3), np.eye(3)
 
-    def _join(
-        self, name: str, kind: str, parent: str, child: str, place: Array, turn: Array, axis: Array, limits: Any
+    def add_joint(
+        self,
+        name: str,
+        kind: str,
+        parent: str,
+        child: str,
+        place: Array,
+        turn: Array,
+        axis: Array,
+        limits: Any,
+        after: Array = _NO_OFFSET,
+        line: int = 1,
     ) -> None:
+        """One joint, as the fields of `Joint`; limits None: it has none."""
+        if any(joint["name"] == name for joint in self.joints):
+            raise UnusableModelError(f"joint {name!r}: two joints have this name; rename one", line)
         self.joints.append({
             "name": name,
             "kind": kind,
@@ -84,6 +98,8 @@ class Chain:
             "place": np.ravel(place).tolist(),
             "turn": np.ravel(turn).tolist(),
             "axis": np.ravel(axis).tolist(),
+            "after": np.ravel(after).tolist(),
+            "line": line,
             "limits": None if limits is None else [float(limits[0]), float(limits[1])],
         })  # fmt: skip
 
@@ -126,17 +142,22 @@ class Chain:
         inertia: Array,
         momentum: Array,
         tolerance: tuple[float, float],
+        whole: tuple[float, Array] | None = None,
     ) -> None:
         """What the engine has at a shape: I (3, 3) [kg m^2] and L_o (3,) [kg m^2/s], axes of the root link.
 
         tolerance : of both, as shares of their largest terms
+        whole : its mass [kg] and centre of mass (3,) [m], from the root link's origin; None: not compared
         """
+        mass, centre = whole or (None, None)
         self.poses.append({
             "shape": shape,
             "rate": rate,
             "inertia": np.ravel(inertia).tolist(),
             "momentum": np.ravel(momentum).tolist(),
             "tolerance": list(tolerance),
+            "mass": mass,
+            "centre": None if centre is None else np.ravel(centre).tolist(),
         })  # fmt: skip
 
     def spoken(self) -> dict[str, Any]:

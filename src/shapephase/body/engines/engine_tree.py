@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,16 @@ from ..body import Body
 from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction
 from .formats import FORMATS
-from .reading import MEMORY, MISSING, NO_MEMORY, REFUSED
+from .reading import BODY, MEMORY, MISSING, NO_MEMORY, REFUSED, SHAPES
 
 _SECONDS = 60
 """[s] for the imports and the file; it only ends what would never end."""
 
 
-def engine_tree(path: Path, name: str) -> tuple[LinkTree, list[dict[str, Any]]]:
+def engine_tree(path: Path, name: str, options: Mapping[str, str]) -> tuple[LinkTree, list[dict[str, Any]]]:
     """Links and joints of a file in a format that an engine owns, and what the engine has at some shapes.
+
+    options : arguments of the reader's `chain_of`
 
     Raises
     ------
@@ -33,10 +36,19 @@ def engine_tree(path: Path, name: str) -> tuple[LinkTree, list[dict[str, Any]]]:
     ModelFileError
         If it does not accept the file, crashes on it or hangs.
     """
+    return _tree_of(_answer(path, name, BODY, json.dumps(dict(options))), str(path))
+
+
+def engine_shapes(path: Path, name: str) -> dict[str, Any]:
+    """What can be drawn of such a file, as its reader says it. Raises what `engine_tree` raises."""
+    return _answer(path, name, SHAPES)
+
+
+def _answer(path: Path, name: str, *words: str) -> dict[str, Any]:
     known, where = FORMATS[name], str(path)
     source = "from shapephase.body.engines.reading import read_in_this_process as read; read()"
     try:
-        child = run_alone(source, (str(path.absolute()), name), b"", _SECONDS)
+        child = run_alone(source, (str(path.absolute()), name, *words), b"", _SECONDS)
     except subprocess.TimeoutExpired:
         raise ModelFileError(f"{where}:1: {known.engine} took more than {_SECONDS} s and was stopped") from None
     if child.returncode == MISSING:
@@ -53,7 +65,7 @@ def engine_tree(path: Path, name: str) -> tuple[LinkTree, list[dict[str, Any]]]:
     if child.returncode:
         said = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
         raise ModelFileError(f"{where}:1: {known.engine} does not read it: {''.join(said) or 'it says nothing'}")
-    return _tree_of(json.loads(child.stdout), where)
+    return json.loads(child.stdout)
 
 
 def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str, Any]]]:
@@ -67,20 +79,23 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
     joints = [
         Joint(
             name=entry["name"],
-            where=where,
+            where=f"{where}:{entry['line']}",
             kind=entry["kind"],
             parent=entry["parent"],
             child=entry["child"],
             place=np.array(entry["place"]),
             turn=np.array(entry["turn"]).reshape(3, 3),
             axis=np.array(entry["axis"]),
-            after=np.zeros(3),
+            after=np.array(entry["after"]),
             limits=(-np.inf, np.inf) if entry["limits"] is None else (entry["limits"][0], entry["limits"][1]),
         )
         for entry in said["joints"]
     ]
     first, ordered = from_the_root(links, joints, where)
-    # Parents before children, as every tree of links has them.
+    reached = {first}
+    # The engine's own order, where it has parents before children, as every tree of links has them.
+    if all(joint.parent in reached and not reached.add(joint.child) for joint in joints):
+        ordered = tuple(joints)
     sorted_links = {name: links[name] for name in (first, *(joint.child for joint in ordered))}
     notes = tuple(f"{where}:1: {note}" for note in said["notes"])
     couplings = {name: _coupling(rule) for name, rule in said["couplings"].items()}
@@ -100,18 +115,22 @@ def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]]
     Raises
     ------
     ModelFileError
-        If inertia or momentum at a random shape and rate differ by more than rounding.
+        If mass, centre, inertia or momentum at a random shape and rate differ by more than rounding.
     """
     for pose in poses:
         shape = np.array([pose["shape"][name] for name in body.joint_names])
         rate = np.array([pose["rate"][name] for name in body.joint_names])
         *_, extent, motion = inertia_and_momentum(tree, pose["shape"], pose["rate"])
-        found = body.locked_inertia(shape).ravel(), body.internal_momentum(shape, rate)
-        for what, got, scale, share in zip(
-            ("inertia", "momentum"), found, (extent, motion), pose["tolerance"], strict=True
-        ):
+        exact, coarse = pose["tolerance"]
+        allowed = {"inertia": exact * extent, "momentum": coarse * motion}
+        found = {"inertia": body.locked_inertia(shape).ravel(), "momentum": body.internal_momentum(shape, rate)}
+        if pose["mass"] is not None:
+            # The centre is off by its share of the size of the body.
+            allowed |= {"mass": exact * body.mass, "centre": exact * np.sqrt(extent / body.mass)}
+            found |= {"mass": np.array(body.mass), "centre": body.centre_of_mass(shape)}
+        for what, got in found.items():
             # A comparison that NaN fails.
-            if not np.all(np.abs(got - np.array(pose[what])) <= share * scale):
+            if not np.all(np.abs(got - np.array(pose[what])) <= allowed[what]):
                 raise ModelFileError(
                     f"{where}:1: the engine has another {what} at a random shape: {pose[what]} against {got.tolist()}; "
                     "please report this file"

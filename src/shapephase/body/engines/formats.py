@@ -8,6 +8,9 @@ from typing import NamedTuple
 _HEAD = 65536
 """[bytes] of a file that are looked at to tell its format."""
 
+MJCF = "mjcf"
+"""The one of these formats in which what floats can be chosen."""
+
 
 class Format(NamedTuple):
     """A format that an engine owns."""
@@ -16,27 +19,36 @@ class Format(NamedTuple):
     engine: str  # the module to import
     extra: str  # of this package, which installs it
     module: str  # the reader beside this module
+    drawing: str = ""  # the reader of what can be drawn
 
 
 FORMATS = {
+    MJCF: Format("an MJCF model", "mujoco", "mjcf", ".mujoco_reading", ".mujoco_drawing"),
     "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading"),
     "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading"),
     "yeadon": Format("measurements for Yeadon's model", "yeadon", "yeadon", ".yeadon_reading"),
 }
 """By our name."""
 _COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/|\s+", re.DOTALL)
+_BEFORE_XML = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*>|\s+", re.DOTALL)
 
 
 def format_of(content: bytes) -> str | None:
-    """The name of the format, by content; None for XML and everything else."""
-    head = content[:_HEAD]
-    start = 3 if head.startswith(b"\xef\xbb\xbf") else 0
-    while found := _COMMENT.match(head, start):
-        start = found.end()
-    if re.match(rb"version\s+\d", head[start:], re.IGNORECASE):
+    """The name of the format, by content; None for a URDF and everything else."""
+    head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
+    if re.match(rb"<mujoco[\s/>]", _after(_BEFORE_XML, head)):
+        return MJCF
+    if re.match(rb"version\s+\d", _after(_COMMENT, head), re.IGNORECASE):
         return "biomod"
     if re.search(rb"<OpenSimDocument[\s>]", head):
         return "opensim"
     if re.search(rb"^\s*measurementconversionfactor\s*:", head, re.MULTILINE):
         return "yeadon"
     return None
+
+
+def _after(passed: re.Pattern[bytes], head: bytes) -> bytes:
+    start = 0
+    while found := passed.match(head, start):
+        start = found.end()
+    return head[start:]

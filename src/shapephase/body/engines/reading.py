@@ -12,8 +12,12 @@ from typing import TextIO
 
 from ...child_process import limit_this_process
 from .chain import UnusableModelError
-from .formats import FORMATS
+from .formats import FORMATS, Format
 
+BODY = "body"
+"""What is asked of a file: its links and joints."""
+SHAPES = "shapes"
+"""The same: what can be drawn."""
 MISSING = 4
 """Exit code where the engine is not installed."""
 REFUSED = 5
@@ -25,8 +29,11 @@ MEMORY = 1024 * 2**20
 
 
 def read_in_this_process() -> None:
-    """Read the file of the first argument in the format of the second, and end the process."""
-    path, name = sys.argv[1:3]
+    """Read the file of the first argument in the format of the second, and end the process.
+
+    The third is `BODY`, and then come options as JSON, or it is `SHAPES`.
+    """
+    path, name, what, *options = sys.argv[1:]
     known = FORMATS[name]
     if find_spec(known.engine) is None:
         sys.exit(MISSING)
@@ -37,22 +44,22 @@ def read_in_this_process() -> None:
     sys.path[:] = map(os.path.abspath, sys.path)
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        code = _answered(path, known.module, answer)
+        code = _answered(path, known, what, options, answer)
         os.chdir(os.path.sep)
     answer.flush()
     sys.exit(code)
 
 
-def _answered(path: str, module: str, answer: TextIO) -> int:
+def _answered(path: str, known: Format, what: str, options: list[str], answer: TextIO) -> int:
     """Write what the reader says; the exit code."""
-    reader = import_module(module, __package__)
+    reader = import_module(known.module if what == BODY else known.drawing, __package__)
     limit_this_process(MEMORY)
     try:
-        chain = reader.chain_of(path)
+        said = reader.chain_of(path, **json.loads(*options)).spoken() if what == BODY else reader.shapes_of(path)
     except MemoryError:
         return NO_MEMORY
     except UnusableModelError as error:
         answer.write(json.dumps({"message": str(error), "line": error.line}))
         return REFUSED
-    answer.write(json.dumps(chain.spoken()))
+    answer.write(json.dumps(said))
     return 0

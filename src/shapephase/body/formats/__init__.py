@@ -1,1 +1,1 @@
-"""Bodies in files: URDF and MJCF, read from their XML."""
+"""Bodies in files that we read: URDF, from its XML."""

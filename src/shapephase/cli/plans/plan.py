@@ -18,7 +18,7 @@ from cyclopts import Parameter
 
 from ...errors import PlanNotFound, ShapeError
 from ..exit_codes import ExitCode
-from ..options import AS_TEXT, BodyArgument, Momentum, PrintOptions, ReportFile
+from ..options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, Momentum, PrintOptions, ReportFile
 from ..outcome import Outcome, check_writable
 from ..progress import Steps, steps
 from ..terminal import say_written
@@ -38,6 +38,7 @@ def plan_command(
     body: BodyArgument,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     turn: str | None = None,
     point: Annotated[tuple[str, str] | None, Parameter(negative_iterable="")] = None,
     rotate: float | None = None,
@@ -147,7 +148,7 @@ def plan_command(
     aside = check_writable(html, "--html", ".html") or aside
     with steps(12 if html else 2) as work:
         work.begin("loading")
-        loaded = load_body(body, isolate=True)
+        loaded = load_body(body, isolate=True, **vars(floating))
         start = None if from_ is None else posture(loaded, from_, "--from", first=True)
         end = to if to in (None, "free") else posture(loaded, to, "--to", first=False)
         goal = words.goal(loaded, _shape_at_end(loaded, start, end))

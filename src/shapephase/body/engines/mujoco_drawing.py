@@ -1,0 +1,86 @@
+"""What MuJoCo's own viewer would show of a body: geoms and meshes, as plain numbers."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from typing import Any
+
+# What its compiled part brings, a type checker does not see.
+# pyright: reportAttributeAccessIssue=false
+import mujoco
+import numpy as np
+
+from .mujoco_model import Compiled, compiled_model, rotation
+
+_KINDS = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", (1.0,)),
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", (1.0, 2.0)),
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", (1.0, 2.0)),
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): ("ellipsoid", (1.0, 1.0, 1.0)),
+    int(mujoco.mjtGeom.mjGEOM_BOX): ("box", (2.0, 2.0, 2.0)),
+    int(mujoco.mjtGeom.mjGEOM_MESH): ("mesh", ()),
+}
+"""What each kind is called, and what its sizes are multiplied by: MuJoCo has half lengths."""
+_SHOWN_GROUPS = (0, 1, 2)
+"""Of geoms, that MuJoCo's viewer shows; the others are for collisions."""
+_GREY = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
+"""The colour of a geom that states none, which its material then has."""
+
+
+def shapes_of(path: str) -> dict[str, Any]:
+    """The geoms to be drawn, and the meshes that they name by number.
+
+    Vertices are float32 [m] and faces int32, each in Base64.
+    """
+    compiled = compiled_model(path, drawn=True)
+    model = compiled.model
+    drawn = [geom for body in range(1, model.nbody) for geom in _drawn(model, body)]
+    meshes = sorted({int(model.geom_dataid[geom]) for geom in drawn if _kind(model, geom) == "mesh"})
+    return {
+        "shapes": [_shape(compiled, geom) for geom in drawn],
+        "meshes": {str(mesh): _mesh(model, mesh) for mesh in meshes},
+    }
+
+
+def _drawn(model: Any, body: int) -> list[int]:
+    """Of the geoms of a body, those that the viewer shows, or all if it shows none."""
+    first = int(model.body_geomadr[body])
+    geoms = range(first, first + int(model.body_geomnum[body]))
+    solid = [geom for geom in geoms if int(model.geom_type[geom]) in _KINDS]
+    return [geom for geom in solid if int(model.geom_group[geom]) in _SHOWN_GROUPS] or solid
+
+
+def _kind(model: Any, geom: int) -> str:
+    return _KINDS[int(model.geom_type[geom])][0]
+
+
+def _shape(compiled: Compiled, geom: int) -> dict[str, Any]:
+    model = compiled.model
+    kind, factors = _KINDS[int(model.geom_type[geom])]
+    colour, material = model.geom_rgba[geom], int(model.geom_matid[geom])
+    if material >= 0 and np.array_equal(colour, _GREY):
+        colour = model.mat_rgba[material]
+    return {
+        "link": compiled.names[int(model.geom_bodyid[geom])],
+        "kind": kind,
+        "dimensions": [factor * size for factor, size in zip(factors, model.geom_size[geom].tolist(), strict=False)],
+        "place": model.geom_pos[geom].tolist(),
+        "turn": rotation(model.geom_quat[geom]).ravel().tolist(),
+        # MuJoCo keeps them in single precision.
+        "colour": [round(min(max(float(part), 0.0), 1.0), 6) for part in colour],
+        "mesh": str(int(model.geom_dataid[geom])) if kind == "mesh" else None,
+    }
+
+
+def _mesh(model: Any, mesh: int) -> dict[str, str]:
+    vertices = _part(model.mesh_vert, model.mesh_vertadr[mesh], model.mesh_vertnum[mesh])
+    faces = _part(model.mesh_face, model.mesh_faceadr[mesh], model.mesh_facenum[mesh])
+    return {"vertices": _text(vertices, "<f4"), "faces": _text(faces, "<i4")}
+
+
+def _part(rows: Any, first: int, count: int) -> Any:
+    return rows[int(first) : int(first) + int(count)]
+
+
+def _text(numbers: Any, kind: str) -> str:
+    return b64encode(np.ascontiguousarray(numbers, kind).tobytes()).decode()

@@ -1,0 +1,198 @@
+"""An MJCF file as MuJoCo compiles it, and which of its bodies floats."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is drawn here
+
+# What its compiled part brings, a type checker does not see.
+# pyright: reportAttributeAccessIssue=false
+import mujoco
+import numpy as np
+
+from ...arrays import Array
+from ..formats.xml_text import xml_tree
+from .chain import UnusableModelError
+
+FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+BALL = int(mujoco.mjtJoint.mjJNT_BALL)
+SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
+"""Kinds of joints; the fourth is a hinge."""
+_PASSED_OVER = {
+    "frame": ("name", "childclass", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
+    "replicate": ("count", "sep", "offset", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
+}
+"""The attributes of elements whose other attributes MuJoCo passes over in silence."""
+_MEMORY = 64 * 2**20
+"""[bytes] for what MuJoCo computes with, the squares of two thousand coordinates."""
+_MOST_SAID = 20
+"""Names that a message lists."""
+_TAG_LINES = 3
+"""Lines over which the tag of an element may run before its name."""
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A model, the names that its bodies have as links, and their lines where the file itself has them."""
+
+    model: Any
+    names: list[str]
+    lines: dict[tuple[str, int], int]
+
+    def below(self, base: int) -> list[int]:
+        """A body and all that hang on it, parents first."""
+        found = {base}
+        for body in range(base + 1, self.model.nbody):
+            if int(self.model.body_parentid[body]) in found:
+                found.add(body)
+        return sorted(found)
+
+    def joints_of(self, body: int) -> range:
+        """Numbers of the joints between a body and the one it hangs on."""
+        first = int(self.model.body_jntadr[body])
+        return range(first, first + int(self.model.body_jntnum[body]))
+
+    def joint_name(self, joint: int) -> str:
+        """Its own, or one after the body that it moves."""
+        body = int(self.model.jnt_bodyid[joint])
+        return self.model.joint(joint).name or f"{self.names[body]}_joint{joint - self.joints_of(body)[0] + 1}"
+
+    def line(self, number: int, kind: str = "body") -> int:
+        """Where a body or joint begins; 1 where that is in another file."""
+        return self.lines.get((kind, number), 1)
+
+
+def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
+    """What MuJoCo makes of a file, with shapes that are drawn only or not.
+
+    Raises UnusableModelError for what it does not accept.
+    """
+    content = Path(path).read_bytes()
+    text = content.decode("utf-8-sig", errors="replace")
+    _check_passed_over(content, path)
+    try:
+        written = mujoco.MjSpec.from_file(path)
+        # Threads would reserve memory by the gigabyte.
+        written.compiler.usethread = False
+        # Nor is there need of room for the contacts of a simulation.
+        written.memory, written.njmax, written.nconmax = _MEMORY, -1, -1
+        written.compiler.discardvisual = written.compiler.discardvisual and not drawn
+        model = written.compile()
+    except (ValueError, RuntimeError) as error:
+        raise _refused(str(error), text) from None
+    lines = text.splitlines()
+    begin = {
+        (kind, part.id): _line(part.info, part.name, lines)
+        for kind, parts in (("body", written.bodies), ("joint", written.joints))
+        for part in parts
+    }
+    begin["body", 0] = next((number for number, line in enumerate(lines, 1) if "<worldbody" in line), 1)
+    return Compiled(model, [model.body(body).name or f"body{body}" for body in range(model.nbody)], begin)
+
+
+def _check_passed_over(content: bytes, path: str) -> None:
+    """Raise UnusableModelError for an attribute that nothing would read: a misspelt place is a wrong place."""
+    for node in xml_tree(content, path).walk():
+        for name in set(node.attributes) - set(_PASSED_OVER.get(node.tag, node.attributes)):
+            near = difflib.get_close_matches(name, _PASSED_OVER[node.tag], 1)
+            meant = f"; did you mean {near[0]}=?" if near else ""
+            raise UnusableModelError(f"<{node.tag}>: MuJoCo passes over {name[:60]!r}{meant}", node.line)
+
+
+def _line(said: str, name: str, lines: list[str]) -> int:
+    """Where the element of this name begins; 1 if that is not in these lines."""
+    found = re.search(r"line (\d+)", said)
+    number = int(found[1]) if found else 1
+    here = 0 < number <= len(lines) and name in "\n".join(lines[number - 1 : number - 1 + _TAG_LINES])
+    return number if here else 1
+
+
+def _refused(said: str, text: str) -> UnusableModelError:
+    """What MuJoCo says, in one line, with the element and its line."""
+    words = " ".join(said.split())
+    at = re.search(r"\s*Element (name )?'([^']*)'(?:, id \d+)?(?:, line (\d+))?\.?$", words)
+    reason = re.sub(r"^(XML )?(Error: )+", "", words[: at.start()] if at else words)
+    reason += " (it may have run out of memory)" if "unknown exception" in reason else ""
+    element, number = "<mujoco>", 1
+    if at:
+        number = int(at[3] or 1)
+        here = "\n".join(text.splitlines()[number - 1 : number - 1 + _TAG_LINES])
+        tag = re.search(rf"<(\w+)[^<>]*\bname\s*=\s*[\"']{re.escape(at[2])}[\"']", here)
+        named = f"{tag[1]} {at[2]!r}" if tag else f"<mujoco>, element {at[2]!r}"
+        element = f"<{at[2]}>" if not at[1] else named if at[2] else element
+    if number == 0:
+        # Of what is included MuJoCo keeps no lines.
+        reason += "; in a file that is included"
+    return UnusableModelError(f"{element}: MuJoCo does not accept it: {reason}", max(number, 1))
+
+
+def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tuple[int, list[str]]:
+    """The body that floats, and notes on what is left out.
+
+    root : "free" removes the joints between it and what it hangs on
+    root_body : its name, where the file has several trees
+    """
+    model, names = compiled.model, compiled.names
+    notes: list[str] = []
+    if root_body is None:
+        base = _only_tree(compiled, notes)
+    elif root_body in names[1:]:
+        base = names.index(root_body, 1)
+    else:
+        near = difflib.get_close_matches(root_body, names[1:], 1) or names[1:]
+        raise UnusableModelError(
+            f"<worldbody>: root_body: no body is named {root_body[:60]!r}; there is {listed(near)}", compiled.line(0)
+        )
+    if model.body_mocapid[base] >= 0:
+        raise UnusableModelError(
+            f"body {names[base]!r}: a mocap body is moved from outside; name another by root_body", compiled.line(base)
+        )
+    holding = [compiled.joint_name(joint) for joint in compiled.joints_of(base) if model.jnt_type[joint] != FREE]
+    if holding and root is None:
+        above = int(model.body_parentid[base])
+        raise UnusableModelError(
+            f"body {names[base]!r}: a joint between {repr(names[above]) if above else 'the world'} and the body that "
+            f'floats, {listed(holding)}; a free body has none: root="free" (--root free) removes it',
+            compiled.line(base),
+        )
+    return base, notes
+
+
+def _only_tree(compiled: Compiled, notes: list[str]) -> int:
+    """The body in the world that moves, or on which others move."""
+    model, names = compiled.model, compiled.names
+    tops = [body for body in range(1, model.nbody) if model.body_parentid[body] == 0]
+    if not tops:
+        raise UnusableModelError("<worldbody>: there is no <body> in it; a free body needs one", compiled.line(0))
+    moving = [body for body in tops if any(len(compiled.joints_of(part)) for part in compiled.below(body))]
+    trees = moving or tops
+    if len(trees) > 1:
+        found = [names[body] for body in trees]
+        raise UnusableModelError(
+            f"body {found[1]!r}: {len(trees)} bodies in the world, one is a free body: {listed(found)}; say which one "
+            f"by root_body={found[0]!r} (--root-body {found[0]})",
+            compiled.line(trees[1]),
+        )
+    left = [names[body] for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]
+    if left:
+        notes.append(f"what stands still in the world is left out: {listed(left)}")
+    return trees[0]
+
+
+def listed(names: list[str]) -> str:
+    """Names for a message, the first of many."""
+    shown = ", ".join(map(repr, names[:_MOST_SAID]))
+    return shown if len(names) <= _MOST_SAID else f"{shown} and {len(names) - _MOST_SAID} more"
+
+
+def rotation(quaternion: Array) -> Array:
+    """Of a quaternion w x y z of length one, or nearly: (3, 3)."""
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew)

@@ -1,0 +1,337 @@
+"""MJCF models, as MuJoCo (Todorov, Erez and Tassa 2012) compiles them.
+
+Includes, defaults, frames, replicas, attachments, meshes with mass and the settings of the compiler are MuJoCo's; what
+is taken over is the compiled tree of bodies, joints and inertias, and which joints follow others. The motor inertia of
+joints (`armature`) belongs to no link and is left out.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+# What its compiled part brings, a type checker does not see.
+# pyright: reportAttributeAccessIssue=false
+import mujoco
+import numpy as np
+
+from ...arrays import Array
+from .._link_tree import MOST_LINKS, MOST_MASS
+from .chain import Chain, UnusableModelError, locked_inertia
+from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
+
+_COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
+_CONNECT = int(mujoco.mjtEq.mjEQ_CONNECT)
+_WELD = int(mujoco.mjtEq.mjEQ_WELD)
+"""Kinds of equalities."""
+_BY_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
+_BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
+"""Of what tendons are led over, that which says to which body it belongs."""
+_OF_SITES = int(mujoco.mjtObj.mjOBJ_SITE)
+_EXACT = 1e-12
+"""Share of the largest terms by which MuJoCo's numbers may differ from ours."""
+_FRAMES = 10.0
+"""Times what quaternions and axes lack of length one."""
+_MOST_LENGTH = 1e6
+"""[m] of places: farther away, differences are lost."""
+_MOST_NAME = 256
+"""Characters of a name, which appears whole in messages and tables."""
+
+
+class Rule(NamedTuple):
+    """Of a joint that follows one other or none: `start` + sum of powers[p] (coordinate of the other - about)^p."""
+
+    leaders: tuple[int, ...]
+    start: float
+    powers: list[float]
+    about: float
+
+
+def chain_of(path: str, root: str | None = None, root_body: str | None = None) -> Chain:
+    """Links and joints of an MJCF file.
+
+    root : "free" removes the joints between the body that floats and the world
+    root_body : the body that floats, with all that hangs on it
+    """
+    compiled = compiled_model(path)
+    base, notes = base_of(compiled, root, root_body)
+    bodies = compiled.below(base)
+    if len(bodies) > MOST_LINKS:
+        raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")
+    own = set(bodies)
+    chain = Chain(_model_name(compiled.model) or Path(path).stem, notes=notes)
+    rules = _rules(compiled, own, base)
+    _check_carried(compiled, own)
+    for body in bodies:
+        _add_link(chain, compiled, body)
+        if body != base:
+            _add_joints(chain, compiled, body)
+    for joint, rule in rules.items():
+        terms = [
+            (compiled.joint_name(leader), np.zeros(0), np.array([rule.about]), np.array(rule.powers)[:, None])
+            for leader in rule.leaders
+        ]
+        chain.couple(compiled.joint_name(joint), rule.start, terms)
+    chain.notes += _ignored(compiled, own)
+    if compiled.model.body_subtreemass[base] > 0.0:
+        _add_poses(chain, compiled, bodies, rules)
+    return chain
+
+
+def _model_name(model: Any) -> str:
+    return bytes(model.names).split(b"\0", 1)[0].decode(errors="replace")
+
+
+# ---- Links and joints -----------------------------------------------------------------------------------------------
+
+
+def _add_link(chain: Chain, compiled: Compiled, body: int) -> None:
+    model, name, line = compiled.model, compiled.names[body], compiled.line(body)
+    _check_name(name, f"body {name!r}", line)
+    mass, moments = float(model.body_mass[body]), model.body_inertia[body]
+    if not max(mass, np.abs(moments).max()) < MOST_MASS:
+        numbers = f"{mass:g} kg, moments {moments.tolist()} kg m^2"
+        raise UnusableModelError(f"body {name!r}: {numbers}: too large, less than {MOST_MASS:g} is needed", line)
+    lengths = np.concatenate([model.body_pos[body], model.body_ipos[body]])
+    _check_places(lengths, np.concatenate([model.body_quat[body], model.body_iquat[body]]), f"body {name!r}", line)
+    turn = rotation(model.body_iquat[body])
+    tensor = turn @ np.diag(moments) @ turn.T
+    chain.add_link(name, mass, model.body_ipos[body], 0.5 * (tensor + tensor.T), line)
+
+
+def _check_name(name: str, owner: str, line: int) -> None:
+    if len(name) > _MOST_NAME:
+        raise UnusableModelError(f"{owner[:60]}: {len(name)} characters; up to {_MOST_NAME} are allowed", line)
+    if not name.isprintable() or name.isspace():
+        raise UnusableModelError(f"{owner}: a name with characters that cannot be printed; rename it", line)
+
+
+def _check_places(places: Array, directions: Array, owner: str, line: int) -> None:
+    if not np.isfinite(directions).all():
+        raise UnusableModelError(f"{owner}: it is turned by {directions.tolist()}: finite numbers are needed", line)
+    if not np.abs(places).max() < _MOST_LENGTH:
+        raise UnusableModelError(f"{owner}: its places {places.tolist()} m: less than {_MOST_LENGTH:g} is needed", line)
+
+
+def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
+    """The joints of a body, one after the other, each about its own place in the body."""
+    model, child = compiled.model, compiled.names[body]
+    parent = compiled.names[int(model.body_parentid[body])]
+    place, turn = model.body_pos[body], rotation(model.body_quat[body])
+    joints = compiled.joints_of(body)
+    if not joints:
+        chain.add_joints(parent, child, place, turn, [])
+    anchor = np.zeros(3)
+    for joint in joints:
+        name, axis = compiled.joint_name(joint), model.jnt_axis[joint]
+        owner, line = f"joint {name!r}", compiled.line(joint, "joint")
+        _check_name(name, owner, line)
+        _check_places(model.jnt_pos[joint], axis, owner, line)
+        if model.jnt_type[joint] == BALL:
+            raise UnusableModelError(f"{owner}: a ball joint; joints of one axis are supported: use three hinges", line)
+        sliding = model.jnt_type[joint] == SLIDE
+        place = place + turn @ (model.jnt_pos[joint] - anchor)
+        anchor = model.jnt_pos[joint]
+        # The coordinate does not begin at zero where the file has the body.
+        by = -_reference(model, joint)
+        place, turn = (place + by * (turn @ axis), turn) if sliding else (place, turn @ _about(axis, by))
+        lower, upper = model.jnt_range[joint].tolist()
+        if lower > upper:
+            raise UnusableModelError(
+                f"{owner}: range: the lower limit {lower:g} is above the upper one, {upper:g}", line
+            )
+        limits = [lower, upper] if model.jnt_limited[joint] else None
+        kind = "prismatic" if sliding else "continuous" if limits is None else "revolute"
+        last = joint == joints[-1]
+        below = child if last else f"{child}\0{name}"
+        if not last:
+            # Between two joints of a body lie axes that are no link.
+            chain.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
+            chain.frames.append(below)
+        after = -anchor if last else np.zeros(3)
+        chain.add_joint(name, kind, parent, below, place, turn, axis, limits, after, line)
+        parent, place, turn = below, np.zeros(3), np.eye(3)
+
+
+def _about(axis: Array, angle: float) -> Array:
+    return rotation(np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis]))
+
+
+# ---- Equalities and what else holds parts together ------------------------------------------------------------------
+
+
+def _rules(compiled: Compiled, own: set[int], base: int) -> dict[int, Rule]:
+    """The joints of the body that follow others, by equalities of joints; those at the root are gone."""
+    model = compiled.model
+    joints = {joint for body in own - {base} for joint in compiled.joints_of(body)}
+    rules: dict[int, Rule] = {}
+    for number in _active(model, _COUPLED):
+        follower, leader = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+        if follower not in joints:
+            continue
+        owner, line = f"joint {compiled.joint_name(follower)!r}", compiled.line(follower, "joint")
+        if follower in rules:
+            raise UnusableModelError(f"{owner}: two equalities hold it; keep one", line)
+        here, powers = _reference(model, follower), model.eq_data[number, :5].tolist()
+        if leader < 0:
+            rules[follower] = Rule((), here + powers[0], [], 0.0)
+            continue
+        if leader not in joints:
+            raise UnusableModelError(
+                f"{owner}: it follows {compiled.joint_name(leader)!r}, which does not belong to the free body; remove "
+                "the equality",
+                line,
+            )
+        rules[follower] = Rule((leader,), here, powers, _reference(model, leader))
+    for joint in rules:
+        _check_no_circle(compiled, joint, rules)
+    return rules
+
+
+def _reference(model: Any, joint: int) -> float:
+    """The coordinate at which the body is where the file has it."""
+    return float(model.qpos0[model.jnt_qposadr[joint]])
+
+
+def _check_no_circle(compiled: Compiled, joint: int, rules: dict[int, Rule]) -> None:
+    seen, leader = {joint}, joint
+    while leader in rules and rules[leader].leaders:
+        (leader,) = rules[leader].leaders
+        if leader in seen:
+            raise UnusableModelError(
+                f"joint {compiled.joint_name(joint)!r}: by equalities joints follow each other in a circle; remove one",
+                compiled.line(joint, "joint"),
+            )
+        seen.add(leader)
+
+
+def _coordinate(joint: int, rules: dict[int, Rule], own: dict[int, tuple[float, float]]) -> tuple[float, float]:
+    """Coordinate and rate of a joint, where those that follow no other have their own."""
+    rule = rules.get(joint)
+    if rule is None:
+        return own[joint]
+    value, speed = rule.start, 0.0
+    for leader in rule.leaders:
+        at, rate = _coordinate(leader, rules, own)
+        polynomial = np.polynomial.Polynomial(rule.powers)
+        value += float(polynomial(at - rule.about))
+        speed += float(polynomial.deriv()(at - rule.about)) * rate
+    return value, speed
+
+
+def _active(model: Any, *kinds: int) -> list[int]:
+    return [number for number in range(model.neq) if model.eq_active0[number] and int(model.eq_type[number]) in kinds]
+
+
+def _held(model: Any, number: int) -> tuple[int, int]:
+    """The two bodies that a weld or connection holds together."""
+    pair = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
+    if int(model.eq_objtype[number]) == _OF_SITES:
+        return int(model.site_bodyid[pair[0]]), int(model.site_bodyid[pair[1]])
+    return pair
+
+
+def _check_carried(compiled: Compiled, own: set[int]) -> None:
+    """That what is left out and moves is not tied to the body, and that no soft part is among its own."""
+    model = compiled.model
+    for number in _active(model, _CONNECT, _WELD):
+        one, other = _held(model, number)
+        outside = other if one in own else one
+        if (one in own) != (other in own) and model.body_treeid[outside] >= 0:
+            inside = one if one in own else other
+            raise UnusableModelError(
+                f"body {compiled.names[inside]!r}: {_equality(model, number)} makes it carry "
+                f"{compiled.names[outside]!r}, which is not part of the free body; remove one of them",
+                compiled.line(inside),
+            )
+    for flex in range(model.nflex):
+        first = int(model.flex_vertadr[flex])
+        soft = own & set(model.flex_vertbodyid[first : first + int(model.flex_vertnum[flex])].tolist())
+        if soft:
+            body = min(soft)
+            raise UnusableModelError(
+                f"body {compiled.names[body]!r}: soft bodies (flex) are no rigid links; remove them",
+                compiled.line(body),
+            )
+
+
+def _equality(model: Any, number: int) -> str:
+    kind = "weld" if int(model.eq_type[number]) == _WELD else "connect"
+    return f"the equality {model.eq(number).name or number!r} ({kind})"
+
+
+def _ignored(compiled: Compiled, own: set[int]) -> list[str]:
+    """What holds or drives joints of the body, of which a free body with given joints knows nothing."""
+    model = compiled.model
+    notes = []
+    for number in _active(model, _CONNECT, _WELD):
+        one, other = _held(model, number)
+        pair = f"{compiled.names[one]!r} and {compiled.names[other]!r}"
+        if one in own and other in own:
+            notes.append(f"{_equality(model, number)} of {pair} is ignored, every joint moves on its own")
+        elif one in own or other in own:
+            notes.append(f"{_equality(model, number)} of {pair} is ignored, the body is free")
+    tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
+    if tendons:
+        named = listed([model.tendon(tendon).name or str(tendon) for tendon in tendons])
+        notes.append(f"tendons are ignored, every joint moves on its own: {named}")
+    pairs = [
+        pair for pair in range(model.npair)
+        if {int(model.geom_bodyid[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])} & own
+    ]  # fmt: skip
+    if pairs:
+        named = listed([model.pair(pair).name or str(pair) for pair in pairs])
+        notes.append(f"contacts are ignored: {named}")
+    return notes
+
+
+def _led_over(model: Any, tendon: int) -> set[int]:
+    """The bodies of its joints and sites."""
+    first = int(model.tendon_adr[tendon])
+    found = set()
+    for wrap in range(first, first + int(model.tendon_num[tendon])):
+        kind, number = int(model.wrap_type[wrap]), int(model.wrap_objid[wrap])
+        if kind == _BY_JOINT:
+            found.add(int(model.jnt_bodyid[number]))
+        elif kind == _BY_SITE:
+            found.add(int(model.site_bodyid[number]))
+    return found
+
+
+# ---- What MuJoCo computes -------------------------------------------------------------------------------------------
+
+
+def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[int, Rule]) -> None:
+    """Mass, centre, inertia and momentum with the body that floats at rest."""
+    model, base = compiled.model, bodies[0]
+    names = {joint: compiled.joint_name(joint) for body in bodies[1:] for joint in compiled.joints_of(body)}
+    quaternions = np.concatenate([model.body_quat[bodies], model.body_iquat[bodies]])
+    lengths = np.concatenate([np.linalg.norm(quaternions, axis=1), np.linalg.norm(model.jnt_axis, axis=1)])
+    tolerance = _EXACT + _FRAMES * float(np.abs(lengths - 1.0).max())
+    # Near the origin nothing is lost by where the file puts the body.
+    above = base
+    while above:
+        model.body_pos[above], model.body_quat[above] = 0.0, (1.0, 0.0, 0.0, 0.0)
+        above = int(model.body_parentid[above])
+    data = mujoco.MjData(model)
+    for joint in compiled.joints_of(base):
+        if model.jnt_type[joint] == FREE:
+            first = int(model.jnt_qposadr[joint])
+            data.qpos[first : first + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    for shape, rate in chain.random_shapes():
+        own = {joint: (shape[name], rate[name]) for joint, name in names.items() if name in shape}
+        for joint in names:
+            value, speed = _coordinate(joint, rules, own)
+            data.qpos[model.jnt_qposadr[joint]], data.qvel[model.jnt_dofadr[joint]] = value, speed
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        axes = data.xmat[base].reshape(3, 3)
+        turns = data.ximat[bodies].reshape(-1, 3, 3)
+        tensors = turns @ (model.body_inertia[bodies][:, :, None] * np.swapaxes(turns, 1, 2))
+        inertia = locked_inertia(model.body_mass[bodies], data.xipos[bodies], tensors)
+        momentum = axes.T @ data.subtree_angmom[base]
+        centre = axes.T @ (data.subtree_com[base] - data.xpos[base])
+        whole = float(model.body_subtreemass[base]), centre
+        chain.add_pose(shape, rate, axes.T @ inertia @ axes, momentum, (tolerance, tolerance), whole)
