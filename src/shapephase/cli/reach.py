@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import AS_TEXT, BodyArgument, PrintOptions
+from .options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, PrintOptions
 from .outcome import Outcome, check_writable
 from .terminal import say_written
 
@@ -22,6 +22,7 @@ def reach_command(
     body: BodyArgument,
     /,
     *,
+    floating: BodyOptions = AS_WRITTEN,
     at: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)] = (),
     pairs: int = 10,
     out: Path | None = None,
@@ -49,7 +50,7 @@ def reach_command(
     aside = check_writable(out, "--out", *_ENDINGS)
     if pairs < 0:
         raise ShapeError(f"--pairs: a whole number, 0 or more, is needed, got {pairs}")
-    loaded = body_argument(body)
+    loaded = body_argument(body, floating)
     found = reachable(loaded, loaded.shape(dict(_coordinate(word) for word in at)))
     if out is not None:
         _draw(out, found)
