@@ -33,6 +33,8 @@ _NODES = 8
 _ACTIVE = 1e-6
 # The least range of a coordinate, so that a coordinate without any does not divide by zero [rad or m].
 _LEAST_RANGE = 1e-300
+# How often a correction is found anew because it would take rates beyond their limits.
+_ROUNDS = 6
 # Singular values of the correction's equations below this share of the largest come from held rates that depend on
 # each other, and are left out.
 _RANK = 1e-10
@@ -167,18 +169,67 @@ def _corrected(
     inverse = np.kron(np.linalg.inv(gram), np.eye(task.dimension))
     conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
     rows, right = np.concatenate([slopes, conditions]), np.concatenate([turn, np.zeros(len(conditions))])
-    if task.cost != "time":
-        held = _held_rates(task, basis, control, duration)
-        rows = np.concatenate([rows, held])
-        right = np.concatenate([right, np.zeros(len(held))])
     # The least change in the metric's norm: with C C^T its inverse, the shortest x of rows C x = right.
     root = np.linalg.cholesky(inverse[np.ix_(free, free)])
-    change = np.zeros(control.size)
-    change[free] = root @ np.linalg.lstsq(rows[:, free] @ root, right, rcond=_RANK)[0]
-    moved = np.clip(control + change.reshape(control.shape), task.lower, task.upper)
+    held = _Held.at_limits(task, basis, control, duration)
+    moved = control
+    for _ in range(_ROUNDS):
+        every, all_right = np.concatenate([rows, held.rows(basis)]), np.concatenate([right, held.changes])
+        change = np.zeros(control.size)
+        change[free] = root @ np.linalg.lstsq(every[:, free] @ root, all_right, rcond=_RANK)[0]
+        moved = np.clip(control + change.reshape(control.shape), task.lower, task.upper)
+        further = held.and_those_beyond(task, basis, control, moved, duration)
+        if further is held:
+            break
+        held = further
     if task.cost == "time":
         duration = float(np.max(np.abs(basis.rate_control @ moved) / task.rate_limit))
     return moved, duration
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """Control points of rates that a correction does not choose.
+
+    Attributes
+    ----------
+    chosen : (j, m) which
+    targets : (j, m) what they become, times the duration, less what they are
+    """
+
+    chosen: Mask
+    targets: Array
+
+    @classmethod
+    def at_limits(cls, task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Held:
+        """Those at their limits, which stay; for a path of least time, which is stretched instead, none."""
+        rates = basis.rate_control @ control / duration
+        chosen = np.abs(rates) > task.rate_limit * (1.0 - _ACTIVE)
+        return cls(chosen & (task.cost != "time"), np.zeros_like(rates))
+
+    def and_those_beyond(
+        self, task: Reorientation, basis: SplineBasis, control: Array, moved: Array, duration: float
+    ) -> _Held:
+        """Those too that a correction would take beyond their limits, which become their limits; itself if none."""
+        after, limits = basis.rate_control @ moved, task.rate_limit * duration
+        beyond = (np.abs(after) > limits) & ~self.chosen
+        if task.cost == "time" or not beyond.any():
+            return self
+        targets = np.where(beyond, np.copysign(limits, after) - basis.rate_control @ control, self.targets)
+        return _Held(self.chosen | beyond, targets)
+
+    @property
+    def changes(self) -> Array:
+        """Of each: (h,)."""
+        return self.targets[self.chosen]
+
+    def rows(self, basis: SplineBasis) -> Array:
+        """From the control points of the path: (h, k m)."""
+        where = np.argwhere(self.chosen)
+        rows = np.zeros((len(where), basis.dimension, self.chosen.shape[1]))
+        for row, (point, coordinate) in enumerate(where):
+            rows[row, :, coordinate] = basis.rate_control[point]
+        return rows.reshape(len(where), basis.dimension * self.chosen.shape[1])
 
 
 def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
@@ -202,16 +253,6 @@ def _free(task: Reorientation, basis: SplineBasis, control: Array) -> Mask:
     """(k, m) which of the movable ones are not at their limits either."""
     reach = _ACTIVE * np.maximum(task.upper - task.lower, _LEAST_RANGE)
     return movable_points(task, basis) & (control > task.lower + reach) & (control < task.upper - reach)
-
-
-def _held_rates(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> Array:
-    """Rows (j, k m) of the rates' control points that are at their limits."""
-    rates = basis.rate_control @ control / duration
-    where = np.argwhere(np.abs(rates) > task.rate_limit * (1.0 - _ACTIVE))
-    rows = np.zeros((len(where), basis.dimension, task.dimension))
-    for row, (point, coordinate) in enumerate(where):
-        rows[row, :, coordinate] = basis.rate_control[point]
-    return rows.reshape(len(where), control.size)
 
 
 def _transported(generator: Array, basis: SplineBasis, duration: float) -> Array:

@@ -28,7 +28,7 @@ _TOLERANCE = 1e-8
 # The shortest duration as a share of the longest, for the cost "time": only to keep the division by T away from 0.
 _SHORTEST = 1e-3
 # What IPOPT reports of a local optimum.
-_GOOD = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 # CasADi handles Ctrl-C itself: in the middle of an iteration IPOPT then returns this status,
 _INTERRUPTED = "NonIpopt_Exception_Thrown"
 # and between iterations this one, which a callback that stops the search causes too.
@@ -253,7 +253,7 @@ class CollocationProgram:
             raise KeyboardInterrupt
         history = stats["iterations"]
         dual, primal = (float(history[key][-1]) if history[key] else np.inf for key in ("inf_du", "inf_pr"))
-        if status in _GOOD and dual > _DEGENERATE:
+        if status in GOOD_STATUS and dual > _DEGENERATE:
             # IPOPT scales by the multipliers, which are unbounded where the constraints leave only one motion.
             status = f"{status}, but degenerate"
         if status == _STOPPED:
@@ -265,7 +265,7 @@ class CollocationProgram:
             attitude=so3.matrix_from_quat(so3.normalised(values[-4:])),
             cost=cost,
             status=status,
-            converged=status in _GOOD,
+            converged=status in GOOD_STATUS,
             kkt_residual=max(dual, primal),
             infeasibility=primal,
             iterations=int(stats["iter_count"]),

@@ -160,7 +160,7 @@ class Search:
     starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000
     seed : of the random guesses; the same seed gives the same plan
     pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
-        else 40 for up to eight, 20 for more
+        else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the goal
     iterations : the most that the solver may take for each start
 
     Raises

@@ -25,7 +25,7 @@ from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
 from ._solver_callback import IterationCallback, heard_interrupts
 from ._spline_basis import SplineBasis
-from .collocation import CollocationProgram
+from .collocation import GOOD_STATUS, CollocationProgram
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search
 from .task import Reorientation, reorientation
@@ -41,6 +41,8 @@ _PIECES_OF_FEW = 160
 # Pieces up to `_MANY_JOINTS`, and beyond.
 _PIECES = 40
 _PIECES_OF_MANY = 20
+# How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
+_HALVINGS = 2
 # Rates and durations may exceed their limits by this share, which the solver leaves.
 _LIMIT_SLACK = 1e-7
 # Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
@@ -166,7 +168,7 @@ def plan_reorientation(
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(_failure_message(task, basis, attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(_failure_message(task, attempts, best, reporter.stopped), plan)
     return plan
 
 
@@ -174,10 +176,9 @@ def _searched_here(
     task: Reorientation, basis: SplineBasis, search: Search, guesses: Sequence[Guess], reporter: _ProgressReporter
 ) -> Iterator[_Attempt]:
     """The local searches, one after the other."""
-    program = _program(task, basis, search.method)
+    local = _LocalSearch.of(task, basis, search)
     for number, guess in enumerate(guesses):
-        report = reporter.solver_callback("search", number + 1, len(guesses))
-        yield _local_search(task, basis, program, guess, int(search.iterations), report)
+        yield local.attempt(guess, reporter.solver_callback("search", number + 1, len(guesses)))
 
 
 def _searched_by(
@@ -189,7 +190,7 @@ def _searched_by(
     reporter: _ProgressReporter,
 ) -> Iterator[_Attempt]:
     """The local searches by an executor, in the order of the guesses."""
-    recipe = pickle.dumps((task, basis.pieces, search.method, int(search.iterations)))
+    recipe = pickle.dumps((task, basis.pieces, search))
     for number, attempt in enumerate(executor.map(partial(_searched_elsewhere, recipe), guesses)):
         end = attempt.report
         reporter.solver_callback("search", number + 1, len(guesses))(end.iterations, end.cost, end.infeasibility)
@@ -203,12 +204,10 @@ _KEPT = threading.local()
 def _searched_elsewhere(recipe: bytes, guess: Guess) -> _Attempt:
     """One of them, in another process or thread."""
     if getattr(_KEPT, "recipe", None) != recipe:
-        task, pieces, method, iterations = pickle.loads(recipe)
-        basis = SplineBasis(pieces)
-        _KEPT.made = task, basis, _program(task, basis, method), iterations
+        task, pieces, search = pickle.loads(recipe)
+        _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
         _KEPT.recipe = recipe
-    task, basis, program, iterations = _KEPT.made
-    return _local_search(task, basis, program, guess, iterations, lambda *_: False)
+    return _KEPT.local.attempt(guess, lambda *_: False)
 
 
 def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
@@ -262,12 +261,14 @@ class _Attempt:
     polished : its path, corrected; None where that could not be reconstructed
     cost : of the corrected path; infinite where there is none
     reaches_goal : whether the corrected path reaches the goal within the limits
+    basis : of its spline
     """
 
     report: Start
     polished: PolishedPath | None
     cost: float
     reaches_goal: bool
+    basis: SplineBasis
 
     def rank(self) -> tuple[bool, bool, float]:
         """The best has the least: first local optima, then paths that reach the goal by cost, then others by error."""
@@ -324,43 +325,83 @@ def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], A
     return lambda places: guess.quaternions(places, turn)
 
 
-def _local_search(
-    task: Reorientation,
-    basis: SplineBasis,
-    program: CollocationProgram | ReducedProgram,
-    guess: Guess,
-    iterations: int,
-    callback: IterationCallback,
-) -> _Attempt:
-    """The local optimum next to a guess, its path corrected to reach the goal."""
-    began = time.perf_counter()
-    solution = program.solve(
-        guess.control,
-        task.duration,
-        _guessed_attitudes(task, guess),
-        iterations=iterations,
-        iteration_callback=callback,
-    )
-    try:
-        polished = polish(task, basis, solution.control, solution.duration)
-        cost = _cost(task, basis, polished)
-    except ShapePhaseError:
-        # The path cannot be reconstructed: the attempt is ranked last, and only the solver's own numbers describe it.
-        polished, cost = None, np.inf
-    reaches_goal = (
-        polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-    )
-    report = Start(
-        status=solution.status,
-        converged=solution.converged and reaches_goal,
-        cost=solution.cost,
-        goal_error=task.goal_error(solution.attitude),
-        kkt_residual=solution.kkt_residual,
-        infeasibility=solution.infeasibility,
-        iterations=solution.iterations,
-        seconds=time.perf_counter() - began,
-    )
-    return _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal)
+@dataclass(frozen=True, eq=False)
+class _LocalSearch:
+    """What finds the local optimum next to a guess.
+
+    Attributes
+    ----------
+    basis : of the path's spline at first
+    program : for this basis
+    halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
+    """
+
+    task: Reorientation
+    basis: SplineBasis
+    program: CollocationProgram | ReducedProgram
+    iterations: int
+    halvings: int
+
+    @classmethod
+    def of(cls, task: Reorientation, basis: SplineBasis, search: Search) -> _LocalSearch:
+        halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
+        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings)
+
+    def attempt(self, guess: Guess, callback: IterationCallback) -> _Attempt:
+        """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
+        found, control = self._on(self.basis, self.program, guess, callback)
+        for _ in range(self.halvings):
+            solved = found.report.status in GOOD_STATUS
+            if not solved or found.reaches_goal:
+                break
+            finer = SplineBasis(2 * found.basis.pieces)
+            onward = guess_of(self.task, finer, found.basis.matrix(PLACES) @ control)
+            if onward is None:
+                break
+            program = CollocationProgram(self.task, finer)
+            following, control = self._on(finer, program, onward, callback)
+            found = min(found, following, key=_Attempt.rank)
+            if found is not following:
+                break
+        return found
+
+    def _on(
+        self,
+        basis: SplineBasis,
+        program: CollocationProgram | ReducedProgram,
+        guess: Guess,
+        callback: IterationCallback,
+    ) -> tuple[_Attempt, Array]:
+        """The attempt on some basis, and the control points that the solver found."""
+        task, began = self.task, time.perf_counter()
+        solution = program.solve(
+            guess.control,
+            task.duration,
+            _guessed_attitudes(task, guess),
+            iterations=self.iterations,
+            iteration_callback=callback,
+        )
+        try:
+            polished = polish(task, basis, solution.control, solution.duration)
+            cost = _cost(task, basis, polished)
+        except ShapePhaseError:
+            # The path cannot be reconstructed: the attempt is ranked last, and only the solver's numbers describe it.
+            polished, cost = None, np.inf
+        reaches_goal = (
+            polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
+        )
+        report = Start(
+            status=solution.status,
+            converged=solution.converged and reaches_goal,
+            cost=solution.cost,
+            goal_error=task.goal_error(solution.attitude),
+            kkt_residual=solution.kkt_residual,
+            infeasibility=solution.infeasibility,
+            iterations=solution.iterations,
+            seconds=time.perf_counter() - began,
+        )
+        attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
+        return attempt, solution.control
 
 
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
@@ -416,9 +457,7 @@ def _plan(
     )
 
 
-def _failure_message(
-    task: Reorientation, basis: SplineBasis, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: bool
-) -> str:
+def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: bool) -> str:
     """Why no plan is returned, start by start, and what the best attempt reached."""
     name = task.body.name
     summary = "; ".join(
@@ -436,7 +475,9 @@ def _failure_message(
     if stopped:
         return f"the search for a motion of the joints of {name} was stopped on request ({summary}); {outcome}"
     fast = (
-        best is not None and best.polished is not None and _share_of_rate_limits(task, basis, best.polished) > _NEARLY
+        best is not None
+        and best.polished is not None
+        and _share_of_rate_limits(task, best.basis, best.polished) > _NEARLY
     )
     way_out = (
         f"joints are at their rate limits: give more than {task.duration:.6g} s (cost='time' finds the least)"
