@@ -255,7 +255,7 @@ def test_a_summary_says_who_follows_whom(leg):
         "knee_slide": "cubic in knee, 5 knots",
         "patella_turn": "cubic in knee, 5 knots",
         "patella_slide": "polynomial of degree 2 in patella_turn",
-        "shoulder": "polynomial of degree 4 in hip + -0.5 knee + 0.2",
+        "shoulder": "polynomial of degree 4 in hip - 0.5 knee + 0.2",
     }
     lines = body_lines(sp.body_summary(body))
     assert "patella_slide  polynomial of degree 2 in patella_turn" in lines

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.body.engines.formats import format_of
@@ -122,6 +123,20 @@ def _rate(gait, path, t, q):
     pi = turn.T @ [1.0, 0.5, -2.0] - gait.internal_momentum(shape, rate)
     w = np.linalg.solve(gait.locked_inertia(shape), pi)
     return 0.5 * np.append(q[3] * w + np.cross(q[:3], w), -q[:3] @ w)
+
+
+@needs_opensim
+def test_a_recorded_base_is_in_the_axes_of_the_pelvis(gait, tmp_path):
+    """Angles about the pelvis' own axes, in the order of the joint to the ground."""
+    assert gait.base_angles == (osim_models.PELVIS[:3], "zxy")
+    names = [*osim_models.PELVIS, *DRIVEN]
+    rows = [[t, 20.0 * t, -30.0 * t, 50.0 * t, t, 1.0, 0.0, *([0.0] * 14)] for t in (0.0, 0.5, 1.0)]
+    lines = "\n".join("\t".join(map(str, row)) for row in rows)
+    file = tmp_path / "turn.mot"
+    file.write_text(MOT.format(rows=3, columns=len(names) + 1, names="\t".join(names), lines=lines))
+    found = sp.read_recorded_motion(file, gait).base_attitude
+    expected = Rotation.from_euler("ZXY", [[20.0 * t, -30.0 * t, 50.0 * t] for t in (0.0, 0.5, 1.0)], degrees=True)
+    np.testing.assert_allclose(found, expected.as_matrix(), rtol=0, atol=1e-14)
 
 
 @needs_opensim

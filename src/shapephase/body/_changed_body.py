@@ -42,4 +42,6 @@ def coupled_body(body: Body, couplings: Mapping[str, Coupling]) -> Body:
             raise unknown_name(f"joint of {body.name}", name, body.chain.names)
         if not isinstance(coupling, Coupling):
             raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
-    return type(body)(body._model, body.name, {**body.couplings, **couplings})
+    changed = type(body)(body._model, body.name, {**body.couplings, **couplings})
+    changed.base_angles = body.base_angles
+    return changed

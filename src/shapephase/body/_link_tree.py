@@ -95,6 +95,8 @@ class LinkTree:
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what the file says and is not taken up
     text : the URDF that was checked, written anew; None for other formats
+    base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
+        it, as "zxy"; None where the file names none
     """
 
     name: str
@@ -104,6 +106,7 @@ class LinkTree:
     frames: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
     text: str | None = None
+    base_angles: tuple[tuple[str, ...], str] | None = None
 
 
 def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:

@@ -63,6 +63,7 @@ class Body:
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     chain : its links and joints as plain numbers
     couplings : by the name of each joint that follows others, how it does
+    base_angles : names and axes of the angles by which its file turns the base; None where it names none
 
     Examples
     --------
@@ -77,6 +78,7 @@ class Body:
         self.name = name
         self.sha256: str | None = None
         self.file: Path | None = None
+        self.base_angles: tuple[tuple[str, ...], str] | None = None
         self.mass = float(pin.computeTotalMass(model))
         self.couplings: Mapping[str, Coupling] = dict(couplings or {})
         self._joints = JointMap(model, pin.neutral(model), self.couplings)

@@ -116,7 +116,7 @@ def described(coupling: Coupling) -> str:
     if not coupling.terms:
         return f"locked at {coupling.start:.6g}"
     parts = [_words(name, function) for name, function in coupling.terms]
-    return " + ".join(parts + ([f"{coupling.start:.6g}"] if coupling.start else []))
+    return _added(parts + ([f"{coupling.start:.6g}"] if coupling.start else []))
 
 
 def _words(name: str, function: JointFunction) -> str:
@@ -129,7 +129,11 @@ def _words(name: str, function: JointFunction) -> str:
         return f"polynomial of degree {degree} in {name}"
     slope = float(function.coefficients[1, 0]) if degree else 0.0
     start = float(function.coefficients[0, 0]) - slope * float(function.centres[0])
-    return f"{slope:.6g} {name}" + (f" + {start:.6g}" if start else "")
+    return _added([f"{slope:.6g} {name}", *([f"{start:.6g}"] if start else [])])
+
+
+def _added(parts: list[str]) -> str:
+    return " + ".join(parts).replace("+ -", "- ")
 
 
 _DEGREES = ("constant", "piecewise linear", "quadratic", "cubic", "quartic", "quintic")

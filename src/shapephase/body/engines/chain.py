@@ -38,6 +38,7 @@ class Chain:
     notes : what the file says and is not taken up
     poses : what the engine gives at random shapes, as `add_pose` takes it
     couplings : of joints that follow others, by name, as `couple` takes them
+    base_angles : names of three angles of the base and the axes they turn about, one after the other; or none
     """
 
     name: str
@@ -47,6 +48,7 @@ class Chain:
     notes: list[str] = field(default_factory=list)
     poses: list[dict[str, Any]] = field(default_factory=list)
     couplings: dict[str, dict[str, Any]] = field(default_factory=dict)
+    base_angles: tuple[list[str], str] | None = None
 
     def add_link(self, name: str, mass: float, centre: Array, inertia: Array, line: int = 1) -> None:
         """With its centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2], in its axes."""

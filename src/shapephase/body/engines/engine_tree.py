@@ -100,7 +100,9 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
     notes = tuple(f"{where}:1: {note}" for note in said["notes"])
     couplings = {name: _coupling(rule) for name, rule in said["couplings"].items()}
     frames = frozenset(said["frames"])
-    tree = LinkTree(said["name"], sorted_links, ordered, couplings, frames=frames, notes=notes)
+    base = said["base_angles"]
+    angles = None if base is None else (tuple(base[0]), base[1])
+    tree = LinkTree(said["name"], sorted_links, ordered, couplings, frames, notes, base_angles=angles)
     return tree, said["poses"]
 
 

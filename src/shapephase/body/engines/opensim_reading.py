@@ -17,6 +17,7 @@ from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
 from .chain import Chain, UnusableModelError
+from .opensim_numbers import ends, loaded, numbers_of, pose_of, refused, value_and_slope, vector_of
 
 _EXACT = 1e-12
 """Share of the largest terms by which the engine's numbers may differ from ours."""
@@ -28,6 +29,7 @@ _FREE = 6
 _X = np.array([1.0, 0.0, 0.0])
 _Y = np.array([0.0, 1.0, 0.0])
 _Z = np.array([0.0, 0.0, 1.0])
+_NAMED = {"x": _X, "y": _Y, "z": _Z}
 _TURN = "revolute"
 _SLIDE = "prismatic"
 _KNOWN = {
@@ -81,7 +83,7 @@ class _Reading:
 
     def __init__(self, path: str, text: str) -> None:
         self._path, self._text = path, text
-        self._model = _loaded(path)
+        self._model = loaded(path)
         self._joints = [self._model.getJointSet().get(k) for k in range(self._model.getNumJoints())]
         self._chain = Chain(Path(path).stem)
         self._base = self._base_joint()
@@ -90,7 +92,7 @@ class _Reading:
     def chain(self) -> Chain:
         """All of it, with what OpenSim computes at some shapes."""
         bodies = [self._model.getBodySet().get(k) for k in range(self._model.getNumBodies())]
-        base = _ends(self._base)[1]
+        base = ends(self._base)[1]
         for body in sorted(bodies, key=lambda one: one.getName() != base):
             self._add_body(body)
         axes = {joint.getName(): self._axes(joint) for joint in self._joints if joint is not self._base}
@@ -102,6 +104,7 @@ class _Reading:
         for name, coordinate in self._coordinates.items():
             if coordinate.rule is not None and any(name == joint["name"] for joint in self._chain.joints):
                 self._couple(name, coordinate.rule)
+        self._chain.base_angles = self._base_angles()
         self._add_poses(base)
         return self._chain
 
@@ -112,7 +115,7 @@ class _Reading:
 
     def _base_joint(self) -> Any:
         """The one joint to the ground. Raises UnusableModelError where there are several or none."""
-        grounded = [joint for joint in self._joints if "ground" in _ends(joint)]
+        grounded = [joint for joint in self._joints if "ground" in ends(joint)]
         if len(grounded) != 1:
             named = ", ".join(repr(joint.getName()) for joint in grounded[:20]) or "none"
             raise self._fault(
@@ -120,11 +123,31 @@ class _Reading:
                 grounded[1].getName() if grounded else "ground",
             )
         joint = grounded[0]
-        name, count, body = joint.getName(), joint.numCoordinates(), _ends(joint)[1]
+        name, count, body = joint.getName(), joint.numCoordinates(), ends(joint)[1]
         if count < _FREE:
             said = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
             self._chain.notes.append(said)
         return joint
+
+    def _base_angles(self) -> tuple[list[str], str] | None:
+        """The angles of the base, where each turns about one of the ground's axes as the others have turned it."""
+        joint = opensim.CustomJoint.safeDownCast(self._base)
+        frames = (self._base.getParentFrame(), self._base.getChildFrame())
+        if joint is None or any(np.any(pose_of(one.findTransformInBaseFrame())[0] != np.eye(3)) for one in frames):
+            return None
+        names, turned = [], ""
+        for k in range(3):
+            axis = joint.getSpatialTransform().getTransformAxis(k)
+            place = [letter for letter, unit in _NAMED.items() if np.array_equal(vector_of(axis.getAxis()), unit)]
+            drivers = axis.getCoordinateNames()
+            if not place or drivers.size() != 1 or not axis.hasFunction():
+                return None
+            rule = self._rule(axis.getFunction(), [drivers.getValue(0)], joint.getName())
+            if rule.start or len(rule.terms) != 1 or _sign(rule.terms[0][1]) != 1.0:
+                return None
+            names.append(drivers.getValue(0))
+            turned += place[0]
+        return (names, turned) if len(set(names)) == len(set(turned)) == len(names) else None
 
     def _known_coordinates(self) -> dict[str, _Coordinate]:
         """By name; those of the base are not among them."""
@@ -195,7 +218,7 @@ class _Reading:
                 raise self._fault(
                     f"joint {joint!r} follows coordinate {driver!r}, which is the base's or unknown", joint
                 )
-        return _Axis(label, _SLIDE if number > 2 else _TURN, _vector(axis.getAxis()), rule)
+        return _Axis(label, _SLIDE if number > 2 else _TURN, vector_of(axis.getAxis()), rule)
 
     def _unlocked(self, rule: _Rule) -> _Rule:
         """With the values of locked coordinates."""
@@ -218,7 +241,7 @@ class _Reading:
         if kind == "Constant":
             return _Rule(opensim.Constant.safeDownCast(function).getValue(), ())
         if kind == "LinearFunction":
-            numbers = _numbers(opensim.LinearFunction.safeDownCast(function).getCoefficients())
+            numbers = numbers_of(opensim.LinearFunction.safeDownCast(function).getCoefficients())
             if len(numbers) != len(drivers) + 1:
                 raise self._fault(f"{owner!r}: {len(numbers)} coefficients for {len(drivers)} coordinates", owner)
             slopes = zip(drivers, numbers, strict=False)
@@ -234,7 +257,7 @@ class _Reading:
         """A function of one coordinate, exactly."""
         if kind == "PolynomialFunction":
             highest_first = opensim.PolynomialFunction.safeDownCast(function).getCoefficients()
-            return polynomial(np.array(_vector(highest_first, highest_first.size()))[::-1])
+            return polynomial(np.array(vector_of(highest_first, highest_first.size()))[::-1])
         if kind == "PiecewiseLinearFunction":
             lines = opensim.PiecewiseLinearFunction.safeDownCast(function)
             return piecewise_linear(*np.array([(lines.getX(k), lines.getY(k)) for k in range(lines.getSize())]).T)
@@ -248,7 +271,7 @@ class _Reading:
                 owner,
             )
         knots = np.array([spline.getX(k) for k in range(spline.getSize())])
-        return hermite(knots, *np.array([_value_and_slope(function, [knot]) for knot in knots]).T)
+        return hermite(knots, *np.array([value_and_slope(function, [knot]) for knot in knots]).T)
 
     def _carriers(self, axes: dict[str, list[_Axis]]) -> dict[str, str]:
         """The axis, by its name, that is the joint of a coordinate: the first that goes as it does, or against it."""
@@ -271,16 +294,16 @@ class _Reading:
 
     def _add_body(self, body: Any) -> None:
         inertia = body.getInertia()
-        (xx, yy, zz), (xy, xz, yz) = _vector(inertia.getMoments()), _vector(inertia.getProducts())
+        (xx, yy, zz), (xy, xz, yz) = vector_of(inertia.getMoments()), vector_of(inertia.getProducts())
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         name = body.getName()
         line = self._fault("", name).line
-        self._chain.add_link(name, body.getMass(), _vector(body.getMassCenter()), tensor, line)
+        self._chain.add_link(name, body.getMass(), vector_of(body.getMassCenter()), tensor, line)
 
     def _add_joint(self, joint: Any, axes: list[_Axis], carriers: dict[str, str]) -> None:
         """Steps from the parent to the child: fixed frames, and joints of one axis between them."""
-        above, child = _ends(joint)
-        pose = _pose(joint.getParentFrame().findTransformInBaseFrame())
+        above, child = ends(joint)
+        pose = pose_of(joint.getParentFrame().findTransformInBaseFrame())
         for axis in axes:
             rule, direction = axis.rule, axis.direction / np.linalg.norm(axis.direction)
             name, sign = axis.name, 1.0
@@ -299,7 +322,7 @@ class _Reading:
             if rule.terms:
                 self._couple(name, rule)
             above, pose = below, (np.eye(3), np.zeros(3))
-        turn, place = _pose(joint.getChildFrame().findTransformInBaseFrame())
+        turn, place = pose_of(joint.getChildFrame().findTransformInBaseFrame())
         turn, place = _after(pose, turn.T, -turn.T @ place)
         self._chain.add_joints(above, child, place, turn, [])
 
@@ -317,7 +340,7 @@ class _Reading:
 
     def _add_poses(self, base: str) -> None:
         """What OpenSim computes with the base at rest."""
-        bare = _loaded(self._path)
+        bare = loaded(self._path)
         for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
             components.clearAndDestroy()
         coordinates = bare.updCoordinateSet()
@@ -329,20 +352,20 @@ class _Reading:
         try:
             state = bare.initSystem()
         except RuntimeError as error:
-            raise _refused(error) from None
+            raise refused(error) from None
         matter, root = bare.getMatterSubsystem(), bare.getBodySet().get(base)
         for shape, rate in self._chain.random_shapes():
             for name, (value, speed) in self._of_all(shape, rate).items():
                 everything[name].setValue(state, value, False)
                 everything[name].setSpeedValue(state, speed)
             bare.realizeVelocity(state)
-            turn, _ = _pose(root.getTransformInGround(state))
+            turn, _ = pose_of(root.getTransformInGround(state))
             whole = matter.calcSystemCentralInertiaInGround(state)
-            (xx, yy, zz), (xy, xz, yz) = _vector(whole.getMoments()), _vector(whole.getProducts())
+            (xx, yy, zz), (xy, xz, yz) = vector_of(whole.getMoments()), vector_of(whole.getProducts())
             inertia = turn.T @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn
             # A part of it does not live longer than the whole.
             both = matter.calcSystemCentralMomentum(state)
-            self._chain.add_pose(shape, rate, inertia, turn.T @ _vector(both.get(0)), (_EXACT, _EXACT))
+            self._chain.add_pose(shape, rate, inertia, turn.T @ vector_of(both.get(0)), (_EXACT, _EXACT))
 
     def _of_all(self, shape: dict[str, float], rate: dict[str, float]) -> dict[str, tuple[float, float]]:
         """Values and speeds of all coordinates but the base's; dependent ones by OpenSim's own functions."""
@@ -364,7 +387,7 @@ class _Reading:
                 elif name in functions:
                     function, drivers = functions[name]
                     there = [find(driver) for driver in drivers]
-                    value, *slopes = _value_and_slope(function, [value for value, _ in there])
+                    value, *slopes = value_and_slope(function, [value for value, _ in there])
                     found[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, there, strict=True))
                 else:
                     found[name] = shape.get(name, 0.0), rate.get(name, 0.0)
@@ -378,45 +401,11 @@ class _Reading:
 _SAME = polynomial(np.array([0.0, 1.0]))
 
 
-def _loaded(path: str) -> Any:
-    try:
-        model = opensim.Model(path)
-        model.finalizeConnections()
-    except RuntimeError as error:
-        raise _refused(error) from None
-    return model
-
-
-def _refused(error: Exception) -> UnusableModelError:
-    said = " ".join(str(error).split("Thrown at")[0].split())
-    return UnusableModelError(f"OpenSim does not accept it: {said.removeprefix('std::exception in ')}")
-
-
-def _ends(joint: Any) -> tuple[str, str]:
-    """Names of the bodies that a joint joins, the ground's is 'ground'."""
-    frames = [frame.findBaseFrame() for frame in (joint.getParentFrame(), joint.getChildFrame())]
-    first, second = ("ground" if one.getAbsolutePathString() == "/ground" else one.getName() for one in frames)
-    return (second, first) if second == "ground" else (first, second)
-
-
 def _sign(function: JointFunction) -> float:
     """1 or -1 where a function goes as its coordinate, or against it; else 0."""
     straight = not len(function.knots) and not function.coefficients[2:].any() and len(function.coefficients) > 1
     slope = float(function.coefficients[1, 0]) if straight else 0.0
     return slope if abs(slope) == 1.0 else 0.0
-
-
-def _value_and_slope(function: Any, places: list[float]) -> list[float]:
-    """The value of a function of OpenSim, and its derivative by each argument."""
-    where = opensim.Vector(len(places), 0.0)
-    for k, place in enumerate(places):
-        where.set(k, place)
-    found = [function.calcValue(where)]
-    for k in range(len(places)):
-        which = opensim.StdVectorInt()
-        which.append(k)
-        found.append(function.calcDerivative(which, where))
-    return found
 
 
 def _moved(kind: str, axis: Array, by: float) -> tuple[Array, Array]:
@@ -430,16 +419,3 @@ def _moved(kind: str, axis: Array, by: float) -> tuple[Array, Array]:
 
 def _after(pose: tuple[Array, Array], turn: Array, place: Array) -> tuple[Array, Array]:
     return pose[0] @ turn, pose[1] + pose[0] @ place
-
-
-def _pose(transform: Any) -> tuple[Array, Array]:
-    matrix = transform.R().asMat33()
-    return np.array([[matrix.get(i, j) for j in range(3)] for i in range(3)]), _vector(transform.p())
-
-
-def _vector(entries: Any, count: int = 3) -> Array:
-    return np.array([entries.get(k) for k in range(count)])
-
-
-def _numbers(entries: Any) -> list[float]:
-    return [entries.get(k) for k in range(entries.getSize())]

@@ -162,6 +162,7 @@ class BaseColumns:
     recording: Recording
     choices: BaseChoices
     degrees: bool | None
+    own: tuple[tuple[str, ...], str] | None  # names of angles that the body's file turns the base by, and their axes
     found: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     rates: dict[str, str] = field(default_factory=dict)
 
@@ -171,7 +172,7 @@ class BaseColumns:
             self.rates[target] = text
             return True
         parts = Label(target, None) if target in _KNOWN else label(target)
-        if parts.name not in _KNOWN:
+        if parts.name not in _KNOWN and parts.name not in (self.own[0] if self.own else ()):
             return False
         table = self.recording.table
         if parts.name in self.found:
@@ -195,7 +196,7 @@ class BaseColumns:
         """
         table, left_out = self.recording.table, {}
         groups: dict[str, _Group] = {}
-        for group in _GROUPS:
+        for group in self._groups():
             there = [name for name in group.names if name in self.found]
             lacking = ", ".join(name for name in group.names if name not in self.found)
             if there and lacking:
@@ -219,6 +220,13 @@ class BaseColumns:
         if position is not None:
             record["position"] = list(self._texts(groups["position"])) if "position" in groups else "base_position"
         return BaseMotion(attitude=attitude, position=position, record=record or None, left_out=left_out)
+
+    def _groups(self) -> tuple[_Group, ...]:
+        """Those that are known anyway; of the angles that the body's own file names, what they turn about there."""
+        if self.own is None:
+            return _GROUPS
+        names, axes = self.own
+        return (*(group for group in _GROUPS if set(group.names) != set(names)), _Group("angles", names, axes, axes))
 
     def _stored(self, what: str) -> Array | None:
         table = self.recording.table

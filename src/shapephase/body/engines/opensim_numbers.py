@@ -1,0 +1,63 @@
+"""What OpenSim's objects hold, as plain numbers; in the reading process alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import opensim
+
+from ...arrays import Array
+from .chain import UnusableModelError
+
+
+def loaded(path: str) -> Any:
+    """The model of a file, its parts connected. Raises UnusableModelError."""
+    try:
+        model = opensim.Model(path)
+        model.finalizeConnections()
+    except RuntimeError as error:
+        raise refused(error) from None
+    return model
+
+
+def refused(error: Exception) -> UnusableModelError:
+    """What OpenSim says, in one line."""
+    said = " ".join(str(error).split("Thrown at")[0].split())
+    return UnusableModelError(f"OpenSim does not accept it: {said.removeprefix('std::exception in ')}")
+
+
+def ends(joint: Any) -> tuple[str, str]:
+    """Names of the bodies that a joint joins, the ground's is 'ground'."""
+    frames = [frame.findBaseFrame() for frame in (joint.getParentFrame(), joint.getChildFrame())]
+    first, second = ("ground" if one.getAbsolutePathString() == "/ground" else one.getName() for one in frames)
+    return (second, first) if second == "ground" else (first, second)
+
+
+def value_and_slope(function: Any, places: list[float]) -> list[float]:
+    """The value of a function of OpenSim, and its derivative by each argument."""
+    where = opensim.Vector(len(places), 0.0)
+    for k, place in enumerate(places):
+        where.set(k, place)
+    found = [function.calcValue(where)]
+    for k in range(len(places)):
+        which = opensim.StdVectorInt()
+        which.append(k)
+        found.append(function.calcDerivative(which, where))
+    return found
+
+
+def pose_of(transform: Any) -> tuple[Array, Array]:
+    """Orientation and origin."""
+    matrix = transform.R().asMat33()
+    return np.array([[matrix.get(i, j) for j in range(3)] for i in range(3)]), vector_of(transform.p())
+
+
+def vector_of(entries: Any, count: int = 3) -> Array:
+    """The entries of one of Simbody's vectors."""
+    return np.array([entries.get(k) for k in range(count)])
+
+
+def numbers_of(entries: Any) -> list[float]:
+    """The entries of one of OpenSim's arrays."""
+    return [entries.get(k) for k in range(entries.getSize())]
