@@ -171,6 +171,12 @@ ARM = joint("PinJoint", "elbow", "trunk", "arm", [coordinate("bend")])
                                   transform=axes(axis(0, "1 0 0", TWICE, "bend")))]),
          "knots must ascend|OpenSim does not accept it"),
         (model(TWO, [TRUNK, ARM])[:-300], "OpenSim does not accept it"),
+        (model(TWO, [TRUNK, ARM, joint("PinJoint", "again", "trunk", "arm", [coordinate("twist")])]),
+         "body 'arm' hangs on two joints, 'elbow' and 'again'"),
+        (model(TWO, [TRUNK, joint("UniversalJoint", "elbow", "trunk", "arm", [coordinate("a"), coordinate("b")])],
+               [coupler("c", "a", "b", line(1.0, 0.1)), coupler("d", "b", "a", line(1.0, 0.1))]),
+         "coordinate 'a' follows itself, by way of others"),
+        (model(TWO, [TRUNK, ARM]).replace("<mass>1.0<", "<mass>nan<"), "OpenSim does not accept it: .*invalid mass"),
         (model(TWO, [TRUNK]), "arm"),
     ],
 )  # fmt: skip

@@ -122,6 +122,15 @@ class _Reading:
                 f"one joint to the ground is needed, which is the base's, got {named}",
                 grounded[1].getName() if grounded else "ground",
             )
+        above: dict[str, str] = {}
+        for joint in self._joints:
+            child, name = ends(joint)[1], joint.getName()
+            if child in above:
+                raise self._fault(
+                    f"body {child!r} hangs on two joints, {above[child]!r} and {name!r}; closed chains are not read",
+                    name,
+                )
+            above[child] = name
         joint = grounded[0]
         name, count, body = joint.getName(), joint.numCoordinates(), ends(joint)[1]
         if count < _FREE:
@@ -171,7 +180,17 @@ class _Reading:
             for driver, _ in rule.terms:
                 if driver not in found:
                     raise self._fault(f"coordinate {name!r} follows {driver!r}, which is the base's or unknown", name)
+            self._check_circle(name, couplers)
         return found
+
+    def _check_circle(self, name: str, couplers: dict[str, _Rule]) -> None:
+        """Raise UnusableModelError where a coordinate follows itself in the end."""
+        reached, ahead = set(), {name}
+        while ahead:
+            ahead = {driver for one in ahead if one in couplers for driver, _ in couplers[one].terms} - reached
+            reached |= ahead
+        if name in reached:
+            raise self._fault(f"coordinate {name!r} follows itself, by way of others; remove a coupler", name)
 
     def _couplers(self) -> dict[str, _Rule]:
         """How coordinates follow others."""
