@@ -128,6 +128,8 @@ def test_a_base_without_mass_of_its_own(tmp_path):
         ("com 0 0 0.2", "com 0 0,2 0", r":\d+: segment 'Thorax': com: '0,2' is no number"),
         ("mass 30", "mass 0x10", r":\d+: segment 'Thorax': mass: '0x10' is no number"),
         ("mass 30", "mass 30\n\tmass 40", r":\d+: segment 'Thorax': 'mass' stands twice"),
+        ("com 0.01 0 -0.02\nendsegment\n", "com 0.01 0 -0.0", r":\d+: segment 'Hand' has no endsegment"),
+        ("endsegment\n\nsegment RightArm", "segment RightArm", r":\d+: segment 'Thorax' has no endsegment"),
         ("rangesQ -0.5 0.9", "rangesQ -0.5 0.9 0.1 0.2", r":\d+: segment 'Thorax': rangesQ has 6 values of 2 coord"),
     ],
 )

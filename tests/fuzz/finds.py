@@ -208,6 +208,12 @@ CASES = {
         said="inertia has 10 values, not 9",
         slow=True,
     ),
+    "a bioMod file that is cut off within a number": Case(
+        make=lambda: _body("body.bioMod", ACROBAT[: ACROBAT.index("com 0.01 0 -0.02") + len("com 0.01 0 -0.0")]),
+        outcome="ModelFileError",
+        said="segment 'Hand' has no endsegment",
+        slow=True,
+    ),
     "a measurement that stands twice": Case(
         make=lambda: _body("body.txt", measured() + "Ls1L: 0.9\n"),
         outcome="ModelFileError",

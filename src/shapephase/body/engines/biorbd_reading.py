@@ -111,7 +111,7 @@ def _refused(said: str, starts: dict[str, int]) -> UnusableModelError:
 
 def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
     """The text without meshes. Raises UnusableModelError for what biorbd would pass over."""
-    kept, segment, meshes, constraints = [], None, 0, 0
+    kept, segment, meshes, constraints, number = [], None, 0, 0, 1
     said: list[tuple[str, int]] = []
     without_blocks = re.sub(r"/\*.*?\*/", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(without_blocks.splitlines(), 1):
@@ -123,6 +123,7 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
             continue
         kept.append(line)
         if word == "segment":
+            _check_closed(segment, number)
             segment = words[1] if len(words) > 1 else ""
             if segment in starts:
                 raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
@@ -136,11 +137,18 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
         elif segment is not None and word:
             _check_word(words, word, segment, number)
             said += [(text, number) for text in words]
+    _check_closed(segment, number)
     if meshes:
         notes.append(f"{meshes} mesh files are not read: they have no part in how the body turns")
     if constraints:
         notes.append(f"{constraints} loop constraints are ignored, every joint is free to move")
     return "\n".join(kept) + "\n"
+
+
+def _check_closed(segment: str | None, line: int) -> None:
+    """Raise UnusableModelError where a segment goes on, as in a file that is cut off."""
+    if segment is not None:
+        raise UnusableModelError(f"segment {segment!r} has no endsegment", line)
 
 
 def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
