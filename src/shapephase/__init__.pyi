@@ -26,6 +26,7 @@ from .body.point_masses import ParticleBody, particle_body
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .dynamics.loads import JointLoads
+from .dynamics.swinging import FreeHinges, free_hinges
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.inertia_errors import InertiaErrors
@@ -99,6 +100,7 @@ __all__ = [
     "FixedPoints",
     "ForcedMotion",
     "ForcedSplit",
+    "FreeHinges",
     "Gyrostat",
     "HorizontalLift",
     "IgnoredElementWarning",
@@ -148,6 +150,7 @@ __all__ = [
     "examples",
     "final_attitudes",
     "fixed_points",
+    "free_hinges",
     "geodesics",
     "holonomy",
     "holonomy_derivative",

@@ -46,6 +46,7 @@ from .descriptions import (
     RigidDescription,
     SampledDescription,
 )
+from .rotors import RotorDescription, rotors_argument, widened_path
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,22 +264,44 @@ class DeformationFamily(Sequence[Deformation]):
 
 
 @overload
-def articulated(body: Body | ParticleBody, path: ShapePath) -> Deformation: ...
+def articulated(
+    body: Body | ParticleBody,
+    path: ShapePath,
+    *,
+    rotors: Mapping[str, float] | None = None,
+    rotor_speeds: Mapping[str, float] | None = None,
+) -> Deformation: ...
 
 
 @overload
 def articulated(body: BodyFamily, path: ShapePath) -> DeformationFamily: ...
 
 
-def articulated(body: Body | ParticleBody | BodyFamily, path: ShapePath) -> Deformation | DeformationFamily:
+def articulated(
+    body: Body | ParticleBody | BodyFamily,
+    path: ShapePath,
+    *,
+    rotors: Mapping[str, float] | None = None,
+    rotor_speeds: Mapping[str, float] | None = None,
+) -> Deformation | DeformationFamily:
     """The deformation of a body whose joints follow a path; of a `BodyFamily` those of all its bodies.
 
     Joints are matched by name where the path has names, else by order. Of a `ParticleBody` it is one of `particles`.
+    Wheels are left out of the path: those that no motor turns keep their momentum, others the speed that a motor
+    holds. On a joint of the path they make a control-moment gyroscope.
+
+    Parameters
+    ----------
+    rotors : for each such joint p = J (a . omega_link + spin), the momentum of its wheel along the axle a, with the
+        turn of the wheel in space [kg m^2/s]; `inertia` is then that which Routh's reduction leaves, I - J a a^T
+    rotor_speeds : or the speed of the wheel on its axle [rad/s]
 
     Raises
     ------
     UnknownNameError, TrajectoryError
         If the path has other joints than the body.
+    ShapeError
+        For a rotor that is not symmetric about its axle.
 
     Warns
     -----
@@ -294,16 +317,23 @@ def articulated(body: Body | ParticleBody | BodyFamily, path: ShapePath) -> Defo
     """
     if isinstance(body, BodyFamily):
         check_object(path, "ShapePath", "path")
+        if rotors or rotor_speeds:
+            raise ShapeError("rotors are those of one body; take one of the family, family[0]")
         return DeformationFamily(body, followed_by(body.body, path))
     check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     if isinstance(body, ParticleBody):
+        if rotors or rotor_speeds:
+            raise ShapeError("rotors are wheels of links; a body of particles has none")
         route = followed_by(body, path)
         return particles(body.masses, ParticlesAlong(body, route), route.duration, route.breaks)
+    wheels = rotors_argument(body, rotors or {}, rotor_speeds or {})
+    if wheels:
+        path = widened_path(body, path, tuple(wheel.joint for wheel in wheels))
     route = followed_by(body, path)
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
-    description = ArticulatedDescription(body, route)
+    description = RotorDescription(body, route, wheels) if wheels else ArticulatedDescription(body, route)
     files = {"body": body.sha256, "path": route.sha256}
     inputs = {name: digest for name, digest in files.items() if digest}
     label = f"{body.name} along a path"

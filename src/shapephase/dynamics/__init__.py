@@ -1,4 +1,4 @@
-"""What drives a motion: the torques of the joints, their power and work. `joint_torques`."""
+"""What drives a motion: torques of joints (`joint_torques`), hinges that swing freely (`free_hinges`), wheels."""
 
 from lazy_loader import attach_stub
 

@@ -16,6 +16,7 @@ from .curves import (
     Repeated,
     Reversed,
     Stretched,
+    Widened,
 )
 
 
@@ -36,6 +37,13 @@ def exact_accelerations(curve: Curve, times: Array) -> Array | None:
     if isinstance(curve, Reordered):
         found = exact_accelerations(curve.curve, times)
         return None if found is None else found[:, curve.order]
+    if isinstance(curve, Widened):
+        inner = exact_accelerations(curve.curve, times)
+        if inner is None:
+            return None
+        found = np.zeros((len(times), curve.n_shape))
+        found[:, curve.columns] = inner
+        return found
     if isinstance(curve, Repeated):
         starts = curve.period * np.arange(curve.count)
         loop = np.searchsorted(starts, times, side="right") - 1

@@ -321,6 +321,25 @@ class Reordered:
 
 
 @dataclass(frozen=True, eq=False)
+class Widened:
+    """The columns of a curve among more, of which the others rest at zero."""
+
+    curve: Curve
+    columns: Integers
+    n_shape: int
+
+    __repr__ = short_repr
+
+    __post_init__ = lock_arrays
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        shapes, rates = np.zeros((2, len(times), self.n_shape))
+        shapes[:, self.columns], rates[:, self.columns] = self.curve(times)
+        return shapes, rates
+
+
+@dataclass(frozen=True, eq=False)
 class Joined:
     """A curve, and after it another, shifted by `offset` (whole turns)."""
 

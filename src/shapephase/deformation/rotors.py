@@ -1,0 +1,212 @@
+"""Wheels that are symmetric about their axles: by their momentum, which stays, or by a speed that motors hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arguments import check_object, number_argument
+from ..arrays import Array, lock_arrays
+from ..body.body import Body
+from ..display import short_repr
+from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..letters import what_came
+from ..shape_space.curves import Widened
+from ..shape_space.function_scan import FunctionScan, ScannedFunction, path_function
+from ..shape_space.shape_path import ShapePath
+from ..shape_space.smoothness import Smoothness
+from .descriptions import UngaugedDescription
+
+# Of the inertia of a wheel, and of its radius of gyration: a wheel in a file is round to the digits that it has.
+_ROUND = 1e-6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Rotor:
+    """A wheel on its axle.
+
+    Attributes
+    ----------
+    joint, link : names of the axle, and of what turns on it
+    inertia : J about the axle [kg m^2]
+    axle : (3,) unit vector in the axes of the link
+    value : the momentum p = J (a . omega_link + spin), or the spin itself [kg m^2/s] or [rad/s]
+    is_momentum : which of both it is
+
+    Examples
+    --------
+    >>> satellite = sp.load_body("satellite")
+    >>> rest = [name for name in satellite.joint_names if name != "wheel_spin"]
+    >>> still = sp.ShapePath.waypoints([0.0, 1.0], np.zeros((2, len(rest))), joint_names=rest)
+    >>> deformation = sp.articulated(satellite, still, rotors={"wheel_spin": 2.0})
+    >>> deformation.description.rotors[0].joint, deformation.internal_momentum(0.5).round(9).tolist()
+    ('wheel_spin', [0.0, 0.0, 2.0])
+    """
+
+    joint: str
+    link: str
+    inertia: float
+    axle: Array
+    value: float
+    is_momentum: bool
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+
+@dataclass(frozen=True, eq=False)
+class RotorDescription(UngaugedDescription):
+    """A body whose joints follow a path while wheels spin; the angles of wheels do not matter, and rest at zero.
+
+    A wheel's momentum p = J (a . (omega + Omega) + spin) stays, where no motor turns it: a is its axle, Omega how its
+    carrier turns as seen from the base. Then Pi = (I - J a a^T) omega + L_o + (p - J a . Omega) a, where L_o is that of
+    the other joints (Routh's reduction). With a given spin it is Pi = I omega + L_o + J spin a.
+    """
+
+    platform: Body
+    route: ShapePath
+    rotors: tuple[Rotor, ...]
+
+    __repr__ = short_repr
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        """As `Description`."""
+        shapes, rates = self.route.curve(times)
+        inertia, internal = self.platform.sample(shapes, rates)
+        for rotor in self.rotors:
+            axle, turning = self._axle(rotor, shapes, rates)
+            if rotor.is_momentum:
+                inertia = inertia - rotor.inertia * axle[:, :, None] * axle[:, None, :]
+                along = rotor.value - rotor.inertia * np.sum(axle * turning, axis=-1)
+            else:
+                along = np.full(len(times), rotor.inertia * rotor.value)
+            internal = internal + along[:, None] * axle
+        return inertia, internal
+
+    def inertia_rate(self, times: Array) -> Array:
+        """As `Description`."""
+        shapes, rates = self.route.curve(times)
+        found = self.platform.inertia_rate(shapes, rates)
+        for rotor in self.rotors:
+            if rotor.is_momentum:
+                axle, turning = self._axle(rotor, shapes, rates)
+                product = np.cross(turning, axle)[:, :, None] * axle[:, None, :]
+                found = found - rotor.inertia * (product + so3.transpose(product))
+        return found
+
+    def spins(self, times: Array, omega: Array) -> Array:
+        """Of the wheels on their axles, while the base turns at omega (..., N, 3): -> (..., N, wheels) [rad/s]."""
+        shapes, rates = self.route.curve(times)
+        found = []
+        for rotor in self.rotors:
+            axle, turning = self._axle(rotor, shapes, rates)
+            free = rotor.value / rotor.inertia - np.sum(axle * (omega + turning), axis=-1)
+            found.append(free if rotor.is_momentum else np.full(free.shape, rotor.value))
+        return np.stack(found, axis=-1)
+
+    def centre_of_mass(self, times: Array) -> Array:
+        """As `Description`."""
+        return self.platform.centre_of_mass(self.route.curve(times)[0])
+
+    def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
+        """As `Description`."""
+        still = self.route.curve(np.array([reference]))[0][0]
+        return self.platform.mass_correlation(*self.route.curve(times), still)
+
+    def kinetic_energy(self, times: Array, turning: Array) -> Array:
+        """As `Description`, that of the wheels included."""
+        shapes, rates = self.route.curve(times)
+        whole = np.broadcast_to(rates, (*turning.shape[:-1], rates.shape[-1])).copy()
+        columns = [self.platform.joint_index(rotor.joint) for rotor in self.rotors]
+        whole[..., columns] = self.spins(times, turning)
+        return self.platform.kinetic_energy(np.broadcast_to(shapes, whole.shape), whole, turning)
+
+    @property
+    def scan(self) -> FunctionScan | None:
+        """As `Description`."""
+        return self.route.scan
+
+    def depends_on(self) -> ScannedFunction:
+        """As `Description`."""
+        return path_function(self.route.curve, self.route.n_shape, self.route.joint_names)
+
+    def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
+        """As `Description`."""
+        shapes, rates = self.route.curve(times)
+        return self.platform.link_pose(shapes, link)[:, :3, :3], self.platform.link_angular_velocity(
+            shapes, rates, link
+        )
+
+    def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
+        """As `Description`."""
+        return replace(self.route.smoothness, knots=None)
+
+    def _axle(self, rotor: Rotor, shapes: Array, rates: Array) -> tuple[Array, Array]:
+        """The axle, and how its carrier turns as seen from the base: (N, 3), (N, 3), base axes."""
+        axle = self.platform.link_pose(shapes, rotor.link)[:, :3, :3] @ rotor.axle
+        return axle, self.platform.link_angular_velocity(shapes, rates, rotor.link)
+
+
+def rotors_argument(body: Body, momenta: Mapping[str, Any], speeds: Mapping[str, Any]) -> tuple[Rotor, ...]:
+    """Wheels by the names of their axles. Raises UnknownNameError, ShapeError for a wheel that is not symmetric."""
+    check_object(body, "Body", "body")
+    found = []
+    for name, given, unit in (("rotors", momenta, "kg m^2/s"), ("rotor_speeds", speeds, "rad/s")):
+        if not isinstance(given, Mapping):
+            raise ShapeError(f"{name}: a mapping from joints to numbers is needed, got {what_came(given)}")
+        for joint, value in given.items():
+            if name == "rotor_speeds" and joint in momenta:
+                raise ShapeError(f"rotor_speeds: {joint} is among the rotors, too; say one of both")
+            found.append(_rotor(body, joint, number_argument(value, f"{name}, {joint}", unit), name == "rotors"))
+    return tuple(found)
+
+
+def _rotor(body: Body, joint: str, value: float, is_momentum: bool) -> Rotor:
+    if joint not in body.joint_names:
+        raise unknown_name(f"joint of {body.name}", joint, body.joint_names)
+    chain = body.chain
+    place = chain.names.index(joint)
+    frame, axle = place + 1, chain.axes[place]
+    if body.joint_units[body.joint_index(joint)] != "rad" or frame in chain.parents:
+        raise ShapeError(
+            f"rotors: {joint} must turn a wheel and nothing that hangs on it; it slides, or has joints below"
+        )
+    tensor, centre = chain.inertias[frame], chain.centres[frame]
+    about = float(axle @ tensor @ axle)
+    across = float(np.trace(tensor) - about) / 2.0
+    round_one = across * np.eye(3) + (about - across) * np.outer(axle, axle)
+    uneven = float(np.abs(tensor - round_one).max()) / about if about > 0.0 else np.inf
+    arm = float(np.linalg.norm(np.cross(axle, centre)))
+    off = arm * np.sqrt(chain.masses[frame] / about) if about > 0.0 else np.inf
+    if max(uneven, off) > _ROUND:
+        raise ShapeError(
+            f"rotors: what {joint} turns is not symmetric about its axle (its inertia by {uneven:.3g} of the moment "
+            f"about it, its centre of mass by {off:.3g} radii of gyration); give its angle by the path"
+        )
+    column = body.momentum_matrix(body.shape())[:, body.joint_index(joint)]
+    if abs(float(np.linalg.norm(column)) - about) > _ROUND * about:
+        raise ShapeError(f"rotors: another joint follows {joint}; give its angle by the path")
+    # Links in the order of the joints, the base first.
+    link = body.moving_parts[frame].links[0]
+    own = body.link_pose(body.shape(), link)[:3, :3].T @ column / about
+    return Rotor(joint=joint, link=link, inertia=about, axle=own, value=value, is_momentum=is_momentum)
+
+
+def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> ShapePath:
+    """A path of the other joints with columns for all, those left out at zero. Raises as `ShapePath.matched`."""
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
+    others = [name for name in body.joint_names if name not in left_out]
+    if path.joint_names is None and path.n_shape != len(others):
+        raise TrajectoryError(
+            f"the path has {path.n_shape} joints, {body.name} without {', '.join(left_out)} has {len(others)}: "
+            f"{', '.join(others)}"
+        )
+    ordered = path.matched(others, f"{body.name} without {', '.join(left_out)}")
+    columns = np.array([body.joint_index(name) for name in others], dtype=int)
+    curve = Widened(ordered.curve, columns, body.n_shape)
+    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None)

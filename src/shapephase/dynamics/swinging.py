@@ -1,0 +1,244 @@
+"""Hinges that no motor holds: they swing as the body turns, and turn it as they swing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_function, check_object, initial_state_arguments, tolerance_argument
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..body.inverse_dynamics import falling_efforts
+from ..chebyshev import inside
+from ..deformation.deformation import articulated
+from ..deformation.rotors import widened_path
+from ..display import short_repr
+from ..errors import AccuracyNotReached, ShapeError, unknown_name
+from ..inertia_tensor import inverse_inertia
+from ..integrator.forced.driven_attitude import DrivenAttitude, driven_attitude
+from ..letters import what_came
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.curves import PiecewisePolynomial
+from ..shape_space.shape_path import ShapePath
+
+Effort = Callable[[float, Array, Array], ArrayLike]
+"""Time, coordinates (k,) and rates (k,) of the free hinges -> what springs and dampers do to them (k,) [N m or N]."""
+# Of the tolerance: how far polynomials between knots may be from what was integrated [rad or m].
+_SHARE = 0.03
+# Pieces between knots; more are not made.
+_MOST_PIECES = 20_000
+# Where a piece is compared with what was integrated.
+_PLACES = (0.25, 0.5, 0.75)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FreeHinges:
+    """The motion of a body some of whose joints swing freely.
+
+    Attributes
+    ----------
+    motion : along the path that came out; `split`, `joint_torques` and all else apply to it
+    path : of all joints, polynomials of degree five between knots
+    hinges : names of those that are free
+    attitude_defect : how far the attitude of the motion is from the one integrated with the hinges [rad]
+    error_estimate : of attitude and hinges, measured [rad or m]
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> rest = ("waist_yaw", "waist_roll")
+    >>> still = sp.ShapePath.waypoints([0.0, 0.5], np.zeros((2, 2)), joint_names=rest)
+    >>> found = sp.free_hinges(cat, still, {"waist_pitch": (0.3, 1.0)}, [0.0, 0.002, 0.01])
+    >>> bool(found.attitude_defect < 1e-9)
+    True
+    """
+
+    motion: Motion
+    path: ShapePath
+    hinges: tuple[str, ...]
+    attitude_defect: float
+    error_estimate: float
+
+    __repr__ = short_repr
+
+
+def free_hinges(
+    body: Body,
+    path: ShapePath,
+    free: Mapping[str, tuple[float, float]],
+    momentum: ArrayLike,
+    attitude: ArrayLike | None = None,
+    *,
+    effort: Effort | None = None,
+    tolerance: float = 1e-9,
+) -> FreeHinges:
+    """The motion of a body some of whose joints follow a path while others swing freely.
+
+    The hinges have no motor. Their accelerations are those with which inverse dynamics finds no effort in them, but
+    that of their springs and dampers. What comes out is a path of all joints, and the motion along it.
+
+    Parameters
+    ----------
+    path : of the other joints
+    free : for each free joint its coordinate and its rate at the start [rad or m], [rad/s or m/s]
+    momentum, attitude : (3,), (3, 3) as for `reconstruct`
+    effort : of springs and dampers, time, coordinates (k,), rates (k,) -> (k,) in the order of `free` [N m or N];
+        None: none
+    tolerance : of attitude and hinges [rad or m]
+
+    Raises
+    ------
+    UnknownNameError, ShapeError, TrajectoryError
+        For a joint that the body has not, no free joint, or a path of other joints than the rest.
+    AccuracyNotReached
+        If the tolerance cannot be met, as for a long swing that is chaotic.
+
+    Notes
+    -----
+    Equation :eq:`free-hinges` of the documentation.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> still = sp.ShapePath.waypoints([0.0, 0.5], np.zeros((2, 2)), joint_names=("waist_yaw", "waist_roll"))
+    >>> found = sp.free_hinges(cat, still, {"waist_pitch": (0.3, 1.0)}, [0.0, 0.002, 0.01])
+    >>> bool(np.abs(sp.joint_torques(found.motion).torque[:, 0]).max() < 1e-9)  # nothing drives the hinge
+    True
+    """
+    check_object(body, "Body", "body")
+    check_object(path, "ShapePath", "path")
+    goal = tolerance_argument(tolerance)
+    starts = _starts(body, free)
+    names = tuple(free)
+    columns = np.array([body.joint_index(name) for name in names], dtype=int)
+    if effort is not None:
+        check_function(effort, "effort", "a function of time, coordinates and rates")
+    route = widened_path(body, path, names)
+    mu, start = initial_state_arguments(momentum, attitude)
+    if mu.ndim > 1 or start.ndim > 2:
+        raise ShapeError("free hinges swing in one motion at a time; give one momentum and attitude")
+    swing = _Swing(body, route, columns, effort, mu)
+    breaks = route.smoothness.breaks
+    scales = np.concatenate([np.ones(len(names)), np.full(len(names), 1.0 / route.duration) + np.abs(starts[1])])
+    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _SHARE * goal)
+    whole = _path_of(swing, found, breaks, goal)
+    motion = reconstruct(articulated(body, whole), mu, attitude, tolerance=goal)
+    times = found.error_times
+    defect = float(so3.angle(so3.transpose(motion.attitude(times)) @ found.attitude(times)).max())
+    worst = float(max(found.attitude_errors[-1], found.state_errors[-1, : len(names)].max()))
+    return FreeHinges(
+        motion=motion, path=whole, hinges=names, attitude_defect=defect, error_estimate=worst + defect + _SHARE * goal
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Swing:
+    """The equations of the hinges and of the base."""
+
+    body: Body
+    route: ShapePath
+    columns: Any
+    effort: Effort | None
+    momentum: Array
+
+    def rates(self, t: float, turned: Array, states: Array) -> tuple[Array, Array]:
+        """As `driven_attitude` asks for; states are the coordinates of the hinges and then their rates."""
+        count = len(self.columns)
+        omega, accelerations = self.accelerations(t, turned, states[:count], states[count:])
+        return omega, np.concatenate([states[count:], accelerations])
+
+    def accelerations(self, t: float, turned: Array, swung: Array, swinging: Array) -> tuple[Array, Array]:
+        """Angular velocity of the base (3,) and accelerations of the hinges (k,)."""
+        at, count = np.array([t]), len(self.columns)
+        (shape, rate), acceleration = self.route.curve(at), self.route.acceleration(at)
+        shape[0, self.columns], rate[0, self.columns] = swung, swinging
+        inertia, matrix, inertia_rate, matrix_rate = (one[0] for one in self.body.sample_rates(shape, rate))
+        inverse = inverse_inertia(inertia)
+        pi = self.momentum @ turned
+        omega = inverse @ (pi - matrix @ rate[0])
+        # The efforts are linear in the accelerations: those of none, and of one of each hinge.
+        tried = np.repeat(acceleration, count + 1, axis=0)
+        tried[np.arange(1, count + 1), self.columns] += 1.0
+        still = np.cross(pi, omega) - inertia_rate @ omega - matrix_rate @ rate[0]
+        spins, slopes = np.broadcast_to(omega, (count + 1, 3)), (still - tried @ matrix.T) @ inverse
+        efforts, _ = falling_efforts(
+            self.body, np.repeat(shape, count + 1, axis=0), np.repeat(rate, count + 1, axis=0), tried, spins, slopes
+        )
+        own = efforts[:, self.columns]
+        given = np.zeros(count)
+        if self.effort is not None:
+            given = np.asarray(self.effort(t, swung, swinging), dtype=np.float64)
+            if given.shape != (count,) or not np.isfinite(given).all():
+                raise ShapeError(
+                    f"effort: {count} finite numbers are needed, at t = {t:.9g} s it gave {what_came(given)}"
+                )
+        return omega, np.linalg.solve((own[1:] - own[0]).T, given - own[0])
+
+
+def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: float) -> ShapePath:
+    """Polynomials of degree five that have coordinates, rates and accelerations at knots, as many as are needed."""
+    knots = np.union1d(found.times, breaks)
+    count = len(swing.columns)
+    while True:
+        left, right = inside(knots[:-1], knots[1:])
+        ends = [_all_joints(swing, found, times) for times in (left, right)]
+        coefficients = _quintics(np.diff(knots), *ends[0], *ends[1])
+        curve = PiecewisePolynomial(knots, coefficients)
+        times = (knots[:-1, None] + np.diff(knots)[:, None] * np.array(_PLACES)).ravel()
+        shapes, rates = swing.route.curve(times)
+        states = found.states(times)
+        shapes[:, swing.columns], rates[:, swing.columns] = states[:, :count], states[:, count:]
+        off = np.abs(curve(times)[0] - shapes).max(initial=0.0)
+        off = max(off, swing.route.duration * np.abs(curve(times)[1] - rates).max(initial=0.0) * _SHARE)
+        if off <= _SHARE * tolerance:
+            break
+        if 2 * len(knots) > _MOST_PIECES:
+            raise AccuracyNotReached(
+                f"the swing of {', '.join(np.array(swing.body.joint_names)[swing.columns])} needs too many pieces of a "
+                "path; loosen the tolerance or shorten the motion"
+            )
+        knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])]))
+    return ShapePath(
+        curve, float(knots[-1]), knots, swing.body.n_shape, swing.body.joint_names, oscillations=0.5
+    )  # fmt: skip
+
+
+def _all_joints(swing: _Swing, found: DrivenAttitude, times: Array) -> tuple[Array, Array, Array]:
+    """Coordinates, rates and accelerations: (N,) -> (N, n) each."""
+    count = len(swing.columns)
+    (shapes, rates), accelerations = swing.route.curve(times), swing.route.acceleration(times)
+    states, attitudes = found.states(times), found.attitude(times)
+    shapes[:, swing.columns], rates[:, swing.columns] = states[:, :count], states[:, count:]
+    for row, (t, turned, state) in enumerate(zip(times, attitudes, states, strict=True)):
+        accelerations[row, swing.columns] = swing.accelerations(float(t), turned, state[:count], state[count:])[1]
+    return shapes, rates, accelerations
+
+
+def _quintics(widths: Array, r: Array, v: Array, a: Array, s: Array, w: Array, b: Array) -> Array:
+    """Coefficients (6, P, n) of the polynomials with these values, slopes and second derivatives at both ends."""
+    h = widths[:, None]
+    gap = s - r - h * v - 0.5 * h**2 * a
+    slope, bend = h * (w - v - h * a), h**2 * (b - a)
+    return np.stack(
+        [
+            r, v, 0.5 * a,
+            (10.0 * gap - 4.0 * slope + 0.5 * bend) / h**3,
+            (-15.0 * gap + 7.0 * slope - bend) / h**4,
+            (6.0 * gap - 3.0 * slope + 0.5 * bend) / h**5,
+        ]
+    )  # fmt: skip
+
+
+def _starts(body: Body, free: Mapping[str, Any]) -> Array:
+    """Coordinates and rates at the start: (2, k). Raises UnknownNameError, ShapeError."""
+    if not isinstance(free, Mapping) or not free:
+        raise ShapeError(f"free: joints with (coordinate, rate) at the start are needed, got {what_came(free)}")
+    for name in free:
+        if name not in body.joint_names:
+            raise unknown_name(f"joint of {body.name}", name, body.joint_names)
+    return np.array([finite_array(pair, f"free, {name}", (2,)) for name, pair in free.items()]).T
