@@ -99,6 +99,8 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "curvature_on_plane": lambda: sp.curvature_on_plane(body, body.joint_names[:2], TIMES, TIMES),
         "is_flat": lambda: sp.is_flat(body),
         "joint_torques": lambda: sp.joint_torques(motion, TIMES),
+        "free_hinges": lambda: sp.free_hinges(body, swung(body), {body.joint_names[0]: (0.3, 1.0)}, MOMENTUM),
+        "torque": lambda: sp.reconstruct(deformation, MOMENTUM, torque=lambda s: 0.01 * s.rate).final_attitude,
         "minimum_perturbation": lambda: sp.minimum_perturbation(body, shape, 0.2, 2),
         "reachable": lambda: sp.reachable(body, shape),
         "particle_body": lambda: sp.curvature(sp.particle_body([1.0, 2.0, 3.0], corners, ["angle"]), [0.4]),
@@ -137,6 +139,11 @@ def corners(shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def flown(name: str, path: sp.ShapePath) -> sp.PhaseSplit:
     """One of the motions that come with the library."""
     return sp.split(sp.reconstruct(sp.articulated(sp.load_body(name), path), MOMENTUM))
+
+
+def swung(body: sp.Body) -> sp.ShapePath:
+    """A path of all joints but the first."""
+    return sp.ShapePath.waypoints([0.0, 1.0], np.outer([0.0, 0.1], np.ones(body.n_shape - 1)))
 
 
 def saved(motion: sp.Motion) -> sp.Motion:
