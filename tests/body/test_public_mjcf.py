@@ -1,8 +1,8 @@
 """MJCF files that public packages ship, against MuJoCo itself: mass, centre, I, L_o, momentum, whole motions.
 
 The packages are not installed for it, only their files are read: those of an environment, or wheels unpacked in the
-folder that MJCF_PACKAGES names (`pip download --no-deps dm_control gymnasium gymnasium-robotics robosuite`, then
-`unzip` each in there).
+folder that MJCF_PACKAGES names: `pip download --no-deps dm_control gymnasium gymnasium-robotics robosuite` there, then
+`unzip` each.
 """
 
 from __future__ import annotations
@@ -31,11 +31,8 @@ REFUSED = {"model_with_ball_joints.xml": "a ball joint"}
 
 def folder_of(package: str) -> Path | None:
     """Where the files of a package lie; None: nowhere."""
-    given = os.environ.get("MJCF_PACKAGES")
-    if given:
-        return next(
-            iter(sorted(path for path in Path(given).rglob(package) if (path / "__init__.py").exists())), None
-        ) or (next(iter(sorted(path for path in Path(given).rglob(package) if path.is_dir())), None))
+    if given := os.environ.get("MJCF_PACKAGES"):
+        return Path(given) / package if (Path(given) / package).is_dir() else None
     spec = importlib.util.find_spec(package)
     return Path(spec.submodule_search_locations[0]) if spec and spec.submodule_search_locations else None
 
@@ -97,12 +94,15 @@ def test_bodies_of_a_package_are_mujoco_s(package):
 
 
 def test_enough_of_them_load():
+    if any(folder_of(package) is None for package in PACKAGES):
+        pytest.skip("not all packages are there")
     bodies = [found[0] for package in PACKAGES for path in files_of(package) if (found := loaded(path))]
     assert len(bodies) >= 60
     assert sum(body.n_shape >= 2 for body in bodies) >= 40
 
 
 def test_what_is_not_taken_is_named():
+    files_of("dm_control")
     (path,) = (path for path in (folder_of("dm_control") or Path()).rglob("*.xml") if path.name in REFUSED)
     with pytest.raises(ModelFileError, match=REFUSED[path.name]):
         sp.load_body(path)
