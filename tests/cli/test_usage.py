@@ -21,6 +21,7 @@ SHALL = {
     "split cat": ["MOTION is missing", "`shapephase split BODY MOTION [OPTIONS]`"],
     "plot cat cat_righting": ["MOTION is missing", "`shapephase plot KIND BODY MOTION [OPTIONS]`"],
     "conjugate 1 2": ["I3 is missing", "`shapephase conjugate I1 I2 I3 [OPTIONS]`"],
+    "rigid 1 2 3": ["--momentum is needed; for example `--momentum 0.6 0.9 0.5`"],
     "plan cat_two_halves 90": ["too many words: '90'", "`shapephase plan BODY [OPTIONS]`"],
     "check cat circle kg": ["too many words: 'kg'", "`shapephase check BODY [MOTION] [OPTIONS]`"],
     "split cat cat_righting --momentum 0 0": ["--momentum: 3 values", "got '0 0'", "`--momentum 0 0 0.02`"],

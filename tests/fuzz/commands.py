@@ -129,6 +129,13 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
     },
     "sweep status": {},
     "sweep export": {"--out": lambda c: _file(c, "table.csv")},
+    "rigid": {
+        "--momentum": _three,
+        "--figure": lambda c: [c.choice(("polhodes", "herpolhode", "rolling", "cones", "x", ""))],
+        "--time": lambda c: [_number(c, "1.5")],
+        "--out": lambda c: _file(c, "out.svg"),
+        "--html": lambda c: _file(c, "out.html"),
+    },
     "conjugate": {"--momenta": _three, "--order": lambda c: [_number(c, "2")], "--out": lambda c: _file(c, "out.svg")},
     "robots": {},
     "doctor": {},
@@ -189,6 +196,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
     words = {
         "plan": [body],
         "conjugate": [_number(chance, "1"), _number(chance, "2"), _number(chance, "3")],
+        "rigid": [_number(chance, "1"), _number(chance, "2"), _number(chance, "3"), "--momentum", *_three(chance)],
         "orbits": [body, motion, _number(chance, "0.02")],
         "plot": [
             odd_one(chance, chance.choice(("momentum", "phases", "shape", "inertia")), ("x", ""), 8),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 import signal
@@ -21,7 +22,7 @@ from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting, satellite_sweep
 from shapephase.plotting.named_figures import FIGURES, figure_image, write_figure
 from shapephase.plotting.pages.report_data import continued_rotation_vectors
-from shapephase.plotting.report import write_report
+from shapephase.plotting.report import figure_rows, write_report
 from support.bodies import random_loop
 from support.browser import furred, opened, seen
 from support.long_runs import full_but
@@ -66,6 +67,32 @@ def text_of(page):
     """What a reader sees, without the animation and the pictures."""
     page = re.sub(r'<script.*?</script>|src="data:[^"]*"|<style>.*?</style>', "", page, flags=re.DOTALL)
     return html.unescape(re.sub(r"<[^>]+>", " ", page))
+
+
+def test_rows_of_figures_have_no_holes():
+    for count in range(1, 12):
+        rows = figure_rows(list(range(count)))
+        assert [figure for row in rows for figure in row] == list(range(count))
+        assert all(len(row) in (2, 3) for row in rows) or count == 1
+        assert [len(row) for row in rows] == sorted(len(row) for row in rows)
+    assert figure_rows([]) == []
+
+
+def test_figures_of_a_row_are_equally_high(sweep, tmp_path):
+    """Breadths as the style shares them, by the figures' own sides: read off the page."""
+    path, moving, _ = sweep
+    write_report(moving, sp.split(moving), tmp_path / "report.html", shape_path=path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    (usual,) = re.findall(r"\.row figure \{[^}]*flex: ([0-9.]+) 1 0", page)
+    (tall,) = re.findall(r"\.row \.tall \{ flex-grow: ([0-9.]+)", page)
+    rows = re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)
+    assert [row.count("<figure") for row in rows] == [2, 2, 3]
+    for row in rows:
+        heights = []
+        for name, image in re.findall(r'<figure( class="tall")?><img[^>]*base64,([^"]*)"', row):
+            width, height = map(float, re.findall(rb'(?:width|height)="([0-9.]+)pt"', base64.b64decode(image))[:2])
+            heights.append(float(tall if name else usual) * height / width)
+        assert heights == pytest.approx([heights[0]] * len(heights), rel=2e-3)
 
 
 @pytest.mark.parametrize("momentum", [True, False])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from itertools import pairwise, product
@@ -19,13 +20,14 @@ from shapephase.errors import GaugeError, MissingExtraError, ShapeError, Unknown
 from shapephase.examples.scenarios import MOTIONS, astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
 from shapephase.plotting import plots
 from shapephase.plotting._joint_looks import other_side
-from shapephase.plotting._sphere_area import enclosed_cells
+from shapephase.plotting._sphere_area import enclosed_cells, outlines
 from shapephase.plotting.motion_plots import _pieces
 from shapephase.plotting.plot_style import axes_image
 from shapephase.rigid_body.euler_top import EulerTop
 from support.long_runs import full_but
 
 BLACK, BLUE, VERMILION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
+UPRIGHT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 UPSIDE_DOWN = so3.exp(np.array([np.pi, 0.0, 0.0]))
 
 
@@ -171,6 +173,39 @@ def test_the_shaded_area_is_the_solid_angle(motions, name, gauge):
     tolerance = 2e-3 * (1.0 + abs(angle))
     assert shaded_area(ax, view) == pytest.approx(angle, abs=tolerance)
     assert f"solid angle {angle:+.4g} sr".replace("-", "−") in ax.get_legend().get_title().get_text()
+
+
+def test_the_shaded_area_is_one_outline_and_the_figure_small():
+    """Half a sphere was 1,300 cells with their sides drawn: megabytes of them."""
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 14.0), [0.6, 0.9, 0.5])
+    ax = plots.plot_momentum_curve(plots.column_axes(3.9), motion, "base")
+    areas = [patch for patch in ax.patches if (patch.get_gid() or "").startswith("area")]
+    corners = sum(len(patch.get_path().vertices) for patch in areas)
+    curve = sum(len(line.get_xdata()) for line in ax.lines if line.get_color() == BLACK)
+    assert corners < 3 * curve
+    assert len(axes_image(ax, "svg")) < 400_000
+
+
+def test_sides_that_polygons_share_cancel():
+    """Of a board of squares with a hole the outer and the inner edge are left, the inner one the other way round."""
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    board = [square + place + 1e-13 * k for k, place in enumerate(product(range(3), range(3))) if place != (1, 1)]
+    found = sorted(outlines(board), key=len)
+    areas = [0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) for x, y in (curve.T for curve in found)]
+    assert [len(curve) for curve in found] == [4, 12]
+    assert areas == pytest.approx([-1.0, 9.0], abs=1e-10)
+    # Without a common side each stays as it is.
+    assert len(outlines([square, np.add(square, [3.0, 0.0])])) == 2
+
+
+def test_a_curve_that_nearly_closes_has_no_end_on_its_start():
+    """The diver's momentum is back within a thousandth of a degree: the end hid the start."""
+    top = EulerTop.principal((1.0, 2.0, 3.0), (0.7, 0.2, 1.5))
+    for missing, shown in ((1e-3, False), (0.1, True)):
+        motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), (1.0 - missing) * top.period), [0.7, 0.2, 1.5])
+        ax = plots.plot_momentum_curve(flat_axes(), motion, "base")
+        assert ("end" in labels(ax)) == ("closing great circle" in labels(ax)) == shown
+        assert len(marked(ax, "*", GREEN)) == 1
 
 
 def test_the_sign_of_the_area_is_told_by_hatching(motions):
@@ -464,6 +499,29 @@ def test_a_small_geometric_phase_is_enlarged(motions):
     assert len(plots.plot_phases(flat_axes(2.6), motions["spinning"]).child_axes) == 1
 
 
+def test_the_power_of_ten_stands_in_the_unit(cat):
+    """Above the axis, where Matplotlib writes it, the legend covered it."""
+    still = sp.ShapePath.waypoints([0.0, 1.0], [np.zeros(cat.n_shape)] * 2, joint_names=cat.joint_names)
+    motion = sp.reconstruct(sp.articulated(cat, still), [0.0, 0.0, 1e-9])
+    for ax, factor in ((plots.plot_phases(flat_axes(), motion), 1.0), (plots.plot_energy(flat_axes(), motion), 1.0)):
+        ax.figure.draw_without_rendering()
+        for axis in (ax.yaxis, *(child.yaxis for child in ax.child_axes)):
+            assert not (axis.get_offset_text().get_visible() and axis.get_offset_text().get_text())
+        power = int(re.search("10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+) ", ax.get_ylabel())[1].translate(UPRIGHT))
+        for place, tick in zip(ax.get_yticks(), ax.get_yticklabels(), strict=True):
+            shown = float(tick.get_text().replace("−", "-")) * 10.0**power
+            assert shown == pytest.approx(factor * place, rel=1e-3, abs=1e-3 * 10.0**power)
+    assert "= 0.00°" in labels(plots.plot_phases(flat_axes(), motion))[1]
+
+
+def test_lines_of_many_loops_are_finer(cat):
+    path = cat_righting()
+    few, many = (plots.plot_shape_path(flat_axes(), one, cat) for one in (path, path.repeated(60)))
+    for one, other in zip(few.lines, many.lines, strict=True):
+        assert other.get_linewidth() == pytest.approx(0.35 * one.get_linewidth())
+        assert other.get_markersize() == pytest.approx(0.35 * one.get_markersize())
+
+
 def test_a_start_upside_down_is_drawn_without_a_jump(cat):
     # A half turn at the start has two rotation vectors; the one that goes on is drawn.
     motion = sp.reconstruct(sp.articulated(cat, cat_righting()), [0.02, 0.0, 0.0], UPSIDE_DOWN)
@@ -541,6 +599,13 @@ def test_the_energy_is_on_an_axis_where_it_is_seen():
     title = ax.get_legend().get_title().get_text()
     assert rf"$\ell^2\!/2I_1$ is beyond the axis, up to {greatest:.4g} J" in title
     assert r"$\ell^2\!/2I_3$" in labels(ax)
+
+
+def test_a_band_between_equal_moments_is_not_in_the_legend():
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 1.0, 2.0]), 2.0), [0.6, 0.1, 1.5])
+    shown = labels(plots.plot_energy(flat_axes(), motion))
+    assert "about largest moment" in shown
+    assert "about smallest moment" not in shown
 
 
 def test_certain_bounds_of_the_energy_are_drawn_as_steps(motions):

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError
-from shapephase.plotting import poinsot_page
+from shapephase.plotting import poinsot_page, poinsot_video
+from shapephase.rigid_body.poinsot import Poinsot
 from support.browser import opened, seen
 from support.pages import page_data
 
@@ -77,6 +78,16 @@ def test_every_regime_has_a_page(tmp_path):
         contact = data["rolling"]["contact"].reshape(-1, 3)
         np.testing.assert_allclose(contact @ top.momentum, 2.0 * top.energy, rtol=1e-6)
         assert np.isfinite(data["rolling"]["polhode"]).all()
+        # A herpolhode that is a point has no curves in time, and the arrow of the momentum ends beyond the plane.
+        drawn = [plot["title"].split(":")[0] for plot in data["plots"]]
+        assert (
+            drawn
+            == ["angular velocity along the principal axes", "herpolhode", "herpolhode"][
+                : 3 if Poinsot(top).annulus[1] else 1
+            ]
+        )
+        foot = float(np.linalg.norm(data["rolling"]["foot"]))
+        assert data["motion"]["arrow"] * data["motion"]["reach"] > 1.3 * foot - 1e-12
     poinsot_page(tops[1], tmp_path / "a.html", frames=5)
     assert page_data(tmp_path / "a.html")["motion"]["duration"] == pytest.approx(24.0 * np.pi, rel=1e-12)
 
@@ -130,3 +141,23 @@ def test_in_a_browser_the_contact_moves_with_the_clock(top, top_page, chromium):
     assert orange(0.9) > orange(0.1) + 100
     assert [message for message in said if message[0] in ("error", "warning")] == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+
+
+@pytest.mark.full
+def test_a_film_shows_the_ellipsoid_and_nothing_else(tmp_path, chromium):
+    """In each of the six pictures the blue of the ellipsoid is in the middle, and what is drawn on the plane grows."""
+    from PIL import Image
+
+    chromium.close()
+    poinsot_video(sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5]), tmp_path / "rolling.png", pixels=(320, 240))
+    with Image.open(tmp_path / "rolling.png") as strip:
+        pictures = np.split(np.asarray(strip.convert("RGB"), dtype=int), 6, axis=1)
+    orange = []
+    for picture in pictures:
+        blue = np.argwhere(picture[..., 2] - picture[..., 0] > 60)
+        assert len(blue) > 0.02 * 320 * 240
+        assert np.abs(blue.mean(axis=0) / [240, 320] - 0.5).max() < 0.25
+        # The edges are empty, but for the time and the axes at the bottom.
+        assert (picture[:3] > 240).all()
+        orange.append(np.count_nonzero((picture[..., 0] - picture[..., 2] > 120) & (picture[..., 1] > 120)))
+    assert orange[-1] > orange[0] + 50

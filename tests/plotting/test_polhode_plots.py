@@ -283,3 +283,14 @@ def test_importing_the_module_does_not_import_matplotlib():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_start_of_a_steady_top_is_not_hidden_by_the_equilibrium_that_it_is():
+    """What is drawn last of the same depth is in front: the legend named a star that nobody saw."""
+    for momentum in ((0.0, 0.0, 2.0), (0.0, 2.0, 0.0)):
+        ax = plot_polhodes(flat_axes(), EulerTop.principal((1.0, 2.0, 3.0), momentum))
+        places = [(line.get_marker(), *line.get_xydata()[0]) for line in ax.lines if line.get_linestyle() == "None"]
+        (star,) = [k for k, place in enumerate(places) if place[0] == "*"]
+        under = [k for k, place in enumerate(places) if place[0] != "*" and place[1:] == places[star][1:]]
+        assert len(under) == 1
+        assert under[0] < star

@@ -83,3 +83,16 @@ def test_what_cannot_be_drawn_is_refused(antenna):
     batch = sp.reconstruct(motion.deformation, np.tile(example.momentum, (2, 1)))
     with pytest.raises(ShapeError, match="batch"):
         plot_crown(column_axes(), crown, batch)
+
+
+def test_a_crown_over_the_whole_sphere_ends_at_the_limb_without_steps():
+    sweep = sp.articulated(sp.load_body("satellite"), sp.examples.satellite_sweep())
+    ax = plot_crown(column_axes(3.4), crown_region(sweep, [0.0, 0.0, 1.0]))
+    (filled,) = [shape for shape in ax.collections if len(shape.get_facecolor())]
+    (square,) = [ring for path in filled.get_paths() for ring in path.to_polygons()]
+    assert square.min(axis=0) == pytest.approx([-1.0, -1.0])
+    assert square.max(axis=0) == pytest.approx([1.0, 1.0])
+    ends = ax.transData.transform([(-1.0, -1.0), (1.0, 1.0)])
+    clip = filled.get_clip_path().get_transformed_points_and_affine()
+    box = clip[1].transform_path(clip[0]).get_extents()
+    assert np.reshape(box.get_points(), (2, 2)) == pytest.approx(ends, abs=1e-6)

@@ -43,6 +43,8 @@ COMMANDS = {
     "conjugate.svg": ("conjugate", "1", "2", ("3", "4"), "--out"),
     "conjugate.pdf": ("conjugate", "1", "2", ("3", "4"), "--out"),
     "conjugate.png": ("conjugate", "1", "2", ("3", "4"), "--out"),
+    "rigid.svg": ("rigid", "1", "2", "3", "--momentum", "1", "0", ("2", "4"), "--out"),
+    "rigid.html": ("rigid", "1", "2", "3", "--momentum", "1", "0", ("2", "4"), "--html"),
 }
 FUNCTIONS = ("motion.npz", "motion.csv", "path.npz", "path.csv", "page.html", "figure.svg")
 WRITERS = (*COMMANDS, *FUNCTIONS)

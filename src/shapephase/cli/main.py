@@ -31,6 +31,7 @@ from .outcome import Outcome
 from .pictures import plot_command, view_command
 from .plans.plan import plan_command
 from .reach import reach_command
+from .rigid import rigid_command
 from .split import split_command
 from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
@@ -56,6 +57,7 @@ app.command(explore_command, name="explore")
 app.command(plan_command, name="plan")
 app.command(conjugate_command, name="conjugate")
 app.command(reach_command, name="reach")
+app.command(rigid_command, name="rigid")
 app.command(check_command, name="check")
 app.command(orbits_command, name="orbits")
 app.command(sweep_app)

@@ -58,8 +58,8 @@ def view_command(
         `--speed 0.1` for slow motion.
     """
     from ..plotting.pages.up_axis import up_axis
-    from ..plotting.pages.video import VIDEO_ENDINGS, check_video
-    from ..plotting.viewer import FILM_SIZE, motion_page, motion_video, view
+    from ..plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+    from ..plotting.viewer import motion_page, motion_video, view
     from . import motion as motions
     from .texts.recording_text import recording_data
 

@@ -5,7 +5,7 @@ from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_l
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
 from .named_figures import FIGURES, Figure, figure_image, write_figure
-from .pages.poinsot_page import poinsot_html, poinsot_page
+from .pages.poinsot_page import poinsot_html, poinsot_page, poinsot_video
 from .plot_style import column_axes
 from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
@@ -52,6 +52,7 @@ __all__ = [
     "plots",
     "poinsot_html",
     "poinsot_page",
+    "poinsot_video",
     "view",
     "write_figure",
     "write_report",

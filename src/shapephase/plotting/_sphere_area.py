@@ -19,6 +19,8 @@ _MAX_SIDE = 0.05
 _SAME_MERIDIAN = 1e-12
 # Winding numbers that have a shade of their own; more are shown as this.
 MAX_WINDING = 3
+# Decimals by which corners are told apart: a side that two cells share differs by rounding.
+_SAME_CORNER = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +75,47 @@ def enclosed_cells(corners: Array, reference: Array) -> AreaCells:
                 polygons.append(_cell(reference, sides, bounds[k], bounds[k + 1]))
                 windings.append(int(layer))
     return AreaCells(polygons=polygons, windings=np.array(windings, dtype=np.int64))
+
+
+def outlines(polygons: list[Array]) -> list[Array]:
+    """The closed curves around polygons that lie side by side: sides gone along both ways cancel.
+
+    What is on the left of a polygon's sides is on the left of these, so that a hole is gone round the other way.
+
+    Parameters
+    ----------
+    polygons : (m_k, d) corners each
+    """
+    corners = np.concatenate(polygons)
+    _, first, place = np.unique(np.round(corners, _SAME_CORNER) + 0.0, axis=0, return_index=True, return_inverse=True)
+    starts = place.ravel()
+    ends = np.concatenate([np.roll(part, -1) for part in np.split(starts, np.cumsum([len(p) for p in polygons])[:-1])])
+    sides, counts = np.unique(starts * len(first) + ends, return_counts=True)
+    one, other = sides // len(first), sides % len(first)
+    back = np.searchsorted(sides, other * len(first) + one)
+    found = np.isin(other * len(first) + one, sides)
+    kept = np.where(one == other, 0, counts - np.where(found, counts[np.where(found, back, 0)], 0))
+    leaving: dict[int, list[int]] = {}
+    for start, end, count in zip(one.tolist(), other.tolist(), kept.tolist(), strict=True):
+        if count > 0:
+            leaving.setdefault(start, []).extend([end] * count)
+    curves = []
+    while leaving:
+        start = next(iter(leaving))
+        curve, corner = [start], _next_corner(leaving, start)
+        while corner != start:
+            curve.append(corner)
+            corner = _next_corner(leaving, corner)
+        curves.append(corners[first[curve]])
+    return curves
+
+
+def _next_corner(leaving: dict[int, list[int]], corner: int) -> int:
+    """Go along one of the sides that leave a corner, once."""
+    following = leaving[corner].pop()
+    if not leaving[corner]:
+        del leaving[corner]
+    return following
 
 
 def _strip_edges(azimuth: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array, Mask, finite_array
-from ._sphere_area import MAX_WINDING, AreaCells
+from ._sphere_area import MAX_WINDING, AreaCells, outlines
 from .plot_style import SMALL, finish
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ class SphereAxes(ParallelAxes):
         legend.set_in_layout(self.solid)
 
     def _fill(self, parts: list[Array], near: bool, label: str | None, colour: str, winding: int) -> None:
-        """Fill all cells of one kind as one path, so that there are no seams between them."""
+        """Fill all cells of one kind as one path around them, so that it is short and there are no seams."""
         from matplotlib.colors import to_rgb
         from matplotlib.patches import Patch, PathPatch
         from matplotlib.path import Path
@@ -189,7 +189,7 @@ class SphereAxes(ParallelAxes):
             self.ax.add_collection3d(Poly3DCollection(parts, **look))
             hatch = {}
         else:
-            paths = [Path(np.vstack([part, part[:1]]) @ self.screen.T, closed=True) for part in parts]
+            paths = [Path(np.vstack([part, part[:1]]) @ self.screen.T, closed=True) for part in outlines(parts)]
             whole = Path.make_compound_path(*paths)
             # Added as an artist: as a patch, each of its curves would be searched for the limits of the data.
             self.ax.add_artist(PathPatch(whole, facecolor=face, linewidth=0.0, gid=gid, zorder=depth, **hatch))

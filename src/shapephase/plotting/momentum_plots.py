@@ -43,8 +43,11 @@ _MANY_POINTS = 30_000
 _MAX_PARTS = 40
 # Length of a curve on the unit sphere [1], some six revolutions, from which on it is drawn in a finer line.
 _LONG = 40.0
-# Angle between start and end [rad] below which a curve counts as closed.
+# Angle between start and end [rad] that is none, and [of the curve's size, at most a radian] that nobody sees.
 _CLOSED = 1e-6
+_UNSEEN = 0.03
+# Solid angle [sr] that is rounding.
+_NO_AREA = 1e-12
 # Half the size of a curve on the screen [radii of the sphere] below which it is enlarged, and what is none.
 _SMALL_CURVE = 0.13
 _NOTHING = 1e-6
@@ -198,7 +201,8 @@ def _draw_curve(
     places = np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875]))
     drawn.arrows(points, places, BLACK, shaft=0.01 * scale)
     drawn.point(points[0], "start", marker="*", color=GREEN, markersize=10.0)
-    if so3.angle_between(points[0], points[-1]) > _CLOSED:
+    size = min(1.0, float(np.linalg.norm(points - points[0], axis=1).max()))
+    if so3.angle_between(points[0], points[-1]) > max(_CLOSED, _UNSEEN * size):
         drawn.point(points[-1], "end", marker="s", color=VERMILION, markersize=5.5)
         drawn.curve(closing, "closing great circle", **_CLOSURE)
     if cells is not None:
@@ -295,4 +299,4 @@ def _view_of(points: Array) -> tuple[float, float]:
 
 
 def _signed(value: float) -> str:
-    return f"{value:+.4g}".replace("-", "−")
+    return "0" if abs(value) < _NO_AREA else f"{value:+.4g}".replace("-", "−")

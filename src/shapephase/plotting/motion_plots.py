@@ -55,6 +55,8 @@ _FLAT = 0.06
 _NOTHING = 1e-9
 # Of the axis: the least that the energy and the two nearest curves are to have of it.
 _PRESSED = 0.3
+# Of the energy: a band of this breadth is rounding, as between equal moments.
+_NO_BAND = 1e-9
 # Of the range of the energies, beyond its ends.
 _ROOM = 0.05
 # Energies that bound the regimes, as the legend names them.
@@ -169,7 +171,8 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
         label, title = "", "attitude, base to inertial axes: rotation vector"
         title += "; dots: half turns" if size.max() > np.pi - _HALF_TURN else ""
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    in_time(ax, (t[0], t[-1]), label, title=title, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    in_time(ax, (t[0], t[-1]), label, loops=motion.deformation.loops, title=title, **above)
     if kind != "quaternion":
         degrees_first(ax, "rotation vector")
     return ax
@@ -216,7 +219,8 @@ def plot_inertia(
         "principal": ("principal moments [kg m²]", "locked inertia, about the centre of mass"),
         "entries": ("locked inertia [kg m²]", "locked inertia in the deformation's frame"),
     }[kind]
-    in_time(ax, (t[0], t[-1]), label, title=title, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    above = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    in_time(ax, (t[0], t[-1]), label, loops=deformation.loops, title=title, **above)
     return ax
 
 
@@ -248,7 +252,7 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
         ax.plot(t, internal[:, k], label=f"$L_{{o,{name}}}$", **SERIES[k])
     ax.plot(t, np.linalg.norm(internal, axis=-1), label="$|L_o|$", color=GREY, linewidth=2.2, zorder=1.5)
     ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "loops": deformation.loops}
     in_time(ax, (t[0], t[-1]), "$L_o$ [kg m²/s]", title="momentum of the joints, the base at rest", **above)
     return ax
 
@@ -307,7 +311,8 @@ def plot_energy(
         (bottom, middle, "about largest moment", {"facecolor": "#FBE8C8", "edgecolor": ORANGE, "hatch": "///"}),
     )
     for low, high, label, look in bands:
-        ax.fill_between(t, low, high, linewidth=0.0, label=label, zorder=1, **look)
+        if (high - low).max() > _NO_BAND * high.max():
+            ax.fill_between(t, low, high, linewidth=0.0, label=label, zorder=1, **look)
     energy = energy_along(motion, t)
     low, high, beyond = _energy_range(energy, bottom, middle, top)
     limits = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
@@ -322,9 +327,8 @@ def plot_energy(
             ax.stairs(values, edges, baseline=None, color=BLACK, linestyle=(0, (1, 1)), linewidth=1.2, label=label)
     ax.plot(t, energy, label="$E$", color=BLACK, linewidth=1.7)
     ax.set_ylim(low, high)
-    in_time(
-        ax, (t[0], t[-1]), "energy [J]", title="\n".join(["energy, and the axis that the momentum circles", *beyond])
-    )
+    title = "\n".join(["energy, and the axis that the momentum circles", *beyond])
+    in_time(ax, (t[0], t[-1]), "energy [J]", loops=motion.deformation.loops, title=title)
     return ax
 
 
@@ -375,7 +379,7 @@ def _phase_title(found: RunningPhases, jumps: int) -> str:
 
 def _degrees(angle: float, *, sign: bool = False) -> str:
     """An angle in degrees with two digits after the point, with a minus sign that is one."""
-    return f"{np.degrees(angle) + 0.0:{'+' if sign else ''}.2f}°".replace("-", "−")
+    return f"{round(float(np.degrees(angle)), 2) + 0.0:{'+' if sign else ''}.2f}°".replace("-", "−")
 
 
 def _broken(t: Array, values: Array, at: Integers) -> tuple[Array, Array]:

@@ -14,16 +14,21 @@ from ..errors import ShapeError, unknown_name
 from ..files import write_whole
 from ..phases._momentum_curve import Gauge
 from ..reconstruction.reconstruction import Motion
+from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
 from .plot_style import axes_image
 from .plots import (
     column_axes,
     plot_attitude,
+    plot_cones,
     plot_energy,
+    plot_herpolhode,
     plot_inertia,
     plot_internal_momentum,
     plot_momentum_curve,
     plot_phases,
+    plot_polhodes,
+    plot_rolling_ellipsoid,
     plot_shape_path,
     plot_torques,
 )
@@ -113,6 +118,15 @@ FIGURES: Mapping[str, Figure] = {
 }
 
 
+RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], object]]] = {
+    "polhodes": (3.8, lambda ax, top, _: plot_polhodes(ax, top)),
+    "herpolhode": (3.8, lambda ax, top, _: plot_herpolhode(ax, top)),
+    "rolling": (3.6, lambda ax, top, time: plot_rolling_ellipsoid(ax, top, time)),
+    "cones": (3.6, lambda ax, top, time: plot_cones(ax, top, time)),
+}
+"""Figures of a free rigid body by name: the height of each [in], and what draws it at a time [s]."""
+
+
 def motion_figure(
     motion: Motion, kind: str | None = None, *, ax: Axes | None = None, gauge: Gauge = "horizontal"
 ) -> Axes:
@@ -191,4 +205,24 @@ def write_figure(
     if path is not None:
         check_object(path, "ShapePath", "path")
     image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
+    write_whole(out, lambda stream: stream.write(image))
+
+
+def write_rigid_figure(kind: str, top: EulerTop, out: str | os.PathLike[str], time: float = 0.0) -> None:
+    """Write one of `RIGID_FIGURES` to an .svg, .pdf or .png file, whole or not at all.
+
+    Parameters
+    ----------
+    time : at which the ellipsoid or the cones are shown [s]
+
+    Notes
+    -----
+    Raises UnknownNameError, ShapeError, MissingExtraError.
+    """
+    if kind not in RIGID_FIGURES:
+        raise unknown_name("kind of figure", kind, RIGID_FIGURES)
+    height, draw = RIGID_FIGURES[kind]
+    ax = column_axes(height)
+    draw(ax, top, time)
+    image = axes_image(ax, Path(out).suffix.removeprefix(".").lower())
     write_whole(out, lambda stream: stream.write(image))

@@ -56,6 +56,11 @@ _RESOLUTION = 300
 _EDGE = 0.05
 # Points of a line that is a mark or a zero line, and no curve to be kept free.
 _FEW = 2
+# Powers of ten of an axis in time that its numbers show as they are.
+_PLAIN_POWERS = (-4, 4)
+# Loops of a path up to which its lines have their whole breadth, and the least part of it.
+_MANY_LOOPS = 12
+_FINEST = 0.35
 # Points of a curve in time: more than one column has pixels at 200 dpi.
 _MIN_POINTS = 800
 # Points of a curve in time for each loop of a repeated path.
@@ -113,6 +118,8 @@ def _is_long(artist: Any) -> bool:
     """Whether an artist has more points than a figure of vectors should hold."""
     if hasattr(artist, "get_xdata"):
         return len(artist.get_xdata(orig=True)) > _MAX_VECTOR_POINTS
+    if hasattr(artist, "get_patch_transform"):
+        return len(artist.get_path().vertices) > _MAX_VECTOR_POINTS
     if hasattr(artist, "get_offsets") and hasattr(artist, "get_paths"):
         return sum(len(path.vertices) for path in artist.get_paths()) > _MAX_VECTOR_POINTS
     return False
@@ -193,6 +200,7 @@ def finish(ax: Any, **place: Any) -> Any:
         "columnspacing": 1.0,
     }
     legend = ax.legend(**{"ncols": 2, "frameon": False, **look, **above, **place})
+    legend.get_title().set_multialignment("center")
     with_symbols(ax)
     return legend
 
@@ -205,23 +213,62 @@ def with_symbols(ax: Any) -> None:
         text.set_math_fontfamily(_SYMBOLS)
 
 
-def in_time(ax: Any, duration: tuple[float, float], label: str, **place: Any) -> None:
-    """Limits, labels and legend of a figure whose abscissa is time [s]; `label` with its unit is for the ordinate."""
+def in_time(ax: Any, duration: tuple[float, float], label: str, *, loops: int = 1, **place: Any) -> None:
+    """Limits, labels and legend of a figure whose abscissa is time [s]; `label` with its unit is for the ordinate.
+
+    Of a path that is gone round in many `loops`, lines and markers are finer.
+    """
     ax.set_xlim(*duration)
+    finer(ax, loops)
     ax.set_xlabel("$t$ [s]", fontsize=SMALL)
-    ax.set_ylabel(label, fontsize=SMALL)
+    label_ordinate(ax, label, max(map(abs, ax.get_ylim())))
     finish(ax, **place)
+
+
+def finer(ax: Any, loops: int) -> None:
+    """Make lines and markers finer where many loops stand side by side, so that they do not run together."""
+    share = max(_MANY_LOOPS / max(loops, _MANY_LOOPS), _FINEST)
+    for line in ax.lines:
+        line.set(linewidth=share * line.get_linewidth(), markersize=share * line.get_markersize())
+
+
+def label_ordinate(ax: Any, label: str, largest: float) -> None:
+    """Name an ordinate whose numbers go up to `largest`, with their power of ten in the unit.
+
+    Where Matplotlib writes it, above the axis, the legend stands.
+    """
+    from matplotlib.ticker import ScalarFormatter
+
+    power, scale = power_of_ten(largest, _PLAIN_POWERS)
+    formatter = ScalarFormatter(useOffset=False)
+    if power:
+        formatter.set_powerlimits((power, power))
+    else:
+        formatter.set_scientific(False)
+    ax.yaxis.set_major_formatter(formatter)
+    ax.yaxis.get_offset_text().set_visible(False)
+    words, bracket, unit = label.rpartition("[")
+    ax.set_ylabel(f"{words}{bracket}{scale}{unit}", fontsize=SMALL)
+
+
+def power_of_ten(largest: float, plain: tuple[int, int] = (-3, 2)) -> tuple[int, str]:
+    """The power to take out of numbers up to the largest, and how it is written before a unit; none if it is plain."""
+    power = int(np.floor(np.log10(largest))) if largest > 0.0 else 0
+    if plain[0] <= power <= plain[1]:
+        return 0, ""
+    return power, "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")) + " "
 
 
 def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
     """An ordinate in degrees on the left, for what is drawn in radians; on the right these, if they are to be seen."""
     left = ax.secondary_yaxis("left", functions=(np.degrees, np.radians))
-    left.set_ylabel(f"{label} [deg]", fontsize=SMALL)
+    largest = max(map(abs, ax.get_ylim()))
+    label_ordinate(left, f"{label} [deg]", float(np.degrees(largest)))
     left.tick_params(labelsize=SMALL)
     if radians:
         ax.yaxis.tick_right()
         ax.yaxis.set_label_position("right")
-        ax.set_ylabel("[rad]", fontsize=SMALL)
+        label_ordinate(ax, "[rad]", largest)
     else:
         ax.tick_params(axis="y", left=False, labelleft=False)
         ax.set_ylabel("")

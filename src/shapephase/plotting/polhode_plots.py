@@ -93,8 +93,6 @@ def plot_polhodes(
         first, second = [point.direction for point in points if point.kind == "degenerate"][::2]
         sphere.curve(np.cos(around) * first + np.sin(around) * second, "circle of equilibria", **_AT_REST)
         points = tuple(point for point in points if point.kind == "centre")
-    if top is not None and top.magnitude > 0.0:
-        _own_polhode(sphere, top)
     markers: dict[str, tuple[str, dict[str, Any]]] = {
         "centre": ("centre", {"marker": "o", "color": BLACK}),
         "saddle": ("saddle", {"marker": "X", "color": VERMILION}),
@@ -103,8 +101,10 @@ def plot_polhodes(
     for point in points:
         label, style = markers[point.kind]
         sphere.point(point.direction, label, **style)
+    if top is not None and top.magnitude > 0.0:
+        _own_polhode(sphere, top)
     for axis, end in enumerate(np.eye(3) * np.copysign(1.0, sphere.eye)):
-        sphere.text(end, f"$I_{axis + 1}$ = {moments[axis]:.3g}", 0.17)
+        sphere.text(end, f"$I_{axis + 1}$ = {moments[axis]:.3g}", 0.24)
     sphere.finish(r"$\Pi_{}/|\Pi|$ [1]", "momentum in the body: polhodes; moments in kg m²")
     return ax
 

@@ -68,20 +68,23 @@ def plot_crown(
     if motion is not None:
         check_object(motion, "Motion", "motion")
     check_flat_axes(ax)
-    from matplotlib.patches import Patch
+    from matplotlib.patches import Circle, Patch
 
     axis = crown.certificate.axis
     sphere = SphereAxes(ax, _beside(axis) if view is None else view)
     across = np.linspace(-1.0, 1.0, _POINTS)
     x, y = np.meshgrid(across, across)
-    rest = 1.0 - x * x - y * y
-    inside = rest >= 0.0
-    towards = np.sqrt(np.maximum(rest, 0.0))[..., None] * sphere.eye
-    directions = x[..., None] * sphere.screen[0] + y[..., None] * sphere.screen[1] + towards
-    within = np.zeros(x.shape)
-    within[inside] = crown.contains(directions[inside])
-    ax.contourf(x, y, within, levels=[0.5, 1.5], colors=[SKY], alpha=0.45, zorder=1.2)
-    ax.contour(x, y, within, levels=[0.5], colors=[BLUE], linewidths=0.8, zorder=1.5)
+    inside = np.hypot(x, y) <= 1.0
+    # Beyond the limb as on it, so that what is cut off there by the circle has no steps.
+    flat = np.stack([x, y], axis=-1) / np.maximum(1.0, np.hypot(x, y))[..., None]
+    towards = np.sqrt(np.maximum(1.0 - np.sum(flat**2, axis=-1), 0.0))[..., None] * sphere.eye
+    within = crown.contains(flat @ sphere.screen + towards).astype(float)
+    limb = Circle((0.0, 0.0), 1.0, transform=ax.transData)
+    if within.any():
+        filled = ax.contourf(x, y, within, levels=[0.5, 1.5], colors=[SKY], alpha=0.45, zorder=1.2)
+        filled.set_clip_path(limb)
+    if within.any() and not within.all():
+        ax.contour(x, y, within, levels=[0.5], colors=[BLUE], linewidths=0.8, zorder=1.5).set_clip_path(limb)
     title = f"certain before the motion: {crown.certificate.regime}"
     if within[inside].mean() > _VISIBLE:
         sphere.named[r"crown: where $\Pi$ can be"] = Patch(facecolor=SKY, edgecolor=BLUE, alpha=0.45)

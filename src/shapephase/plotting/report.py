@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from ..arguments import check_file_name, check_object
 from ..files import write_whole
@@ -27,6 +28,22 @@ from .named_figures import FIGURES, figure_image
 from .pages.report_data import report_data
 from .pages.templates import SCENE_SCRIPTS, page_html
 from .viewer import scene_and_data
+
+# Of a figure [in]; the style of a report has the shares of taller ones in a row.
+_USUAL_HEIGHT = 2.8
+# Figures beside each other: more would be too small to be read.
+_IN_A_ROW = 3
+
+
+def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
+    """Figures in rows that are all full, of two or three each (one alone is a row), the shorter ones first."""
+    count = -(-len(figures) // _IN_A_ROW)
+    rows, taken = [], 0
+    for k in range(count):
+        size = (len(figures) - taken) // (count - k)
+        rows.append(figures[taken : taken + size])
+        taken += size
+    return rows
 
 
 def write_report(
@@ -88,7 +105,7 @@ def write_report(
             continue
         begin(f"drawing {kind.replace('_', ' ')}")
         image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
-        figures.append({"caption": figure.caption, "image": image})
+        figures.append({"caption": figure.caption, "image": image, "tall": figure.height > _USUAL_HEIGHT})
     torques = [torque_words(motion)] if scene.body is not None and scene.body.n_shape else []
     page = page_html(
         "report.html",
@@ -103,7 +120,7 @@ def write_report(
         split_rows=split_rows(result),
         error_bars=[line for line in error_bars if line],
         recording=[line for line in recording if line],
-        figures=figures,
+        rows=figure_rows(figures),
         joints=joint_rows(scene.body, shape_path) if scene.body is not None and shape_path is not None else (),
         parts=part_rows(scene.body) if scene.body is not None else (),
         input_rows=input_rows(motion, result.gauge, scene.body),

@@ -18,7 +18,21 @@ from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
 from ._joint_looks import both_sides, joint_looks
 from ._letters import plain_text
-from .plot_style import BLACK, BLUE, GREEN, GREY, SMALL, check_flat_axes, degrees_first, even_times, finish, in_time
+from .plot_style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    SMALL,
+    check_flat_axes,
+    degrees_first,
+    even_times,
+    finer,
+    finish,
+    in_time,
+    label_ordinate,
+    power_of_ten,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -113,12 +127,14 @@ def plot_shape_path(
         handles.append(_band_patch())
         texts.append("beyond a limit")
     for unit, twin in list(places.items())[1:]:
-        twin.set_ylabel(f"joints [{unit}]", fontsize=SMALL)
+        finer(twin, route.loops)
+        label_ordinate(twin, f"joints [{unit}]", max(map(abs, twin.get_ylim())))
         twin.tick_params(labelsize=SMALL)
     columns = 1 if max(map(len, texts)) > _MAX_BESIDE else 2
     above = {"ncols": columns, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     title = "joints in time; dashes: the right side" if both_sides(shown) else "joints in time"
-    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", handles=handles, labels=texts, title=title, **above)
+    named_by = {"handles": handles, "labels": texts, "title": title, **above}
+    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", loops=route.loops, **named_by)
     if scales[0] == "rad":
         degrees_first(ax, "joints", radians=len(scales) == 1)
     return ax
@@ -220,7 +236,7 @@ def plot_curvature(
     field = curvature_on_plane(body, (i, j), rows[0], rows[1], shape)
     direction, name = _direction(axis, field)
     values = (field @ direction).T
-    power, scale = _power_of_ten(float(np.abs(values).max()))
+    power, scale = power_of_ten(float(np.abs(values).max()))
     values = values * 10.0**-power
     largest = float(np.abs(values).max()) or 1.0
     mesh = _coloured(ax, rows, values, largest)
@@ -355,14 +371,6 @@ def _contours(ax: Any, rows: list[Array], values: Array, largest: float) -> None
         widths = [1.5 if abs(level) < _ZERO_LEVEL * largest else 0.7 for level in levels]
         lines = ax.contour(*rows, values, levels=levels, colors="#333333", linestyles=styles, linewidths=widths)
         ax.clabel(lines, fmt=lambda level: f"{level:.2g}".replace("-", "−"), fontsize=SMALL - 2, inline_spacing=2)
-
-
-def _power_of_ten(largest: float) -> tuple[int, str]:
-    """The power to take out of numbers up to the largest, and how it is written before a unit."""
-    power = int(np.floor(np.log10(largest))) if largest > 0.0 else 0
-    if -3 <= power <= 2:
-        return 0, ""
-    return power, "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")) + " "
 
 
 def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:

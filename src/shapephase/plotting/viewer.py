@@ -27,10 +27,8 @@ from .pages.motion_data import motion_data
 from .pages.playing import frame_count, playing_speed
 from .pages.templates import SCENE_SCRIPTS, page_html
 from .pages.up_axis import up_axis
-from .pages.video import check_video, frame_times, write_video
+from .pages.video import FILM_SIZE, check_video, frame_times, write_video
 
-FILM_SIZE = (640, 480)
-"""Width and height of a frame of a film, unless they are given [px]."""
 # Ports after the given one that are tried when that is in use.
 _PORTS = 100
 # The highest port there is.

@@ -19,6 +19,7 @@ from ...rigid_body.euler_top import EulerTop
 from ...rigid_body.poinsot import Poinsot
 from .playing import frame_count, playing_speed
 from .templates import SCENE_SCRIPTS, page_html
+from .video import FILM_SIZE, check_video, frame_times, write_video
 
 # Periods of the body momentum that are shown, where there are any.
 _PERIODS = 3.0
@@ -28,6 +29,8 @@ _TURNS = 6.0
 _POLHODE = 361
 # Radius of the part of the plane that is drawn, over the largest of the ellipsoid and the herpolhode.
 _PLANE = 1.15
+# Length of the arrow of the momentum, over the distance of the plane: it ends beyond.
+_ARROW = 1.35
 # Lines of the plane in each direction.
 _LINES = 13
 # Of the ellipsoid; what is inside is seen through it.
@@ -110,8 +113,44 @@ def poinsot_html(
             "rolling": _rolling(rolling, times),
             "plots": _plots(rolling, times),
         },
-        facts=_facts(rolling),
+        facts=rolling_facts(top),
     )
+
+
+def poinsot_video(
+    top: EulerTop,
+    path: str | os.PathLike[str],
+    *,
+    pixels: tuple[int, int] = FILM_SIZE,
+    duration: float | None = None,
+    speed: float | None = None,
+) -> None:
+    """Write Poinsot's description as a film, or as a strip of six pictures, drawn as `poinsot_page` draws it.
+
+    Parameters
+    ----------
+    top, duration : as in `poinsot_page`
+    path, pixels, speed : as in `motion_video`
+
+    Notes
+    -----
+    Raises as `motion_video` and `poinsot_page`.
+
+    Examples
+    --------
+    >>> try:
+    ...     sp.plotting.poinsot_video(sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5]), "rolling.webm")
+    ... except sp.errors.UnknownNameError as error:
+    ...     print(error)
+    unknown kind of film '.webm'. Valid: .gif, .mp4, .png
+    """
+    check_object(top, "EulerTop", "top")
+    check_file_name(path, "path")
+    ending = check_video(path, pixels)
+    shown = _duration(top, duration)
+    rate = playing_speed(shown, speed)
+    page = poinsot_html(top, duration=shown, speed=rate)
+    write_video(page, path, frame_times(ending, shown, rate), pixels)
 
 
 def _duration(top: EulerTop, duration: float | None) -> float:
@@ -150,6 +189,7 @@ def _motion(rolling: Poinsot, times: Array, speed: float) -> dict[str, Any]:
         "momentum": top.momentum.tolist(),
         "trail": None,
         "reach": reach,
+        "arrow": max(1.0, _ARROW * rolling.distance / reach),
         "extent": _extent(rolling, times).astype(np.float32),
         "up": (-rolling.normal).tolist(),
         "ghost": False,
@@ -206,9 +246,13 @@ def _rolling(rolling: Poinsot, times: Array) -> dict[str, Any]:
 def _plots(rolling: Poinsot, times: Array) -> list[dict[str, Any]]:
     velocity = rolling.polhode(times) @ rolling.top.axes
     along = {f"axis of I{sign}": velocity[:, k] for k, sign in enumerate("₁₂₃")}
+    turning = _plot("angular velocity along the principal axes", "rad/s", along)
+    if not rolling.annulus[1]:
+        # The herpolhode is a point.
+        return [turning]
     radius, angle = rolling.herpolhode_radius(times), np.degrees(rolling.herpolhode_angle(times))
     return [
-        _plot("angular velocity along the principal axes", "rad/s", along),
+        turning,
         _plot("herpolhode: distance from the foot of the momentum", "rad/s", {"radius": radius}),
         _plot("herpolhode: angle about the momentum", "°", {"angle": angle}),
     ]
@@ -219,9 +263,9 @@ def _plot(title: str, unit: str, series: dict[str, Array]) -> dict[str, Any]:
     return {"title": title, "unit": unit, "series": curves}
 
 
-def _facts(rolling: Poinsot) -> list[tuple[str, str, str]]:
-    """Names, numbers and what they mean."""
-    top = rolling.top
+def rolling_facts(top: EulerTop) -> list[tuple[str, str, str]]:
+    """Of a top with momentum: names, numbers and what they mean."""
+    rolling = Poinsot(top)
     inner, outer = rolling.annulus
     rows = [
         ("Principal moments", numbers(top.moments, "kg m²"), "ascending; the axes of the ellipsoid are √(2K/I)"),

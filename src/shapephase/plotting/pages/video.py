@@ -21,6 +21,8 @@ from ...arrays import Array
 from ...errors import MissingExtraError, OutputFileError, ShapeError, unknown_name
 from ...files import write_whole
 
+FILM_SIZE = (640, 480)
+"""Width and height of a frame of a film, unless they are given [px]."""
 # Frames in a second, by the file's ending [1/s]: a GIF counts in hundredths of a second.
 _RATES = {".gif": 25, ".mp4": 30}
 VIDEO_ENDINGS = (".gif", ".mp4", ".png")

@@ -93,12 +93,13 @@ class Explorer {
     const {component, gauge, axis, largest} = this.map;
     const what = component === "magnitude" ? "magnitude" : `component ${axis}`;
     const frame = gauge === "base axes" ? "base axes" : "the axes that the connection turns least";
-    const unsigned = component === "magnitude";
+    const unsigned = component === "magnitude", [one, other] = this.plane.joints.map(joint => joint.unit);
+    const per = one === other ? `${one}²` : `(${one} ${other})`;
     document.getElementById("colours").className = unsigned ? "unsigned" : "";
     const ends = unsigned ? [0, 0.5 * largest, largest] : [-largest, 0, largest];
     document.getElementById("ends").replaceChildren(...ends.map(value => element("span", {textContent: shortNumber(value)})));
     document.getElementById("scale").textContent =
-      `Curvature, ${what} in ${frame}, in rad per ${this.plane.joints.map(joint => joint.unit).join(" · ")}. A small loop, ` +
+      `Curvature, ${what} in ${frame}, in rad/${per}. A small loop, ` +
       "counter-clockwise, turns the body by minus the curvature times its area.";
   }
 

@@ -138,7 +138,7 @@ class Figure3D {
       this.axes[k].pose = product(poseAlong(turned(base, axis), placeOf(base)), size);
     });
     if (this.momentum && this.magnitude) {
-      const long = MOMENTUM_LENGTH * this.data.reach;
+      const long = this.arrowLength();
       this.momentum.pose = product(poseAlong(this.data.momentum, centre), scaled(long, long, long));
     }
     this.centre.pose = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...centre, 1];
@@ -151,6 +151,11 @@ class Figure3D {
       this.scene.world = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...plus(this.start, centre, -1), 1];
     }
     this.scene.invalidate();
+  }
+
+  // Of the momentum: some pages need a longer one than others, to be seen.
+  arrowLength() {
+    return (this.data.arrow ?? MOMENTUM_LENGTH) * this.data.reach;
   }
 
   placeGhosts() {
@@ -175,8 +180,8 @@ class Figure3D {
     });
     if (!this.hidden.has("inertial axes")) this.drawInertialAxes(pen);
     if (this.magnitude && !this.hidden.has("momentum")) {
-      const tip = plus(this.centrePlace, unit(this.data.momentum), 1.09 * MOMENTUM_LENGTH * reach);
-      label(pen, where(tip), `${Number(this.magnitude.toPrecision(3))} kg m²/s`, "#a04400");
+      const tip = plus(this.centrePlace, unit(this.data.momentum), this.arrowLength());
+      labelBeyond(pen, where(this.centrePlace), where(tip), `${Number(this.magnitude.toPrecision(3))} kg m²/s`, "#a04400");
     }
   }
 

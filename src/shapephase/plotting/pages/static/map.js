@@ -7,6 +7,19 @@ const POSITIVE = [190, 76, 0];
 // Room for numbers and names [px]: left, right, above, below.
 const MAP_ROOM = [58, 12, 12, 46];
 
+// Across the map: signs where the field is at least that part of its largest, so that grey tells the sign, too.
+const SIGNS = 9;
+const SIGNED = 0.12;
+
+// A name and what follows it within some pixels: of a longer one the middle is left out.
+function fitting(pen, name, after, room) {
+  pen.font = LABEL_FONT;
+  for (let kept = name.length; ; kept--) {
+    const text = kept < name.length ? `${name.slice(0, Math.ceil(kept / 2))}…${name.slice(name.length - Math.floor(kept / 2))}` : name;
+    if (kept < 2 || pen.measureText(text + after).width <= room) return text + after;
+  }
+}
+
 class CurvatureMap {
   constructor(holder, plane) {
     Object.assign(this, {holder, plane, gauge: "least perturbation", component: "largest", points: [], listeners: []});
@@ -32,7 +45,7 @@ class CurvatureMap {
   }
 
   colour() {
-    const values = this.values(), count = this.plane.map;
+    const values = this.shownValues = this.values(), count = this.plane.map;
     this.largest = values.reduce((most, value) => Math.max(most, Math.abs(value)), 1e-12);
     const pen = this.picture.getContext("2d"), image = pen.createImageData(count, count);
     for (let a = 0; a < count; a++) {
@@ -71,8 +84,25 @@ class CurvatureMap {
     pen.drawImage(this.picture, MAP_ROOM[0], MAP_ROOM[2], this.size, this.size);
     pen.strokeStyle = "#777";
     pen.strokeRect(MAP_ROOM[0], MAP_ROOM[2], this.size, this.size);
+    if (this.component !== "magnitude") this.drawSigns(pen);
     this.drawScales(pen);
     if (this.spline) this.drawLoop(pen);
+  }
+
+  drawSigns(pen) {
+    pen.font = LABEL_FONT;
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.fillStyle = "rgba(0, 0, 0, 0.55)";
+    const count = this.plane.map, values = this.shownValues;
+    for (let a = 0; a < SIGNS; a++) {
+      for (let b = 0; b < SIGNS; b++) {
+        const [u, v] = [(a + 0.5) / SIGNS, (b + 0.5) / SIGNS];
+        const value = values[Math.floor(u * count) * count + Math.floor(v * count)];
+        if (Math.abs(value) < SIGNED * this.largest) continue;
+        pen.fillText(value < 0 ? "−" : "+", MAP_ROOM[0] + u * this.size, MAP_ROOM[2] + (1 - v) * this.size);
+      }
+    }
   }
 
   drawScales(pen) {
@@ -86,7 +116,7 @@ class CurvatureMap {
         const text = typeset(Number(tick.toPrecision(6)));
         if (n === 0) label(pen, [u, bottom + 12], text); else label(pen, [MAP_ROOM[0] - 6, v], text, "#333", "right");
       }
-      const name = `${joint.name} [${joint.unit === "rad" ? "°" : "m"}]`;
+      const name = fitting(pen, joint.name, ` [${joint.unit === "rad" ? "°" : "m"}]`, this.size);
       if (n === 0) label(pen, [MAP_ROOM[0] + this.size / 2, bottom + 33], name);
       else {
         pen.save();

@@ -144,5 +144,17 @@ function playMotion(data, add = () => {}) {
   sceneControls(document.getElementById("show"), scene, figure);
   const holder = document.getElementById("joints");
   if (holder) jointSliders(holder, figure, clock);
-  return {clock, scene, figure};
+  return {clock, scene, figure, film: () => film(clock, scene, figure)};
+}
+
+// Nothing but the scene and the time, for films.
+function film(clock, scene, figure) {
+  clock.play(false);
+  document.documentElement.className = "film";
+  scene.drawOver.push(pen => {
+    const {clientWidth, clientHeight} = scene.holder;
+    label(pen, [clientWidth - 12, clientHeight - 16], `${clock.time.toFixed(2)} s`, "#333", "right");
+  });
+  clock.show(0);
+  scene.fit(figure.extent());
 }

@@ -4,6 +4,11 @@
 // Vertical field of view [rad]: like that of a lens of 50 mm, without distortion at the edges.
 const FIELD_OF_VIEW = 0.7;
 
+// Of labels: their font, half the height of a line of it, and the least distance from an arrow's tip [px].
+const LABEL_FONT = "13px system-ui, sans-serif";
+const LABEL_HALF_HEIGHT = 8;
+const LABEL_GAP = 7;
+
 const VERTEX_SHADER = `#version 300 es
 uniform mat4 view, projection, model;
 uniform mat3 turn;
@@ -247,9 +252,20 @@ class Scene3D {
   }
 }
 
+// A text beyond the tip of an arrow, so far that it does not stand on it.
+function labelBeyond(pen, foot, tip, text, colour) {
+  if (!foot || !tip) return;
+  pen.font = LABEL_FONT;
+  const along = [tip[0] - foot[0], tip[1] - foot[1]], long = Math.hypot(...along);
+  const [x, y] = long > 1 ? along.map(part => part / long) : [0, -1];
+  const half = 0.5 * pen.measureText(text).width;
+  const away = LABEL_GAP + Math.min(half / Math.max(Math.abs(x), 1e-3), LABEL_HALF_HEIGHT / Math.max(Math.abs(y), 1e-3));
+  label(pen, [tip[0] + away * x, tip[1] + away * y], text, colour);
+}
+
 function label(pen, at, text, colour = "#333", align = "center") {
   if (!at) return;
-  pen.font = "13px system-ui, sans-serif";
+  pen.font = LABEL_FONT;
   pen.textAlign = align;
   // A text in the middle of its place stays inside the picture.
   if (align === "center") {

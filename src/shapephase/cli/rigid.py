@@ -1,0 +1,99 @@
+"""`shapephase rigid`: a free rigid body in closed form, its figures, and its ellipsoid rolling in a page or a film."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..errors import ShapeError
+from .options import AS_TEXT, PrintOptions
+from .outcome import Outcome, check_writable
+from .terminal import say_written
+
+
+def rigid_command(
+    i1: float,
+    i2: float,
+    i3: float,
+    /,
+    *,
+    momentum: Annotated[
+        tuple[float, float, float],
+        Parameter(
+            negative_iterable="",
+            help="Angular momentum at the start along the three principal axes, which the body starts with along the "
+            "inertial ones, in kg m^2/s; for example `--momentum 0.6 0.9 0.5`.",
+        ),
+    ],
+    figure: str = "polhodes",
+    time: float = 0.0,
+    out: Path | None = None,
+    html: Path | None = None,
+    video: Path | None = None,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """Say how a free rigid body turns, and draw its polhodes, its rolling ellipsoid or its cones.
+
+    Parameters
+    ----------
+    i1
+        Principal moment about axis 1, in kg m^2; for example `1`.
+    i2
+        Principal moment about axis 2, in kg m^2; for example `2`.
+    i3
+        Principal moment about axis 3, in kg m^2; for example `3`.
+    figure
+        What `--out` draws: polhodes, herpolhode, rolling (the ellipsoid on its plane) or, with two equal moments,
+        cones (of the body and of space); for example `--figure rolling`.
+    time
+        When the ellipsoid and the cones are shown, in s; for example `--time 1.5`.
+    out
+        Write the figure to this file, .svg, .pdf or .png; without it none is drawn. For example `--out polhodes.svg`.
+    html
+        Write the ellipsoid that rolls on its plane to this HTML file, to play offline; without it none is written. For
+        example `--html rolling.html`.
+    video
+        Write the same as a film to this GIF or MP4 file, or six pictures side by side to this PNG file; without it none
+        is written. A Chromium draws it (`pip install 'shapephase[video]'`). For example `--video rolling.gif`.
+    """
+    from ..errors import unknown_name
+    from ..plotting.named_figures import RIGID_FIGURES, write_rigid_figure
+    from ..plotting.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
+    from ..plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+    from ..rigid_body.euler_top import EulerTop
+
+    if figure not in RIGID_FIGURES:
+        raise unknown_name("kind of figure", figure, RIGID_FIGURES)
+    if not math.isfinite(time):
+        raise ShapeError(f"--time: a number is needed, got {time}")
+    aside = check_writable(out, "--out", ".svg", ".pdf", ".png")
+    aside = check_writable(html, "--html", ".html") or aside
+    aside = check_writable(video, "--video", *VIDEO_ENDINGS) or aside
+    if video is not None:
+        check_video(video, FILM_SIZE)
+    top = EulerTop.principal((i1, i2, i3), momentum)
+    facts = rolling_facts(top)
+    files = {"figure": out, "html": html, "video": video}
+    if out is not None:
+        write_rigid_figure(figure, top, out, time)
+    if html is not None:
+        poinsot_page(top, html)
+    if video is not None:
+        poinsot_video(top, video)
+    written = {name: str(file) for name, file in files.items() if file is not None}
+    for file in written.values():
+        say_written(Path(file))
+    data = {
+        "moments_kg_m2": [i1, i2, i3],
+        "momentum_kg_m2_s": list(momentum),
+        "energy_J": top.energy,
+        "regime": top.regime,
+        "period_s": top.period if math.isfinite(top.period) else None,
+        **written,
+    }
+    wide = max(len(name) for name, _, _ in facts)
+    lines = [f"{name:{wide}}  {number}; {meaning}" for name, number, meaning in facts]
+    return Outcome("\n".join(lines), data, aside=aside)
