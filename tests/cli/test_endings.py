@@ -148,12 +148,9 @@ def test_endings_in_any_case(capfd, tmp_path, ending):
         ("plan", "cat_two_halves", "--rotate", "60", "--out"),
         ("plan", "cat_two_halves", "--rotate", "60", "--html"),
         ("conjugate", "1", "2", "3", "--out"),
-<<<<<<< HEAD
         ("torques", *CAT[1:], "--out"),
-=======
         ("rigid", "1", "2", "3", "--momentum", "1", "0", "2", "--out"),
         ("rigid", "1", "2", "3", "--momentum", "1", "0", "2", "--html"),
->>>>>>> 9101d15 (The area on the momentum sphere is one outline; figures mended after a look at each; a command for the rigid body's figures)
     ],
 )
 def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_path, monkeypatch, command):
@@ -162,15 +159,9 @@ def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_p
 
     monkeypatch.setattr("shapephase.body.catalog.load_body", never)
     monkeypatch.setattr("shapephase.rigid_body.geodesics.serret_andoyer_metric", never)
-<<<<<<< HEAD
-    ending = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html", "torques": ".csv"}[
-        command[0]
-    ]
-=======
     monkeypatch.setattr("shapephase.rigid_body.euler_top.EulerTop.principal", never)
-    endings = {"plot": ".svg", "conjugate": ".svg", "rigid": ".svg", "plan": ".csv", "split": ".npz", "view": ".html"}
-    ending = endings[command[0]]
->>>>>>> 9101d15 (The area on the momentum sphere is one outline; figures mended after a look at each; a command for the rigid body's figures)
+    endings = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html"}
+    ending = (endings | {"torques": ".csv", "rigid": ".svg"})[command[0]]
     ending = ".html" if command[-1] == "--html" else ending
     folder = tmp_path / f"folder{ending}"
     folder.mkdir()
@@ -331,12 +322,9 @@ ENDINGS = [
     (6, "plan cat_two_halves --rotate 10 --out folder.csv"),
     (2, "conjugate 1 1 2"),
     (6, "conjugate 1 2 3 --out folder.svg"),
-<<<<<<< HEAD
     (6, "torques cat cat_righting --out folder.csv"),
-=======
     (2, "rigid 1 2 3 --momentum 0 0 1 --figure orbit"),
     (6, "rigid 1 2 3 --momentum 0 0 1 --out folder.svg"),
->>>>>>> 9101d15 (The area on the momentum sphere is one outline; figures mended after a look at each; a command for the rigid body's figures)
     (2, "robots more"),
     (2, "doctor more"),
     (2, "compile more"),

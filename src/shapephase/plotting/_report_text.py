@@ -10,6 +10,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
+from ..deformation.descriptions import RigidDescription
 from ..dynamics.torques import joint_torques
 from ..phases.phases import PhaseSplit
 from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
@@ -41,21 +42,31 @@ def lead(motion: Motion) -> str:
     return f"{motion.duration:g} s, angular momentum ({momentum}) kg m²/s"
 
 
+def is_rigid(motion: Motion) -> bool:
+    """Whether the body keeps its shape."""
+    return isinstance(motion.deformation.description, RigidDescription)
+
+
 def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     """What happened, in sentences."""
     name = f"The body ({body.name}, {body.n_shape} joints, {body.mass:.4g} kg)" if body else "The body"
     loop = "and ends in the shape it began with" if result.is_loop else "and ends in another shape than it began with"
     words = [f"{name} changes its shape for {motion.duration:g} s {loop}."]
+    if is_rigid(motion):
+        words = [f"The body is rigid and turns for {motion.duration:g} s."]
     if not result.has_phase:
         words.append(f"There is no angular momentum: the shape alone turned it by {_turn(result.total_rotation)}.")
         return words
     size = float(np.linalg.norm(motion.momentum))
-    words.append(
+    alone = (
         f"The shape alone turned it by {_turn(result.holonomy)}; the angular momentum of {size:.4g} kg m²/s added "
         f"{_turn(result.dynamical_rotation)}. Both together turned it by {_turn(result.total_rotation)}."
     )
+    if is_rigid(motion):
+        alone = f"The angular momentum of {size:.4g} kg m²/s turned it by {_turn(result.total_rotation)}."
+    words.append(alone)
     phase, dynamic, geometric = (
-        f"{np.degrees(float(value)):.2f}°"
+        f"{np.degrees(float(value)):z.2f}°"
         for value in (result.montgomery_phase, result.dynamic_phase, result.geometric_phase)
     )
     words.append(
@@ -65,7 +76,7 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     )
     gap = float(result.momentum_gap)
     if gap > CLOSED_GAP:
-        closing = f"{np.degrees(float(result.closing_phase)):.2f}°"
+        closing = f"{np.degrees(float(result.closing_phase)):z.2f}°"
         words.append(
             f"There the momentum's direction ended {np.degrees(gap):.2f}° from where it began. The great circle back "
             f"to the start closes its curve, and adds {closing} of the geometric phase; beside the phase, the body is "
@@ -116,7 +127,7 @@ def split_rows(result: PhaseSplit) -> list[Row]:
     if not result.has_phase:
         words = "none: there is no angular momentum, the body turns by its shape alone"
         return [*rows, ("Montgomery phase", "", words)]
-    area = f"{float(result.solid_angle):.{digits_left(float(errors.geometric_phase), RADIAN_DIGITS)}f}"
+    area = f"{float(result.solid_angle):z.{digits_left(float(errors.geometric_phase), RADIAN_DIGITS)}f}"
     closing = []
     if float(result.momentum_gap) > CLOSED_GAP:
         remark = "of the geometric phase, by the great circle that closes the momentum's curve"
@@ -161,7 +172,7 @@ def part_rows(body: Body) -> list[tuple[str, ...]]:
 
 def input_rows(motion: Motion, gauge: str, body: Body | None) -> list[Row]:
     """How good the numbers are, what they were computed from, and how."""
-    quaternion = ", ".join(f"{x:.9f}" for x in motion.quat_xyzw(motion.duration) + 0.0)
+    quaternion = ", ".join(f"{x:z.9f}" for x in motion.quat_xyzw(motion.duration))
     rows = [
         ("Final attitude", "", f"quaternion x y z w ({quaternion})"),
         ("Error estimate", f"{float(motion.error_estimate):.2e} rad", f"tolerance {motion.tolerance:g} rad"),
@@ -226,10 +237,10 @@ def _with_error(angle: float, error: Array) -> tuple[str, str]:
     off = float(error)
     in_degrees = digits_left(float(np.degrees(off)), DEGREE_DIGITS)
     in_radians = digits_left(off, RADIAN_DIGITS)
-    return f"{np.degrees(angle):.{in_degrees}f}°", f"{angle:.{in_radians}f} ± {off:.1e} rad"
+    return f"{np.degrees(angle):z.{in_degrees}f}°", f"{angle:z.{in_radians}f} ± {off:.1e} rad"
 
 
 def _amount(value: float, unit: str) -> str:
     if abs(value) > _NO_LIMIT:
         return "none"
-    return f"{np.degrees(value) + 0.0:.1f}°" if unit == "rad" else f"{value + 0.0:.4g} m"
+    return f"{np.degrees(value):z.1f}°" if unit == "rad" else f"{value:z.4g} m"

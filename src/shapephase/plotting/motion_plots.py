@@ -379,7 +379,7 @@ def _phase_title(found: RunningPhases, jumps: int) -> str:
 
 def _degrees(angle: float, *, sign: bool = False) -> str:
     """An angle in degrees with two digits after the point, with a minus sign that is one."""
-    return f"{round(float(np.degrees(angle)), 2) + 0.0:{'+' if sign else ''}.2f}°".replace("-", "−")
+    return f"{np.degrees(angle):{'+' if sign else ''}z.2f}°".replace("-", "−")
 
 
 def _broken(t: Array, values: Array, at: Integers) -> tuple[Array, Array]:

@@ -47,6 +47,7 @@ class Figure:
     height : [in]
     draw : draws into axes, from a motion, the path of the joints and a gauge
     with_momentum, with_path : whether it needs a momentum, a path of the joints
+    of_change : whether it shows nothing but zero of a rigid body
 
     Examples
     --------
@@ -59,6 +60,7 @@ class Figure:
     draw: Callable[[Axes, Motion, ShapePath | None, Gauge], object]
     with_momentum: bool = False
     with_path: bool = False
+    of_change: bool = False
 
     __repr__ = short_repr
 
@@ -108,6 +110,7 @@ FIGURES: Mapping[str, Figure] = {
         caption="Internal momentum",
         height=2.8,
         draw=lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation),
+        of_change=True,
     ),
     "energy": Figure(
         caption="The energy, and the axis that the momentum circles",

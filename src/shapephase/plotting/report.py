@@ -17,6 +17,7 @@ from ._report_text import (
     CONVENTIONS,
     accuracy,
     input_rows,
+    is_rigid,
     joint_rows,
     lead,
     part_rows,
@@ -31,19 +32,13 @@ from .viewer import scene_and_data
 
 # Of a figure [in]; the style of a report has the shares of taller ones in a row.
 _USUAL_HEIGHT = 2.8
-# Figures beside each other: more would be too small to be read.
-_IN_A_ROW = 3
 
 
 def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
-    """Figures in rows that are all full, of two or three each (one alone is a row), the shorter ones first."""
-    count = -(-len(figures) // _IN_A_ROW)
-    rows, taken = [], 0
-    for k in range(count):
-        size = (len(figures) - taken) // (count - k)
-        rows.append(figures[taken : taken + size])
-        taken += size
-    return rows
+    """Figures in rows that are all full: two each, and three in the last one of an odd number."""
+    last = max(len(figures) - 3, 0) if len(figures) % 2 else len(figures)
+    rows = [figures[k : k + 2] for k in range(0, last, 2)]
+    return rows + ([figures[last:]] if len(figures) % 2 else [])
 
 
 def write_report(
@@ -102,6 +97,8 @@ def write_report(
     figures = []
     for kind, figure in FIGURES.items():
         if (figure.with_momentum and not result.has_phase) or (figure.with_path and shape_path is None):
+            continue
+        if figure.of_change and is_rigid(motion):
             continue
         begin(f"drawing {kind.replace('_', ' ')}")
         image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()

@@ -1,11 +1,19 @@
 // The sphere of momentum directions, turned by hand, with the curve so far and a dot for the clock's time.
 "use strict";
 
+// Corners that are those of a star.
+const STAR = 5;
+// Way from end to start, over the curve's size and at most 1, below which nobody sees that it is open.
+const UNSEEN = 0.03;
+
 class MomentumSphere {
   // `directions`: x y z for each frame of the clock, in the axes of the gauge.
   constructor(canvas, directions, clock) {
     Object.assign(this, {canvas, directions, clock, count: directions.length / 3});
-    this.closing = this.greatCircle(this.at(this.count - 1), this.at(0));
+    const fromStart = k => norm(plus(this.at(k), this.at(0), -1));
+    const size = Math.min(1, Math.max(...Array.from({length: this.count}, (_, k) => fromStart(k))));
+    const open = fromStart(this.count - 1) > UNSEEN * size;
+    this.closing = open ? this.greatCircle(this.at(this.count - 1), this.at(0)) : [];
     // Beside the middle of the curve, so that most of it is in front.
     let middle = [0, 0, 0];
     for (let k = 0; k < this.count; k++) middle = plus(middle, this.at(k));
@@ -67,14 +75,22 @@ class MomentumSphere {
     pen.setLineDash([]);
   }
 
-  spot(pen, point, colour, radius) {
+  // A mark with that many corners, or a star of five points: shapes, so that grey tells them, too. None is a disc.
+  spot(pen, point, colour, radius, corners = 0) {
     const [x, y, depth] = this.seen(point);
     pen.globalAlpha = depth >= 0 ? 1 : 0.4;
     pen.fillStyle = colour;
     pen.strokeStyle = "white";
     pen.lineWidth = 1.5;
     pen.beginPath();
-    pen.arc(x, y, radius, 0, 2 * Math.PI);
+    if (!corners) pen.arc(x, y, radius, 0, 2 * Math.PI);
+    const star = corners === STAR;
+    for (let k = 0; k < (star ? 2 : 1) * corners; k++) {
+      const angle = star ? Math.PI * (k / corners - 0.5) : Math.PI * (2 * k + 1) / corners;
+      const reach = star && k % 2 ? 0.45 * radius : radius;
+      pen.lineTo(x + reach * Math.cos(angle), y + reach * Math.sin(angle));
+    }
+    pen.closePath();
     pen.fill();
     pen.stroke();
     pen.globalAlpha = 1;
@@ -107,8 +123,8 @@ class MomentumSphere {
     this.path(pen, this.closing, "#d55e00", 1.5, [5, 3]);
     this.path(pen, all, "#9a9a9a", 1.3);
     this.path(pen, [...all.slice(0, frame + 1), this.current], "#000000", 2.2);
-    this.spot(pen, all[0], "#009e73", 5);
-    if (this.closing.length) this.spot(pen, all[this.count - 1], "#d55e00", 4);
+    this.spot(pen, all[0], "#009e73", 8, STAR);
+    if (this.closing.length) this.spot(pen, all[this.count - 1], "#d55e00", 6, 4);
     this.spot(pen, this.current, "#0072b2", 6);
     [[1, 0, 0], [0, 1, 0], [0, 0, 1]].forEach((axis, k) => {
       const [x, y, depth] = this.seen(times(axis, 1.13));
