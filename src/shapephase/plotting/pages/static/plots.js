@@ -11,6 +11,14 @@ const CURVES = [
 const SIZE = [460, 206];
 const MARGINS = [52, 10, 8, 40];
 
+// Letters of a name beside a curve: a longer one is without its middle, and whole under the pointer.
+const LONGEST_NAME = 34;
+
+function shortName(name) {
+  const half = Math.floor(0.5 * (LONGEST_NAME - 1));
+  return name.length > LONGEST_NAME ? `${name.slice(0, half)}…${name.slice(-half)}` : name;
+}
+
 function drawn(parent, kind, attributes) {
   const made = parent.appendChild(document.createElementNS(SVG, kind));
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -83,11 +91,11 @@ class TimePlot {
     drawn(this.svg, "polyline", {points: points.join(" "), fill: "none", stroke: colour, "stroke-width": 1.7,
       "stroke-dasharray": dashes});
     const dot = drawn(this.svg, "circle", {r: 3.4, fill: colour, stroke: "white"});
-    const key = element("span", {className: "key"});
+    const key = element("span", {className: "key", title: name});
     const line = {x1: 0, x2: 32, y1: 5, y2: 5, stroke: colour, "stroke-width": 2, "stroke-dasharray": dashes};
     drawn(drawn(key, "svg", {viewBox: "0 0 32 10", "aria-hidden": "true"}), "line", line);
     const value = element("output");
-    key.append(`${name} `, value);
+    key.append(`${shortName(name)} `, value);
     this.legend.append(key);
     return {dot, value, values};
   }
