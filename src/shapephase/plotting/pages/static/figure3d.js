@@ -239,7 +239,7 @@ class Figure3D {
       }
     }
     if (this.magnitude) {
-      const tip = times(unit(this.data.momentum), 1.12 * MOMENTUM_LENGTH * this.data.reach);
+      const tip = times(unit(this.data.momentum), 1.12 * this.arrowLength());
       const count = this.data.centre.length / 3;
       for (const k of [0, count - 1]) points.push(plus(Array.from(row(this.data.centre, k, 3)), tip));
     }

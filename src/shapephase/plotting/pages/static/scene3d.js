@@ -9,6 +9,9 @@ const LABEL_FONT = "13px system-ui, sans-serif";
 const LABEL_HALF_HEIGHT = 8;
 const LABEL_GAP = 7;
 
+// Rounds in which the camera finds the middle of what it is to show: it is then within a pixel.
+const CENTRING_ROUNDS = 5;
+
 const VERTEX_SHADER = `#version 300 es
 uniform mat4 view, projection, model;
 uniform mat3 turn;
@@ -132,13 +135,18 @@ class Scene3D {
     const {right, back, above} = this.cameraAxes();
     const aspect = Math.max(this.holder.clientWidth, 1) / Math.max(this.holder.clientHeight, 1);
     const tangent = Math.tan(0.5 * FIELD_OF_VIEW);
-    let distance = 1e-6;
-    for (const point of points) {
-      const d = plus(point, this.camera.target, -1);
-      const across = Math.max(Math.abs(dot(d, right)) / aspect, Math.abs(dot(d, above))) / tangent;
-      distance = Math.max(distance, dot(d, back) + across);
+    // The middle of what is seen is not that of the points: near ones are further from it. Each round halves the rest, or more.
+    for (let round = 0; round < CENTRING_ROUNDS; round++) {
+      const offsets = points.map(point => plus(point, this.camera.target, -1));
+      const needed = offsets.map(d => dot(d, back) + Math.max(Math.abs(dot(d, right)) / aspect, Math.abs(dot(d, above))) / tangent);
+      this.camera.distance = margin * Math.max(1e-6, ...needed);
+      if (round === CENTRING_ROUNDS - 1) break;
+      for (const axis of [right, above]) {
+        const seen = offsets.map(d => dot(d, axis) / (this.camera.distance - dot(d, back)));
+        const middle = 0.5 * (Math.min(...seen) + Math.max(...seen));
+        this.camera.target = plus(this.camera.target, axis, middle * this.camera.distance);
+      }
     }
-    this.camera.distance = margin * distance;
     this.invalidate();
   }
 
