@@ -81,3 +81,17 @@ def test_without_momentum_nothing_turns(capsys):
         main(["rigid", "1", "2", "3", "--momentum", "0", "0", "0"])
     assert ended.value.code == ExitCode.USAGE
     assert "momentum" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("moments", "largest", "said"),
+    [
+        ((1, 2, 3), "1e300", "at most 1e+30 kg m^2/s can be drawn"),
+        (("1e-20", "1e-20", "1.5e-20"), "1e20", "may turn at 1e+40 rad/s"),
+    ],
+)
+def test_what_turns_too_fast_to_be_drawn_is_refused(capsys, moments, largest, said):
+    with pytest.raises(SystemExit) as ended:
+        main(["rigid", *map(str, moments), "--momentum", "0", "0", largest])
+    assert ended.value.code == ExitCode.USAGE
+    assert said in capsys.readouterr().err

@@ -10,7 +10,12 @@ import pytest
 from matplotlib.figure import Figure
 
 from shapephase.errors import MissingExtraError, ShapeError
-from shapephase.plotting.polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
+from shapephase.plotting.polhode_plots import (
+    herpolhode_times,
+    plot_heavy_top_stability,
+    plot_herpolhode,
+    plot_polhodes,
+)
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.poinsot import Poinsot
 
@@ -286,11 +291,22 @@ def test_importing_the_module_does_not_import_matplotlib():
 
 
 def test_the_start_of_a_steady_top_is_not_hidden_by_the_equilibrium_that_it_is():
-    """What is drawn last of the same depth is in front: the legend named a star that nobody saw."""
+    """The legend named a star that nobody saw."""
     for momentum in ((0.0, 0.0, 2.0), (0.0, 2.0, 0.0)):
         ax = plot_polhodes(flat_axes(), EulerTop.principal((1.0, 2.0, 3.0), momentum))
-        places = [(line.get_marker(), *line.get_xydata()[0]) for line in ax.lines if line.get_linestyle() == "None"]
-        (star,) = [k for k, place in enumerate(places) if place[0] == "*"]
-        under = [k for k, place in enumerate(places) if place[0] != "*" and place[1:] == places[star][1:]]
-        assert len(under) == 1
-        assert under[0] < star
+        marks = [line for line in ax.lines if line.get_linestyle() == "None"]
+        (star,) = [line for line in marks if line.get_marker() == "*"]
+        (under,) = [line for line in marks if line is not star and np.array_equal(line.get_xydata(), star.get_xydata())]
+        assert under.get_zorder() < star.get_zorder()
+
+
+def test_of_a_herpolhode_of_very_many_turns_the_first_are_drawn():
+    """A nearly symmetric body next to a circle of equilibria goes round 1e10 times in its period."""
+    top = EulerTop.principal((1.0, 1.0, 1.9999999), (1e-9, 1.0, 1e-9))
+    times = herpolhode_times(top, 5.0)
+    turns = np.ptp(Poinsot(top).herpolhode_angle(times[:: len(times) - 1])) / (2.0 * np.pi)
+    assert 100.0 < turns < 400.0
+    # Each step is so short that its chord is not seen.
+    assert turns * 2.0 * np.pi / len(times) < 0.021
+    short = EulerTop.principal((1.0, 2.0, 3.0), (0.3, 0.5, 0.9))
+    assert herpolhode_times(short, 5.0)[-1] == pytest.approx(5.0 * short.period, rel=1e-15)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -12,6 +12,14 @@ from ..errors import ShapeError
 from .options import AS_TEXT, PrintOptions
 from .outcome import Outcome, check_writable
 from .terminal import say_written
+
+if TYPE_CHECKING:
+    from ..rigid_body.euler_top import EulerTop
+
+Vector = tuple[float, float, float]
+
+# Largest momentum [kg m^2/s] and angular velocity [rad/s], and one over its least: pages hold it in 32 bits.
+_LARGEST = 1e30
 
 
 def rigid_command(
@@ -21,7 +29,7 @@ def rigid_command(
     /,
     *,
     momentum: Annotated[
-        tuple[float, float, float],
+        Vector,
         Parameter(
             negative_iterable="",
             help="Angular momentum at the start along the three principal axes, which the body starts with along the "
@@ -63,7 +71,6 @@ def rigid_command(
     from ..plotting.named_figures import RIGID_FIGURES, write_rigid_figure
     from ..plotting.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
     from ..plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
-    from ..rigid_body.euler_top import EulerTop
 
     if figure not in RIGID_FIGURES:
         raise unknown_name("kind of figure", figure, RIGID_FIGURES)
@@ -74,7 +81,7 @@ def rigid_command(
     aside = check_writable(video, "--video", *VIDEO_ENDINGS) or aside
     if video is not None:
         check_video(video, FILM_SIZE)
-    top = EulerTop.principal((i1, i2, i3), momentum)
+    top = _top((i1, i2, i3), momentum)
     facts = rolling_facts(top)
     files = {"figure": out, "html": html, "video": video}
     if out is not None:
@@ -97,3 +104,18 @@ def rigid_command(
     wide = max(len(name) for name, _, _ in facts)
     lines = [f"{name:{wide}}  {number}; {meaning}" for name, number, meaning in facts]
     return Outcome("\n".join(lines), data, aside=aside)
+
+
+def _top(moments: Vector, momentum: Vector) -> EulerTop:
+    """The body, if it turns at a rate that can be drawn. Raises ShapeError."""
+    from ..rigid_body.euler_top import EulerTop
+
+    largest = max(map(abs, momentum))
+    if not largest <= _LARGEST:
+        raise ShapeError(f"--momentum: at most {_LARGEST:g} kg m^2/s can be drawn, got {largest:g}")
+    top = EulerTop.principal(moments, momentum)
+    for speed in (top.magnitude / float(moment) for moment in top.moments):
+        if top.magnitude and not 1.0 / _LARGEST <= speed <= _LARGEST:
+            ends = f"from {1.0 / _LARGEST:g} to {_LARGEST:g} can be drawn"
+            raise ShapeError(f"--momentum: this body may turn at {speed:.3g} rad/s; {ends}")
+    return top

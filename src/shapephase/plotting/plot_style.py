@@ -61,6 +61,8 @@ _PLAIN_POWERS = (-4, 4)
 # Loops of a path up to which its lines have their whole breadth, and the least part of it.
 _MANY_LOOPS = 12
 _FINEST = 0.35
+# Points of a curve that are drawn as an image in one piece.
+_RASTER_PIECE = 5_000
 # Points of a curve in time: more than one column has pixels at 200 dpi.
 _MIN_POINTS = 800
 # Points of a curve in time for each loop of a repeated path.
@@ -106,8 +108,11 @@ def axes_image(ax: Any, ending: str) -> bytes:
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}[ending]
     for artist in ax.figure.findobj(_is_long):
         artist.set_rasterized(True)
+    from matplotlib import rc_context
+
     stream = BytesIO()
-    with warnings.catch_warnings():
+    # In one piece, a curve that crosses itself very often is more than the rasterizer holds.
+    with warnings.catch_warnings(), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
         # A letter that the font has not is an empty frame in the figure.
         warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
         ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)

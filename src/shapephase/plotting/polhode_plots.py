@@ -37,9 +37,9 @@ _TAIL = 10.0
 _SEPARATRIX_END = 1e-5
 # Phase between points of a herpolhode [rad]: its chords then stay within a line's width of the curve.
 _PHASE_STEP = 0.02
-# Points of a herpolhode: smooth at the least, and a second of drawing at the most.
+# Points of a herpolhode: smooth at the least, and at the most some two hundred turns, which cannot be told apart.
 _MIN_POINTS = 400
-_MAX_POINTS = 200_000
+_MAX_POINTS = 60_000
 # I3/I1 at the top of the chart: a little above 2, which no rigid body exceeds, to show the line of double roots.
 _LARGEST_RATIO = 2.2
 
@@ -93,6 +93,8 @@ def plot_polhodes(
         first, second = [point.direction for point in points if point.kind == "degenerate"][::2]
         sphere.curve(np.cos(around) * first + np.sin(around) * second, "circle of equilibria", **_AT_REST)
         points = tuple(point for point in points if point.kind == "centre")
+    if top is not None and top.magnitude > 0.0:
+        _own_polhode(sphere, top)
     markers: dict[str, tuple[str, dict[str, Any]]] = {
         "centre": ("centre", {"marker": "o", "color": BLACK}),
         "saddle": ("saddle", {"marker": "X", "color": VERMILION}),
@@ -100,9 +102,8 @@ def plot_polhodes(
     }
     for point in points:
         label, style = markers[point.kind]
-        sphere.point(point.direction, label, **style)
-    if top is not None and top.magnitude > 0.0:
-        _own_polhode(sphere, top)
+        # Behind the top's own start, which may be there, too.
+        sphere.point(point.direction, label, behind=True, **style)
     for axis, end in enumerate(np.eye(3) * np.copysign(1.0, sphere.eye)):
         sphere.text(end, f"$I_{axis + 1}$ = {moments[axis]:.3g}", 0.24)
     sphere.finish(r"$\Pi_{}/|\Pi|$ [1]", "momentum in the body: polhodes; moments in kg m²")
@@ -118,7 +119,7 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
     Parameters
     ----------
     ax : flat axes
-    periods : of the body momentum, above 0
+    periods : of the body momentum, above 0; of more than some two hundred turns the first are drawn
 
     Raises
     ------
@@ -253,9 +254,10 @@ def polhode_times(top: EulerTop) -> Array:
 
 def herpolhode_times(top: EulerTop, periods: float) -> Array:
     """Times fine enough both for the rotation about mu and for the waves between the circles."""
+    fastest = max(top.rate, top.magnitude / float(top.moments[0]))
     if top.regime == "separatrix":
         start, end = (np.array([-_TAIL, _TAIL]) - top.orbit.phase) / top.rate
     else:
-        start, end = 0.0, periods * top.period
-    phases = (end - start) * max(top.rate, top.magnitude / float(top.moments[0]))
+        start, end = 0.0, min(periods * top.period, _MAX_POINTS * _PHASE_STEP / fastest)
+    phases = (end - start) * fastest
     return np.linspace(start, end, int(np.clip(phases / _PHASE_STEP, _MIN_POINTS, _MAX_POINTS)))
