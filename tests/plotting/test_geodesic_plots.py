@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d import art3d
 from scipy.interpolate import CubicSpline
 
 from shapephase import so3
-from shapephase.cli.conjugate import conjugate_command
+from shapephase.cli.rigid_body.conjugate import conjugate_command
 from shapephase.errors import InputFileNotFoundError, ShapeError, UnknownNameError
 from shapephase.plotting.geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from shapephase.plotting.plot_style import column_axes

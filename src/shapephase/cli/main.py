@@ -20,7 +20,6 @@ from ..errors import OutputFileError, ShapePhaseError
 from ..integrator.fast.switch import begin_command
 from ..provenance import command_line, provenance
 from .check import check_command
-from .conjugate import conjugate_command
 from .ctrl_c import was_pressed
 from .doctor import doctor_command
 from .exit_codes import ExitCode, exit_code_list, exit_code_of
@@ -31,7 +30,8 @@ from .outcome import Outcome
 from .pictures import plot_command, view_command
 from .plans.plan import plan_command
 from .reach import reach_command
-from .rigid import rigid_command
+from .rigid_body.conjugate import conjugate_command
+from .rigid_body.rigid import rigid_command
 from .split import split_command
 from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity

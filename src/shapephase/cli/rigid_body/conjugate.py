@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import ShapeError
-from .options import AS_TEXT, PrintOptions
-from .outcome import Outcome, check_writable
-from .terminal import say_written
+from ...errors import ShapeError
+from ..options import AS_TEXT, PrintOptions
+from ..outcome import Outcome, check_writable
+from ..terminal import say_written
 
 if TYPE_CHECKING:
-    from ..arrays import Array
+    from ...arrays import Array
 
 _ENDINGS = (".svg", ".pdf", ".png")
 _PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
@@ -53,8 +53,8 @@ def conjugate_command(
     """
     import numpy as np
 
-    from ..arrays import finite_array
-    from ..rigid_body.geodesics import serret_andoyer_metric
+    from ...arrays import finite_array
+    from ...rigid_body.geodesics import serret_andoyer_metric
 
     aside = check_writable(out, "--out", *_ENDINGS)
     metric = serret_andoyer_metric((i1, i2, i3))
@@ -96,9 +96,9 @@ def conjugate_command(
 
 
 def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
-    from ..files import write_whole
-    from ..plotting.geodesic_plots import plot_conjugate_locus
-    from ..plotting.plot_style import axes_image, column_axes
+    from ...files import write_whole
+    from ...plotting.geodesic_plots import plot_conjugate_locus
+    from ...plotting.plot_style import axes_image, column_axes
 
     image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:].lower())
     write_whole(out, lambda stream: stream.write(image))

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import ShapeError
-from .options import AS_TEXT, PrintOptions
-from .outcome import Outcome, check_writable
-from .terminal import say_written
+from ...errors import ShapeError
+from ..options import AS_TEXT, PrintOptions
+from ..outcome import Outcome, check_writable
+from ..terminal import say_written
 
 if TYPE_CHECKING:
-    from ..rigid_body.euler_top import EulerTop
+    from ...rigid_body.euler_top import EulerTop
 
 Vector = tuple[float, float, float]
 
@@ -67,10 +67,10 @@ def rigid_command(
         Write the same as a film to this GIF or MP4 file, or six pictures side by side to this PNG file; without it none
         is written. A Chromium draws it (`pip install 'shapephase[video]'`). For example `--video rolling.gif`.
     """
-    from ..errors import unknown_name
-    from ..plotting.named_figures import RIGID_FIGURES, write_rigid_figure
-    from ..plotting.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
-    from ..plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+    from ...errors import unknown_name
+    from ...plotting.named_figures import RIGID_FIGURES, write_rigid_figure
+    from ...plotting.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
+    from ...plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
 
     if figure not in RIGID_FIGURES:
         raise unknown_name("kind of figure", figure, RIGID_FIGURES)
@@ -108,7 +108,7 @@ def rigid_command(
 
 def _top(moments: Vector, momentum: Vector) -> EulerTop:
     """The body, if it turns at a rate that can be drawn. Raises ShapeError."""
-    from ..rigid_body.euler_top import EulerTop
+    from ...rigid_body.euler_top import EulerTop
 
     largest = max(map(abs, momentum))
     if not largest <= _LARGEST:
