@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
-import opensim
 
 from ...arrays import Array
 from .chain import UnusableModelError
 
 
+@lru_cache(maxsize=1)
+def engine() -> Any:
+    """OpenSim, imported by the first use: whoever looks through all modules may have another CasADi to load."""
+    return import_module("opensim")
+
+
 def loaded(path: str) -> Any:
     """The model of a file, its parts connected. Raises UnusableModelError."""
     try:
-        model = opensim.Model(path)
+        model = engine().Model(path)
         model.finalizeConnections()
     except RuntimeError as error:
         raise refused(error) from None
@@ -36,12 +43,12 @@ def ends(joint: Any) -> tuple[str, str]:
 
 def value_and_slope(function: Any, places: list[float]) -> list[float]:
     """The value of a function of OpenSim, and its derivative by each argument."""
-    where = opensim.Vector(len(places), 0.0)
+    where = engine().Vector(len(places), 0.0)
     for k, place in enumerate(places):
         where.set(k, place)
     found = [function.calcValue(where)]
     for k in range(len(places)):
-        which = opensim.StdVectorInt()
+        which = engine().StdVectorInt()
         which.append(k)
         found.append(function.calcDerivative(which, where))
     return found

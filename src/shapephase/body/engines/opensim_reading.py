@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import opensim
 
 from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
 from .chain import Chain, UnusableModelError
-from .opensim_numbers import ends, loaded, numbers_of, pose_of, refused, value_and_slope, vector_of
+from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, refused, value_and_slope, vector_of
 
 _EXACT = 1e-12
 """Share of the largest terms by which the engine's numbers may differ from ours."""
@@ -70,8 +69,8 @@ class _Coordinate(NamedTuple):
 
 def chain_of(path: str) -> Chain:
     """Links and joints of an .osim file, on the body that is joined to the ground."""
-    opensim.Logger.setLevelString("Off")
-    opensim.Logger.removeFileSink()
+    engine().Logger.setLevelString("Off")
+    engine().Logger.removeFileSink()
     content = Path(path).read_bytes()
     if len(content) > _MOST_BYTES:
         raise UnusableModelError(f"it has {len(content) >> 20} MiB; up to {_MOST_BYTES >> 20} MiB are read")
@@ -140,7 +139,7 @@ class _Reading:
 
     def _base_angles(self) -> tuple[list[str], str] | None:
         """The angles of the base, where each turns about one of the ground's axes as the others have turned it."""
-        joint = opensim.CustomJoint.safeDownCast(self._base)
+        joint = engine().CustomJoint.safeDownCast(self._base)
         frames = (self._base.getParentFrame(), self._base.getChildFrame())
         if joint is None or any(np.any(pose_of(one.findTransformInBaseFrame())[0] != np.eye(3)) for one in frames):
             return None
@@ -173,7 +172,7 @@ class _Reading:
                 clamped = coordinate.getDefaultClamped()
                 limits = (coordinate.getRangeMin(), coordinate.getRangeMax()) if clamped else (-np.inf, np.inf)
                 locked = coordinate.getDefaultValue() if coordinate.getDefaultLocked() else None
-                sliding = coordinate.getMotionType() == opensim.Coordinate.Translational
+                sliding = coordinate.getMotionType() == engine().Coordinate.Translational
                 rule = None if locked is not None else couplers.get(name)
                 found[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
         for name, rule in couplers.items():
@@ -200,7 +199,7 @@ class _Reading:
             constraint = constraints.get(k)
             if not constraint.get_isEnforced():
                 continue
-            coupler = opensim.CoordinateCouplerConstraint.safeDownCast(constraint)
+            coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraint)
             if coupler is None:
                 kind = constraint.getConcreteClassName()
                 self._chain.notes.append(
@@ -216,7 +215,7 @@ class _Reading:
         """In the order in which they move what is behind them, with rules of coordinates that are not locked."""
         name, kind = joint.getName(), joint.getConcreteClassName()
         if kind == "CustomJoint":
-            transform = opensim.CustomJoint.safeDownCast(joint).getSpatialTransform()
+            transform = engine().CustomJoint.safeDownCast(joint).getSpatialTransform()
             found = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
         elif kind in _KNOWN:
             found = [
@@ -254,13 +253,13 @@ class _Reading:
         """A function of OpenSim as functions of one coordinate each."""
         kind = function.getConcreteClassName()
         if kind == "MultiplierFunction":
-            multiplier = opensim.MultiplierFunction.safeDownCast(function)
+            multiplier = engine().MultiplierFunction.safeDownCast(function)
             inner, factor = self._rule(multiplier.getFunction(), drivers, owner), multiplier.getScale()
             return _Rule(factor * inner.start, tuple((name, one.scaled(factor)) for name, one in inner.terms))
         if kind == "Constant":
-            return _Rule(opensim.Constant.safeDownCast(function).getValue(), ())
+            return _Rule(engine().Constant.safeDownCast(function).getValue(), ())
         if kind == "LinearFunction":
-            numbers = numbers_of(opensim.LinearFunction.safeDownCast(function).getCoefficients())
+            numbers = numbers_of(engine().LinearFunction.safeDownCast(function).getCoefficients())
             if len(numbers) != len(drivers) + 1:
                 raise self._fault(f"{owner!r}: {len(numbers)} coefficients for {len(drivers)} coordinates", owner)
             slopes = zip(drivers, numbers, strict=False)
@@ -275,14 +274,14 @@ class _Reading:
     def _single(self, function: Any, kind: str, owner: str) -> JointFunction:
         """A function of one coordinate, exactly."""
         if kind == "PolynomialFunction":
-            highest_first = opensim.PolynomialFunction.safeDownCast(function).getCoefficients()
+            highest_first = engine().PolynomialFunction.safeDownCast(function).getCoefficients()
             return polynomial(np.array(vector_of(highest_first, highest_first.size()))[::-1])
         if kind == "PiecewiseLinearFunction":
-            lines = opensim.PiecewiseLinearFunction.safeDownCast(function)
+            lines = engine().PiecewiseLinearFunction.safeDownCast(function)
             return piecewise_linear(*np.array([(lines.getX(k), lines.getY(k)) for k in range(lines.getSize())]).T)
-        spline = opensim.SimmSpline.safeDownCast(function)
-        if kind == "GCVSpline" and opensim.GCVSpline.safeDownCast(function).getDegree() == _CUBIC:
-            spline = opensim.GCVSpline.safeDownCast(function)
+        spline = engine().SimmSpline.safeDownCast(function)
+        if kind == "GCVSpline" and engine().GCVSpline.safeDownCast(function).getDegree() == _CUBIC:
+            spline = engine().GCVSpline.safeDownCast(function)
         if spline is None:
             raise self._fault(
                 f"{owner!r}: a {kind} cannot be taken over exactly; Constant, LinearFunction, PolynomialFunction, "
@@ -391,7 +390,7 @@ class _Reading:
         functions = {}
         constraints = self._model.getConstraintSet()
         for k in range(constraints.getSize()):
-            coupler = opensim.CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
+            coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
             if coupler is not None and coupler.get_isEnforced():
                 names = coupler.getIndependentCoordinateNames()
                 drivers = [names.get(place) for place in range(names.getSize())]
