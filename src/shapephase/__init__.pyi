@@ -11,6 +11,7 @@ from . import (
     integrator,
     optimal_control,
     phases,
+    planar,
     plotting,
     reconstruction,
     rigid_body,
@@ -78,6 +79,7 @@ from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_hol
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
 from .shape_space.reach.holonomy_algebra import Reach, reachable
+from .shape_space.reach.manipulators import dynamic_manipulability, generalised_jacobian, reaction_null_space
 from .shape_space.reach.perturbation_frames import MinimumPerturbation, minimum_perturbation
 from .shape_space.shape_path import ShapePath
 from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_summary
@@ -142,6 +144,7 @@ __all__ = [
     "curvature_on_plane",
     "deformation",
     "derivatives",
+    "dynamic_manipulability",
     "dynamic_phase_from_energy",
     "dynamics",
     "elliptic",
@@ -151,6 +154,7 @@ __all__ = [
     "final_attitudes",
     "fixed_points",
     "free_hinges",
+    "generalised_jacobian",
     "geodesics",
     "holonomy",
     "holonomy_derivative",
@@ -179,11 +183,13 @@ __all__ = [
     "path_summary",
     "phases",
     "plan_reorientation",
+    "planar",
     "plots",
     "plotting",
     "prescribed",
     "principal_gauge",
     "reachable",
+    "reaction_null_space",
     "read_recorded_motion",
     "read_shape_path",
     "reconstruct",

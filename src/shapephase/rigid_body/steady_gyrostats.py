@@ -171,7 +171,7 @@ def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, 
     --------
     >>> turn = sp.rigid_body.dual_spin_turn(np.diag([1.0, 2.0, 3.0]), [1.0, 0.0, 1.0], 1.0, 3)
     >>> turn.rotor.round(6).tolist()
-    [0.0, 0.697486, 1.0]
+    [0.0, 0.606339, 1.0]
     """
     tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
     size = positive_argument(magnitude, "magnitude", "a momentum in kg m^2/s")
