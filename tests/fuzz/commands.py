@@ -58,6 +58,23 @@ _RECORDING: Mapping[str, Callable[[Random], list[str]]] = {
     "--base-axes": lambda c: [c.choice(("x,-z,y", "x,y,z", "x,x,y", "estimate", "", "w"))],
     "--flight": lambda c: c.choice((["auto"], ["all"], [_number(c, "0"), _number(c, "1")], ["x"], ["1"])),
 }
+_ROOT: Mapping[str, Callable[[Random], list[str]]] = {
+    "--root": lambda c: [c.choice(("free", "fixed", ""))],
+    "--root-body": lambda c: [c.choice(("base", "body0", "none", ""))],
+}
+_POSTURES = (
+    "hip=0.1",
+    "hip=5deg,wrist=0.1",
+    "hip=nan",
+    "none=1",
+    "hip",
+    "=",
+    "",
+    "motion.csv",
+    "hip=9",
+    "boom=1mm",
+    "free",
+)
 _FLIGHT: Mapping[str, Callable[[Random], list[str]]] = {
     "--momentum": _three,
     "--attitude": lambda c: odd_one(
@@ -117,6 +134,20 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--seed": lambda c: [_number(c, "1")],
         "--pieces": lambda c: [_number(c, "6")],
         "--iterations": lambda c: [_number(c, "3")],
+        "--turn": lambda c: [
+            c.choice(("5 about y", "5", "nan about x", "5 about 0,0,0", "5 about 0,1,1", "about y", ""))
+        ],
+        "--point": lambda c: [
+            c.choice(("0 0 1", "hand 0 0 1", "none 0 0 1", "0 0 0", "nan 0 1")),
+            c.choice(("0 1 0", "0 0 1e400", "x", "")),
+        ],
+        "--from": lambda c: [c.choice(_POSTURES)],
+        "--to": lambda c: [c.choice(_POSTURES)],
+        "--joints": lambda c: [c.choice(("hip", "hip,wrist", "hip,hip", "none", ""))],
+        "--hold": lambda c: [c.choice(("boom", "hip,wrist,boom", "none", ""))],
+        "--mirror": lambda c: [c.choice(("hip=wrist", "hip=-wrist", "hip=hip", "hip=boom", "hip=-none", "hip", ""))],
+        "--workers": lambda c: [c.choice(("1", "0", "-1", "x"))],
+        "--time-limit": lambda c: [_number(c, "2")],
         "--rate-limit": lambda c: [c.choice(("2", "hip=2", "none=1", "-1", "nan", "hip", "hip=", "1e400", "90deg"))],
         "--rates-at-ends": lambda c: [c.choice(("zero", "free", "x", ""))],
         "--html": lambda c: _file(c, "plan.html"),
@@ -126,6 +157,17 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--workers": lambda c: [odd_one(c, "1", ("0", "-1", "1.5", "x", ""), 2)],
         "--scheduler": lambda c: [c.choice(("", "x", "tcp://", "tcp://127.0.0.1:1", "http://[", "127.0.0.1:99999"))],
         "--resume": lambda _: [],
+    },
+    "plot sweep": {
+        "--kind": lambda c: [c.choice(("histogram", "quantiles", "map", "x", ""))],
+        "--along": lambda c: [
+            c.choice(("momentum_x", "momentum_z", "turn", "none", "")) for _ in range(c.randrange(4))
+        ],
+    },
+    "reach": {
+        "--at": lambda c: [c.choice(_POSTURES)],
+        "--pairs": lambda c: [_number(c, "3")],
+        "--out": lambda c: _file(c, "reach.svg"),
     },
     "sweep status": {},
     "sweep export": {"--out": lambda c: _file(c, "table.csv")},
@@ -154,7 +196,10 @@ def _sweep(chance: Random, name: str) -> tuple[dict[str, bytes], list[str]]:
     made = odd_one(chance, store_trial, (study_file,), 2)(chance)
     files = dict(made.files)
     if name != "sweep":
-        return files, [odd_one(chance, "out.zarr", _STORES, 5)] + ["--out", "table.csv"] * (name == "sweep export")
+        drawn = [odd_one(chance, "turn", ("poison", "status", "momentum_x", "turn_0", "none", ""), 2)]
+        drawn = drawn if name == "plot sweep" else []
+        out = {"plot sweep": ["--out", "out.png"], "sweep export": ["--out", "table.csv"]}.get(name, [])
+        return files, [odd_one(chance, "out.zarr", _STORES, 5), *drawn, *out]
     if made.kind == "study" and rarely(chance, 4):
         files |= {other: data for other, data in store_files().items() if other != "study.toml"}
     study = odd_one(chance, "study.toml", ("no.toml", "motion.csv", "", "folder", "out.zarr"), 10)
@@ -195,6 +240,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
             files, motion = files | fuzzed.files, fuzzed.main
     words = {
         "plan": [body],
+        "reach": [body],
         "conjugate": [_number(chance, "1"), _number(chance, "2"), _number(chance, "3")],
         "rigid": [_number(chance, "1"), _number(chance, "2"), _number(chance, "3"), "--momentum", *_three(chance)],
         "orbits": [body, motion, _number(chance, "0.02")],
@@ -207,7 +253,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
         "doctor": [],
         "": [],
     }.get(name, [body, motion])
-    if name.startswith("sweep"):
+    if "sweep" in name:
         files, words = _sweep(chance, name)
     if name == "explore":
         words = [body, "--joints", "hip", odd_one(chance, "wrist", ("hip", "boom", *ODD_NAMES), 3)]
@@ -217,7 +263,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
         words += ["--out", "out.png"]
     if name == "plan" and not rarely(chance, 5):
         words += ["--rotate", _number(chance, "5")]
-    offered = _COMMANDS[name]
+    offered = _COMMANDS[name] | (_ROOT if body in words else {})
     for option in chance.sample(sorted(offered), min(len(offered), chance.randrange(3))):
         words += [option, *offered[option](chance)]
     if rarely(chance, 8):
