@@ -35,6 +35,7 @@ def connected(address: str) -> Iterator[Any]:
     """
     try:
         from distributed import Client
+        from distributed.comm import resolve_address
     except ImportError:
         raise MissingExtraError("a cluster needs Dask; install it with: pip install 'shapephase[study]'") from None
     if not isinstance(address, str):
@@ -42,6 +43,8 @@ def connected(address: str) -> Iterator[Any]:
     # What it says of lost connections is said by one error.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
+        # What is no address at all is said at once: a client that was begun would first have to be ended.
+        resolve_address(address)
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SchedulerLostError(f"there is no scheduler at {address!r:.80} ({type(error).__name__})") from None
