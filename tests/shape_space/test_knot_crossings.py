@@ -10,6 +10,7 @@ from shapephase.body import Coupling
 from shapephase.errors import ShapeError
 from shapephase.shape_space.knot_crossings import route_along
 from support.coupled_bodies import KNOTS, LEG, TURN, TURNS, bounded, by_hand, couplings
+from support.long_runs import full_but
 
 MOMENTUM = [0.3, -0.1, 0.5]
 LINE = Coupling.piecewise_linear("knee", KNOTS, TURNS)
@@ -49,8 +50,8 @@ def paths():
 PATHS = paths()
 
 
-@pytest.mark.parametrize("fast_or_not", ["slow", "fast"])
-@pytest.mark.parametrize("turn", TURNING)
+@pytest.mark.parametrize("fast_or_not", full_but(["slow", "fast"], "fast"))
+@pytest.mark.parametrize("turn", full_but(TURNING, "spline", "line"))
 @pytest.mark.parametrize("kind", PATHS)
 def test_motions_are_those_of_joints_driven_by_hand(kind, turn, fast_or_not, load_urdf, request):
     """Breaks of the driven motion are where a knee that is looked at at many times goes through knots.
