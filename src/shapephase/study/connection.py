@@ -35,7 +35,7 @@ def connected(address: str) -> Iterator[Any]:
     """
     try:
         from distributed import Client
-        from distributed.comm import resolve_address
+        from distributed.comm.addressing import resolve_address
     except ImportError:
         raise MissingExtraError("a cluster needs Dask; install it with: pip install 'shapephase[study]'") from None
     if not isinstance(address, str):
