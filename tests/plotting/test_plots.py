@@ -952,3 +952,12 @@ def test_long_curves_are_images_within_the_figure(points, kind):
     picture = axes_image(ax, "svg")
     assert len(picture) < 4e5
     assert (b"<image" in picture) == (kind == "image")
+
+
+def test_the_legend_of_reach_is_within_the_column_and_axes_differ_in_grey():
+    ax = plots.plot_reach(plots.column_axes(), sp.reachable(sp.load_body("cat_two_halves")))
+    ax.figure.draw_without_rendering()
+    box = ax.get_legend().get_window_extent()
+    assert box.x0 >= 0.0
+    assert box.x1 <= ax.figure.canvas.get_width_height()[0]
+    assert len({patch.get_hatch() for patch in ax.patches}) == len(ax.patches) == 3

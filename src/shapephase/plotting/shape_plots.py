@@ -284,7 +284,8 @@ def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
         raise ShapeError("found: there are no pairs of joints to draw; the body has one joint or none")
     for place, pair in enumerate(shown):
         about = int(np.argmax(np.abs(pair.axis)))
-        ax.barh(place, pair.degrees, color=(BLUE, GREEN, GREY)[about], label=f"about {_AXES[about]}")
+        look = {"color": (BLUE, GREEN, GREY)[about], "hatch": (None, "////", "....")[about], "edgecolor": "white"}
+        ax.barh(place, pair.degrees, label=f"about {_AXES[about]}", **look)
     ax.set_yticks(range(len(shown)), [plain_text(" × ".join(pair.joints)) for pair in shown])
     ax.set_ylim(len(shown) - 0.5, -0.5)
     units = {pair.units for pair in shown}
@@ -293,7 +294,8 @@ def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
     handles, labels = ax.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))
     order = sorted(named)
-    place = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
+    # It reaches to the left, over the names of the joints, where there is room.
+    place = {"ncols": 3, "loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
     finish(ax, handles=[named[one] for one in order], labels=order, **place)
     return ax
 
