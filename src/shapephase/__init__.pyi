@@ -23,7 +23,7 @@ from . import (
 from .body.body import Body
 from .body.catalog import load_body, robot_names
 from .body.family import BodyFamily
-from .body.point_masses import ParticleBody, particle_body
+from .body.particles.point_masses import ParticleBody, particle_body
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .dynamics.loads import JointLoads

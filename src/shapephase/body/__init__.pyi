@@ -5,8 +5,8 @@ from .couplings.coupling import Coupling
 from .family import BodyFamily
 from .joint_chain import JointChain
 from .moving_parts import MovingPart
+from .particles.point_masses import ParticleBody, particle_body
 from .plausibility import implausible
-from .point_masses import ParticleBody, particle_body
 
 __all__ = [
     "Body",

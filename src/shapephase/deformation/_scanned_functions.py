@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..arrays import Array
-from ..shape_space.function_scan import Judge, ScannedFunction, Words
+from ..shape_space.scan.function_scan import Judge, ScannedFunction, Words
 
 Pair = Callable[[Array], tuple[Array, Array]]
 

@@ -16,8 +16,8 @@ from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError, WrongObjectError
 from ..inertia_tensor import second_moment
 from ..letters import what_came
-from ..shape_space.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
-from ..shape_space.scanning import scanned
+from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
+from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over

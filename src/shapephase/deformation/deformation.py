@@ -22,7 +22,7 @@ from ..arguments import (
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.family import BodyFamily
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..display import card_html, card_text, short_repr
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
@@ -31,7 +31,7 @@ from ..integrator.sampling import Sampler, Samplers
 from ..letters import what_came
 from ..shape_space.body_path import path_gap
 from ..shape_space.family_variants import FamilyVariants
-from ..shape_space.function_scan import FunctionScan
+from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ..shape_space.unit_doubts import followed_by
 from ._card import deformation_card

@@ -14,14 +14,14 @@ from .. import so3
 from ..arguments import check_picklable, inertia_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coefficients
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
 from ..shape_space.body_path import channels_along, recorded_path
-from ..shape_space.function_scan import FunctionScan, ScannedFunction, path_function
-from ..shape_space.scanning import scanned
+from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
+from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
 from ..shape_space.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle

@@ -24,8 +24,8 @@ from ..integrator.resolved import DEGREE
 from ..integrator.sampling import sampler
 from ..integrator.stepped import SteppedRotation
 from ..letters import what_came
-from ..shape_space.function_scan import ScannedFunction
-from ..shape_space.scanning import scanned
+from ..shape_space.scan.function_scan import ScannedFunction
+from ..shape_space.scan.scanning import scanned
 from ._principal_frame import Frames, principal_frames
 from ._scanned_functions import rates_alone, turns_alone, turns_and_rates
 from .deformation import Deformation

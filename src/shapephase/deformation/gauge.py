@@ -22,8 +22,8 @@ from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.resolved import joined
-from ..shape_space.function_scan import FunctionScan, ScannedFunction, side_by_side
-from ..shape_space.scanning import scanned
+from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, side_by_side
+from ..shape_space.scan.scanning import scanned
 from ..shape_space.smoothness import Smoothness
 from .deformation import Deformation
 from .descriptions import Description

@@ -16,7 +16,7 @@ from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ..letters import what_came
 from ..shape_space.curves import Widened
-from ..shape_space.function_scan import FunctionScan, ScannedFunction, path_function
+from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.shape_path import ShapePath
 from ..shape_space.smoothness import Smoothness
 from .descriptions import UngaugedDescription

@@ -10,7 +10,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..errors import OpenPathError
 from ..integrator.fast.tree import tree_channels
 from ..integrator.recorded.knot_path import KnotPath, Slopes

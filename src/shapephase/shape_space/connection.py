@@ -13,7 +13,7 @@ from .. import so3
 from ..arguments import check_function, check_object, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..display import short_repr
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia

@@ -13,7 +13,7 @@ from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation

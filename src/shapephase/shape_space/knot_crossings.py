@@ -16,7 +16,7 @@ from ..arguments import check_object
 from ..arrays import Array, Mask
 from ..body.body import Body
 from ..body.couplings.coordinate_map import CoordinateMap
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..chebyshev import inside, nodes_on, values_to_coefficients
 from .curves import Curve
 from .shape_path import ShapePath

@@ -25,8 +25,6 @@ from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
-from ._derived_scan import DerivedScan, JoinedScan
-from ._rate_check import check_rates
 from .curves import (
     CLOSED,
     Curve,
@@ -42,8 +40,10 @@ from .curves import (
     Stretched,
     returned_pair,
 )
-from .function_scan import FunctionScan, path_function
-from .scanning import scanned
+from .scan._derived_scan import DerivedScan, JoinedScan
+from .scan._rate_check import check_rates
+from .scan.function_scan import FunctionScan, path_function
+from .scan.scanning import scanned
 from .smoothness import Smoothness
 
 _WHOLE_TURN = 2.0 * np.pi

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..body.body import Body
-from ..body.point_masses import ParticleBody
+from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryWarning
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import route_along

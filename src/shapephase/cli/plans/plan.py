@@ -120,7 +120,7 @@ def plan_command(
         Processes of this machine that search side by side, without unit; without it one search after the other. For
         example `--workers 4`.
     time_limit
-        In s: when so much time has passed, the search ends with the best so far. For example `--time-limit 60`.
+        The longest that the search may take, in s; then it ends with the best so far. For example `--time-limit 60`.
     seed
         Of the random guesses, a whole number; for example `--seed 7`.
     pieces

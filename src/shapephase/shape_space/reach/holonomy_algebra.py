@@ -12,7 +12,7 @@ from ...arguments import check_object, number_argument, whole_argument
 from ...arrays import Array, finite_array, lock_arrays
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_smooth
-from ...body.point_masses import ParticleBody
+from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import ShapeError
 from ..connection import connection_slopes, curvature, horizontal_lift

@@ -13,7 +13,7 @@ from ... import so3
 from ...arguments import check_object, whole_argument
 from ...arrays import Array, finite_array, lock_arrays
 from ...body.body import Body
-from ...body.point_masses import ParticleBody
+from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ..body_path import check_closed

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import Array
-from ..integrator.resolved import joined
+from ...arrays import Array
+from ...integrator.resolved import joined
 from .function_scan import FunctionScan
 
 if TYPE_CHECKING:
-    from .shape_path import ShapePath
+    from ..shape_path import ShapePath
 
 
 @dataclass(frozen=True, eq=False)

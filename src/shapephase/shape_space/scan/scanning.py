@@ -12,11 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from .. import run_progress
-from ..arrays import Array, Mask
-from ..chebyshev import derivative_matrix, nodes_on, unit_nodes
-from ..errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
-from ..integrator.resolved import DEGREE
+from ... import run_progress
+from ...arrays import Array, Mask
+from ...chebyshev import derivative_matrix, nodes_on, unit_nodes
+from ...errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
+from ...integrator.resolved import DEGREE
+from ..curves import CLOSED
 from ._kink_location import located_kink
 from ._scan_panels import (
     CHECKS,
@@ -31,7 +32,6 @@ from ._scan_panels import (
     sample_times,
     transform,
 )
-from .curves import CLOSED
 from .function_scan import FunctionScan, ScannedFunction
 
 _EPS = float(np.finfo(float).eps)

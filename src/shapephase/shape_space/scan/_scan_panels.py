@@ -7,9 +7,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask
-from ..chebyshev import inside
-from ..integrator.resolved import DEGREE, ResolvedPath
+from ...arrays import Array, Integers, Mask
+from ...chebyshev import inside
+from ...integrator.resolved import DEGREE, ResolvedPath
 
 # Samples of the whole path: with the jitter below no gap is above 1/4,000 of the duration.
 _SAMPLES = 5200

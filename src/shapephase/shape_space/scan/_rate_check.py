@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array, check_finite
-from ..errors import TrajectoryError
-from .curves import Curve
+from ...arrays import Array, check_finite
+from ...errors import TrajectoryError
+from ..curves import Curve
 
 
 def check_rates(curve: Curve, breaks: Array) -> None:

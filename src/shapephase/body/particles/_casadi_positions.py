@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, finite_array
-from ..errors import ShapeError
-from ..letters import what_came
+from ...arrays import Array, finite_array
+from ...errors import ShapeError
+from ...letters import what_came
 
 
 def is_casadi_function(value: object) -> bool:

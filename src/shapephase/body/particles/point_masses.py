@@ -9,12 +9,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
-from ..arguments import check_picklable, names_argument
-from ..arrays import Array, check_reach, common_batch, finite_array, lock_arrays
-from ..display import short_repr
-from ..errors import ShapeError, WrongObjectError, unknown_name
-from ..letters import what_came
+from ... import so3
+from ...arguments import check_picklable, names_argument
+from ...arrays import Array, check_reach, common_batch, finite_array, lock_arrays
+from ...display import short_repr
+from ...errors import ShapeError, WrongObjectError, unknown_name
+from ...letters import what_came
 from ._casadi_positions import CasadiPositions, is_casadi_function
 
 _Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]

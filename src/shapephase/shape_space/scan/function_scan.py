@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask
-from ..integrator.resolved import ResolvedPath
-from .curves import Curve
+from ...arrays import Array, Integers, Mask
+from ...integrator.resolved import ResolvedPath
+from ..curves import Curve
 
 Judge = Callable[[Array, Array], tuple[Array, Array]]
 """Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column]."""

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..arrays import Array
-from ..chebyshev import nodes_on, values_to_coefficients
+from ...arrays import Array
+from ...chebyshev import nodes_on, values_to_coefficients
 
 # Of the series on each side: continued by half their own length they stay exact on so short a stretch.
 _DEGREE = 4

@@ -1,0 +1,1 @@
+"""Bodies of point masses whose places are a function of a shape."""
