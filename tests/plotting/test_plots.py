@@ -842,6 +842,8 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
         plots.plot_shape_path: (path, cat),
         plots.plot_shape_plane: (path, joints, cat),
         plots.plot_curvature: (cat, joints),
+        plots.plot_torques: (motion,),
+        plots.plot_reach: (sp.reachable(sp.load_body("cat_two_halves")),),
     }
     elsewhere = ("polhodes", "herpolhode", "heavy_top_stability", "crown", "bounds")
     elsewhere += ("caustic", "conjugate_locus", "ellipsoid_locus")

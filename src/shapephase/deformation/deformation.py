@@ -46,7 +46,7 @@ from .descriptions import (
     RigidDescription,
     SampledDescription,
 )
-from .rotors import RotorDescription, rotors_argument, widened_path
+from .rotors import RotorDescription, mapping_of_joints, rotors_argument, widened_path
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,19 +315,20 @@ def articulated(
     >>> deformation.duration, deformation.inertia(0.0).trace().round(6).item()
     (1.0, 0.045)
     """
+    momenta, speeds = mapping_of_joints(rotors, "rotors"), mapping_of_joints(rotor_speeds, "rotor_speeds")
     if isinstance(body, BodyFamily):
         check_object(path, "ShapePath", "path")
-        if rotors or rotor_speeds:
+        if momenta or speeds:
             raise ShapeError("rotors are those of one body; take one of the family, family[0]")
         return DeformationFamily(body, followed_by(body.body, path))
     check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     if isinstance(body, ParticleBody):
-        if rotors or rotor_speeds:
+        if momenta or speeds:
             raise ShapeError("rotors are wheels of links; a body of particles has none")
         route = followed_by(body, path)
         return particles(body.masses, ParticlesAlong(body, route), route.duration, route.breaks)
-    wheels = rotors_argument(body, rotors or {}, rotor_speeds or {})
+    wheels = rotors_argument(body, momenta, speeds)
     if wheels:
         path = widened_path(body, path, tuple(wheel.joint for wheel in wheels))
     route = followed_by(body, path)

@@ -151,13 +151,18 @@ class RotorDescription(UngaugedDescription):
         return axle, self.platform.link_angular_velocity(shapes, rates, rotor.link)
 
 
+def mapping_of_joints(value: Any, name: str) -> Mapping[str, Any]:
+    """From joints to numbers; None: an empty one. Raises ShapeError."""
+    if value is not None and not isinstance(value, Mapping):
+        raise ShapeError(f"{name}: a mapping from joints to numbers is needed, got {what_came(value)}")
+    return value or {}
+
+
 def rotors_argument(body: Body, momenta: Mapping[str, Any], speeds: Mapping[str, Any]) -> tuple[Rotor, ...]:
     """Wheels by the names of their axles. Raises UnknownNameError, ShapeError for a wheel that is not symmetric."""
     check_object(body, "Body", "body")
     found = []
     for name, given, unit in (("rotors", momenta, "kg m^2/s"), ("rotor_speeds", speeds, "rad/s")):
-        if not isinstance(given, Mapping):
-            raise ShapeError(f"{name}: a mapping from joints to numbers is needed, got {what_came(given)}")
         for joint, value in given.items():
             if name == "rotor_speeds" and joint in momenta:
                 raise ShapeError(f"rotor_speeds: {joint} is among the rotors, too; say one of both")

@@ -7,7 +7,6 @@ dashes and points by their markers, so that nothing is lost in black and white. 
 
 from __future__ import annotations
 
-import warnings
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +20,7 @@ from ..errors import MissingExtraError, ShapeError
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
+from ..warning_filters import quiet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,9 +112,8 @@ def axes_image(ax: Any, ending: str) -> bytes:
 
     stream = BytesIO()
     # In one piece, a curve that crosses itself very often is more than the rasterizer holds.
-    with warnings.catch_warnings(), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
-        # A letter that the font has not is an empty frame in the figure.
-        warnings.filterwarnings("ignore", message="Glyph .* missing from", category=UserWarning)
+    # And a letter that the font has not is an empty frame in the figure.
+    with quiet("Glyph .* missing from", UserWarning), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
         ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
     return stream.getvalue()
 

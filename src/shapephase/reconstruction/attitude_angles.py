@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
 from ..errors import unknown_name
+from ..warning_filters import quiet
 
 _AXES = ("x", "y", "z")
 _TURN = 2.0 * np.pi
@@ -52,9 +51,8 @@ def euler_angles(attitudes: Array, sequence: str) -> Array:
     # Loaded when needed: it is a large part of SciPy.
     from scipy.spatial.transform import Rotation
 
-    with warnings.catch_warnings():
-        # Where the gimbals lock the third angle is taken to be zero, and what follows is continued from there.
-        warnings.filterwarnings("ignore", message="Gimbal lock", category=UserWarning)
+    # Where the gimbals lock the third angle is taken to be zero, and what follows is continued from there.
+    with quiet("Gimbal lock", UserWarning):
         found = Rotation.from_matrix(attitudes).as_euler(sequence)
     proper = sequence[0] == sequence[2]
     for k in range(1, len(found)):

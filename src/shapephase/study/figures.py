@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from ..arguments import check_choice, check_object, names_argument
 from ..arrays import Array
 from ..errors import StudyError, unknown_name
 from ..plotting.plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_flat_axes, finish
+from ..warning_filters import quiet
 from .store import StudyStore
 
 if TYPE_CHECKING:
@@ -85,9 +85,8 @@ def plot_study(
         return ax
     sorted_out = np.moveaxis(table, axes, range(len(axes)))
     cells = sorted_out.reshape(*sorted_out.shape[: len(axes)], -1)
-    with warnings.catch_warnings():
-        # A cell in which all cases failed stays empty.
-        warnings.simplefilter("ignore", RuntimeWarning)
+    # A cell in which all cases failed stays empty.
+    with quiet(category=RuntimeWarning):
         if kind == "quantiles":
             _draw_quantiles(ax, chosen[0], cells, label)
         else:

@@ -9,7 +9,6 @@ import pickle
 import queue
 import threading
 import time
-import warnings
 from collections.abc import Callable, Generator
 from contextlib import closing
 from pathlib import Path
@@ -22,6 +21,7 @@ from ..arrays import Integers
 from ..errors import MissingExtraError, RunStopped, StudyError, StudyStoreError
 from ..integrator.fast.switch import is_allowed
 from ..letters import what_came
+from ..warning_filters import quiet
 from ._evaluate import DONE, Evaluator, Results
 from ._processor import processor_text
 from ._workers import CaseWorker
@@ -126,8 +126,7 @@ class _Tally:
 def _in_this_process(study: Study, missing: Integers) -> Chunks:
     evaluator = Evaluator(study, study.inputs)
     for number in missing.tolist():
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with quiet():
             results = evaluator.together(np.arange(*study.chunk_range(number)))
         yield number, results, processor_text()
 

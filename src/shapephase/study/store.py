@@ -9,7 +9,6 @@ import json
 import os
 import secrets
 import shutil
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +23,7 @@ from ..display import short_repr
 from ..errors import MissingExtraError, OutputFileError, StudyStoreError
 from ..letters import printable
 from ..provenance import provenance
+from ..warning_filters import quiet
 from ._axes import OF_PARTS
 from ._evaluate import DIED, DONE, NAME_LENGTH, RAISED, TEXT_LENGTH, TIMED_OUT, Results
 from ._processor import processor_text
@@ -320,9 +320,8 @@ def _make(place: Path, study: Study) -> None:
     for output in study.resolved_outputs:
         about = {"units": output.unit, "role": "result", "about": output.about}
         _create(group, study, output.name, np.float64, np.nan, _dimensions(output.name, output.shape), about)
-    with warnings.catch_warnings():
-        # Zarr's specification does not have it yet, and xarray complains where it is missing.
-        warnings.simplefilter("ignore")
+    # Zarr's specification does not have it yet, and xarray complains where it is missing.
+    with quiet():
         _zarr().consolidate_metadata(place)
 
 
@@ -380,8 +379,7 @@ def _disk_faults(path: Path) -> Iterator[None]:
 
 def _zarr() -> Any:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with quiet():
             import zarr
     except ImportError:
         raise MissingExtraError("a study needs Zarr; install it with: pip install 'shapephase[study]'") from None

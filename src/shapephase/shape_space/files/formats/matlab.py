@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import threading
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ....errors import ShapePhaseError, TrajectoryError
+from ....warning_filters import ONE_THREAD
 from .._recording import Table
 from .hdf5 import MOST_VALUES, is_hdf5, read_hdf5
 from .named_arrays import arrays_table
@@ -20,8 +20,6 @@ from .parser_process import table_apart
 
 _DEEPEST = 4
 """Structures inside each other that are read."""
-_WARNINGS = threading.Lock()
-"""What Python warns of is set for all threads at once."""
 _SMALL = 2**22
 """Arrays in a file, unpacked [bytes], that are read in this process."""
 _PLAIN = (
@@ -90,7 +88,7 @@ def _loaded(data: bytes, names: list[str]) -> dict[str, Any]:
     """Some of the variables; what is true or false there, which SciPy alone reads as ones and zeros, is so here."""
     import scipy.io
 
-    with _WARNINGS, warnings.catch_warnings(record=True) as raised:
+    with ONE_THREAD, warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always", np.exceptions.ComplexWarning)
         typed = scipy.io.loadmat(io.BytesIO(data), variable_names=names, simplify_cells=True, mat_dtype=True)
     if not any(issubclass(warning.category, np.exceptions.ComplexWarning) for warning in raised):

@@ -5,8 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-import threading
-import warnings
 import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,6 +13,7 @@ from typing import Any
 
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
 from ....files import zip_members
+from ....warning_filters import quiet
 from .._labels import unit_of
 from .._recording import Table
 from .column_tables import column_table
@@ -34,7 +33,6 @@ _FLAT = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
 _ROW = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["']([^"']*)["']""")
 _PLAIN_ROW = re.compile(rb"[0-9]{1,18}")
 _SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
-_WARNINGS = threading.Lock()
 
 
 def read_excel(where: Path, data: bytes, sheet: str | None) -> Table:
@@ -105,8 +103,7 @@ def _silent_openpyxl() -> Iterator[None]:
 
     One thread at a time: Python's filters belong to the process.
     """
-    with _WARNINGS, warnings.catch_warnings():
-        warnings.filterwarnings("ignore", module="openpyxl")
+    with quiet(module="openpyxl"):
         yield
 
 
