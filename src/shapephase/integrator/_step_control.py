@@ -11,7 +11,8 @@ from ._spectral_error import spectral_norms
 from .fast import engine
 from .fast.estimate_constants import (
     AIM,
-    BY_CHANCE,
+    CHANCE_DEGREES,
+    CHANCE_PARTS,
     DEGREES_A_RADIAN,
     DEGREES_A_STEP,
     DISTANCE,
@@ -23,7 +24,6 @@ from .fast.estimate_constants import (
     SHORT_TURN_A_STEP,
     SIGNIFICANT,
     SPANNED_DEGREES,
-    SWINGS_A_RADIAN,
     TURN_A_STEP,
 )
 from .fast.panels import errors_of_steps, plan_of_steps, sizes_of_terms
@@ -47,7 +47,6 @@ class StepRequirements(NamedTuple):
     sizes : (3, P) of each panel a bound of how far the body turns there, the error of a single step but for a factor
         common to all [rad], and the last significant degree
     rates : (P, n) the size of each term of the rate of turning, times the panel's width [rad]
-    swings : (P,) degrees that the turn adds to what the steps of a panel have to follow; without momentum zero
     whole_turn : the bound for all panels and loops [rad]
     tolerance : of the attitude [rad]
     loops : how often the panels are repeated
@@ -55,7 +54,6 @@ class StepRequirements(NamedTuple):
 
     sizes: Array
     rates: Array
-    swings: Array
     whole_turn: float
     tolerance: float
     loops: int
@@ -70,7 +68,6 @@ class StepRequirements(NamedTuple):
         return cls(
             sizes=sizes,
             rates=rates,
-            swings=(SWINGS_A_RADIAN if magnitude else 0.0) * np.minimum(sizes[0], MOST_TURN),
             whole_turn=interpolant.loops * float(sizes[0].sum()),
             tolerance=tolerance,
             loops=interpolant.loops,
@@ -105,10 +102,11 @@ class StepRequirements(NamedTuple):
     def stepping_error(self, steps: Integers, distance: Array) -> Array:
         """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad]."""
         if engine.is_ready():
-            return errors_of_steps(self.rates, self.swings, steps, self.tolerance, distance)
-        most = _most_degrees(self.rates, self.swings, steps, NOT_SMALL * distance)
+            return errors_of_steps(self.rates, steps, self.tolerance, distance)
+        most = _most_degrees(self.rates, steps, NOT_SMALL * distance)
+        by_chance = self.tolerance * np.interp(most, CHANCE_DEGREES, CHANCE_PARTS)
         part = np.exp(np.interp(most, SPANNED_DEGREES, _LOGARITHMS))
-        return np.maximum(part * distance, np.minimum(BY_CHANCE * self.tolerance, MOST_BY_CHANCE * distance))
+        return np.maximum(part * distance, np.minimum(by_chance, MOST_BY_CHANCE * distance))
 
 
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
@@ -126,9 +124,9 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
 
 
-def _most_degrees(rates: Array, swings: Array, steps: Integers, least: Array) -> Array:
-    """The most degrees that a step spans of terms above each of some sizes: (P, n), (P,), (P,), (B,) -> (B,)."""
-    spanned = (np.arange(rates.shape[1]) + swings[:, None]) / steps[:, None]
+def _most_degrees(rates: Array, steps: Integers, least: Array) -> Array:
+    """The most degrees that a step spans of terms above each of some sizes: (P, n), (P,), (B,) -> (B,)."""
+    spanned = np.arange(rates.shape[1]) / steps[:, None]
     most = np.empty(len(least))
     at_once = max(1, _MOST_COMPARED // spanned.size)
     for first in range(0, len(least), at_once):

@@ -67,23 +67,23 @@ DISTANCE = 10.0**-8.1
 """The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
 each the sum of its terms times the eighth power of their degree over half the steps. Three of four random motions
 need no more."""
-AIM = 50.0
+AIM = 40.0
 """Of the tolerance: the distance that is planned for; its part that counts is far smaller, and so is the usual one."""
 
 # ---- The error of steps, from their distance from half as many -----------------------------------------------------
 
-NOT_SMALL = 0.005
+NOT_SMALL = 0.02
 """Of the distance: terms above count when it is asked how many degrees a step spans."""
-SWINGS_A_RADIAN = 1.5
-"""What a radian turned on a panel adds to these degrees."""
-SPANNED_DEGREES = (1.7, 2.2, 2.5, 2.8, 3.4, 4.0, 4.5, 7.0, 10.0)
-"""For each the error is a part of the distance. An eighth-order formula would allow 1/255; that is the median of 30,000
-random motions, half of them with bumps and ramps that hide, each stepped four times as finely for comparison. It is
-less sure the more degrees a step spans: one of those motions came to 1/6 at 2.7 degrees."""
-PARTS_OF_DISTANCE = (1 / 60, 1 / 30, 1 / 15, 1 / 12, 1 / 9, 1 / 6, 1 / 3.5, 1 / 2, 1.0)
+SPANNED_DEGREES = (1.6, 1.9, 2.4, 3.0, 3.5, 5.0)
+"""For each the error is a part of the distance. An eighth-order formula would allow 1/255; that is the median of 1,200
+random motions, half of them with bumps and ramps that hide. It is less sure the more degrees a step spans: of 10,000
+motions one came to 1/9.6 at 2.2 degrees."""
+PARTS_OF_DISTANCE = (1.0 / 80.0, 1.0 / 32.0, 1.0 / 8.0, 1.0 / 5.0, 1.0 / 4.0, 1.0)
 """Their logarithms are joined by straight lines."""
-BY_CHANCE = 0.005
-"""Of the tolerance: the distance may be small by chance, so the error is at least this, as far as it allows."""
+CHANCE_DEGREES = (1.6, 2.4)
+"""The distance of steps that span so many degrees may be small by chance."""
+CHANCE_PARTS = (0.0, 0.005)
+"""Of the tolerance: then the error is at least this, joined by a straight line, as far as the distance allows."""
 MOST_BY_CHANCE = 0.25
 """Of the distance: more error than that was never hidden by chance."""
 

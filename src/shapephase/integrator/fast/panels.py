@@ -109,10 +109,10 @@ def plan_of_steps(sizes: Array, loops: int, tolerance: float, turn_a_step: float
     return planned
 
 
-def errors_of_steps(rates: Array, swings: Array, steps: Integers, tolerance: float, distances: Array) -> Array:
-    """What `StepRequirements.stepping_error` finds: (P, n), (P,), (P,), (B,) -> (B,) [rad]."""
+def errors_of_steps(rates: Array, steps: Integers, tolerance: float, distances: Array) -> Array:
+    """What `StepRequirements.stepping_error` finds: (P, n), (P,), (B,) -> (B,) [rad]."""
     errors = np.empty(len(distances))
-    _kernel().errors_of_steps(plain(rates), plain(swings), steps, float(tolerance), plain(distances), errors)
+    _kernel().errors_of_steps(plain(rates), steps, float(tolerance), plain(distances), errors)
     return errors
 
 
@@ -130,7 +130,7 @@ def warm() -> None:
     series_with_changed_ends(coefficients, degree, one, 1.0)
     rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
     plan_of_steps(sizes, 1, 1.0, 1.0)
-    errors_of_steps(rates, one, np.array([2]), 1.0, one)
+    errors_of_steps(rates, np.array([2]), 1.0, one)
 
 
 @lru_cache(maxsize=64)

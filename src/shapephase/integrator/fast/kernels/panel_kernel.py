@@ -9,7 +9,8 @@ import numpy as np
 from ..estimate_constants import (
     AIM,
     AT_ROUNDING,
-    BY_CHANCE,
+    CHANCE_DEGREES,
+    CHANCE_PARTS,
     CONVERGED_TAIL,
     CONVERGING,
     DECAY,
@@ -330,14 +331,15 @@ def _between(x, places, values):
 
 
 @kernel
-def errors_of_steps(rates, swings, steps, tolerance, distances, errors):
-    """As `StepRequirements.stepping_error`: (P, n), (P,), (P,), (B,) -> (B,), the last one filled."""
+def errors_of_steps(rates, steps, tolerance, distances, errors):
+    """As `StepRequirements.stepping_error`: (P, n), (P,), (B,) -> (B,), the last one filled."""
     for row in range(len(distances)):
         distance, most = distances[row], 0.0
         least = NOT_SMALL * distance
         for panel in range(len(steps)):
             for k in range(rates.shape[1]):
                 if rates[panel, k] > least:
-                    most = max(most, (k + swings[panel]) / steps[panel])
+                    most = max(most, k / steps[panel])
+        by_chance = tolerance * _between(most, CHANCE_DEGREES, CHANCE_PARTS)
         share = math.exp(_between(most, SPANNED_DEGREES, _LOGARITHMS))
-        errors[row] = max(share * distance, min(BY_CHANCE * tolerance, MOST_BY_CHANCE * distance))
+        errors[row] = max(share * distance, min(by_chance, MOST_BY_CHANCE * distance))
