@@ -116,6 +116,10 @@ def searched(
     shrink: bool = True,
 ) -> Find | None:
     """Try inputs of a grammar until one shows a fault; that one is made smaller where `shrink`, and comes back."""
+    if not shrink:
+        # Hypothesis takes longer to draw an input than most of them take to be tried.
+        drawn = (GRAMMARS[grammar](Random(f"{grammar} {start} {k}")) for k in range(trials))
+        return next(filter(None, (_tried(process, trial, tally, by_command_line) for trial in drawn)), None)
     found: list[Find] = []
 
     @seed(start)
@@ -123,18 +127,15 @@ def searched(
         max_examples=trials,
         deadline=None,
         database=None,
-        phases=(Phase.generate, Phase.shrink) if shrink else (Phase.generate,),
+        phases=(Phase.generate, Phase.shrink),
         suppress_health_check=list(HealthCheck),
         report_multiple_bugs=False,
     )
     @given(st.randoms(use_true_random=False))
     def attempt(chance: Random) -> None:
-        trial = GRAMMARS[grammar](chance)
-        answer = process.tried(trial, by_command_line=by_command_line)
-        if not found:
-            tally.count(trial.source + " process" * by_command_line, answer)
-        if answer["faults"]:
-            found.append(Find(trial=trial, faults=tuple(answer["faults"])))
+        find = _tried(process, GRAMMARS[grammar](chance), None if found else tally, by_command_line)
+        if find is not None:
+            found.append(find)
             raise _Fault
 
     try:
@@ -142,3 +143,11 @@ def searched(
     except _Fault:
         return found[-1]
     return None
+
+
+def _tried(process: LimitedProcess, trial: Trial, tally: Tally | None, by_command_line: bool) -> Find | None:
+    """Try an input, and count it; what it shows if that is a fault."""
+    answer = process.tried(trial, by_command_line=by_command_line)
+    if tally is not None:
+        tally.count(trial.source + " process" * by_command_line, answer)
+    return Find(trial=trial, faults=tuple(answer["faults"])) if answer["faults"] else None
