@@ -57,6 +57,9 @@ _NEARLY = 0.9
 _MOST_NAMED = 8
 # The fewest guesses that it ranks, so that a single start is the best of several.
 _COARSE_GUESSES = 8
+# Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
+# rounding decides whether a search comes to it.
+_SPARE = 2
 # The most iterations for each: a guess that needs more is not a good start.
 _COARSE_ITERATIONS = 60
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
@@ -158,12 +161,17 @@ def plan_reorientation(
     with heard_interrupts():
         basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
         reporter = _ProgressReporter(iteration_callback)
-        starting_points = _starting_points(task, basis, chosen, reporter)
+        starting_points, spare = _starting_points(task, basis, chosen, reporter)
         searched = _searched_here if executor is None else partial(_searched_by, executor)
         for attempt in searched(task, basis, chosen, starting_points, reporter):
             attempts.append(attempt)
             if reporter.stopped:
                 break
+        if not reporter.stopped and not any(attempt.report.converged for attempt in attempts):
+            for attempt in _searched_here(task, basis, chosen, spare, reporter):
+                attempts.append(attempt)
+                if reporter.stopped or attempt.report.converged:
+                    break
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
@@ -290,11 +298,14 @@ def _default_pieces(task: Reorientation) -> int:
 
 def _starting_points(
     task: Reorientation, basis: SplineBasis, search: Search, reporter: _ProgressReporter
-) -> list[Guess]:
-    """The guesses to start from; for few joints each first improved on a coarse spline, the cheapest taken."""
+) -> tuple[list[Guess], list[Guess]]:
+    """The guesses to start from, and those to go on with if none of them leads to a plan.
+
+    For few joints each is first improved on a coarse spline, and the cheapest are taken.
+    """
     count = int(search.starts)
     if task.dimension > _MANY_JOINTS:
-        return guesses(task, basis, search.seed, count)
+        return guesses(task, basis, search.seed, count), []
     coarse = SplineBasis(_COARSE_PIECES)
     candidates = guesses(task, coarse, search.seed, max(count, _COARSE_GUESSES))
     program = CollocationProgram(task, coarse)
@@ -314,7 +325,8 @@ def _starting_points(
         guess = guess_of(task, basis, curve)
         if guess is not None:
             found.append((solution.cost if solution.converged else np.inf, number, guess))
-    return [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])][:count]
+    ranked = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
+    return ranked[:count], ranked[count : count + _SPARE]
 
 
 def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
