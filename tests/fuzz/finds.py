@@ -113,6 +113,15 @@ def _unknown_element() -> Trial:
     return _motion("motion.mat", head + _element(14, array))
 
 
+def _unknown_class() -> Trial:
+    """A `.mat` file whose second vector is of class 99."""
+    numbers = _element(9, struct.pack("<3d", 0.0, 1.0, 2.0))
+    arrays = [_matrix(kind, (1, 3), name) + numbers for kind, name in ((6, b"time"), (99, b"hip"))]
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    content = head + b"".join(_element(14, array) for array in arrays)
+    return _motion("motion.mat", content, rest_missing=True, ignore_extra=True)
+
+
 def _long_words() -> Trial:
     """A Parquet file of ten kilobytes, one of whose columns is four thousand times a word of a megabyte."""
     import pyarrow
@@ -207,6 +216,20 @@ CASES = {
         outcome="ModelFileError",
         said="inertia has 10 values, not 9",
         slow=True,
+    ),
+    "a mass of 0.515 kg, which biorbd reads as 5.15 - 1": Case(
+        make=lambda: _body("body.bioMod", ACROBAT.replace("mass 0.5", "mass 5.150000E-01", 1)),
+        outcome="ModelFileError",
+        said="write a small e",
+        slow=True,
+    ),
+    "an array of no class that MATLAB has, which was left out": Case(
+        make=_unknown_class, said="is of a class that does not exist"
+    ),
+    "a store whose name has 300 letters": Case(
+        make=lambda: Trial(kind="store", source="find", main="x" * 300),
+        outcome="StudyStoreError",
+        said="there is no store",
     ),
     "a bioMod file that is cut off within a number": Case(
         make=lambda: _body("body.bioMod", ACROBAT[: ACROBAT.index("com 0.01 0 -0.02") + len("com 0.01 0 -0.0")]),

@@ -11,7 +11,6 @@ import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import closing
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,8 +88,8 @@ def recipe_of(study: Study) -> bytes:
 
 
 def _target(study: Study, store: str | os.PathLike[str], resume: bool) -> StudyStore:
-    if not (resume and Path(store).exists()):
-        if Path(store).exists():
+    if not (resume and os.path.exists(store)):
+        if os.path.exists(store):
             # What is there is looked at first: a store says so.
             open_study(store)
             raise StudyStoreError(f"{store}: there is a store already; go on with it by resume, or name another place")

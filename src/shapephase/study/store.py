@@ -214,7 +214,7 @@ def open_study(path: str | os.PathLike[str]) -> StudyStore:
     """
     check_file_name(path, "path")
     place = Path(path)
-    if not place.exists():
+    if not os.path.exists(place):
         raise StudyStoreError(f"{place}: there is no store of a study")
     try:
         attributes = dict(_zarr().open_group(place, mode="r", zarr_format=3).attrs)
@@ -231,7 +231,7 @@ def open_study(path: str | os.PathLike[str]) -> StudyStore:
 def new_store(path: str | os.PathLike[str], study: Study) -> StudyStore:
     """Make an empty store, whole or not at all. Raises StudyStoreError where something is already, OutputFileError."""
     place = Path(path)
-    if place.exists():
+    if os.path.exists(place):
         raise StudyStoreError(f"{place}: there is something already; go on with it by resume, or name another place")
     if not place.parent.is_dir():
         raise OutputFileError(f"cannot write {place}: there is no such folder {place.parent}")

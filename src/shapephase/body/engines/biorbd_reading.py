@@ -29,12 +29,9 @@ _COUNTS = {"parent": 1, "translations": 1, "rotations": 1, "rtinmatrix": 1, "mas
 """How many values follow a word; biorbd passes over those beyond, and over the last letters of `1,5`."""
 _FRAME = 16
 """Values of a frame as a matrix; otherwise three angles, the order of their axes, and three coordinates."""
-_OPERATORS = re.compile(r"[-+*/^()]")
-_OPERAND = re.compile(
-    r"|\$\w+|pi|nan|inf(inity)?|cos|sin|tan|acos|asin|atan|exp|log|sqrt|abs|(\d+\.?\d*|\.\d+)(e\d*)?",
-    re.IGNORECASE | re.ASCII,
-)
-"""What stands between operators; of `1e-3` the operator is the exponent's sign."""
+_OPERAND = r"(\$\w+|[Pp][Ii]|(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(nan|NaN|inf|Infinity))"
+_VALUE = re.compile(rf"[+-]?(\(+[+-]?)?{_OPERAND}\)*([-+*/]\(*{_OPERAND}\)*)*", re.ASCII)
+"""What biorbd reads right: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it."""
 _DROPPED = ("meshfile",)
 """A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
 _NO_ROOT = ("root", "base")
@@ -202,8 +199,11 @@ def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int
             )
     if word in ("rt", "mass", "com", "inertia", "rangesq"):
         for text in numbers:
-            if not all(_OPERAND.fullmatch(part) for part in _OPERATORS.split(text)):
-                raise UnusableModelError(f"segment {segment!r}: {word}: {text!r:.40} is no number", line)
+            if not _VALUE.fullmatch(text):
+                hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
+                raise UnusableModelError(
+                    f"segment {segment!r}: {word}: {text!r:.40} is no number that biorbd reads{hint}", line
+                )
 
 
 def _base(model: Any, segments: dict[str, int], starts: dict[str, int]) -> tuple[str, list[str]]:

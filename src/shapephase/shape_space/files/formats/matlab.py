@@ -66,7 +66,10 @@ def read_arrays_of(where: Path, data: bytes, chosen: str | None = None) -> Table
         values = sum(float(np.prod(shape, dtype=np.float64)) for _, shape, _ in listed)
         if values > MOST_VALUES:
             raise TrajectoryError(f"{where}: {values:.3g} values, up to {MOST_VALUES} are read; write fewer samples")
-        objects = [name for name, _, kind in listed if kind in ("opaque", "object", "function", "unknown")]
+        unknown = [name for name, _, kind in listed if kind == "unknown"]
+        if unknown:
+            raise TrajectoryError(f"{where}: {unknown[0]!r} is of a class that does not exist; the file is damaged")
+        objects = [name for name, _, kind in listed if kind in ("opaque", "object", "function")]
         readable = [name for name, _, kind in listed if name not in objects]
         loaded = _loaded(data, readable)
     except ShapePhaseError:
