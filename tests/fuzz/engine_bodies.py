@@ -22,7 +22,9 @@ _ODD_BLOCKS = (
 
 
 def _numbers(chance: Random, values: Sequence[float]) -> str:
-    words = [entry(chance, value, 200).strip() or "0" for value in values]
+    words = [entry(chance, value, 600).strip() or "0" for value in values]
+    # A large E is refused, since biorbd reads it wrong.
+    words = [odd_one(chance, word.replace("E", "e"), (word,), 300) for word in words]
     if rarely(chance, 120):
         words = words[:-1] if chance.randrange(2) else [*words, "0"]
     return " ".join(words)
