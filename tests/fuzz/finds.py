@@ -248,6 +248,11 @@ CASES = {
     "a parameter of a motion that a rigid body does not have": Case(
         make=lambda: _study("parameters = {beta = 0.5}\n" + RIGID), outcome="StudyError", said="a rigid body has no"
     ),
+    "a mean that is true": Case(
+        make=lambda: _study(RIGID + '[over.tolerance]\ndistribution = "normal"\nmean = true\ndeviation = 0.02\n'),
+        outcome="StudyError",
+        said="over.tolerance.mean: true and false",
+    ),
     "a parameter that is a text": Case(
         make=lambda: _study('body = "cat_two_halves"\nmotion = "kane_scher"\nparameters = {alpha = 0, beta = "x"}\n'),
         outcome="StudyError",

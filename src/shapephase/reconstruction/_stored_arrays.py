@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .. import so3
 from ..arrays import Array, Integers, finite_array
 
 _CHANNELS = 9
@@ -52,6 +53,8 @@ def check_rotation(arrays: Mapping[str, Any], loops: int, count: int) -> None:
     directions = _numbers(arrays, "step_directions", count, None, 3)
     if directions.shape[1] not in (0, total + 1):
         raise ValueError(f"step_directions: {total + 1} directions are needed, got {directions.shape[1]}")
+    if directions.shape[1]:
+        _check_directions(directions, quaternions)
     for name in ("step_turns", "step_dynamics"):
         _numbers(arrays, name, count, None if directions.shape[1] == 0 else total)
     for name in ("step_sampling_error", "step_stepping_error", "step_rounding_error", "step_amplification"):
@@ -59,6 +62,16 @@ def check_rotation(arrays: Mapping[str, Any], loops: int, count: int) -> None:
             raise ValueError(f"{name} is below 0")
     _numbers(arrays, "perturbed", *coefficients.shape)
     _numbers(arrays, "hidden")
+
+
+def _check_directions(directions: Array, quaternions: Array) -> None:
+    """Raise ValueError where directions of the momentum are not those that the attitudes give it."""
+    turned = so3.apply(so3.transpose(so3.matrix_from_quat(quaternions)), directions[:, :1])
+    # Compared before anything is squared: numbers of a damaged file may be as large as there are.
+    if np.any(np.abs(directions) > 2.0) or np.any(np.abs(turned - directions) > _UNIT):
+        raise ValueError("step_directions: not those of a momentum that rests in space")
+    if np.any(np.abs((directions[:, :1] ** 2).sum(axis=-1) - 1.0) > _UNIT):
+        raise ValueError("step_directions: not of length 1")
 
 
 def check_rows(parts: Sequence[Any], count: int) -> None:

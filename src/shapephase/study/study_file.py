@@ -191,4 +191,11 @@ def _check_names(kind: str, said: Mapping[str, Any], known: Any, *, needed: Any 
 
 
 def _numbers(value: Any, name: str) -> Array:
+    if _has_truth(value):
+        raise StudyError(f"{name}: true and false are no numbers")
     return finite_array(value, name)
+
+
+def _has_truth(value: Any) -> bool:
+    """Whether something that is true or false stands where numbers may, which NumPy reads as 1 and 0."""
+    return isinstance(value, bool) or (isinstance(value, list) and any(map(_has_truth, value)))
