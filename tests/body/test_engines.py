@@ -98,6 +98,32 @@ def test_six_digits_of_a_frame_are_made_a_rotation(tmp_path, exact_acrobat):
     assert EPS * scale < np.abs(apart).max() < 10 * SIX_DIGITS * scale
 
 
+def test_a_part_in_a_mirror_is_where_biorbd_sees_it(tmp_path, exact_acrobat):
+    """Models of real acrobats have frames with determinant -1: the same part, said in mirrored numbers."""
+    hand = exact_acrobat[exact_acrobat.index("segment Hand") :]
+    plain = hand.replace("0.0002 0 0\n", "0.0002 0 0.00002\n")
+    plain = plain.replace("\t\t0 0 0.0001", "\t\t0.00002 0 0.0001")
+    finger = "segment Finger\n\tparent Hand\n{}\tmass 0.02\n\tcom 0 0 {}0.01\nendsegment\n"
+    mirrored = plain.replace("rt 0.3 0 0 xyz 0 0.1 -0.05", f"RTinMatrix 1\n{_matrix(Rotation.from_euler('x', 0.3))}")
+    mirrored = mirrored.replace("0.01 0 -0.02", "0.01 0 0.02").replace("0.00002", "-0.00002")
+    above = exact_acrobat.replace(hand, "")
+    same = loaded(tmp_path, above + plain + finger.format("\trt 0 0 0 xyz 0 0 0.03\n", ""), "plain.bioMod")
+    body = loaded(tmp_path, above + mirrored + finger.format("\trt 0 0 0 xyz 0 0 -0.03\n", "-"), "mirrored.bioMod")
+    shape, rate = np.array([0.2, -0.3, 0.5, 0.1, 0.7, 0.05]), np.array([0.3, 0.2, -0.4, 0.5, 0.1, 0.2])
+    locked, momentum = same.locked_inertia(shape), same.internal_momentum(shape, rate)
+    np.testing.assert_allclose(body.locked_inertia(shape), locked, rtol=0, atol=100 * EPS * np.abs(locked).max())
+    np.testing.assert_allclose(body.internal_momentum(shape, rate), momentum, rtol=0, atol=100 * EPS * body.mass)
+    with pytest.raises(ModelFileError, match=r":\d+: segment 'Hand': the frame of a mirror .* no joints move in it"):
+        loaded(tmp_path, above + mirrored.replace("\tmass", "\trotations x\n\tmass", 1))
+
+
+def _matrix(turn):
+    """Of the hand's frame in a mirror that swaps its palm and its back."""
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = turn.as_matrix() @ np.diag([1.0, 1.0, -1.0]), [0.0, 0.1, -0.05]
+    return "\tRT\n" + "".join("\t\t" + " ".join(map(repr, row)) + "\n" for row in frame.tolist())
+
+
 def test_a_base_without_mass_of_its_own(tmp_path):
     """Coordinates spread over segments without mass are the base's: the same body."""
     body, whole = loaded(tmp_path, MASSLESS_ROOT), loaded(tmp_path, ACROBAT)

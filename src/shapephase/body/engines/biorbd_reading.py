@@ -54,23 +54,32 @@ def chain_of(path: str) -> Chain:
     base, dropped = _base(model, segments, starts)
     for name in dropped:
         notes.append(f"segment {name!r} has no mass: its coordinates are the free base's, as those of {base!r}")
-    lack = 0.0
+    lack, flips = 0.0, {}
     for name, number in segments.items():
         segment, line = model.segment(number), starts.get(name, 1)
         if name in dropped:
             continue
-        traits = segment.characteristics()
-        chain.add_link(name, traits.mass(), traits.CoM().to_array(), traits.inertia().to_array(), line)
+        parent = segment.parent().to_string()
+        frame = segment.localJCS().to_array()
+        above = flips.get(parent, np.eye(3))
+        turn, flips[name], missing = _orthonormal(above @ frame[:3, :3], name, line)
+        if flips[name][2, 2] < 0.0:
+            if segment.nbDof() or name == base:
+                raise UnusableModelError(
+                    f"segment {name!r}: the frame of a mirror is no base, and no joints move in it", line
+                )
+            notes.append(f"segment {name!r} has the frame of a mirror: its mass is taken over where biorbd sees it")
+        traits, flip = segment.characteristics(), flips[name]
+        tensor = flip @ traits.inertia().to_array() @ flip
+        chain.add_link(name, traits.mass(), flip @ traits.CoM().to_array(), tensor, line)
         if name == base:
             continue
         if segment.isRotationAQuaternion():
             raise UnusableModelError(
                 f"segment {name!r} turns by a quaternion; joints of one axis are supported: write `rotations xyz`", line
             )
-        frame = segment.localJCS().to_array()
-        turn, missing = _orthonormal(frame[:3, :3])
         lack = max(lack, missing)
-        chain.add_joints(segment.parent().to_string(), name, frame[:3, 3], turn, _axes(segment, name))
+        chain.add_joints(parent, name, above @ frame[:3, 3], turn, _axes(segment, name))
     if lack > _EXACT:
         notes.append(f"frames are orthonormal to {lack:.1g} only: the nearest rotations are taken")
     _add_poses(chain, model, segments, base, lack)
@@ -238,13 +247,14 @@ def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float]]]:
     ]
 
 
-def _orthonormal(matrix: Array) -> tuple[Array, float]:
-    """The nearest rotation, and how far the matrix is from it."""
+def _orthonormal(matrix: Array, name: str, line: int) -> tuple[Array, Array, float]:
+    """The nearest rotation, what makes a mirror of it if the matrix is one, and how far the matrix is from both."""
     left, values, right = np.linalg.svd(matrix)
-    turn = left @ right
-    if np.linalg.det(turn) < 0.0 or not np.abs(values - 1.0).max() < 1e-2:
-        raise UnusableModelError(f"the frame {matrix.tolist()} is no rotation")
-    return turn, float(np.abs(matrix - turn).max())
+    nearest = left @ right
+    if not np.abs(values - 1.0).max() < 1e-2:
+        raise UnusableModelError(f"segment {name!r}: its frame {matrix.tolist()} is no rotation", line)
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(nearest))])
+    return nearest @ flip, flip, float(np.abs(matrix - nearest).max())
 
 
 def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, lack: float) -> None:
