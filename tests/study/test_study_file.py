@@ -203,3 +203,43 @@ def test_a_sweep_of_the_command_line_fills_a_store_and_goes_on(write, capfd):
     assert room.open_study("out.zarr").attributes["command"].startswith("shapephase sweep study.toml")
     code, out, _ = ended(capfd, "sweep", "study.toml", "--store", "out.zarr", "--resume", "--json")
     assert (code, json.loads(out)["counts"]["done"]) == (0, 4)
+
+
+WALKER = """<mujoco><worldbody><body name="torso"><joint name="lift" type="slide" axis="0 0 1"/>
+<joint name="pitch" axis="0 1 0"/><geom type="capsule" size="0.05 0.3"/>
+<body name="thigh" pos="0 0.05 -0.3"><joint name="hip" axis="1 0.2 0" limited="false"/>
+<geom type="capsule" size="0.04" fromto="0 0 0 0 0.1 -0.4"/></body></body>
+<body name="ball"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>
+"""
+WALKS = """
+body = "walker.xml"
+motion = "hip.csv"
+momentum = [0.1, 0.2, 0.3]
+"""
+
+
+def test_what_floats_of_an_mjcf_is_said_in_the_file_or_to_the_command(write, tmp_path, capfd):
+    pytest.importorskip("mujoco")
+    (tmp_path / "walker.xml").write_text(WALKER)
+    times = np.linspace(0.0, 1.0, 11)
+    rows = "".join(f"{t},{np.sin(3.0 * t)}\n" for t in times)
+    (tmp_path / "hip.csv").write_text("time,hip [rad]\n" + rows)
+    body = sp.load_body("walker.xml", root="free", root_body="torso")
+    deformation = sp.articulated(body, sp.read_shape_path("hip.csv", body))
+    motion = sp.reconstruct(deformation, [0.1, 0.2, 0.3], tolerance=1e-9)
+    command = ["sweep", write(WALKS), "--store", "said.zarr", "--workers", "1"]
+    assert ended(capfd, *command, "--root", "free", "--root-body", "torso")[0] == 0
+    said = room.open_study("said.zarr")
+    np.testing.assert_array_equal(said.values("final_attitude")[0], motion.final_attitude)
+    written = room.read_study(write('root = "free"\nroot_body = "torso"\n' + WALKS))
+    assert written.hash == said.attributes["study_hash"] != room.read_study(write(WALKS)).hash
+    store = room.read_study(write(WALKS)).run("bare.zarr", workers=0)
+    ((_, name, text),) = store.errors()
+    assert (name, "root_body" in text) == ("ModelFileError", True)
+    code, _, err = ended(capfd, *command, "--root", "fixed")
+    assert (code, "'fixed'" in err, len(err.splitlines())) == (ExitCode.USAGE, True, 1)
+
+
+def test_a_rigid_body_has_no_root():
+    with pytest.raises(StudyError, match="root_body: a rigid body is not read from a file"):
+        room.Study(room.RigidBody(np.eye(3), 1.0), root_body="torso")

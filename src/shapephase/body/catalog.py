@@ -94,11 +94,7 @@ def load_body(
     """
     check_flag(isolate, "isolate")
     check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
-    if root is not None:
-        check_choice(root, "value of root", ("free",))
-    if not isinstance(root_body, str | None):
-        raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
-    given = {name: value for name, value in (("root", root), ("root_body", root_body)) if value is not None}
+    given = loading_options(root, root_body)
     if isinstance(source, str | os.PathLike):
         path, installed = _path_of(os.fspath(source))
         content = read_file(path)
@@ -115,6 +111,15 @@ def load_body(
     for category, message in doubts:
         warnings.warn(message, category, stacklevel=2)
     return body
+
+
+def loading_options(root: str | None, root_body: str | None) -> dict[str, str]:
+    """Of these arguments of `load_body` those that are given. Raises UnknownNameError, WrongObjectError."""
+    if root is not None:
+        check_choice(root, "value of root", ("free",))
+    if not isinstance(root_body, str | None):
+        raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
+    return {name: value for name, value in (("root", root), ("root_body", root_body)) if value is not None}
 
 
 def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,7 +13,7 @@ from cyclopts import App, Parameter
 from ..errors import ShapeError
 from ..files import write_whole
 from ..run_progress import RunProgress
-from .options import AS_TEXT, FigureFile, PrintOptions
+from .options import AS_TEXT, AS_WRITTEN, BodyOptions, FigureFile, PrintOptions
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import Verbosity, say, say_written
@@ -56,6 +57,7 @@ def sweep_command(
     resume: Annotated[
         bool, Parameter(negative="", help="Go on with a store that is there; for example `--resume`.")
     ] = False,
+    floating: BodyOptions = AS_WRITTEN,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Compute the cases of a study in a TOML file, on all processors or on a cluster, into a Zarr store.
@@ -74,6 +76,7 @@ def sweep_command(
     if workers is not None and (scheduler is not None or workers < 1):
         raise ShapeError(f"--workers: a whole number above 0, and no --scheduler beside it, is needed, got {workers}")
     read = read_study(study)
+    read = replace(read, **{name: value for name, value in vars(floating).items() if value is not None})
     try:
         with steps(1) as work, nullcontext() if scheduler is None else connected(scheduler) as client:
             work.begin(f"computing {read.cases} cases")

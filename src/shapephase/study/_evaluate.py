@@ -230,7 +230,7 @@ class Evaluator:
     def _body(self, case: Case) -> Body:
         name = str(case.body)
         if name not in self._bodies:
-            body = load_body(case.body)
+            body = load_body(case.body, **self.study.loading)
             self._check("body", name, body.sha256)
             self._bodies[name] = body
         return self._bodies[name]

@@ -165,11 +165,11 @@ def fingerprint(source: Any) -> str | None:
     return None
 
 
-def body_fingerprint(source: BodySource) -> str | None:
-    """The same of a body, which is looked for. Raises UnknownNameError, InputFileNotFoundError."""
+def body_fingerprint(source: BodySource, loading: Mapping[str, str]) -> str | None:
+    """The same of a body, which is looked for. Raises what `load_body` raises for a name."""
     if isinstance(source, RigidBody) or os.path.isfile(source):
         return fingerprint(source)
-    return load_body(source).sha256
+    return load_body(source, **loading).sha256
 
 
 def described(source: Any) -> Any:

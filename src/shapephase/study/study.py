@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_function, number_argument, tolerance_argument, vector_argument
 from ..arrays import Array, Integers
-from ..body.catalog import load_body
+from ..body.catalog import load_body, loading_options
 from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError
@@ -78,6 +78,7 @@ class Study:
     chunk : cases that are computed and stored together
     momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w
     time_limit : of one case [s]; None: none
+    root, root_body : what floats of the bodies' MJCF files, as for `load_body`
 
     Raises
     ------
@@ -107,6 +108,8 @@ class Study:
     gauge: str = field(default="horizontal", kw_only=True)
     parameters: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     time_limit: float | None = field(default=None, kw_only=True)
+    root: str | None = field(default=None, kw_only=True)
+    root_body: str | None = field(default=None, kw_only=True)
 
     __repr__ = short_repr
 
@@ -122,6 +125,8 @@ class Study:
         gauge_link(self.gauge)
         if self.time_limit is not None and not number_argument(self.time_limit, "time_limit", "s") > 0.0:
             raise StudyError(f"time_limit: seconds above 0 are needed, got {what_came(self.time_limit)}")
+        if isinstance(self.body, RigidBody) and self.loading:
+            raise StudyError(f"{next(iter(self.loading))}: a rigid body is not read from a file")
         if self.cases > MOST_CASES:
             raise StudyError(f"{self.cases} cases; at most {MOST_CASES} fit into one study")
         _ = self.resolved_outputs, self.inputs
@@ -160,6 +165,11 @@ class Study:
         return outputs_argument(self.outputs, (*_TAKEN, *(axis.name for axis in self.axes)))
 
     @property
+    def loading(self) -> dict[str, str]:
+        """Arguments of `load_body` for its bodies."""
+        return loading_options(self.root, self.root_body)
+
+    @property
     def grid_shape(self) -> tuple[int, ...]:
         """How many values each grid has, and last the draws."""
         return (*(len(axis.grid) for axis in self.axes if axis.grid is not None), self.draws)
@@ -183,7 +193,7 @@ class Study:
         """SHA-256 of the files, functions and bodies of the library that it is made of."""
         found = {}
         for source in self._bodies:
-            found[f"body {described(source)}"] = body_fingerprint(source)
+            found[f"body {described(source)}"] = body_fingerprint(source, self.loading)
         for source in self._motions:
             found[f"motion {described(source)}"] = fingerprint(source)
         for output in self.outputs:
@@ -209,6 +219,8 @@ class Study:
             "parameters": _plain(self.parameters),
             "time_limit": self.time_limit,
             "inputs": self.inputs,
+            # Only where they are given: stores from before they could be go on.
+            **self.loading,
         }
 
     @property
@@ -325,7 +337,7 @@ class Study:
         fault: ShapePhaseError | None = None
         for source in self._bodies:
             try:
-                body = load_body(source)
+                body = load_body(source, **self.loading)
             except ShapePhaseError as error:
                 fault = fault or error
                 continue
@@ -364,7 +376,7 @@ class Study:
         neutral = np.zeros if name == "centres" else np.ones
         found = np.array(values[name]) if name in values else neutral((count, self._parts, *OF_PARTS[name]))
         if single:
-            body = load_body(self._bodies[0])
+            body = load_body(self._bodies[0], **self.loading)
             for axis in single:
                 found[:, part_number(body, axis.partition(".")[2])] = values[axis]
         return found

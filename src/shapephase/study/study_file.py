@@ -20,7 +20,10 @@ from .distributions import DISTRIBUTIONS, Choice, LogNormal
 from .outputs import Output
 from .study import Study
 
-_PLAIN = ("outputs", "draws", "seed", "chunk", "momentum", "attitude", "tolerance", "gauge", "parameters", "time_limit")
+_PLAIN = (
+    *("outputs", "draws", "seed", "chunk", "momentum", "attitude", "tolerance", "gauge", "parameters", "time_limit"),
+    *("root", "root_body"),
+)
 _ENTRIES = ("body", "motion", "rigid", "over", "functions", *_PLAIN)
 _FACTORS = {
     "rad": 1.0,
