@@ -113,7 +113,7 @@ def load_body(
     return body
 
 
-def loading_options(root: str | None, root_body: str | None) -> dict[str, str]:
+def loading_options(root: str | None, root_body: str | None) -> dict[str, Any]:
     """Of these arguments of `load_body` those that are given. Raises UnknownNameError, WrongObjectError."""
     if root is not None:
         check_choice(root, "value of root", ("free",))

@@ -165,7 +165,7 @@ def fingerprint(source: Any) -> str | None:
     return None
 
 
-def body_fingerprint(source: BodySource, loading: Mapping[str, str]) -> str | None:
+def body_fingerprint(source: BodySource, loading: Mapping[str, Any]) -> str | None:
     """The same of a body, which is looked for. Raises what `load_body` raises for a name."""
     if isinstance(source, RigidBody) or os.path.isfile(source):
         return fingerprint(source)

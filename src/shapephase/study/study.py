@@ -165,7 +165,7 @@ class Study:
         return outputs_argument(self.outputs, (*_TAKEN, *(axis.name for axis in self.axes)))
 
     @property
-    def loading(self) -> dict[str, str]:
+    def loading(self) -> dict[str, Any]:
         """Arguments of `load_body` for its bodies."""
         return loading_options(self.root, self.root_body)
 
