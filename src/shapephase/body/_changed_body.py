@@ -43,5 +43,5 @@ def coupled_body(body: Body, couplings: Mapping[str, Coupling]) -> Body:
         if not isinstance(coupling, Coupling):
             raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
     changed = type(body)(body._model, body.name, {**body.couplings, **couplings})
-    changed.base_angles = body.base_angles
+    changed.base_angles, changed.base_slides = body.base_angles, body.base_slides
     return changed

@@ -97,6 +97,7 @@ class LinkTree:
     text : the URDF that was checked, written anew; None for other formats
     base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
         it, as "zxy"; None where the file names none
+    base_slides : names of three coordinates that move the root link along x, y and z; None where the file names none
     """
 
     name: str
@@ -107,6 +108,7 @@ class LinkTree:
     notes: tuple[str, ...] = ()
     text: str | None = None
     base_angles: tuple[tuple[str, ...], str] | None = None
+    base_slides: tuple[str, ...] | None = None
 
 
 def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:

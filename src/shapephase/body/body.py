@@ -64,6 +64,7 @@ class Body:
     chain : its links and joints as plain numbers
     couplings : by the name of each joint that follows others, how it does
     base_angles : names and axes of the angles by which its file turns the base; None where it names none
+    base_slides : names of what its file moves the base along x, y and z by; None where it names none
 
     Examples
     --------
@@ -79,6 +80,7 @@ class Body:
         self.sha256: str | None = None
         self.file: Path | None = None
         self.base_angles: tuple[tuple[str, ...], str] | None = None
+        self.base_slides: tuple[str, ...] | None = None
         self.mass = float(pin.computeTotalMass(model))
         self.couplings: Mapping[str, Coupling] = dict(couplings or {})
         self._joints = JointMap(model, pin.neutral(model), self.couplings)

@@ -257,7 +257,7 @@ def _from_file(
         tree = urdf_tree(root)
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.couplings)
-    body.base_angles = tree.base_angles
+    body.base_angles, body.base_slides = tree.base_angles, tree.base_slides
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     check_against_file(body, tree, where)
     check_against_engine(body, tree, poses, where)

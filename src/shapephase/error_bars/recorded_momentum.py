@@ -22,6 +22,8 @@ from ._along_motion import responses
 
 # Rounds of Gauss and Newton; a flight of many turns takes ten.
 _MOST_ROUNDS = 40
+# After so many, one that is no flight of the body is known to be none.
+_ENOUGH_ROUNDS = 12
 # Of the deviations that the fit itself leaves open: a smaller step is the last.
 _SMALL_STEP = 1e-3
 # [rad] and of the momentum: where there is no noise.
@@ -197,10 +199,7 @@ def _flight_fitted(
         fit = _with_axes(deformation, times, recorded, tolerance)
     else:
         fit = _fitted(deformation, times, recorded, tolerance, np.eye(3))
-    if _spread(fit.residuals) > _NO_FLIGHT:
-        raise AccuracyNotReached(
-            f"{_apart(fit.residuals)}: is it a free flight of this body, and are the recorded axes those of its base?"
-        )
+    _check_near(fit.residuals, times)
     return fit
 
 
@@ -226,7 +225,9 @@ def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: 
     half = len(times) // 2
     if half < _FIRST_TIMES:
         return fit.settled(fit.first_motion(axes), axes)
-    return fit.settled(_fitted(deformation, times[:half], recorded[:half], tolerance, axes).motion, axes)
+    before = _fitted(deformation, times[:half], recorded[:half], tolerance, axes)
+    _check_near(before.residuals, times[:half])
+    return fit.settled(before.motion, axes)
 
 
 def _momenta(deformation: Deformation, times: Array, recorded: Array) -> tuple[Array, Array]:
@@ -299,7 +300,9 @@ class _Least:
     def settled(self, motion: Motion, axes: Array) -> _Fitted:
         """By steps of Gauss and Newton from a motion and axes, halved where they go too far."""
         residuals = self._residuals(motion, axes)
-        for _ in range(_MOST_ROUNDS):
+        for number in range(_MOST_ROUNDS):
+            if number == _ENOUGH_ROUNDS:
+                _check_near(residuals, self.times)
             slopes = self._slopes(motion)
             step = np.asarray(np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0], dtype=np.float64)
             if self._is_small(step, slopes, motion, residuals):
@@ -360,6 +363,15 @@ class _Least:
 def _spread(residuals: Array) -> float:
     """Root mean square of the angles [rad]."""
     return float(np.sqrt((residuals**2).sum(axis=1).mean()))
+
+
+def _check_near(residuals: Array, times: Array) -> None:
+    """Raise AccuracyNotReached where what is left of attitudes at these times is no noise."""
+    if _spread(residuals) > _NO_FLIGHT:
+        raise AccuracyNotReached(
+            f"{_apart(residuals)} from {times[0]:.6g} to {times[-1]:.6g} s: is it a free flight of this body, and are "
+            "the recorded axes those of its base?"
+        )
 
 
 def _apart(residuals: Array) -> str:

@@ -52,6 +52,7 @@ def chain_of(path: str) -> Chain:
     chain = Chain(Path(path).stem, notes=notes)
     segments = {model.segment(k).name().to_string(): k for k in range(model.nbSegment())}
     base, dropped = _base(model, segments, starts)
+    _name_base(chain, [model.segment(segments[name]) for name in (*dropped, base)])
     for name in dropped:
         notes.append(f"segment {name!r} has no mass: its coordinates are the free base's, as those of {base!r}")
     lack, flips = 0.0, {}
@@ -233,6 +234,22 @@ def _base(model: Any, segments: dict[str, int], starts: dict[str, int]) -> tuple
         dropped.append(base)
         base = below[0]
     return base, dropped
+
+
+def _name_base(chain: Chain, way: list[Any]) -> None:
+    """The coordinates that move the base, where those of the segments on the way to it are seen along fixed axes."""
+    frames = [segment.localJCS().to_array() for segment in way]
+    if any(np.any(frame[:3, :3] != np.eye(3)) for frame in frames):
+        return
+    hinges = [(segment, axis) for segment in way for axis in segment.seqR().to_string()]
+    letters = "".join(axis for _, axis in hinges)
+    if sorted(letters) == list(_AXES) and not way[-1].isRotationAQuaternion():
+        names = [f"{segment.name().to_string()}_Rot{axis.upper()}" for segment, axis in hinges]
+        chain.base_angles = (names, letters)
+    slides = {axis: segment for segment in way for axis in segment.seqT().to_string()}
+    unturned = not any(segment.seqR().to_string() for segment in way[:-1])
+    if sorted(slides) == list(_AXES) and unturned and not any(frame[:3, 3].any() for frame in frames):
+        chain.base_slides = [f"{slides[axis].name().to_string()}_Trans{axis.upper()}" for axis in _AXES]
 
 
 def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float]]]:

@@ -39,6 +39,7 @@ class Chain:
     poses : what the engine gives at random shapes, as `add_pose` takes it
     couplings : of joints that follow others, by name, as `couple` takes them
     base_angles : names of three angles of the base and the axes they turn about, one after the other; or none
+    base_slides : names of three coordinates that move the base along x, y and z; or none
     """
 
     name: str
@@ -49,6 +50,7 @@ class Chain:
     poses: list[dict[str, Any]] = field(default_factory=list)
     couplings: dict[str, dict[str, Any]] = field(default_factory=dict)
     base_angles: tuple[list[str], str] | None = None
+    base_slides: list[str] | None = None
 
     def add_link(self, name: str, mass: float, centre: Array, inertia: Array, line: int = 1) -> None:
         """With its centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2], in its axes."""

@@ -100,9 +100,17 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
     notes = tuple(f"{where}:1: {note}" for note in said["notes"])
     couplings = {name: _coupling(rule) for name, rule in said["couplings"].items()}
     frames = frozenset(said["frames"])
-    base = said["base_angles"]
-    angles = None if base is None else (tuple(base[0]), base[1])
-    tree = LinkTree(said["name"], sorted_links, ordered, couplings, frames, notes, base_angles=angles)
+    base, slides = said["base_angles"], said["base_slides"]
+    tree = LinkTree(
+        said["name"],
+        sorted_links,
+        ordered,
+        couplings,
+        frames,
+        notes,
+        base_angles=None if base is None else (tuple(base[0]), base[1]),
+        base_slides=None if slides is None else tuple(slides),
+    )
     return tree, said["poses"]
 
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # Digits of a bar that are shown; the number before it ends where the bar does.
 _DIGITS = 2
+# Of the angle, or of a degree: a bar below is rounding.
+_NO_BAR = 1e-12
 
 
 def error_bars(
@@ -104,7 +106,7 @@ def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) ->
 def _with_bar(angle: float, bar: float) -> str:
     """Both in degrees, ending at the same digit."""
     angle, bar = math.degrees(angle), math.degrees(bar)
-    if not bar:
+    if bar < _NO_BAR * max(angle, 1.0):
         return f"{angle:16.6f} ± 0"
     digits = max(_DIGITS - 1 - math.floor(math.log10(bar)), 0)
     return f"{angle:16.{digits}f} ± {bar:.{digits}f}"

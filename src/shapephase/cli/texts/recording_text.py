@@ -77,11 +77,11 @@ def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
         f"{fitted.times[worst]:.6g} s"
     )
     parts = np.array_split(np.arange(len(angles)), min(_MOST_PARTS, len(angles)))
-    times = "".join(f"{fitted.times[part].mean():8.3g}" for part in parts)
+    times = "".join(f" {fitted.times[part].mean():7.3g}" for part in parts)
     return [
         *lines,
         f"{'  time [s]':24}{times}",
-        f"{'  off, rms [deg]':24}{''.join(f'{_rms(angles[part]):8.3g}' for part in parts)}",
+        f"{'  off, rms [deg]':24}{''.join(f' {_rms(angles[part]):7.2g}' for part in parts)}",
     ]
 
 

@@ -162,7 +162,8 @@ class BaseColumns:
     recording: Recording
     choices: BaseChoices
     degrees: bool | None
-    own: tuple[tuple[str, ...], str] | None  # names of angles that the body's file turns the base by, and their axes
+    angles: tuple[tuple[str, ...], str] | None  # that the body's file turns the base by, and their axes
+    slides: tuple[str, ...] | None  # that it moves the base by
     found: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     rates: dict[str, str] = field(default_factory=dict)
 
@@ -172,7 +173,7 @@ class BaseColumns:
             self.rates[target] = text
             return True
         parts = Label(target, None) if target in _KNOWN else label(target)
-        if parts.name not in _KNOWN and parts.name not in (self.own[0] if self.own else ()):
+        if parts.name not in _KNOWN and parts.name not in self._own_names:
             return False
         table = self.recording.table
         if parts.name in self.found:
@@ -223,10 +224,17 @@ class BaseColumns:
 
     def _groups(self) -> tuple[_Group, ...]:
         """Those that are known anyway; of the angles that the body's own file names, what they turn about there."""
-        if self.own is None:
-            return _GROUPS
-        names, axes = self.own
-        return (*(group for group in _GROUPS if set(group.names) != set(names)), _Group("angles", names, axes, axes))
+        groups = _GROUPS
+        if self.angles is not None:
+            names, axes = self.angles
+            groups = (*(one for one in groups if set(one.names) != set(names)), _Group("angles", names, axes, axes))
+        if self.slides is not None:
+            groups = (*groups, _Group("position", self.slides))
+        return groups
+
+    @property
+    def _own_names(self) -> tuple[str, ...]:
+        return (*(self.angles[0] if self.angles else ()), *(self.slides or ()))
 
     def _stored(self, what: str) -> Array | None:
         table = self.recording.table

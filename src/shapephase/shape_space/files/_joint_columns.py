@@ -103,7 +103,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     found: dict[int, str] = {}
     units: dict[str, str] = {}
     known: set[int] = set()
-    base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles)
+    base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles, body.base_slides)
     left_out: dict[str, str] = {}
     for text, values in table.columns.items():
         target = choices.names.get(text, text)
