@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from shapephase import so3
+from shapephase.errors import ShapeError
 from shapephase.rigid_body.heavy_top import HeavyTop
 from shapephase.rigid_body.lagrange_top import (
     LagrangeTop,
@@ -19,6 +20,7 @@ from shapephase.rigid_body.lagrange_top import (
     sleeping_top,
     spectrally_stable,
     stability_chart,
+    upright_potential,
 )
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -123,12 +125,39 @@ def test_e_quadratic_and_the_threshold_m6():
             assert np.all(sleep.minors > 0.0) == fast
             assert sleep.phi_dot == pytest.approx(-0.5 * p / top.transverse, rel=1e-14)
             assert np.array_equal(sleep.quadratic, coefficients)
-    assert sleeping_top(LagrangeTop(1.0, 3.0, 4.0), 4.0).verdict == "marginal"
+    assert sleeping_top(LagrangeTop(1.0, 3.0, 4.0), 4.0).verdict == "stable"
     # However thin the top is across: Phi'' is large enough.
     assert np.all(sleeping_top(LagrangeTop(0.1, 9.0, 1.0), 5.0).minors > 0.0)
     assert sleeping_top(LagrangeTop(1.0, 3.0, -4.0), 0.0).verdict == "stable"
     assert sleeping_top(LagrangeTop(1.0, 3.0, 4.0), 0.0).verdict == "unstable"
     assert LagrangeTop(1.0, 3.0, -4.0).critical_momentum == 0.0
+
+
+def test_at_the_threshold_the_upright_spin_is_stable_m6():
+    """The potential has a minimum of fourth order there; motions of a top tilted a little stay as near as it says."""
+    rng = np.random.default_rng(17)
+    for _ in range(20):
+        top = random_lagrange(rng)
+        assert sleeping_top(top, top.critical_momentum).verdict == "stable"
+        assert not sleeping_top(top, top.critical_momentum).energy_casimir
+        p, tilt = float(rng.normal() * 4.0), np.linspace(0.05, 3.0, 7)
+        # The energy of a top that is let go at this tilt without tilting, with Pi_3 = Pi.Gamma = p.
+        gamma = np.stack([np.sin(tilt), 0.0 * tilt, np.cos(tilt)], axis=-1)
+        momentum = np.stack([p * (1.0 - np.cos(tilt)) / np.sin(tilt), 0.0 * tilt, np.full(7, p)], axis=-1)
+        energy = top.heavy_top.energy(momentum, gamma) - top.heavy_top.energy(p * UP, UP)
+        assert upright_potential(top, p, tilt) == pytest.approx(energy, rel=1e-9, abs=1e-12)
+        u = np.tan(0.005) ** 2
+        assert upright_potential(top, top.critical_momentum, 0.01) == pytest.approx(2.0 * top.mgl * u * u, rel=1e-4)
+    top = LagrangeTop(1.0, 0.5, 2.0)
+    # As much energy as at 0.2 rad: the tilt stays below, though it began at a hundredth of that.
+    rate = np.sqrt(2.0 * upright_potential(top, top.critical_momentum, 0.2))
+    start = [0.0, rate, top.critical_momentum]
+    motion = top.heavy_top.motion(start, duration=13.0, tolerance=1e-6)
+    largest = np.arccos(motion.gamma(np.linspace(0.0, 13.0, 1001))[:, 2]).max()
+    assert 0.199 < largest <= 0.2 + 1e-6
+    assert sleeping_top(LagrangeTop(1.0, 3.0, 0.0), 0.0).verdict == "marginal"
+    with pytest.raises(ShapeError, match="tilt"):
+        upright_potential(top, 1.0, np.pi)
 
 
 def test_linear_matrix_polynomial_discriminant_and_spectrum_m7():

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.stability import steady_rotation, steady_rotations
+from shapephase.rigid_body.stability import spin_in_space, steady_rotation, steady_rotations
 from support.independent import cross
 from support.long_runs import full_but
 
@@ -292,3 +292,74 @@ def test_steady_rotations_refuse_what_is_none():
     for magnitude in (0.0, -1.0, [1.0, 2.0]):
         with pytest.raises(ShapeError, match="magnitude"):
             steady_rotations(inertia, magnitude)
+
+
+# ---- In space -------------------------------------------------------------------------------------------------------
+
+
+def between(momenta, axis):
+    """Angles, by the cross product where they are small."""
+    return np.arctan2(np.linalg.norm(np.cross(momenta, axis), axis=-1), momenta @ np.asarray(axis))
+
+
+def test_in_space_the_axis_stays_in_a_cone_about_the_momentum_l7():
+    """The widest angle, and the mean rate of the turn, along integrated motions in axes that are not principal."""
+    rng = np.random.default_rng(21)
+    for index in (0, 2):
+        for size in (0.02, 0.2):
+            tensor = turned([1.0, 2.0, 3.0], rng)
+            steady = steady_rotations(tensor, 1.3)[index].momentum
+            disturbed = steady + size * rng.normal(size=3)
+            found = spin_in_space(tensor, steady, disturbed)
+            top = EulerTop(tensor, disturbed)
+            inverse = np.linalg.inv(tensor)
+            times = np.linspace(0.0, top.period, 1001)
+            run = solve_ivp(
+                lambda _, y, inverse=inverse: np.cross(y, inverse @ y),
+                (0.0, top.period),
+                disturbed,
+                rtol=1e-11,
+                atol=1e-13,
+                t_eval=times,
+            )
+            angles = between(run.y.T, steady)
+            assert found.verdict == "stable up to the turn about the momentum"
+            assert angles.max() <= found.tilt + 1e-9
+            assert angles.max() > found.tilt - 1e-3 * found.tilt
+            # In space: the axis R n and the constant R Pi, and how far an axis across has gone round.
+            attitudes = top.attitude(np.linspace(0.0, 40.0 * top.period, 8001))
+            across = attitudes @ so3.perpendicular(steady / np.linalg.norm(steady))
+            first, second = np.linalg.svd(top.momentum[None])[2][1:]
+            second = np.cross(top.momentum / np.linalg.norm(top.momentum), first)
+            angle = np.unwrap(np.arctan2(across @ second, across @ first))
+            steady_rate = np.linalg.norm(steady) / steady_rotation(tensor, steady).moment
+            rate = (angle[-1] - angle[0]) / (40.0 * top.period)
+            assert rate - steady_rate == pytest.approx(found.drift, abs=1e-11 * steady_rate)
+
+
+def test_small_disturbances_tilt_little_where_the_spin_is_stable_l7():
+    tensor = np.diag([1.0, 2.0, 3.0])
+    for axis, stable in ((0, True), (1, False), (2, True)):
+        steady = np.eye(3)[axis]
+        tilts = [spin_in_space(tensor, steady, [*steady, s, 2.0 * s, -s]).tilt for s in (1e-3, 1e-6)]
+        assert (tilts[0] < 5e-3 and tilts[1] < 5e-6) if stable else min(tilts) > 3.0
+    # Two equal moments: the momentum wanders along the circle of equilibria, however little it left it.
+    wandering = spin_in_space(np.diag([1.0, 1.0, 2.0]), [1.0, 0.0, 0.0], [1.0, 0.0, 1e-6])
+    assert wandering.verdict == "unstable"
+    assert wandering.tilt > 3.0
+    ball = spin_in_space(np.eye(3), [1.0, 0.0, 0.0], [1.0, 0.1, 0.0])
+    assert ball.tilt == pytest.approx(np.arctan(0.1), abs=1e-15)
+    assert ball.verdict.startswith("stable")
+    behind = spin_in_space(tensor, [0.0, 0.0, -1.0], [0.1, 0.1, 1.0])
+    polhode = EulerTop(tensor, [0.1, 0.1, 1.0])
+    angles = between(polhode.body_momentum(np.linspace(0.0, polhode.period, 4001)), [0.0, 0.0, -1.0])
+    assert behind.tilt == pytest.approx(angles.max(), abs=1e-6)
+    # On the separatrix, exactly: 1 - 1/2 = 3^2 (1/2 - 1/2.25).
+    moments, start = [1.0, 2.0, 2.25], np.array([1.0, 0.0, 3.0])
+    track = EulerTop.principal(moments, start).body_momentum(np.linspace(-40.0, 40.0, 2001))
+    assert EulerTop.principal(moments, start).regime == "separatrix"
+    for axis in np.eye(3):
+        found = spin_in_space(np.diag(moments), axis, start)
+        assert found.tilt == pytest.approx(between(track, axis).max(), abs=1e-6)
+    with pytest.raises(ShapeError, match="disturbed"):
+        spin_in_space(tensor, [0.0, 0.0, 1.0], np.zeros(3))

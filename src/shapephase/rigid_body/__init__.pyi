@@ -2,7 +2,13 @@ from . import geodesics, lie
 from ._andoyer_pendulum import AndoyerPendulum, andoyer_pendulum
 from ._flow import ascending_times, flow
 from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, twist_defect
-from ._momentum_orbit import MomentumOrbit, momentum_orbit, separatrix_solid_angle
+from ._momentum_orbit import (
+    MomentumOrbit,
+    WeierstrassForm,
+    momentum_orbit,
+    separatrix_solid_angle,
+    weierstrass_form,
+)
 from ._nutation import Nutation, nutation
 from .euler_angles import ZXZ, ZYZ, EulerChart, canonical_bracket, precession_rate
 from .euler_top import EulerTop
@@ -20,11 +26,12 @@ from .lagrange_top import (
     sleeping_top,
     spectrally_stable,
     stability_chart,
+    upright_potential,
 )
 from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, rigid_body_pendulum
 from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
-from .stability import SteadyRotation, steady_rotation, steady_rotations
+from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
 from .steady_gyrostats import (
     DualSpinTurn,
     GyrostatEquilibrium,
@@ -56,8 +63,10 @@ __all__ = [
     "Poinsot",
     "RigidBodyPendulum",
     "SleepingTop",
+    "SpinInSpace",
     "StabilityChart",
     "SteadyRotation",
+    "WeierstrassForm",
     "andoyer_pendulum",
     "ascending_times",
     "bifurcation_rotors",
@@ -89,8 +98,11 @@ __all__ = [
     "sleeping_spectrum",
     "sleeping_top",
     "spectrally_stable",
+    "spin_in_space",
     "stability_chart",
     "steady_rotation",
     "steady_rotations",
     "twist_defect",
+    "upright_potential",
+    "weierstrass_form",
 ]

@@ -10,7 +10,8 @@ the (y, p_y) plane, along axis 2, at y = 0 and pi, the unstable one; momenta alo
 Bonnard et al. number the axes by descending moments: their H_1, H_2, H_3 are our Pi_3, -Pi_2, Pi_1 (the sign keeps the
 frame right-handed), their I_1, I_2, I_3 our I_3, I_2, I_1. The functions take the moments in any order and momenta in
 the caller's axes. If those descend, y and p_y are the paper's; in any other order, axes 1, 2, 3 above are the caller's
-by ascending moment, axis 2 reversed where that order is left-handed.
+by ascending moment, axis 2 reversed where that order is left-handed. p_y is L itself, with y' = p_y (a_1 - w) as in the
+paper's (8); the geodesics of `serret_andoyer` begin with p_y below 0, see there.
 
 Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 and 3.5; theory.md N12.
 """

@@ -206,6 +206,103 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     return 4.0 * float(np.arctan2(own, opposite))
 
 
+@dataclass(frozen=True, eq=False)
+class WeierstrassForm:
+    """The squares of a free rigid body's momentum by Weierstrass's function; see `weierstrass_form`.
+
+    Attributes
+    ----------
+    moments : (3,) principal, by body axis [kg m^2]
+    roots : (3,) e_1, e_2, e_3 by body axis, of sum zero; the least belongs to the middle moment [1/s^2]
+    invariants : g_2 [1/s^4] and g_3 [1/s^6] of y'^2 = 4 y^3 - g_2 y - g_3
+    half_periods : omega, and the size of the imaginary one, omega' = i times it [s]; Pi_i^2 has the period 2 omega
+    shift : t_0, real part of the constant in y = P(t + t_0 + omega') [s]
+
+    Examples
+    --------
+    >>> form = sp.rigid_body.weierstrass_form([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> print(np.sqrt(form.squares(0.0)).round(9))
+    [0.6 0.9 0.5]
+    """
+
+    moments: Array
+    roots: Array
+    invariants: tuple[float, float]
+    half_periods: tuple[float, float]
+    shift: float
+    _orbit: MomentumOrbit
+
+    __repr__ = short_repr
+
+    def value(self, t: ArrayLike) -> Array:
+        """y(t), between the two lower roots: (...) [s] -> (...) [1/s^2]."""
+        times = finite_array(t, "t", unit="s")
+        orbit = self._orbit
+        middle = orbit.magnitude * orbit.directions(orbit.rate * times + orbit.phase)[..., 1]
+        i1, i2, i3 = orbit.moments
+        return self.roots.min() + (i2 - i1) * (i3 - i2) / (i1 * i2 * i2 * i3) * middle * middle
+
+    def squares(self, t: ArrayLike) -> Array:
+        """Pi_i^2 = (y - e_i)/(a_j a_k), a_i = 1/I_k - 1/I_j: (...) [s] -> (..., 3), body axes [(kg m^2/s)^2]."""
+        return (self.value(t)[..., None] - self.roots) / _products(self.moments)
+
+
+def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm:
+    """The polhode by Weierstrass's elliptic function P, for any order of the moments.
+
+    With Pi_i' = a_i Pi_j Pi_k all three Pi_i^2 change in step: Pi_i^2 = (y - e_i)/(a_j a_k) with one y, and the product
+    of Euler's equations says y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
+
+    Parameters
+    ----------
+    moments : (3,) three different principal moments by body axis [kg m^2]
+    momentum : (3,) Pi at t = 0, body axes, along none of them and not on the separatrix [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError
+        If two moments are equal, or the momentum stands still or is on the separatrix, where P has no period.
+
+    Notes
+    -----
+    Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
+
+    Examples
+    --------
+    >>> form = sp.rigid_body.weierstrass_form([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
+    >>> print(f"{top.period / form.half_periods[0]:.9f}")  # Pi itself has twice the period of its squares
+    4.000000000
+    """
+    values, start = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
+    if values.shape != (3,) or start.shape != (3,) or values.min() <= 0.0 or len(set(values.tolist())) < 3:
+        raise ShapeError("moments, momentum: three different numbers above 0, and one momentum (3,), are needed")
+    ascending, order, parity = ascending_moments(values)
+    # All three components change sign with an odd order: a proper turn, and the squares stay.
+    orbit = momentum_orbit(ascending, parity * start[order])
+    if not orbit.rate or not orbit.complement or orbit.regime == "steady":
+        raise ShapeError(
+            f"momentum: {start} stands still in the body or is on the separatrix; P has no real period there"
+        )
+    parts = _products(values) * start**2
+    roots = parts.mean() - parts
+    quarters = elliptic.complete_k(orbit.complement), elliptic.complete_k(1.0 - orbit.complement)
+    return WeierstrassForm(
+        moments=values,
+        roots=roots,
+        invariants=(2.0 * float(roots @ roots), 4.0 * float(np.prod(roots))),
+        half_periods=(float(quarters[0]) / orbit.rate, float(quarters[1]) / orbit.rate),
+        shift=orbit.phase / orbit.rate,
+        _orbit=orbit,
+    )
+
+
+def _products(moments: Array) -> Array:
+    """a_j a_k by body axis, a_i = 1/I_k - 1/I_j: (3,) -> (3,)."""
+    rates = (np.roll(moments, -1) - np.roll(moments, -2)) / (np.roll(moments, -1) * np.roll(moments, -2))
+    return np.roll(rates, -1) * np.roll(rates, -2)
+
+
 def _stationary_orbit(moments: Array, start: Array, magnitude: float) -> MomentumOrbit:
     """Pi is constant in the body, which turns about it, and circles nothing."""
     direction = start / magnitude if magnitude else np.zeros(3)

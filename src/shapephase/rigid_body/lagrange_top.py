@@ -27,6 +27,8 @@ _LARGEST_TILT = 0.01
 """Largest first tilt of a simulation [rad]: its growth by the factor above is still less than a right angle."""
 _LOCAL_TOLERANCE = 1e-9
 """Local tolerance of a simulation [rad], far below the least sensible tilt."""
+_THRESHOLD = 8.0 * float(np.finfo(float).eps)
+"""Of p^2 - 4 Mgl I1, relative to p^2: closer to the threshold, the momentum is `critical_momentum` but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,9 @@ class SleepingTop:
     eigenvalues : (4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]
     energy_casimir : whether the second variation is definite (stable in the sense of Liapunov)
     spectrally_stable : whether no eigenvalue has a positive real part
-    verdict : "stable", "unstable", or "marginal" where p^2 = 4 Mgl I1, which neither method decides
+    verdict : "stable" or "unstable". Where p^2 = 4 Mgl I1 > 0 neither method decides, but `upright_potential` does: it
+        has a strict minimum there, and the spin is stable. "marginal" where p and Mgl both vanish: a top at rest
+        without weight, which any momentum carries away
 
     Examples
     --------
@@ -142,8 +146,10 @@ class StabilityChart:
 
 
 def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
-    """The upright spin with Pi_3 = `momentum` [kg m^2/s], and its stability: stable if Pi_3^2 > 4 Mgl I1, else not.
+    """The upright spin with Pi_3 = `momentum` [kg m^2/s], and its stability: stable if Pi_3^2 >= 4 Mgl I1, else not.
 
+    At equality, of which the theorem says nothing, the energy has a strict minimum among the motions of the same Pi_3
+    and Pi.Gamma (see `upright_potential`), and an isolated level of conserved quantities is stable.
     The free number e = -Phi_dot/p is taken where the e-quadratic is largest, at 1/(2 I1).
 
     Raises
@@ -153,7 +159,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
 
     Notes
     -----
-    Source: Marsden and Ratiu, theorem 15.10.1.
+    Source: Marsden and Ratiu, theorem 15.10.1; D. Aeyels, Syst. Control Lett. 19 (1992) 461, for equality.
 
     Examples
     --------
@@ -170,6 +176,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     b = -2.0 * phi_prime + 2.0 * i3 * phi_dot**2 + abs(mgl) + p * p / i1
     second = second_variation(top, p, phi_dot, b=b)
     excess = p * p - 4.0 * mgl * i1
+    at_threshold = abs(excess) <= _THRESHOLD * p * p
     stable = bool(np.all(spectrally_stable([i1, i1, i3], mgl, p)))
     return SleepingTop(
         momentum=p,
@@ -183,10 +190,41 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
         minors=np.array([np.linalg.det(second[:n, :n]) for n in range(1, 7)]),
         quadratic=e_quadratic(top, p),
         eigenvalues=sleeping_spectrum([i1, i1, i3], mgl, p),
-        energy_casimir=excess > 0.0,
+        energy_casimir=excess > 0.0 and not at_threshold,
         spectrally_stable=stable,
-        verdict="stable" if excess > 0.0 else "unstable" if excess < 0.0 else "marginal",
+        verdict=("stable" if p else "marginal") if at_threshold else "stable" if excess > 0.0 else "unstable",
     )
+
+
+def upright_potential(top: LagrangeTop, momentum: float, tilt: ArrayLike) -> Array:
+    """V(tilt) - V(0) of a top with Pi_3 = Pi.Gamma = `momentum`: (...) [rad] -> (...) [J].
+
+    The energy of such motions is I1 tilt'^2/2 + V. With u = tan^2(tilt/2), V = Mgl (1 - u)/(1 + u) + p^2 u/(2 I1),
+    so V - V(0) = (p^2/(2 I1) - 2 Mgl) u + 2 Mgl u^2/(1 + u). At p^2 = 4 Mgl I1 the first term vanishes and the second
+    is positive: 2 Mgl u^2 - ..., a minimum of fourth order in the tilt.
+
+    Parameters
+    ----------
+    momentum : p = Pi_3 [kg m^2/s]
+    tilt : of the axis from the upward vertical, in (-pi, pi) [rad]
+
+    Raises ShapeError if a tilt is pi or more. Source: theory.md M6, what theorem 15.10.1 leaves out.
+
+    Examples
+    --------
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
+    >>> heights = sp.rigid_body.upright_potential(top, top.critical_momentum, [0.1, 0.2])
+    >>> print(f"{heights[1] / heights[0]:.1f}, nearly 2^4")
+    16.0, nearly 2^4
+    """
+    check_object(top, "LagrangeTop", "top")
+    p, angle = _number(momentum, "momentum"), finite_array(tilt, "tilt", unit="rad")
+    if np.any(np.abs(angle) >= np.pi):
+        raise ShapeError(
+            f"tilt: {np.abs(angle).max():.6g} rad; between -pi and pi the axis points away from straight down"
+        )
+    u = np.tan(0.5 * angle) ** 2
+    return ((p * p / top.transverse - 4.0 * top.mgl) / 2.0 + 2.0 * top.mgl * u / (1.0 + u)) * u
 
 
 def second_variation(

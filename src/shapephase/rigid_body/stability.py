@@ -20,6 +20,7 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 from ..letters import what_came
+from .euler_top import EulerTop
 
 _ROUNDING = 16.0 * np.finfo(float).eps
 """Moments of a tensor that is not diagonal closer than this, relative to its trace, may be equal but for rounding."""
@@ -180,6 +181,108 @@ def steady_rotations(
     _, axes = principal_axes(tensor)
     smallest, intermediate, largest = (steady_rotation(tensor, norm * axes[:, k]) for k in range(3))
     return smallest, intermediate, largest
+
+
+@dataclass(frozen=True)
+class SpinInSpace:
+    """How a body moves in space that was disturbed in a steady rotation, for all time; see `spin_in_space`.
+
+    Attributes
+    ----------
+    steady : the steady rotation that was disturbed
+    momentum : (3,) the disturbed Pi, body axes [kg m^2/s]
+    tilt : the greatest angle ever between the axis of the steady rotation and the angular momentum, which is constant
+        in space [rad]; on a separatrix the limit that is never quite reached
+    drift : how much faster than in the steady rotation the body turns about the momentum, on average [rad/s]; NaN where
+        Pi does not circle the axis
+    verdict : "stable up to the turn about the momentum": the tilt is as small as one likes for small disturbances,
+        while the angle about the momentum drifts; or "unstable"
+
+    Examples
+    --------
+    >>> spin = sp.rigid_body.spin_in_space(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0], [0.0, 0.01, 1.0])
+    >>> spin.verdict
+    'stable up to the turn about the momentum'
+    """
+
+    steady: SteadyRotation
+    momentum: Array
+    tilt: float
+    drift: float
+    verdict: str
+
+    __repr__ = short_repr
+
+
+def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike) -> SpinInSpace:
+    """What a steady rotation's stability means for the body that one sees: its axis stays near the momentum in space.
+
+    As Pi = R^T mu, the angle in space between a body axis n and the constant mu is that in the body between n and Pi.
+    So where Pi stays near n in the body, n stays near mu in space, and the tilt is that of the polhode's farthest
+    point. The angle about mu is not stable: motions of nearly the same momentum turn at slightly different rates.
+    With two equal moments a rotation across their axis is unstable in space: the momentum wanders along the circle of
+    equilibria, and the axis away from the momentum.
+
+    Parameters
+    ----------
+    inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
+    momentum : (3,) of the steady rotation, along a principal axis [kg m^2/s]
+    disturbed : (3,) Pi after the disturbance, not zero [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError, UnphysicalInertiaError, SingularInertiaError
+        As `steady_rotation`; also if `disturbed` is zero.
+
+    Notes
+    -----
+    Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
+
+    Examples
+    --------
+    >>> spin = sp.rigid_body.spin_in_space(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0], [0.0, 0.01, 1.0])
+    >>> print(f"tilt {np.degrees(spin.tilt):.4f} degrees, drift {spin.drift:.2e} rad/s")
+    tilt 0.5729 degrees, drift 2.50e-05 rad/s
+    """
+    steady = steady_rotation(inertia, momentum)
+    vector = finite_array(disturbed, "disturbed", unit="kg m^2/s")
+    if vector.shape != (3,) or not vector.any():
+        raise ShapeError(f"disturbed: one momentum (3,) other than zero is needed, got {what_came(disturbed)}")
+    axis = steady.momentum / np.linalg.norm(steady.momentum)
+    top = EulerTop(inertia, np.asarray(vector), None)
+    stable = steady.verdict == "stable"
+    return SpinInSpace(
+        steady=steady,
+        momentum=np.asarray(vector),
+        tilt=_farthest(top, axis),
+        drift=_mean_turn(top, axis) - float(np.linalg.norm(steady.momentum)) / steady.moment,
+        verdict="stable up to the turn about the momentum" if stable else "unstable",
+    )
+
+
+def _farthest(top: EulerTop, axis: Array) -> float:
+    """The greatest angle between Pi and a principal axis [rad]."""
+    orbit, own = top.orbit, top.axes.T @ axis
+    if orbit.circled < 0:
+        return float(so3.angle_between(orbit.direction, own))
+    shares, index = np.abs(orbit.amplitudes), int(np.argmax(np.abs(own)))
+    if index == orbit.circled:
+        # Farthest where the component along the middle axis is greatest; from behind, where Pi is nearest to the axis.
+        if own @ orbit.direction > 0.0:
+            return float(np.arctan2(shares[1], shares[index] * np.sqrt(orbit.complement)))
+        return float(np.pi - np.arctan2(shares[orbit.other], shares[index]))
+    if orbit.regime == "separatrix" and index == orbit.other:
+        return 0.5 * np.pi if own @ orbit.start > 0.0 else float(np.pi - np.arccos(min(1.0, shares[index])))
+    return float(np.pi - np.arccos(min(1.0, shares[index])))
+
+
+def _mean_turn(top: EulerTop, axis: Array) -> float:
+    """Mean rate of the body about the momentum, where Pi circles this axis or stands still [rad/s]."""
+    if top.orbit.circled < 0:
+        return 2.0 * top.energy / top.magnitude
+    if np.abs(top.axes[:, top.orbit.circled] @ axis) < 0.5 or not np.isfinite(top.period):
+        return float("nan")
+    return top.montgomery_phase / top.period
 
 
 def _tensor(inertia: ArrayLike) -> Array:

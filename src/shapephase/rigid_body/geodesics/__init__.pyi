@@ -11,7 +11,7 @@ from ._conjugate_locus import (
 from ._cut_locus import CutLocus, cut_locus, cut_time
 from ._ellipsoid import EllipsoidStretch, astroid, ellipsoid, ellipsoid_period, meridian_length, metric_coefficients
 from ._extremal import Extremal, Start, extremal, start_of, stretch_at, variational_jacobi_field
-from ._sadov_variables import SadovVariables, sadov_frequencies, sadov_variables
+from ._sadov_variables import SadovVariables, andoyer_from_sadov, sadov_frequencies, sadov_variables
 from ._serret_andoyer_constants import (
     GeodesicClass,
     GeodesicConstants,
@@ -50,6 +50,7 @@ __all__ = [
     "TabulatedStretch",
     "TurningBody",
     "andoyer_from_euler",
+    "andoyer_from_sadov",
     "andoyer_motion",
     "andoyer_variables",
     "assumptions",

@@ -9,6 +9,7 @@ I_3 (`SerretAndoyerMetric.andoyer_axes`); the papers number these moments in des
 sense of the motion; it grows from 0, with the momentum along the axis of I_3, to G, along that of I_1. Where the
 momentum circles the axis of I_3 or its opposite, angles count from l = pi/2 or -pi/2, L > 0; where it circles that of
 I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it follows from l.
+`andoyer_from_sadov` goes the other way; the side of the axis on which the momentum is has to be given.
 
 Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
 speed by homogeneity: the action and the rates are sqrt(2 E) times theirs.
@@ -23,12 +24,16 @@ from numpy.typing import ArrayLike
 
 from ... import elliptic, so3
 from ...arguments import check_object
-from ...arrays import Array, Mask, finite_array
+from ...arrays import Array, Mask, common_batch, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
+from ...letters import what_came
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
-from .serret_andoyer import serret_andoyer_metric
+from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
+
+_HALVINGS = 60
+"""Of a right angle, which leave rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +96,7 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
     axes = metric.andoyer_axes
     if not np.array_equal(axes, np.eye(3)):
         variables = andoyer_variables(variables.attitude @ axes, variables.body_momentum @ axes)
-        metric = serret_andoyer_metric(np.sort(metric.moments)[::-1])
+        metric = _descending(metric)
     momentum = variables.body_momentum
     family = metric.geodesics_of(momentum)
     lost = family.complement == 0.0
@@ -147,6 +152,107 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     family = metric.geodesics_of(momentum)
     speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))
     return speed * 2.0 * np.pi / family.period, speed * family.mean_theta_rate
+
+
+def andoyer_from_sadov(
+    moments: ArrayLike, angles: ArrayLike, actions: ArrayLike, side: ArrayLike = 1.0
+) -> AndoyerVariables:
+    """The states with these angle and action variables, in Andoyer's: (3,), (..., 3), (..., 3), (...) -> (...).
+
+    Parameters
+    ----------
+    moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
+    angles : (..., 3) those of J, G and K: `own`, `precession`, `node` of `sadov_variables` [rad]
+    actions : (..., 3) J, G and K, 0 <= J <= G and |K| <= G [kg m^2/s]
+    side : (...) 1 or -1: whether the momentum is on the positive side of the axis that it circles, which is that of
+        the largest moment where J is below its value on the separatrix, and that of the smallest moment above
+
+    Raises
+    ------
+    ShapeError
+        If two moments are equal, an action is out of range, a side is another number, or J is that of the separatrix.
+
+    Notes
+    -----
+    The energy is found from J by bisection, as J grows with the angle of the momentum from the axis of the largest
+    moment. Next to the separatrix angles lose digits as in `sadov_variables`.
+
+    Source: Sadov 1970; theory.md R15.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> sadov = geodesics.sadov_variables([3.0, 2.0, 1.0], state)
+    >>> angles = [sadov.own, sadov.precession, sadov.node]
+    >>> actions = [sadov.action, sadov.total, sadov.vertical]
+    >>> again = geodesics.andoyer_from_sadov([3.0, 2.0, 1.0], angles, actions)
+    >>> print(again.body_momentum.round(9))
+    [1.5 0.3 0.4]
+    """
+    metric = serret_andoyer_metric(moments)
+    axes, metric = metric.andoyer_axes, _descending(metric)
+    turn, action = finite_array(angles, "angles", (3,), unit="rad"), finite_array(actions, "actions", (3,))
+    hemisphere = finite_array(side, "side")
+    common_batch(angles=turn.shape[:-1], actions=action.shape[:-1], side=hemisphere.shape)
+    if np.any(np.abs(hemisphere) != 1.0):
+        raise ShapeError(f"side: 1 or -1 is needed, got {what_came(side)}")
+    own, precession, node = np.moveaxis(turn, -1, 0)
+    enclosed, total, vertical = np.moveaxis(action, -1, 0)
+    if np.any((total <= 0.0) | (enclosed < 0.0) | (enclosed > total)):
+        raise ShapeError("actions: J must be between 0 and G, which must be above 0")
+    own, precession, node, enclosed, total, vertical, hemisphere = np.broadcast_arrays(
+        own, precession, node, enclosed, total, vertical, hemisphere
+    )
+    tilt = _tilt_of_action(metric, enclosed / total)
+    across = _between_ends(tilt)
+    family = metric.geodesics_of(across)
+    if np.any(family.complement == 0.0):
+        raise ShapeError("actions: J is that of the separatrix, where there are no angle variables")
+    quarter = elliptic.complete_k(family.complement)
+    u = 2.0 * quarter * own / np.pi
+    sn, cn, dn, _, part = elliptic.jacobi_and_pi_excess(family.constants.characteristic, u, family.complement)
+    whole = elliptic.complete_pi_excess(family.constants.characteristic, family.complement)
+    i1, i2, i3 = ascending_moments(metric.moments)[0]
+    # As in `_argument`, the other way.
+    oscillating, far = family.is_oscillating, np.sqrt(i3 - i1)
+    small, large = np.sin(tilt), np.cos(tilt)
+    middle = -hemisphere * small * far * sn / np.sqrt((i3 - i2) * i1 / i2)
+    swinging = np.arctan2(hemisphere * large * dn, middle)
+    turning = np.arctan2(cn / far, -hemisphere * sn / np.sqrt(i3 * (i2 - i1) / i2))
+    state = AndoyerVariables(
+        g=so3.wrap(precession - family.constants.third_kind * (part - whole * (u / quarter))),
+        k=so3.wrap(node),
+        l=np.where(oscillating, swinging, turning),
+        total=total,
+        vertical=vertical,
+        axial=total * np.where(oscillating, small * cn, hemisphere * small * dn),
+    )
+    if np.array_equal(axes, np.eye(3)):
+        return state
+    return andoyer_variables(state.attitude @ axes.T, state.body_momentum @ axes.T)
+
+
+def _descending(metric: SerretAndoyerMetric) -> SerretAndoyerMetric:
+    """The metric in its own axes, `andoyer_axes`."""
+    return serret_andoyer_metric(np.sort(metric.moments)[::-1])
+
+
+def _between_ends(tilt: Array) -> Array:
+    """Unit momenta between the axes of the largest and of the smallest moment, `andoyer_axes`: (...) -> (..., 3)."""
+    return np.stack([np.cos(tilt), np.zeros(tilt.shape), np.sin(tilt)], axis=-1)
+
+
+def _tilt_of_action(metric: SerretAndoyerMetric, share: Array) -> Array:
+    """The angle from the axis of the largest moment at which the action is this share of G: (...) -> (...) [rad]."""
+    low, high = np.zeros(share.shape), np.full(share.shape, 0.5 * np.pi)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        momentum = _between_ends(middle)
+        speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))
+        below = speed * metric.geodesics_of(momentum).action < share
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.where(share == 0.0, 0.0, np.where(share == 1.0, 0.5 * np.pi, 0.5 * (low + high)))
 
 
 def _argument(moments: Array, momentum: Array, angle: Array, oscillating: Mask, complement: Array) -> Array:

@@ -11,6 +11,10 @@ it is the surface of revolution d phi^2 + m(phi) d theta^2, 1/m = a_3 + (a_2 - a
 of unit speed H = 1/2, and p_theta = G/sqrt(2 E) for a body of energy E, whose time is the arc length over sqrt(2 E).
 All lengths and p_theta are in sqrt(kg) m, theta and y in radians.
 
+The sign of p_y: phi grows here as y falls, d phi = -dy/sqrt(a_1 - w), so that p_y = -phi'/sqrt(a_1 - w) begins below
+zero. The paper has d phi = +dy/sqrt(C - w), hence y = pi/2 + am(alpha phi, k) and p_y of the opposite sign: the
+same geodesics, mirrored in the equator (theory.md B-E5).
+
 Bonnard et al. number the moments in descending order: their I_1, I_2, I_3 are our I_3, I_2, I_1, their A < B < C our
 a_3, a_2, a_1. A metric takes the moments in any order and momenta in the caller's axes.
 
