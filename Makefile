@@ -1,9 +1,9 @@
 # The checks of .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test deaths goals times notebooks docs full lowest fuzz bench
+.PHONY: check lint types imports test deaths goals published times notebooks docs full lowest fuzz bench
 
-check: lint types imports test deaths goals docs
+check: lint types imports test deaths goals published docs
 
 lint:
 	$(BIN)/ruff check .
@@ -26,6 +26,10 @@ deaths:
 # Six turns of four small bodies, planned from rest to rest.
 goals:
 	$(BIN)/pytest -n auto tests/optimal_control/test_plan_goals.py -k reached
+
+# The numbers of docs/published.md, computed anew.
+published:
+	$(BIN)/python -m benchmarks.published --check
 
 # What each quick test takes of the processor, and the budget.
 times:

@@ -618,6 +618,37 @@ def test_cut_locus_is_an_arc_of_the_opposite_parallel_or_meridian_o16():
         cut_locus(oblate, oblate.reach)
 
 
+def orbital_transfer_metric(latitude):
+    """cos^2/(1 - 4/5 cos^2) of the latitude, and its derivative."""
+    square = np.cos(latitude) ** 2
+    room = 1.0 - 0.8 * square
+    return square / room, -np.sin(2.0 * latitude) / room**2
+
+
+def test_where_only_the_first_return_falls_the_cut_locus_is_an_arc_of_the_parallel_o16():
+    """Orbital transfer (Bonnard, Caillau, Sinclair, Tanaka 2009): p^2/m = p^2/cos^2 - 4 p^2/5, so all is a sphere's."""
+    surface = surface_of_metric(orbital_transfer_metric, 0.5 * np.pi)
+    assert (surface.curvature_trend(), surface.tameness()) == ("neither", "decreasing")
+    p = np.array([0.3, 1.0, 2.0, 2.2])
+    root = np.sqrt(1.0 + 0.8 * p**2)
+    np.testing.assert_allclose(surface.period(p), 2.0 * np.pi / root, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(surface.first_return(p), np.pi * (1.0 - 0.8 * p / root), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(cut_locus(surface).longitudes, (0.2 * np.pi, 1.8 * np.pi), rtol=0, atol=1e-13)
+    latitude, angle = 0.3, 0.6
+    largest = np.sqrt(orbital_transfer_metric(latitude)[0])
+    end = np.pi * (1.0 - 0.8 * largest / np.sqrt(1.0 + 0.8 * largest**2))
+    arc = cut_locus(surface, latitude)
+    assert (arc.kind, arc.latitudes) == ("parallel", (-latitude, -latitude))
+    np.testing.assert_allclose(arc.longitudes, (end, 2.0 * np.pi - end), rtol=0, atol=1e-12)
+    time = float(cut_time(surface, angle, latitude))
+    there, mirrored = (np.array(extremal(surface, sign * angle, latitude).state(time)[:2]) for sign in (1.0, -1.0))
+    np.testing.assert_allclose(there, mirrored, rtol=0, atol=1e-11)
+    # None of the points that are nearer is the end.
+    near = extremal(surface, np.linspace(-np.pi, np.pi, 1441), latitude).state(0.98 * time)
+    across = 2.0 * np.sqrt(surface.metric(there[0])) * np.sin(0.5 * (near[1] - there[1]))
+    assert np.hypot(near[0] - there[0], across).min() > 0.015 * time
+
+
 @pytest.mark.parametrize("aspect", [0.7, 1.4])
 def test_at_the_cut_time_the_mirror_image_arrives_and_no_shorter_way_exists_o16(aspect):
     surface = ellipsoid(aspect)

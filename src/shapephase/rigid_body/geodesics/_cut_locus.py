@@ -3,9 +3,11 @@
 On a smooth sphere of revolution, symmetric in its equator, whose curvature falls all the way from the equator to the
 poles (an oblate ellipsoid), the cut locus of a point is an arc of the opposite parallel; where it rises (a prolate
 one), an arc of the opposite meridian; on the round sphere the opposite point. The arc's ends are conjugate points.
+It is an arc of the opposite parallel also where only the first return falls with p, whatever the curvature does:
+extremals of opposite directions meet there, after half a period, and those of smaller p farther on.
 
-Sources: Sinclair and Tanaka 2007, main theorem; Bonnard, Cots and Shcherbakova 2013, end of section 2; theory.md O16,
-P6.
+Sources: Sinclair and Tanaka 2007, main theorem; Bonnard, Caillau, Sinclair and Tanaka 2009, for first returns; Bonnard,
+Cots and Shcherbakova 2013, end of section 2; theory.md O16, P6.
 """
 
 from __future__ import annotations
@@ -59,8 +61,8 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     Raises
     ------
     ShapeError
-        If the surface is no smooth sphere whose curvature changes one way from the equator to the poles, or the point
-        is a pole.
+        If the surface is no smooth sphere whose curvature changes one way from the equator to the poles, or whose first
+        return falls with p, or the point is a pole.
 
     Examples
     --------
@@ -73,10 +75,10 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     kind = _kind(surface, latitude)
     phi = float(latitude)
     if kind == "point":
-        return CutLocus(kind=kind, latitudes=(-phi, -phi), longitudes=(np.pi, np.pi))
+        return CutLocus(kind=kind, latitudes=(0.0 - phi, 0.0 - phi), longitudes=(np.pi, np.pi))
     if kind == "parallel":
         end = float(conjugate_points(surface, 0.0, 1, latitude).longitude)
-        return CutLocus(kind=kind, latitudes=(-phi, -phi), longitudes=(end, 2.0 * np.pi - end))
+        return CutLocus(kind=kind, latitudes=(0.0 - phi, 0.0 - phi), longitudes=(end, 2.0 * np.pi - end))
     ends = np.sort(conjugate_points(surface, np.array([0.5, -0.5]) * np.pi, 1, latitude).latitude)
     return CutLocus(kind=kind, latitudes=(float(ends[0]), float(ends[1])), longitudes=(np.pi, np.pi))
 
@@ -128,6 +130,11 @@ def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
     if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - _POLE_MARGIN:
         raise ShapeError(f"latitude: one number between the poles is needed, got {what_came(latitude)}")
     trend = surface.curvature_trend()
-    if trend == "neither":
-        raise ShapeError("the curvature must fall, or rise, all the way from the equator to the poles; it does neither")
-    return {"decreasing": "parallel", "increasing": "meridian", "constant": "point"}[trend]
+    if trend != "neither":
+        return {"decreasing": "parallel", "increasing": "meridian", "constant": "point"}[trend]
+    if surface.tameness() == "decreasing":
+        return "parallel"
+    raise ShapeError(
+        "the curvature must fall, or rise, all the way from the equator to the poles, or the first return fall with p; "
+        "they do not"
+    )
