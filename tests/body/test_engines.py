@@ -154,6 +154,7 @@ def test_a_base_without_mass_of_its_own(tmp_path):
         ("com 0 0 0.2", "com 0 0,2 0", r":\d+: segment 'Thorax': com: '0,2' is no number that biorbd reads$"),
         ("mass 30", "mass 0x10", r":\d+: segment 'Thorax': mass: '0x10' is no number that biorbd reads$"),
         ("mass 30", "mass 3.0E+01", r":\d+: segment 'Thorax': mass: '3.0E\+01' is no number that.*; write a small e"),
+        ("0 0.35 0\n", "0 0.35 0\n\tmeshfile a.stl\n", r":\d+: segment 'Thorax': inertia has 6 values, not 9"),
         ("mass 30", "mass 2^5", r":\d+: segment 'Thorax': mass: '2\^5' is no number"),
         ("mass 30", "mass 30\n\tmass 40", r":\d+: segment 'Thorax': 'mass' stands twice"),
         ("com 0.01 0 -0.02\nendsegment\n", "com 0.01 0 -0.0", r":\d+: segment 'Hand' has no endsegment"),
@@ -165,6 +166,23 @@ def test_a_biomod_that_cannot_be_used(tmp_path, old, new, message):
     assert old in ACROBAT
     with pytest.raises(ModelFileError, match=message):
         loaded(tmp_path, ACROBAT.replace(old, new, 1))
+
+
+def test_points_and_patches_of_a_mesh_may_be_many(tmp_path):
+    lines = (
+        "mesh 0 0 0",
+        "mesh 0 0.1 0",
+        "mesh 1E-1 0 0",
+        "patch 0 1 2",
+        "patch 2 1 0",
+        "meshcolor 1 0 0",
+        "com 0 0 0.2",
+    )
+    mesh = "".join(f"\n\t{line}" for line in lines)
+    body = loaded(tmp_path, ACROBAT.replace("\n\tcom 0 0 0.2", mesh, 1))
+    np.testing.assert_array_equal(
+        body.locked_inertia(body.shape()), loaded(tmp_path, ACROBAT).locked_inertia(np.zeros(6))
+    )
 
 
 def test_values_are_what_biorbd_makes_of_them(tmp_path):

@@ -51,7 +51,7 @@ def biomod_faults(file: Path, body: Any) -> Iterator[str]:
             said = []
         elif said is not None:
             said.append(word)
-    if any("$" in word or "*" in word for word in words):
+    if any(re.search(r"[$*/()]", word) for word in words):
         return
     masses = {}
     for name, traits in segments.items():

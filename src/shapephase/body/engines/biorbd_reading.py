@@ -29,6 +29,8 @@ _COUNTS = {"parent": 1, "translations": 1, "rotations": 1, "rtinmatrix": 1, "mas
 """How many values follow a word; biorbd passes over those beyond, and over the last letters of `1,5`."""
 _FRAME = 16
 """Values of a frame as a matrix; otherwise three angles, the order of their axes, and three coordinates."""
+_ONCE = (*_COUNTS, "rt", "rangesq")
+"""Words of which a second one takes the place of the first; meshes have many points."""
 _OPERAND = r"(\$\w+|[Pp][Ii]|(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(nan|NaN|inf|Infinity))"
 _VALUE = re.compile(rf"[+-]?(\(+[+-]?)?{_OPERAND}\)*([-+*/]\(*{_OPERAND}\)*)*", re.ASCII)
 """What biorbd reads right: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it."""
@@ -127,6 +129,7 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
         if word in _DROPPED:
             meshes += 1
             kept.append("")
+            said += [(text, number) for text in words[:1]]
             continue
         kept.append(line)
         if word == "segment":
@@ -183,7 +186,7 @@ def _check_values(segment: str, said: list[tuple[str, int]]) -> None:
             continue
         _check_count(segment, word, found, start)
         word, start = text.lower(), line
-        if found.setdefault(word, []):
+        if found.setdefault(word, []) and word in _ONCE:
             raise UnusableModelError(f"segment {segment!r}: {text!r} stands twice", line)
 
 
