@@ -63,6 +63,20 @@ def _reshaped(name: str, shape: list[int]) -> bytes:
     return json.dumps(said).encode()
 
 
+def _matlab(**arrays: object) -> Trial:
+    import scipy.io
+
+    stream = io.BytesIO()
+    scipy.io.savemat(stream, arrays)
+    return Trial(
+        kind="motion",
+        source="find",
+        files={"motion.mat": stream.getvalue()},
+        main="motion.mat",
+        options={"rest_missing": True, "ignore_extra": True},
+    )
+
+
 def _table(rows: str) -> Trial:
     return _motion("motion.csv", "time,hip,wrist,boom\n" + rows)
 
@@ -225,6 +239,24 @@ CASES = {
     ),
     "an array of no class that MATLAB has, which was left out": Case(
         make=_unknown_class, said="is of a class that does not exist"
+    ),
+    "a joint whose numbers are texts, which was at rest": Case(
+        make=lambda: _matlab(time=[0.0, 0.5, 1.0], wrist=["0.1", "0.2", "0.3"]),
+        said="no column for joint wrist, and 'wrist' is text, which is not read",
+    ),
+    "a matrix without names of its columns, whose joints were at rest": Case(
+        make=lambda: _matlab(time=[0.0, 0.5, 1.0], shapes=np.eye(3)), said="name its columns in `joint_names`"
+    ),
+    "six numbers for the nine of an inertia, the rest after a mesh": Case(
+        make=lambda: _body("body.bioMod", ACROBAT.replace("0 0.35 0\n", "0 0.35 0\n\tmeshfile none.stl\n", 1)),
+        outcome="ModelFileError",
+        said="inertia has 6 values, not 9",
+        slow=True,
+    ),
+    "a centre in brackets, which biorbd reads": Case(
+        make=lambda: _body("body.bioMod", ACROBAT.replace("com 0 0 0.2", "com (0) 0 0.2", 1)),
+        outcome="accepted",
+        slow=True,
     ),
     "a store whose name has 300 letters": Case(
         make=lambda: Trial(kind="store", source="find", main="x" * 300),

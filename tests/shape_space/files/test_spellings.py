@@ -603,3 +603,55 @@ def truths_written(kind, column, folder):
         with open(file, "r+b") as stream:
             stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
     return file
+
+
+@pytest.mark.parametrize("kind", ["m.mat", "m.h5", "m.npz"])
+@pytest.mark.parametrize("value", ["text", "one value", "short"])
+def test_a_joint_that_is_in_the_file_but_no_column_is_not_silently_at_rest(kind, value, tmp_path):
+    entry = {"text": [f"{v}" for v in SHAPES[:, 0]], "one value": 0.2, "short": SHAPES[:3, :2]}[value]
+    file = partly_array_file(tmp_path / kind, {JOINTS[0]: entry, "note": "after lunch"})
+    options = {"rest_missing": True, "ignore_extra": True}
+    with pytest.raises(TrajectoryError, match=f"no column for joint {JOINTS[0]}, and '{JOINTS[0]}' is .* is not read"):
+        sp.read_shape_path(file, BODY, **options)
+    # Told to, it rests.
+    path = sp.read_shape_path(file, BODY, names={JOINTS[0]: None}, **options)
+    assert np.array_equal(path.shape(TIMES)[:, 1:], SHAPES[:, 1:])
+    assert not path.shape(TIMES)[:, 0].any()
+    rested = sp.read_shape_path(file, BODY, rest={JOINTS[0]: 0.2})
+    np.testing.assert_allclose(rested.shape(TIMES)[:, 0], 0.2, rtol=4e-16)
+
+
+@pytest.mark.parametrize("kind", ["m.mat", "m.h5"])
+def test_a_matrix_whose_columns_have_no_names_is_no_motion_at_rest(kind, tmp_path):
+    file = array_file(tmp_path / kind, {"time": TIMES, "shapes": SHAPES})
+    with pytest.raises(TrajectoryError, match=r"no vector is a joint of .*'shapes' is .*; name its columns"):
+        sp.read_shape_path(file, BODY, rest_missing=True, ignore_extra=True)
+
+
+@pytest.mark.parametrize("kind", ["m.mat", "m.h5"])
+def test_a_base_of_another_width_is_not_passed_over(kind, tmp_path):
+    file = partly_array_file(tmp_path / kind, {JOINTS[0]: SHAPES[:, 0], "base_position": SHAPES[:, :2]})
+    with pytest.raises(TrajectoryError, match=r"base_position is an array .*; a matrix of 3 columns is needed"):
+        sp.read_shape_path(file, BODY)
+
+
+def partly_array_file(file, others):
+    """A recording of all joints but the first, and other entries."""
+    if file.suffix == ".npz":
+        return array_file(file, {"time": TIMES, "shapes": SHAPES[:, 1:], "joint_names": list(JOINTS[1:])} | others)
+    return array_file(file, {"time": TIMES} | {name: SHAPES[:, k] for k, name in enumerate(JOINTS) if k} | others)
+
+
+def array_file(file, entries):
+    import h5py
+    import scipy.io
+
+    if file.suffix == ".mat":
+        scipy.io.savemat(file, entries)
+    elif file.suffix == ".npz":
+        np.savez(file, **entries)
+    else:
+        with h5py.File(file, "w") as book:
+            for name, value in entries.items():
+                book[name] = value
+    return file

@@ -125,6 +125,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         units[body.joint_names[joint]] = unit
         known |= {joint} if stated else set()
         shapes[:, joint] = (ANGLES | LENGTHS)[unit] * values
+    _check_unread(found, body, recording, choices)
     at_rest = _rest_of_missing(found, body, where, choices)
     for name, value in at_rest.items():
         shapes[:, body.joint_index(name)] = value
@@ -209,6 +210,27 @@ def _unit(
             "(--degrees, --radians)"
         )
     return "deg" if table.degrees else "rad", table.degrees
+
+
+def _check_unread(found: Mapping[int, str], body: Body, recording: Recording, choices: JointChoices) -> None:
+    """Raise TrajectoryError where a joint would rest though the file has something by its name, or a matrix."""
+    table = recording.table
+    for text, what in table.unread.items():
+        target = choices.names.get(text, text)
+        resolved = None if target is None else _resolved(target, body)
+        if resolved is None or resolved.name in (choices.rest or {}):
+            continue
+        if body.joint_names.index(resolved.name) not in found:
+            raise TrajectoryError(
+                f"{table.where}: no column for joint {resolved.name}, and {text!r} is {what}, which is not read; write "
+                f"{len(table.rows)} numbers as those of the others, or leave it out with names={{{text!r}: None}} "
+                f"(--names {text}=)"
+            )
+    if table.unnamed and body.n_shape and not found:
+        raise TrajectoryError(
+            f"{table.where}: no vector is a joint of {body.name}, and {table.unnamed[0]!r} is "
+            f"{table.unread[table.unnamed[0]]}; name its columns in `joint_names`"
+        )
 
 
 def _rest_of_missing(found: Mapping[int, str], body: Body, where: str, choices: JointChoices) -> dict[str, float]:

@@ -42,6 +42,8 @@ class Table:
     faults : label -> sample -> what stands there and is no number, of the first of them
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
+    unread : name -> what it is, of arrays and other entries of the file that are no columns
+    unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     """
 
     where: str
@@ -57,6 +59,8 @@ class Table:
     faults: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     base_quat_xyzw: Array | None = None
     base_position: Array | None = None
+    unread: Mapping[str, str] = field(default_factory=dict)
+    unnamed: Sequence[str] = ()
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""

@@ -357,7 +357,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
 
 def _mapping(names: Mapping[str, str | None] | None, table: Table) -> dict[str, str | None]:
     """A user's mapping by the labels of a table. Raises UnknownNameError for a column that is not there."""
-    labels = [text for text in table.columns if len(text) <= LONGEST_NAME]
+    labels = [text for text in (*table.columns, *table.unread) if len(text) <= LONGEST_NAME]
     try:
         return mapping_argument(names, labels)
     except KeyError as error:

@@ -17,6 +17,8 @@ from .._recording import MOST_BYTES, Table
 _FREE_JOINT = 7
 # Where the entries x, y, z, w stand in a quaternion that begins with its scalar part.
 _SCALAR_FIRST = [1, 2, 3, 0]
+_READ = ("time", "timestep", "shapes", "qpos", "joint_names", "base_quat_xyzw", "base_quat_wxyz", "base_position")
+"""The arrays of a file that have a meaning."""
 
 
 def read_arrays(where: Path, data: bytes, joint_names: Sequence[str], timestep: float | None) -> Table:
@@ -58,7 +60,7 @@ def _shapes(arrays: dict[str, Any], where: Path) -> Table:
     quaternions, positions = _quaternions(arrays, where, len(times)), arrays.get("base_position")
     if positions is not None:
         positions = _array(positions, where, "base_position", (len(times), 3), "m")
-    return _table(where, "NPZ", times, shapes, names, quaternions, positions)
+    return _table(where, "NPZ", times, shapes, names, quaternions, positions, arrays)
 
 
 def _quaternions(arrays: dict[str, Any], where: Path, count: int) -> Array | None:
@@ -86,7 +88,7 @@ def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], tim
     times = _mujoco_times(arrays, where, len(qpos), timestep)
     quaternions = qpos[:, 3:_FREE_JOINT][:, _SCALAR_FIRST] if free else None
     positions = qpos[:, :3] if free else None
-    return _table(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions)
+    return _table(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions, arrays)
 
 
 def _mujoco_times(arrays: dict[str, Any], where: Path, count: int, timestep: float | None) -> Array:
@@ -112,6 +114,7 @@ def _table(
     names: list[str],
     quaternions: Array | None,
     positions: Array | None,
+    arrays: dict[str, Any],
 ) -> Table:
     return Table(
         where=str(where),
@@ -123,6 +126,9 @@ def _table(
         by_format=True,
         base_quat_xyzw=quaternions,
         base_position=positions,
+        unread={
+            name: f"an array {found.shape} of {found.dtype}" for name, found in arrays.items() if name not in _READ
+        },
     )
 
 

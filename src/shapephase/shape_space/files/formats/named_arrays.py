@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,12 +46,15 @@ def arrays_table(
             raise unknown_name(f"structure in {where}", chosen, sorted(groups))
         inside = entries[chosen]
     for _ in range(_DEEPEST):
-        columns = _matrix(where, inside) or _vectors(where, inside)
+        columns, used = _matrix(where, inside)
+        columns = columns or _vectors(where, inside)
         if columns:
-            base = _base_columns(inside)
+            base = _base_columns(where, inside)
             of_base = {label: units[name] for label, name, _ in base if units and name in units}
+            read = {*used, *(label for label, _ in columns), *(name for _, name, _ in base)}
             columns += [(label, values) for label, _, values in base]
-            return column_table(where, kind, columns, units={**(units or {}), **of_base}, row="sample")
+            table = column_table(where, kind, columns, units={**(units or {}), **of_base}, row="sample")
+            return _with_unread(table, {name: value for name, value in inside.items() if name not in read})
         groups = {name: value for name, value in inside.items() if isinstance(value, Mapping)}
         if len(groups) != 1:
             break
@@ -58,20 +62,31 @@ def arrays_table(
     groups = [name for name, value in inside.items() if isinstance(value, Mapping)]
     if len(groups) > 1:
         raise TrajectoryError(f"{where}: several structures, choose one with topic=: {', '.join(groups[:20])}")
-    listed = ", ".join(f"{name} {_described(value)}" for name, value in list(inside.items())[:12]) or "nothing"
+    listed = ", ".join(f"{name}, {_described(value)}" for name, value in list(inside.items())[:12]) or "nothing"
     raise TrajectoryError(
         f"{where}: no motion; vectors of one length, named `time` and as the joints, or a matrix `shapes` beside the "
         f"names of its columns in `joint_names`, are needed; there is {listed}"
     )
 
 
-def _matrix(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
-    """The columns of a matrix that has names, and of vectors as long as it."""
-    names = next((entries[key] for key in _NAMES if _are_texts(entries.get(key))), None)
+def _with_unread(table: Table, entries: Mapping[str, Any]) -> Table:
+    """The table, and what else there is beside its columns."""
+    unread = {name: _described(value) for name, value in entries.items()}
+    unnamed = [
+        name
+        for name in _MATRICES
+        if isinstance(value := entries.get(name), np.ndarray) and value.ndim == 2 and len(table.rows) in value.shape
+    ]
+    return replace(table, unread=unread, unnamed=unnamed)
+
+
+def _matrix(where: str, entries: Mapping[str, Any]) -> tuple[list[tuple[object, Any]], tuple[str, ...]]:
+    """The columns of a matrix that has names, and of vectors as long as it; and which entries these are."""
+    named = next((key for key in _NAMES if _are_texts(entries.get(key))), None)
     found = [key for key in _MATRICES if isinstance(value := entries.get(key), np.ndarray) and value.ndim == 2]
-    if names is None or not found:
-        return []
-    matrix = entries[found[0]]
+    if named is None or not found:
+        return [], ()
+    matrix, names = entries[found[0]], entries[named]
     if matrix.shape[1] != len(names):
         raise TrajectoryError(f"{where}: {found[0]} has {matrix.shape[1]} columns, and there are {len(names)} names")
     others = [
@@ -79,7 +94,7 @@ def _matrix(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
         for name, value in entries.items()
         if name != found[0] and (vector := _vector(where, name, value)) is not None and len(vector) == len(matrix)
     ]
-    return [*others, *((name, matrix[:, k]) for k, name in enumerate(names))]
+    return [*others, *((name, matrix[:, k]) for k, name in enumerate(names))], (named, found[0])
 
 
 def _vectors(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
@@ -88,13 +103,18 @@ def _vectors(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]
     return [(name, vector) for name, vector in found if vector is not None]
 
 
-def _base_columns(entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
+def _base_columns(where: str, entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
     """Label, matrix and values of the columns that say where the base is and how it is turned."""
     found: list[tuple[str, str, Any]] = []
     for name, labels in _OF_THE_BASE.items():
-        value = entries.get(name)
-        if isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[1] == len(labels):
-            found += [(label, name, value[:, k]) for k, label in enumerate(labels)]
+        if name not in entries:
+            continue
+        value = entries[name]
+        if not isinstance(value, np.ndarray) or value.ndim != 2 or value.shape[1] != len(labels):
+            raise TrajectoryError(
+                f"{where}: {name} is {_described(value)}; a matrix of {len(labels)} columns is needed"
+            )
+        found += [(label, name, value[:, k]) for k, label in enumerate(labels)]
     return found
 
 
@@ -117,5 +137,5 @@ def _are_texts(value: Any) -> bool:
 
 def _described(value: Any) -> str:
     if isinstance(value, np.ndarray):
-        return f"{value.shape} of {value.dtype}"
-    return "(a structure)" if isinstance(value, Mapping) else "(texts)" if isinstance(value, list) else "(not read)"
+        return f"an array {value.shape} of {value.dtype}" if value.size != 1 else "a single value"
+    return "a structure" if isinstance(value, Mapping) else "text" if isinstance(value, list) else "of another kind"

@@ -74,6 +74,7 @@ def answer_with_table(reader: Callable[..., Table]) -> None:
         described: dict[str, Any] = {"error": type(error).__name__, "message": str(error)}
     else:
         described = {name: getattr(table, name) for name in ("where", "format", "row", "by_format", "degrees")}
+        described |= {"unread": dict(table.unread), "unnamed": list(table.unnamed)}
         described |= {"labels": list(table.columns), "units": dict(table.units)}
         described["faults"] = {label: dict(found) for label, found in table.faults.items()}
         arrays = {f"column_{k}": values for k, values in enumerate(table.columns.values())}
