@@ -155,6 +155,12 @@ def test_a_base_without_mass_of_its_own(tmp_path):
         ("mass 30", "mass 0x10", r":\d+: segment 'Thorax': mass: '0x10' is no number that biorbd reads$"),
         ("mass 30", "mass 3.0E+01", r":\d+: segment 'Thorax': mass: '3.0E\+01' is no number that.*; write a small e"),
         ("0 0.35 0\n", "0 0.35 0\n\tmeshfile a.stl\n", r":\d+: segment 'Thorax': inertia has 6 values, not 9"),
+        (
+            "rangesQ -0.5 0.9",
+            "rangesQ 0.9 -0.5",
+            r":\d+: joint 'Thorax_RotX': the lower limit 0.9 is not below the upper",
+        ),
+        ("segment Hand", "segment Hand" + 300 * "d", r":\d+: segment 'Handd.* 304 characters; up to 256 are allowed"),
         ("mass 30", "mass 2^5", r":\d+: segment 'Thorax': mass: '2\^5' is no number"),
         ("mass 30", "mass 30\n\tmass 40", r":\d+: segment 'Thorax': 'mass' stands twice"),
         ("com 0.01 0 -0.02\nendsegment\n", "com 0.01 0 -0.0", r":\d+: segment 'Hand' has no endsegment"),

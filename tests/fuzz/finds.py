@@ -258,6 +258,18 @@ CASES = {
         outcome="accepted",
         slow=True,
     ),
+    "limits of which the lower is above the upper, in a bioMod file": Case(
+        make=lambda: _body("body.bioMod", ACROBAT.replace("rangesQ -0.5 0.9", "rangesQ 0.9 -0.5", 1)),
+        outcome="ModelFileError",
+        said="the lower limit 0.9 is not below the upper one, -0.5",
+        slow=True,
+    ),
+    "a segment whose name has 70,000 letters": Case(
+        make=lambda: _body("body.bioMod", ACROBAT.replace("segment Hand", "segment " + 70_000 * "x", 1)),
+        outcome="ModelFileError",
+        said="70000 characters; up to 256 are allowed",
+        slow=True,
+    ),
     "a store whose name has 300 letters": Case(
         make=lambda: Trial(kind="store", source="find", main="x" * 300),
         outcome="StudyStoreError",

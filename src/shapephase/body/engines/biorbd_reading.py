@@ -16,7 +16,7 @@ import biorbd
 import numpy as np
 
 from ...arrays import Array
-from .chain import Chain, UnusableModelError, locked_inertia
+from .chain import Chain, UnusableModelError, check_name, locked_inertia
 
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 _WORDS = (
@@ -82,7 +82,7 @@ def chain_of(path: str) -> Chain:
                 f"segment {name!r} turns by a quaternion; joints of one axis are supported: write `rotations xyz`", line
             )
         lack = max(lack, missing)
-        chain.add_joints(parent, name, above @ frame[:3, 3], turn, _axes(segment, name))
+        chain.add_joints(parent, name, above @ frame[:3, 3], turn, _axes(segment, name), line)
     if lack > _EXACT:
         notes.append(f"frames are orthonormal to {lack:.1g} only: the nearest rotations are taken")
     _add_poses(chain, model, segments, base, lack)
@@ -135,6 +135,7 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
         if word == "segment":
             _check_closed(segment, number)
             segment = words[1] if len(words) > 1 else ""
+            check_name(segment, f"segment {segment!r}", number)
             if segment in starts:
                 raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
             starts[segment], said = number, [(text, number) for text in words[2:]]

@@ -17,6 +17,8 @@ POSES = 3
 SEED = 20060518
 """Any number: the random shapes are the same at every loading."""
 _NO_OFFSET = np.zeros(3)
+_MOST_NAME = 256
+"""Characters of a name, which appears whole in messages and tables."""
 
 
 class UnusableModelError(Exception):
@@ -60,7 +62,13 @@ class Chain:
         self.links.append(entry | {"inertia": np.ravel(inertia).tolist()})
 
     def add_joints(
-        self, parent: str, child: str, place: Array, turn: Array, axes: list[tuple[str, str, Array, list[float]]]
+        self,
+        parent: str,
+        child: str,
+        place: Array,
+        turn: Array,
+        axes: list[tuple[str, str, Array, list[float]]],
+        line: int = 1,
     ) -> None:
         """The joints between two links, each moved by the one before it.
 
@@ -68,14 +76,15 @@ class Chain:
         axes : name, "revolute" or "prismatic", axis (3,), limits [rad or m]; none: the links are fixed to each other
         """
         if not axes:
-            self.add_joint(f"{child}_fixed", "fixed", parent, child, place, turn, np.array([1.0, 0.0, 0.0]), None)
+            ahead = np.array([1.0, 0.0, 0.0])
+            self.add_joint(f"{child}_fixed", "fixed", parent, child, place, turn, ahead, None, line=line)
         for number, (name, kind, axis, limits) in enumerate(axes):
             last = number == len(axes) - 1
             below = child if last else f"{child}__{name}"
             if not last:
                 self.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
                 self.frames.append(below)
-            self.add_joint(name, kind, parent, below, place, turn, axis, limits)
+            self.add_joint(name, kind, parent, below, place, turn, axis, limits, line=line)
             parent, place, turn = below, np.zeros(3), np.eye(3)
 
     def add_joint(
@@ -94,6 +103,10 @@ class Chain:
         """One joint, as the fields of `Joint`; limits None: it has none."""
         if any(joint["name"] == name for joint in self.joints):
             raise UnusableModelError(f"joint {name!r}: two joints have this name; rename one", line)
+        if limits is not None and not limits[0] <= limits[1]:
+            raise UnusableModelError(
+                f"joint {name!r}: the lower limit {limits[0]:g} is not below the upper one, {limits[1]:g}", line
+            )
         self.joints.append({
             "name": name,
             "kind": kind,
@@ -167,6 +180,14 @@ class Chain:
     def spoken(self) -> dict[str, Any]:
         """All of it as JSON holds it."""
         return self.__dict__
+
+
+def check_name(name: str, owner: str, line: int) -> None:
+    """Raise UnusableModelError for a name that is too long, or cannot be printed."""
+    if len(name) > _MOST_NAME:
+        raise UnusableModelError(f"{owner[:60]}: {len(name)} characters; up to {_MOST_NAME} are allowed", line)
+    if not name.isprintable() or name.isspace():
+        raise UnusableModelError(f"{owner}: a name with characters that cannot be printed; rename it", line)
 
 
 def locked_inertia(masses: Array, centres: Array, tensors: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arrays import Array
 from .._link_tree import MOST_LINKS, MOST_MASS
-from .chain import Chain, UnusableModelError, locked_inertia
+from .chain import Chain, UnusableModelError, check_name, locked_inertia
 from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
 
 _COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
@@ -34,8 +34,6 @@ _FRAMES = 10.0
 """Times what quaternions and axes lack of length one."""
 _MOST_LENGTH = 1e6
 """[m] of places: farther away, differences are lost."""
-_MOST_NAME = 256
-"""Characters of a name, which appears whole in messages and tables."""
 
 
 class Rule(NamedTuple):
@@ -87,7 +85,7 @@ def _model_name(model: Any) -> str:
 
 def _add_link(chain: Chain, compiled: Compiled, body: int) -> None:
     model, name, line = compiled.model, compiled.names[body], compiled.line(body)
-    _check_name(name, f"body {name!r}", line)
+    check_name(name, f"body {name!r}", line)
     mass, moments = float(model.body_mass[body]), model.body_inertia[body]
     if not max(mass, np.abs(moments).max()) < MOST_MASS:
         numbers = f"{mass:g} kg, moments {moments.tolist()} kg m^2"
@@ -97,13 +95,6 @@ def _add_link(chain: Chain, compiled: Compiled, body: int) -> None:
     turn = rotation(model.body_iquat[body])
     tensor = turn @ np.diag(moments) @ turn.T
     chain.add_link(name, mass, model.body_ipos[body], 0.5 * (tensor + tensor.T), line)
-
-
-def _check_name(name: str, owner: str, line: int) -> None:
-    if len(name) > _MOST_NAME:
-        raise UnusableModelError(f"{owner[:60]}: {len(name)} characters; up to {_MOST_NAME} are allowed", line)
-    if not name.isprintable() or name.isspace():
-        raise UnusableModelError(f"{owner}: a name with characters that cannot be printed; rename it", line)
 
 
 def _check_places(places: Array, directions: Array, owner: str, line: int) -> None:
@@ -125,7 +116,7 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
     for joint in joints:
         name, axis = compiled.joint_name(joint), model.jnt_axis[joint]
         owner, line = f"joint {name!r}", compiled.line(joint, "joint")
-        _check_name(name, owner, line)
+        check_name(name, owner, line)
         _check_places(model.jnt_pos[joint], axis, owner, line)
         if model.jnt_type[joint] == BALL:
             raise UnusableModelError(f"{owner}: a ball joint; joints of one axis are supported: use three hinges", line)

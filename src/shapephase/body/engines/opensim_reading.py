@@ -15,7 +15,7 @@ import numpy as np
 from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
-from .chain import Chain, UnusableModelError
+from .chain import Chain, UnusableModelError, check_name
 from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, refused, value_and_slope, vector_of
 
 _EXACT = 1e-12
@@ -165,6 +165,7 @@ class _Reading:
             for k in range(joint.numCoordinates() if joint is not self._base else 0):
                 coordinate = joint.get_coordinates(k)
                 name = coordinate.getName()
+                check_name(name, f"coordinate {name!r}", self._fault("", name).line)
                 if name in found:
                     raise self._fault(f"two coordinates are named {name!r}; give each a name of its own", name)
                 if coordinate.getDefaultIsPrescribed():
@@ -316,6 +317,7 @@ class _Reading:
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         name = body.getName()
         line = self._fault("", name).line
+        check_name(name, f"body {name!r}", line)
         self._chain.add_link(name, body.getMass(), vector_of(body.getMassCenter()), tensor, line)
 
     def _add_joint(self, joint: Any, axes: list[_Axis], carriers: dict[str, str]) -> None:

@@ -17,7 +17,10 @@ from .._recording import MOST_BYTES, Table
 _FREE_JOINT = 7
 # Where the entries x, y, z, w stand in a quaternion that begins with its scalar part.
 _SCALAR_FIRST = [1, 2, 3, 0]
-_READ = ("time", "timestep", "shapes", "qpos", "joint_names", "base_quat_xyzw", "base_quat_wxyz", "base_position")
+_READ = (
+    *("time", "timestep", "shapes", "qpos", "joint_names", "base_quat_xyzw", "base_quat_wxyz", "base_position"),
+    "provenance",
+)
 """The arrays of a file that have a meaning."""
 
 
