@@ -74,7 +74,7 @@ _TRANSFER = "Orbital transfer"
 _CAT_INPUTS = "J = 0.0025, I = 0.01 kg m², 1 s, begins and ends straight"
 _FLIPS = "A spacecraft that flips, or does not"
 _CATS = "Cats of two halves"
-_CLOCKS = "Two clocks of a cases.tumbling body"
+_CLOCKS = "Two clocks of a tumbling body"
 _HOLONOMIES = "The smallest holonomies"
 _HALLEY = "long axis 66° from L, precession 3.69 d, roll 7.1 d"
 _MORPHS = "I = (0.3, 0.35, 0.4) kg m², ω = (0.1, 15, 0.1) rad/s"
@@ -89,7 +89,7 @@ def _bricks() -> list[Entry]:
     printed = {"x": "12.6183908", "y": "-17.3974748", "z": "31.1195889"}
     return [
         Entry(
-            topic="A cases.tumbling brick",
+            topic="A tumbling brick",
             what=f"rate about {axis} after 30 s",
             source="nasa2015",
             inputs="I = (0.001894220, 0.006211019, 0.007194665) slug ft², rates 10, 20, 30 °/s",
