@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
@@ -115,3 +117,37 @@ def test_a_study_says_what_it_needs(argument, monkeypatch, tmp_path):
 def test_what_is_no_store_or_file_of_a_study_is_named(call):
     with pytest.raises(WrongObjectError, match="is needed, got a Body"):
         call(sp.load_body("cat_two_halves"))
+
+
+def test_every_function_that_hands_keywords_on_names_one_that_it_does_not_have(tmp_path):
+    """The fault names the function that was called and its arguments, not one inside that never heard of it."""
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 0.0, 0.0])
+    calls = {
+        "Motion.to_dataframe": (motion.to_dataframe,),
+        "Motion.view": (motion.view,),
+        "Motion.write_csv": (motion.write_csv, tmp_path / "m.csv"),
+        "motion_html": (sp.plotting.motion_html, motion),
+        "motion_page": (sp.motion_page, motion, tmp_path / "m.html"),
+        "motion_video": (sp.plotting.motion_video, motion, tmp_path / "m.gif"),
+        "moving_scene": (sp.plotting.moving_scene, motion, 5),
+        "view": (sp.view, motion),
+    }
+    assert set(handing_on()) == set(calls)
+    for place, (call, *arguments) in calls.items():
+        said = rf"^unknown argument of {place.rpartition('.')[2]} 'gravitation'. Did you mean 'gravity'\? Valid: "
+        with pytest.raises(WrongObjectError, match=said):
+            call(*arguments, gravitation=[0.0, 0.0, -9.81])
+    assert not list(tmp_path.iterdir())
+
+
+def handing_on():
+    """Names of the public functions and methods that take any keywords."""
+    for name, thing in NAMES.items():
+        inherited = {key: getattr(thing, key, None) for key in dir(thing)} if inspect.isclass(thing) else {}
+        last = name.rpartition(".")[2]
+        for place, function in {last: thing, **{f"{last}.{key}": value for key, value in inherited.items()}}.items():
+            private = function is not thing and place.rpartition(".")[2].startswith("_")
+            if not inspect.isfunction(function) or private:
+                continue
+            if any(part.kind is part.VAR_KEYWORD for part in inspect.signature(function).parameters.values()):
+                yield place

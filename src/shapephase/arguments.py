@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
+from inspect import signature
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -83,6 +84,8 @@ _WAYS = {
     "Reach": {"": "make it with reachable(body, shape)"},
     "InertiaErrors": {"": "make it with InertiaErrors(masses=0.05), for example"},
 }
+OF_A_FALL = ("start", "velocity", "gravity")
+"""Keywords of `Motion.base_position`, which what writes or shows a motion hands on."""
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
 
@@ -113,6 +116,18 @@ def check_executor(value: object) -> None:
             "executor: one of concurrent.futures, or of a cluster (client.get_executor()), is needed, got "
             f"{what_came(value)}"
         )
+
+
+def check_keywords(given: Iterable[str], function: Callable[..., object], others: Iterable[str] = OF_A_FALL) -> None:
+    """Raise WrongObjectError for a keyword that a public function which hands keywords on does not have.
+
+    given : the keywords that it hands on
+    others : those of them that are known
+    """
+    own = [name for name, part in list(signature(function).parameters.items())[1:] if part.kind != part.VAR_KEYWORD]
+    for name in given:
+        if name not in others:
+            raise WrongObjectError(str(unknown_name(f"argument of {function.__name__}", name, [*own, *others])))
 
 
 def check_choice(value: object, kind: str, choices: Collection[str]) -> None:

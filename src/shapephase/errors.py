@@ -48,9 +48,10 @@ class ShapeError(ShapePhaseError, ValueError):
 
 
 class WrongObjectError(ShapeError, TypeError):
-    """A function got another kind of object than it needs.
+    """A function got another kind of object than it needs, or an argument that it does not have.
 
-    Remedy: the message says what is needed, what came, and how the one is made of the other.
+    Remedy: the message says what is needed, what came, and how the one is made of the other; or which arguments there
+    are.
 
     Examples
     --------

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_keywords, check_object
 from ..arrays import Array
 from ..body._drawing_limits import hull, outermost
 from ..body.appearance import BOX_COLOUR, Visual, visuals
@@ -164,6 +164,7 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
     check_object(motion, "Motion", "motion")
+    check_keywords(fall, moving_scene)
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MAX_FRAMES:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_file_name, check_flag, check_object
+from ..arguments import check_file_name, check_flag, check_keywords, check_object
 from ..errors import ShapeError, VisualWarning
 from ..files import write_whole
 from ..letters import what_came
@@ -86,6 +86,7 @@ def motion_page(
     True
     """
     check_object(motion, "Motion", "motion")
+    check_keywords(fall, motion_page)
     check_file_name(path, "path")
     page = motion_html(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, **fall)
     write_whole(path, lambda stream: stream.write(page.encode()))
@@ -109,6 +110,8 @@ def motion_html(
     >>> sp.plotting.motion_html(motion, frames=5)[:15].lower()
     '<!doctype html>'
     """
+    check_object(motion, "Motion", "motion")
+    check_keywords(fall, motion_html)
     scene, data = scene_and_data(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, fall=fall)
     return page_html(
         "motion.html",
@@ -162,6 +165,7 @@ def motion_video(
     unknown kind of film '.webm'. Valid: .gif, .mp4, .png
     """
     check_object(motion, "Motion", "motion")
+    check_keywords(fall, motion_video)
     ending = check_video(path, pixels)
     rate = playing_speed(motion.duration, speed)
     page = motion_html(motion, speed=rate, frames=None, trail=trail, ghost=ghost, up=up, **fall)
@@ -231,6 +235,7 @@ def view(
     True
     """
     check_object(motion, "Motion", "motion")
+    check_keywords(fall, view)
     check_flag(browser, "browser")
     check_flag(notebook, "notebook", allow_none=True)
     if not isinstance(host, str):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import times_argument
+from ..arguments import check_keywords, times_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
@@ -97,6 +97,7 @@ class MotionViews:
         ShapeError
             If the motion is a batch.
         """
+        check_keywords(fall, MotionViews.write_csv)
         write_table(path, self._columns(times, fall))
 
     def to_dataframe(self: Any, times: ArrayLike | None = None, **fall: ArrayLike) -> Any:
@@ -113,6 +114,7 @@ class MotionViews:
         MissingExtraError
             Without pandas.
         """
+        check_keywords(fall, MotionViews.to_dataframe)
         try:
             from pandas import DataFrame
         except ImportError:
