@@ -16,4 +16,5 @@ __version__ = "0.1.0"
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
 
 offer("Motion.plot", "shapephase.plotting.named_figures", "motion_figure")
+offer("Motion.to_xarray", "shapephase.exports.tables", "motion_dataset")
 offer("Motion.view", "shapephase.plotting.viewer", "view")

@@ -7,6 +7,7 @@ from . import (
     error_bars,
     errors,
     examples,
+    exports,
     inertia_tensor,
     integrator,
     optimal_control,
@@ -41,6 +42,7 @@ from .errors import (
     TrajectoryWarning,
     UnphysicalInertiaWarning,
 )
+from .exports.tables import export_motion
 from .integrator.fast.engine import compile_steps
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
@@ -151,6 +153,8 @@ __all__ = [
     "error_bars",
     "errors",
     "examples",
+    "export_motion",
+    "exports",
     "final_attitudes",
     "fixed_points",
     "free_hinges",

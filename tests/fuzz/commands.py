@@ -106,6 +106,7 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--out": lambda c: _file(c, "out.npz"),
         "--html": lambda c: _file(c, "report.html"),
         "--phases": lambda _: [],
+        "--samples": lambda _: [],
         "--up": lambda c: [c.choice(_UP)],
     },
     "torques": _RECORDING | _FLIGHT | _TOLERANCE | {"--out": lambda c: _file(c, "out.csv")},

@@ -37,7 +37,7 @@ GIVEN: dict[str, Any] = {
 # They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
 MAKERS = (
     "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "sampler",
-    "samplers", "plot", "view", "to_dataframe",
+    "samplers", "plot", "view", "to_dataframe", "to_xarray",
 )  # fmt: skip
 
 
@@ -99,6 +99,8 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "curvature_on_plane": lambda: sp.curvature_on_plane(body, body.joint_names[:2], TIMES, TIMES),
         "is_flat": lambda: sp.is_flat(body),
         "joint_torques": lambda: sp.joint_torques(motion, TIMES),
+        "mujoco_arrays": lambda: sp.exports.mujoco_arrays(motion, TIMES),
+        "pinocchio_arrays": lambda: sp.exports.pinocchio_arrays(motion, TIMES),
         "free_hinges": lambda: sp.free_hinges(body, swung(body), {body.joint_names[0]: (0.3, 1.0)}, MOMENTUM),
         "torque": lambda: sp.reconstruct(deformation, MOMENTUM, torque=lambda s: 0.01 * s.rate).final_attitude,
         "minimum_perturbation": lambda: sp.minimum_perturbation(body, shape, 0.2, 2),

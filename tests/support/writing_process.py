@@ -29,6 +29,10 @@ COMMANDS = {
     "split.npz": ("split", *CAT, ("0.02", "0.03"), "--out"),
     "split.html": ("split", *CAT, ("0.02", "0.03"), "--html"),
     "phases.csv": ("split", *CAT, ("0.02", "0.03"), "--phases"),
+    **{
+        f"samples.{kind}": ("split", *CAT, ("0.02", "0.03"), "--samples")
+        for kind in ("csv", "parquet", "nc", "mat", "h5")
+    },
     "torques.csv": ("torques", *CAT, ("0.02", "0.03"), "--out"),
     "view.html": ("view", *CAT, ("0.02", "0.03"), "--html"),
     "plot.svg": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
@@ -63,6 +67,36 @@ class WritingProcess(AskedProcess):
         super().__init__(__file__, *writers, **fixed)
 
 
+def _parquet_rows(stream: Any) -> int:
+    from pyarrow.parquet import read_table
+
+    return read_table(stream).num_rows
+
+
+def _netcdf_rows(stream: Any) -> int:
+    from scipy.io import netcdf_file
+
+    with netcdf_file(stream, mmap=False) as file:
+        return len(file.variables["time"][:])
+
+
+def _matlab_rows(stream: Any) -> int:
+    from scipy.io import loadmat
+
+    return len(loadmat(stream)["time"])
+
+
+def _hdf5_rows(stream: Any) -> int:
+    import h5py
+
+    with h5py.File(stream) as file:
+        return len(file["time"][()])
+
+
+_ARRAYS = {"parquet": _parquet_rows, "nc": _netcdf_rows, "mat": _matlab_rows, "h5": _hdf5_rows}
+"""Samples in a file, by the library of its format."""
+
+
 def is_whole(content: bytes, writer: str) -> bool:
     """Whether these are all bytes of a file of this kind, by another reader of the format."""
     kind = writer.split(".")[1]
@@ -76,6 +110,8 @@ def is_whole(content: bytes, writer: str) -> bool:
 
         rows = np.genfromtxt(io.BytesIO(content), delimiter=",", skip_header=1)
         return content.endswith(b"\n") and len(rows) > 100 and bool(np.isfinite(rows).all())
+    if kind in _ARRAYS:
+        return _ARRAYS[kind](io.BytesIO(content)) > 100
     if kind == "svg":
         return ElementTree.fromstring(content).tag.endswith("svg")
     ends = {"html": b"</html>", "pdf": b"%%EOF", "png": b"IEND\xaeB`\x82"}

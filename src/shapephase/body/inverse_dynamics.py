@@ -42,18 +42,41 @@ def falling_efforts(
     check_object(body, "Body", "body")
     model, data, joints = body._model, body._data(), body._joints
     check_smooth(joints.follows, "torques need", kinks_only=True)
+    states = floating_states(body, shapes, rates, accelerations, spins, spin_rates)
+    states[2][:, :3] += model.gravity.linear
+    whole = np.array([pin.rnea(model, data, *state) for state in zip(*states, strict=True)])
+    whole = whole.reshape(len(shapes), model.nv)
+    return joints.columns(whole[:, _BASE:], shapes), whole[:, :_BASE]
+
+
+def floating_states(
+    body: Body, shapes: Array, rates: Array, accelerations: Array, spins: Array, spin_rates: Array
+) -> tuple[Array, Array, Array]:
+    """Configurations, velocities and accelerations of Pinocchio's model while the centre of mass rests.
+
+    The base's position is the origin, its attitude the identity. The first six velocities are linear and angular, base
+    axes, and their accelerations the derivatives of these six numbers.
+
+    Parameters
+    ----------
+    shapes, rates, accelerations, spins, spin_rates : as for `falling_efforts`
+
+    Returns
+    -------
+    (N, nq), (N, nv), (N, nv)
+    """
+    check_object(body, "Body", "body")
+    model, data, joints = body._model, body._data(), body._joints
+    check_smooth(joints.follows, "accelerations need", kinks_only=True)
     configurations = joints.configurations(shapes)
     velocities, slopes = joints.velocities(shapes, rates), joints.accelerations(shapes, rates, accelerations)
-    gravity = model.gravity.linear
-    whole = np.empty_like(velocities)
     for row, (q, v, a) in enumerate(zip(configurations, velocities, slopes, strict=True)):
         pin.centerOfMass(model, data, q, v, a)
         centre, speed, w = data.com[0].copy(), data.vcom[0].copy(), spins[row]
         v[:3], v[3:_BASE] = -speed - _cross(w, centre), w
         a[3:_BASE] = spin_rates[row]
-        a[:3] = gravity - data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
-        whole[row] = pin.rnea(model, data, q, v, a)
-    return joints.columns(whole[:, _BASE:], shapes), whole[:, :_BASE]
+        a[:3] = -data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
+    return configurations, velocities, slopes
 
 
 def _cross(first: Array, second: Array) -> Array:

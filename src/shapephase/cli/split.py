@@ -42,6 +42,7 @@ def split_command(
     recording: RecordingOptions = AS_RECORDED,
     errors: ErrorOptions = EXACT,
     out: Path | None = None,
+    samples: Path | None = None,
     phases: Path | None = None,
     html: ReportFile = None,
     up: UpAxis = None,
@@ -53,12 +54,16 @@ def split_command(
     ----------
     out
         Write the motion to this NPZ file, or to a pipe; without it none is written. For example `--out fall.npz`.
+    samples
+        Write base and joints at 201 even times to this file (.csv, .parquet, .nc, .mat, .h5), in SI units; without it
+        none is written. For example `--samples fall.nc`.
     phases
         Write the phases in time, in degrees and in radians, to this CSV file; its last row is the table's. Without it
         none is written. For example `--phases phases.csv`.
     """
     import numpy as np
 
+    from ..exports.tables import ENDINGS, export_motion
     from ..phases.phases import running_phases, split
     from ..phases.split_text import split_lines
     from ..shape_space.body_path import path_gap
@@ -68,6 +73,7 @@ def split_command(
     from .texts.result_text import gap_text, recorded_base_text, split_data, split_heading
 
     aside = check_writable(out, "--out", ".npz")
+    aside = check_writable(samples, "--samples", *ENDINGS) or aside
     aside = check_writable(phases, "--phases", ".csv") or aside
     aside = check_writable(html, "--html", ".html") or aside
     if html is not None:
@@ -83,6 +89,9 @@ def split_command(
         if out is not None:
             flown.motion.save(out)
             say_written(out)
+        if samples is not None:
+            export_motion(flown.motion, samples)
+            say_written(samples)
         if phases is not None:
             times = np.linspace(0.0, flown.motion.duration, _ROWS)
             running_phases(flown.motion, times, gauge).write_csv(phases)

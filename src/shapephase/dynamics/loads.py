@@ -18,7 +18,8 @@ from ..display import short_repr
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
-from ._driven_motion import Drive, body_and_path, drive
+from ._driven_motion import BY_JOINTS, Drive, drive
+from .moving_body import needed_body_and_path
 
 # Of a panel of the quadrature.
 _POINTS = 10
@@ -161,7 +162,7 @@ def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
     if not isinstance(motion, ForcedMotion):
         check_object(motion, "Motion", "motion")
-    body, _ = body_and_path(motion)
+    body, _ = needed_body_and_path(motion, BY_JOINTS)
     breaks = motion.breaks if isinstance(motion, ForcedMotion) else motion.deformation.breaks
     edges = np.union1d(motion.solution.times, breaks)
     edges = edges[np.append(True, np.diff(edges) > 1e-12 * motion.duration)]

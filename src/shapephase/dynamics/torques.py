@@ -17,8 +17,9 @@ from ..errors import MissingExtraError, ShapeError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
-from ._driven_motion import body_and_path, drive
+from ._driven_motion import BY_JOINTS, drive
 from .loads import JointLoads, joint_loads
+from .moving_body import needed_body_and_path
 
 # Rows of a table.
 _ROWS = 201
@@ -164,7 +165,7 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     """
     if not isinstance(motion, ForcedMotion):
         check_object(motion, "Motion", "motion")
-    body, _ = body_and_path(motion)
+    body, _ = needed_body_and_path(motion, BY_JOINTS)
     given = np.linspace(0.0, motion.duration, _ROWS) if t is None else t
     times = times_argument(given, motion.duration)
     found = drive(motion, times.ravel())

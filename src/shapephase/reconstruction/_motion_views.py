@@ -121,6 +121,22 @@ class MotionViews:
             raise MissingExtraError("a table needs pandas; install it with: pip install pandas") from None
         return DataFrame(self._columns(times, fall))
 
+    def to_xarray(self: Any, times: ArrayLike | None = None, **fall: ArrayLike) -> Any:
+        """Base, joints and their rates in time as a data set of xarray, as `exports.motion_dataset` makes it.
+
+        Parameters
+        ----------
+        times, fall : as for `write_csv`
+
+        Raises
+        ------
+        ShapeError
+            If the motion is a batch.
+        MissingExtraError
+            Without xarray.
+        """
+        return offered("Motion.to_xarray")(self, times, **fall)
+
     def plot(self: Any, kind: str | None = None, *, ax: Any = None, gauge: Any = "horizontal") -> Any:
         """Draw one of the figures of `plotting.FIGURES` and return its Matplotlib axes.
 

@@ -20,6 +20,8 @@ ESTIMATE = "estimate"
 """Instead of the axes of the base: they are found by a fit."""
 # In the tables that `Motion.write_csv` writes; they follow from the rest.
 _FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
+# The same of `export_motion`, which writes velocities, too.
+_VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")
 _AGREES = 0.1
 """Of the rates themselves, in the median: turns between samples that are off by less are the turns of these rates."""
 _CONTRADICTS = 0.5
@@ -171,6 +173,8 @@ class BaseColumns:
         """Keep a column, by its label and the name that it goes by, if it is one of the base."""
         if target in _FOLLOWING:
             self.rates[target] = text
+            return True
+        if target in _VELOCITIES:
             return True
         parts = Label(target, None) if target in _KNOWN else label(target)
         if parts.name not in _KNOWN and parts.name not in self._own_names:

@@ -1,0 +1,168 @@
+"""All that other programs ask of one motion at some times: base, joints, their rates and accelerations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_object, times_argument
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..body.inverse_dynamics import floating_states
+from ..dynamics.moving_body import body_and_path, moving_body, needed_body_and_path
+from ..errors import ShapeError
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+
+# Of a table, where no times are given.
+_ROWS = 201
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fall:
+    """How the centre of mass moves: start + velocity t + gravity t^2 / 2, inertial axes [m], [m/s], [m/s^2]."""
+
+    start: Array
+    velocity: Array
+    gravity: Array
+
+    @classmethod
+    def of(cls, start: ArrayLike, velocity: ArrayLike, gravity: ArrayLike) -> Fall:
+        """What a user has given. Raises ShapeError."""
+        return cls(
+            start=finite_array(start, "start", (3,), unit="m"),
+            velocity=finite_array(velocity, "velocity", (3,), unit="m/s"),
+            gravity=finite_array(gravity, "gravity", (3,), unit="m/s^2"),
+        )
+
+    def centre(self, times: Array) -> Array:
+        """(N,) -> (N, 3) [m]."""
+        return self.start + times[:, None] * self.velocity + 0.5 * times[:, None] ** 2 * self.gravity
+
+    def speed(self, times: Array) -> Array:
+        """(N,) -> (N, 3) [m/s]."""
+        return self.velocity + times[:, None] * self.gravity
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WholeMotion:
+    """A floating body with joints at N times.
+
+    Attributes
+    ----------
+    body : whose joints these are
+    times : (N,) [s]
+    attitude : (N, 3, 3) base axes to inertial axes
+    configurations : (N, nq) of the body's own model of Pinocchio
+    velocities, accelerations : (N, nv) of it: linear and angular of the base, base axes, then the joints; and the
+        derivatives of these numbers
+    names : of all k joints, those that follow others included
+    joints, rates, slopes : (N, k) [rad or m], a second, a second squared
+    shapes, shape_rates : (N, n) of the independent joints
+    """
+
+    body: Body
+    times: Array
+    attitude: Array
+    configurations: Array
+    velocities: Array
+    accelerations: Array
+    names: tuple[str, ...]
+    joints: Array
+    rates: Array
+    slopes: Array
+    shapes: Array
+    shape_rates: Array
+
+    @property
+    def position(self) -> Array:
+        """(N, 3) of the base origin, inertial axes [m]."""
+        return self.configurations[:, :3]
+
+    @property
+    def quat_xyzw(self) -> Array:
+        """(N, 4) the attitude, without a change of sign from one time to the next."""
+        return self.configurations[:, 3:7]
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(N, 3) of the base, base axes [rad/s]."""
+        return self.velocities[:, 3:6]
+
+    @property
+    def world_velocity(self) -> Array:
+        """(N, 3) of the base origin, inertial axes [m/s]."""
+        return so3.apply(self.attitude, self.velocities[:, :3])
+
+
+def checked_times(motion: Motion | ForcedMotion, times: ArrayLike | None) -> Array:
+    """The times of a table of one motion: (N,) [s]; None: 201 even ones. Raises ShapeError, TrajectoryError."""
+    if not isinstance(motion, ForcedMotion):
+        check_object(motion, "Motion", "motion")
+    if motion.batch:
+        raise ShapeError(f"one motion can be exported, this is a batch of {motion.batch}; reconstruct one of them")
+    given = (
+        np.linspace(0.0, motion.duration, _ROWS) if times is None else finite_array(times, "times", (None,), unit="s")
+    )
+    if given.ndim != 1:
+        raise ShapeError(f"times: (N,) in one row are needed, got shape {given.shape}")
+    return times_argument(given, motion.duration)
+
+
+def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> WholeMotion:
+    """Base and joints at (N,) times, in whatever gauge the motion is: seen from the base of its body.
+
+    Raises
+    ------
+    WrongObjectError
+        If the body has no joints along a path.
+    """
+    body, path = needed_body_and_path(motion, "this export needs")
+    moving = moving_body(motion, body, path, times)
+    shapes, rates, spins = moving.shapes, moving.rates, moving.spins[0]
+    configurations, velocities, accelerations = floating_states(
+        body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0]
+    )
+    attitude = base_attitude(motion, times)
+    backwards = so3.transpose(attitude)
+    speed = so3.apply(backwards, fall.speed(times))
+    configurations[:, :3] = fall.centre(times) - so3.apply(attitude, body.centre_of_mass(shapes))
+    configurations[:, 3:7] = continued_quaternions(attitude)
+    velocities[:, :3] += speed
+    accelerations[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
+    follows = body.chain.follows
+    joints, joint_rates = follows.with_rates(shapes, rates)
+    slopes = follows.with_rates(shapes, moving.accelerations)[1]
+    if not follows.is_linear:
+        slopes = slopes + (follows.slope_rates(shapes, rates) @ rates[..., None])[..., 0]
+    return WholeMotion(
+        body=body,
+        times=times,
+        attitude=attitude,
+        configurations=configurations,
+        velocities=velocities,
+        accelerations=accelerations,
+        names=follows.names,
+        joints=joints,
+        rates=joint_rates,
+        slopes=slopes,
+        shapes=shapes,
+        shape_rates=rates,
+    )
+
+
+def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
+    """Of the base of the body, in whatever gauge the motion is: (N,) -> (N, 3, 3)."""
+    turned = motion.attitude(times)
+    return turned if body_and_path(motion) is None else turned @ motion.deformation.frame(times)
+
+
+def continued_quaternions(attitudes: Array) -> Array:
+    """Quaternions x y z w of attitudes that follow each other, of one sign throughout: (N, 3, 3) -> (N, 4)."""
+    quaternions = so3.quat_from_matrix(attitudes)
+    flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
+    quaternions[1:] *= np.cumprod(flips)[:, None]
+    return quaternions

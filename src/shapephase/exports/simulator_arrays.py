@@ -1,0 +1,217 @@
+"""The whole floating motion as the vectors of simulators: MuJoCo's `qpos` and `qvel`, Pinocchio's `q`, `v` and `a`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Array, lock_arrays
+from ..display import short_repr
+from ..errors import UnknownNameError
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ._whole_motion import Fall, WholeMotion, checked_times, whole_motion
+
+# Numbers of a free joint among the configurations, and among the velocities.
+_FREE_Q = 7
+_FREE_V = 6
+# Entries w, x, y, z of a quaternion x y z w.
+_SCALAR_FIRST = [3, 0, 1, 2]
+# MuJoCo's number of a free joint among the kinds of joints.
+_MUJOCO_FREE = 0
+_MOST_NAMED = 8
+_ORIGIN = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MujocoArrays:
+    """A motion as MuJoCo has it.
+
+    Attributes
+    ----------
+    time : (N,) [s]
+    qpos : (N, nq) position of the base, its quaternion w x y z, the joints [m], [rad or m]
+    qvel : (N, nv) velocity of the base origin in inertial axes, angular velocity in base axes, rates of the joints
+    joint_names : of all joints, in the order of the columns
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+    >>> found = sp.exports.mujoco_arrays(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]))
+    >>> found.qpos.shape, found.qvel.shape, found.joint_names
+    ((201, 10), (201, 9), ('waist_pitch', 'waist_yaw', 'waist_roll'))
+    """
+
+    time: Array
+    qpos: Array
+    qvel: Array
+    joint_names: tuple[str, ...]
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PinocchioArrays:
+    """A motion as Pinocchio has it, of a model whose base is a free-flyer.
+
+    Attributes
+    ----------
+    time : (N,) [s]
+    q : (N, nq) position of the base, its quaternion x y z w, the joints; one without end as its cosine and sine
+    v : (N, nv) linear and angular velocity of the base in base axes, rates of the joints
+    a : (N, nv) the derivatives of these numbers; where a path's acceleration jumps, those that follow
+    joint_names : of all joints, in the order of the columns
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+    >>> found = sp.exports.pinocchio_arrays(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), [0.0, 0.5])
+    >>> found.q.shape, found.v.shape, found.a.shape
+    ((2, 10), (2, 9), (2, 9))
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    joint_names: tuple[str, ...]
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+
+def mujoco_arrays(
+    motion: Motion | ForcedMotion,
+    times: ArrayLike | None = None,
+    *,
+    model: Any = None,
+    start: ArrayLike = _ORIGIN,
+    velocity: ArrayLike = _ORIGIN,
+    gravity: ArrayLike = _ORIGIN,
+) -> MujocoArrays:
+    """The motion as MuJoCo's `qpos` and `qvel`.
+
+    Parameters
+    ----------
+    motion : of an articulated body, in any gauge
+    times : (N,) [s]; None: 201 even times
+    model : a `mujoco.MjModel` with one free joint, in whose order the joints are put by their names; None: all joints
+        in the body's order, behind the free joint
+    start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        If the motion is a batch, for times outside of it.
+    WrongObjectError
+        If the body has no joints along a path.
+    UnknownNameError
+        If the model has no free joint, or lacks joints of the body, or has others.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> found = sp.exports.mujoco_arrays(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), [0.0])
+    >>> print(found.qpos[0, 3:7])  # the identity, w first
+    [1. 0. 0. 0.]
+    """
+    whole = whole_motion(motion, checked_times(motion, times), Fall.of(start, velocity, gravity))
+    quaternions = whole.quat_xyzw[:, _SCALAR_FIRST]
+    base = np.hstack([whole.position, quaternions]), np.hstack([whole.world_velocity, whole.angular_velocity])
+    if model is None:
+        qpos, qvel = np.hstack([base[0], whole.joints]), np.hstack([base[1], whole.rates])
+        return MujocoArrays(time=whole.times, qpos=qpos, qvel=qvel, joint_names=whole.names)
+    free = [k for k in range(model.njnt) if model.jnt_type[k] == _MUJOCO_FREE]
+    names = [model.joint(k).name for k in range(model.njnt) if k not in free]
+    order = _order(whole, names, "MuJoCo", len(free))
+    places = [k for k in range(model.njnt) if k not in free]
+    qpos, qvel = np.tile(model.qpos0, (len(whole.times), 1)), np.zeros((len(whole.times), model.nv))
+    _fill(qpos, base[0], int(model.jnt_qposadr[free[0]]))
+    _fill(qvel, base[1], int(model.jnt_dofadr[free[0]]))
+    qpos[:, model.jnt_qposadr[places]] = whole.joints[:, order]
+    qvel[:, model.jnt_dofadr[places]] = whole.rates[:, order]
+    return MujocoArrays(time=whole.times, qpos=qpos, qvel=qvel, joint_names=tuple(names))
+
+
+def pinocchio_arrays(
+    motion: Motion | ForcedMotion,
+    times: ArrayLike | None = None,
+    *,
+    model: Any = None,
+    start: ArrayLike = _ORIGIN,
+    velocity: ArrayLike = _ORIGIN,
+    gravity: ArrayLike = _ORIGIN,
+) -> PinocchioArrays:
+    """The motion as Pinocchio's `q`, `v` and `a`, as Crocoddyl has them.
+
+    Parameters
+    ----------
+    motion : of an articulated body, in any gauge
+    times : (N,) [s]; None: 201 even times
+    model : a `pinocchio.Model` whose first joint is a free-flyer, in whose order the joints are put by their names;
+        None: all joints in the body's order
+    start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        If the motion is a batch, for times outside of it.
+    WrongObjectError
+        If the body has no joints along a path.
+    UnknownNameError
+        If the model has no free-flyer, or lacks joints of the body, or has others.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> found = sp.exports.pinocchio_arrays(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), [0.0])
+    >>> print(found.q[0, 3:7])  # the identity, w last
+    [0. 0. 0. 1.]
+    """
+    whole = whole_motion(motion, checked_times(motion, times), Fall.of(start, velocity, gravity))
+    if model is None:
+        return PinocchioArrays(
+            time=whole.times,
+            q=whole.configurations,
+            v=whole.velocities,
+            a=whole.accelerations,
+            joint_names=whole.names,
+        )
+    kinds = list(model.joints)
+    free = len(kinds) > 1 and (kinds[1].nq, kinds[1].nv) == (_FREE_Q, _FREE_V)
+    names = list(model.names)[2:]
+    order = _order(whole, names, "Pinocchio", int(free))
+    count = len(whole.times)
+    q, v, a = np.zeros((count, model.nq)), np.zeros((count, model.nv)), np.zeros((count, model.nv))
+    _fill(q, whole.configurations[:, :_FREE_Q], kinds[1].idx_q)
+    _fill(v, whole.velocities[:, :_FREE_V], kinds[1].idx_v)
+    _fill(a, whole.accelerations[:, :_FREE_V], kinds[1].idx_v)
+    for place, kind in zip(order, kinds[2:], strict=True):
+        column = whole.joints[:, [place]]
+        _fill(q, np.hstack([np.cos(column), np.sin(column)]) if kind.nq == 2 else column, kind.idx_q)
+        _fill(v, whole.rates[:, [place]], kind.idx_v)
+        _fill(a, whole.slopes[:, [place]], kind.idx_v)
+    return PinocchioArrays(time=whole.times, q=q, v=v, a=a, joint_names=tuple(names))
+
+
+def _fill(array: Array, columns: Array, first: int) -> None:
+    array[:, first : first + columns.shape[1]] = columns
+
+
+def _order(whole: WholeMotion, names: list[str], program: str, free: int) -> list[int]:
+    """Where each joint of a model stands among those of the body. Raises UnknownNameError."""
+    if free != 1:
+        raise UnknownNameError(f"model: a model of {program} with one free joint, the base, is needed; it has {free}")
+    for given, others, said in (
+        (whole.names, names, f"the model of {program} lacks joints of {whole.body.name}"),
+        (names, whole.names, f"the model of {program} has joints that {whole.body.name} has not"),
+    ):
+        lacking = [name for name in given if name not in others]
+        if lacking:
+            more = f" and {len(lacking) - _MOST_NAMED} more" if len(lacking) > _MOST_NAMED else ""
+            raise UnknownNameError(f"model: {said}: {', '.join(lacking[:_MOST_NAMED])}{more}")
+    return [whole.names.index(name) for name in names]

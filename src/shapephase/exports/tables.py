@@ -1,0 +1,268 @@
+"""A motion as a data set of xarray, and in files of tables and arrays: CSV, Parquet, NetCDF, MATLAB, HDF5."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_file_name
+from ..arrays import Array
+from ..dynamics.moving_body import body_and_path
+from ..errors import MissingExtraError, unknown_name
+from ..files import write_whole
+from ..provenance import provenance
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ._whole_motion import Fall, WholeMotion, checked_times, continued_quaternions, whole_motion
+
+_ORIGIN = (0.0, 0.0, 0.0)
+_AXES = ("x", "y", "z")
+_QUATERNION = ("qx", "qy", "qz", "qw")
+_MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
+# Bytes of text that a MATLAB file begins with.
+_MATLAB_TEXT = 116
+_DATA_SET = "a data set needs xarray; install it with: pip install 'shapephase[study]'"
+
+
+class _Samples(dict[str, tuple[Array, str, str]]):
+    """Arrays by name, each with the dimension of its columns ("" for none) and its unit."""
+
+    joint_names: tuple[str, ...]
+    joint_units: tuple[str, ...]
+    attributes: dict[str, Any]
+
+
+def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None, **fall: ArrayLike) -> Any:
+    """One motion as an `xarray.Dataset` along time: base, joints, their rates; `motion.to_xarray()`.
+
+    Variables have their units as attributes. `base_quat_xyzw` (time, quaternion), `base_position` and, where the body
+    has joints along a path, `base_velocity` (time, axis) are in inertial axes, `angular_velocity` (time, axis) in base
+    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints.
+
+    Parameters
+    ----------
+    motion : a single one
+    times : (N,) [s]; None: 201 even times
+    fall : start, velocity, gravity as in `Motion.base_position`
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        If the motion is a batch, for times outside of it.
+    MissingExtraError
+        Without xarray.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> found = sp.exports.motion_dataset(motion, [0.0, 1.0])
+    >>> print(found.angular_velocity.sel(axis="z").values.round(9), found.angular_velocity.units)
+    [2. 2.] rad/s
+    """
+    try:
+        import xarray
+    except ImportError:
+        raise MissingExtraError(_DATA_SET) from None
+    samples = _samples(motion, times, fall)
+    labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
+    variables = {
+        name: (("time", dimension), values, {"units": unit} if unit else {})
+        for name, (values, dimension, unit) in samples.items()
+        if dimension
+    }
+    coordinates: dict[str, Any] = {"time": ("time", samples["time"][0], {"units": "s"})}
+    coordinates |= {
+        name: list(entries) for name, entries in labels.items() if any(name == one[0][1] for one in variables.values())
+    }
+    if "joint" in coordinates:
+        coordinates["joint_unit"] = ("joint", list(samples.joint_units))
+    return xarray.Dataset(variables, coordinates, samples.attributes)
+
+
+def export_motion(
+    motion: Motion | ForcedMotion, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike
+) -> None:
+    """Write samples of one motion, base and joints, to a file whose ending says the format.
+
+    - `.csv`, `.parquet`: one row a sample; labels of joints say their units, in Parquet as metadata `unit`.
+    - `.nc`: the data set of `Motion.to_xarray` as NetCDF.
+    - `.mat`, `.h5`: the same as arrays by their names, with `joint_names`.
+
+    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. For the whole motion, to be asked at any
+    time, there is `Motion.save`.
+
+    Parameters
+    ----------
+    motion : a single one
+    times : (N,) [s]; None: 201 even times
+    fall : start, velocity, gravity as in `Motion.base_position`
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        If the motion is a batch, for times outside of it.
+    UnknownNameError
+        For another ending.
+    MissingExtraError
+        Without xarray, pyarrow or h5py, for the formats that need them.
+    OutputFileError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> sp.export_motion(motion, "turn.csv", np.linspace(0.0, 1.0, 101))
+    >>> print(sp.read_recorded_motion("turn.csv", cat).base_attitude.shape)
+    (101, 3, 3)
+    """
+    check_file_name(path, "path")
+    where = Path(path)
+    if where.suffix.lower() not in ENDINGS:
+        raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
+    content = _WRITERS[where.suffix.lower()](motion, times, fall)
+    write_whole(where, lambda stream: stream.write(content))
+
+
+def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
+    at = checked_times(motion, times)
+    falling = Fall.of(**({"start": _ORIGIN, "velocity": _ORIGIN, "gravity": _ORIGIN} | fall))
+    whole = None if body_and_path(motion) is None else whole_motion(motion, at, falling)
+    found = _Samples() if whole is None else _of_joints(whole)
+    attitude = motion.attitude(at) if whole is None else whole.attitude
+    found["time"] = at, "", "s"
+    if whole is None:
+        centre = so3.apply(attitude, motion.deformation.centre_of_mass(at))
+        found["base_quat_xyzw"] = continued_quaternions(attitude), "quaternion", ""
+        found["angular_velocity"] = motion.angular_velocity(at), "axis", "rad/s"
+        found["base_position"] = falling.centre(at) - centre, "axis", "m"
+        found.joint_names, found.joint_units = (), ()
+    momentum = motion.momentum(at) if isinstance(motion, ForcedMotion) else motion.momentum
+    found.attributes = {
+        "momentum": np.asarray(momentum).reshape(-1, 3)[0].tolist(),
+        "momentum_units": "kg m^2/s",
+        "provenance": json.dumps(provenance(motion.deformation.made_from)),
+    }
+    if isinstance(motion, Motion):
+        found.attributes["error_estimate"] = float(motion.error_estimate)
+        found.attributes["error_estimate_units"] = "rad"
+    return found
+
+
+def _of_joints(whole: WholeMotion) -> _Samples:
+    found = _Samples()
+    found.joint_names, found.joint_units = whole.body.joint_names, whole.body.joint_units
+    found["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
+    found["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
+    found["base_position"] = whole.position, "axis", "m"
+    found["base_velocity"] = whole.world_velocity, "axis", "m/s"
+    found["shapes"] = whole.shapes, "joint", "rad" if set(found.joint_units) == {"rad"} else ""
+    found["shape_rates"] = whole.shape_rates, "joint", "rad/s" if set(found.joint_units) == {"rad"} else ""
+    return found
+
+
+def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
+    """Columns of a table by their names, with their units."""
+    labels = {
+        "base_quat_xyzw": _QUATERNION,
+        "angular_velocity": [f"omega_{axis}_rad_s" for axis in _AXES],
+        "base_position": [f"base_{axis}_m" for axis in _AXES],
+        "base_velocity": [f"base_v{axis}_m_s" for axis in _AXES],
+        "shapes": samples.joint_names,
+    }
+    units = {"shapes": samples.joint_units}
+    found: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}
+    for name, columns in labels.items():
+        if name in samples:
+            values, _, unit = samples[name]
+            each = units.get(name, (unit,) * len(columns))
+            found |= {
+                label: (np.ascontiguousarray(column), one)
+                for label, column, one in zip(columns, values.T, each, strict=True)
+            }
+    return found
+
+
+def _csv(motion: Any, times: Any, fall: Any) -> bytes:
+    samples = _samples(motion, times, fall)
+    columns, text = _columns(samples), io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    bracketed = {"time", *samples.joint_names}
+    writer.writerow([f"{label} [{unit}]" if label in bracketed else label for label, (_, unit) in columns.items()])
+    writer.writerows(np.column_stack([values for values, _ in columns.values()]).tolist())
+    return text.getvalue().encode()
+
+
+def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        raise MissingExtraError("Parquet files need pyarrow; install it with: pip install 'shapephase[data]'") from None
+    samples = _samples(motion, times, fall)
+    columns = _columns(samples)
+    fields = [
+        pyarrow.field(label, pyarrow.float64(), metadata={"unit": unit} if unit else None)
+        for label, (_, unit) in columns.items()
+    ]
+    about = {name: json.dumps(value) for name, value in samples.attributes.items()}
+    schema = pyarrow.schema(fields, metadata=about)
+    stream = io.BytesIO()
+    parquet.write_table(pyarrow.table([pyarrow.array(v) for v, _ in columns.values()], schema=schema), stream)
+    return stream.getvalue()
+
+
+def _netcdf(motion: Any, times: Any, fall: Any) -> bytes:
+    return bytes(motion_dataset(motion, times, **fall).to_netcdf(engine="scipy"))
+
+
+def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
+    from scipy.io import savemat
+
+    samples, stream = _samples(motion, times, fall), io.BytesIO()
+    arrays: dict[str, Any] = {name: values for name, (values, _, _) in samples.items()}
+    if samples.joint_names:
+        arrays["joint_names"] = np.array(samples.joint_names, dtype=object)
+        arrays["joint_units"] = np.array(samples.joint_units, dtype=object)
+    savemat(stream, arrays | samples.attributes, oned_as="column", do_compression=True)
+    # The text at the start has the time of the day, by which two files of the same motion would differ.
+    return _MATLAB.ljust(_MATLAB_TEXT).encode() + stream.getvalue()[_MATLAB_TEXT:]
+
+
+def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtraError("HDF5 files need h5py; install it with: pip install 'shapephase[data]'") from None
+    samples, stream = _samples(motion, times, fall), io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, (values, _, unit) in samples.items():
+            file[name] = values
+            if unit:
+                file[name].attrs["units"] = unit
+        if samples.joint_names:
+            file["joint_names"] = list(samples.joint_names)
+            file["joint_units"] = list(samples.joint_units)
+        for name, value in samples.attributes.items():
+            file.attrs[name] = value
+    return stream.getvalue()
+
+
+_WRITERS: dict[str, Callable[[Any, Any, Any], bytes]] = {
+    ".csv": _csv,
+    ".parquet": _parquet,
+    ".nc": _netcdf,
+    ".mat": _matlab,
+    ".h5": _hdf5,
+}
+ENDINGS = tuple(_WRITERS)
+"""Of the files that `export_motion` writes."""
