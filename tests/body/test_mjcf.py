@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import warnings
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -16,7 +17,14 @@ from shapephase import child_process
 from shapephase.body.engines import engine_tree as asking
 from shapephase.body.engines.formats import MJCF, format_of
 from shapephase.body.engines.reading import MISSING
-from shapephase.errors import MissingExtraError, ModelFileError, ShapeError, ShapePhaseError, UnknownNameError
+from shapephase.errors import (
+    IgnoredElementWarning,
+    MissingExtraError,
+    ModelFileError,
+    ShapeError,
+    ShapePhaseError,
+    UnknownNameError,
+)
 from support.damaged_files import mutated
 from support.floating_mujoco import FloatingMujoco
 from support.hostile_files import GOOD_MJCF
@@ -411,6 +419,40 @@ def test_a_coupled_floating_motion_is_mujoco_s(load_mjcf, tmp_path):
     )
     body = load_mjcf(text)
     loop = random_loop(7, body.n_shape, duration=1.0, harmonics=1)
+    momentum = random_vector(7, np.trace(body.locked_inertia(body.shape())) / 3.0)
+    times = np.linspace(0.0, 1.0, 6)
+    expected = simulated_motion(FloatingMujoco(tmp_path / "body.xml"), loop, momentum, None, times).attitude
+    motion = sp.reconstruct(sp.articulated(body, loop.path), momentum, tolerance=1e-11)
+    np.testing.assert_allclose(motion.attitude(times), expected, rtol=0, atol=1e-9)
+
+
+BALL = mjcf('<joint name="k" axis="1 2 3" pos="0 0.1 0"/><joint name="j" type="ball" pos="0.1 0 0.05"/>' + INERTIAL)
+
+
+def test_a_ball_joint_is_mujoco_s(load_mjcf, tmp_path):
+    """Beside a hinge of the same body, about another place; its range is told and ignored."""
+    body = load_mjcf(BALL)
+    assert body.joint_names == ("k", "j.x", "j.y", "j.z", "j.w")
+    same = FloatingMujoco(tmp_path / "body.xml")
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        shape, rate = random.normal(size=(2, 5))
+        same.place(np.zeros(3), np.eye(3), shape)
+        same.move(np.zeros(3), np.zeros(3), rate)
+        centre, inertia = body.centre_of_mass(shape), body.locked_inertia(shape)
+        np.testing.assert_allclose(centre, same.centre_of_mass(), rtol=0, atol=1e-13)
+        np.testing.assert_allclose(inertia, same.locked_inertia(), rtol=0, atol=1e-13)
+        momentum = body.internal_momentum(shape, rate)
+        np.testing.assert_allclose(momentum, same.momentum_about_centre(), rtol=0, atol=1e-12 * np.abs(rate).sum())
+    with pytest.warns(IgnoredElementWarning, match="joint 'j': the range of a ball joint is ignored"):
+        load_mjcf(BALL.replace('type="ball"', 'type="ball" range="0 30"'))
+
+
+def test_a_floating_motion_with_a_ball_joint_is_mujoco_s(load_mjcf, tmp_path):
+    """As above; the ball goes round its whole group, its four numbers along a Fourier series of any length."""
+    body = load_mjcf(BALL)
+    loop = random_loop(7, body.n_shape, duration=1.0, harmonics=1)
+    loop = replace(loop, mean=loop.mean + np.eye(5)[4])
     momentum = random_vector(7, np.trace(body.locked_inertia(body.shape())) / 3.0)
     times = np.linspace(0.0, 1.0, 6)
     expected = simulated_motion(FloatingMujoco(tmp_path / "body.xml"), loop, momentum, None, times).attitude

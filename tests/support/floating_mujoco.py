@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from shapephase.arrays import Array
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 _COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
 _NEXT_TO_NOTHING = 2e-15
 """[kg], and [kg m^2]; MuJoCo's least is 1e-15."""
@@ -26,9 +27,12 @@ _OFF = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT) | int(mujoco.mjtDisableBit.mj
 class FloatingMujoco:
     """The model of a file of which one body floats; vectors are (base velocity, world; base rate, base axes; joints).
 
+    Of a ball joint shapes have four numbers x, y, z, w, a quaternion of any length, and rates their derivatives.
+
     Attributes
     ----------
     joints : numbers of those that the body moves and that follow no other, in MuJoCo's order
+    width : how many numbers a shape has
     """
 
     def __init__(self, path: Path, root_body: str | None = None) -> None:
@@ -70,17 +74,24 @@ class FloatingMujoco:
         self._rules = {int(model.eq_obj1id[k]): k for k in coupled}
         self._moving = [joint for joint in moving if joint != free]
         self.joints = [joint for joint in self._moving if joint not in self._rules]
+        self.width = sum(4 if int(model.jnt_type[joint]) == _BALL else 1 for joint in self.joints)
 
     def _hangs(self, body: int) -> bool:
         while body not in (0, self.base):
             body = int(self.model.body_parentid[body])
         return body == self.base
 
-    def _spread(self, shape: Array, rate: Array, bend: Array) -> dict[int, tuple[float, float, float]]:
+    def _spread(self, shape: Array, rate: Array, bend: Array) -> dict[int, tuple[Any, Any, Any]]:
         """Coordinate, rate and acceleration of every joint, those that follow others by their polynomials."""
-        known = {joint: tuple(each) for joint, each in zip(self.joints, np.stack([shape, rate, bend], -1), strict=True)}
+        known: dict[int, tuple[Any, Any, Any]] = {}
+        numbers = np.stack([shape, rate, bend], -1)
+        assert len(numbers) == self.width
+        for joint in self.joints:
+            ball = int(self.model.jnt_type[joint]) == _BALL
+            known[joint] = _ball(*numbers[:4].T) if ball else tuple(numbers[0])
+            numbers = numbers[4 if ball else 1 :]
 
-        def of(joint: int) -> tuple[float, float, float]:
+        def of(joint: int) -> tuple[Any, Any, Any]:
             if joint not in known:
                 rule, model = self._rules[joint], self.model
                 leader = int(model.eq_obj2id[rule])
@@ -103,9 +114,10 @@ class FloatingMujoco:
         qpos[place + 3] = quat_xyzw[3]
         qpos[place + 4 : place + 7] = quat_xyzw[:3]
         self._shape = np.asarray(shape, dtype=float)
-        none = np.zeros(len(self.joints))
+        none = np.zeros(self.width)
         for joint, (q, _, _) in self._spread(self._shape, none, none).items():
-            qpos[self.model.jnt_qposadr[joint]] = q
+            first = int(self.model.jnt_qposadr[joint])
+            qpos[first : first + np.size(q)] = q
         mujoco.mj_fwdPosition(self.model, self.data)
 
     def place(self, position: Array, attitude: Array, shape: Array) -> None:
@@ -114,7 +126,7 @@ class FloatingMujoco:
     def move(self, velocity: Array, omega: Array, rate: Array) -> None:
         """Set the velocity and compute all that depends on it."""
         self._rate = np.asarray(rate, dtype=float)
-        self.data.qvel[:] = self._vector(velocity, omega, self._rate, np.zeros(len(self.joints)), 1)
+        self.data.qvel[:] = self._vector(velocity, omega, self._rate, np.zeros(self.width), 1)
         mujoco.mj_fwdVelocity(self.model, self.data)
 
     def _vector(self, linear: Any, angular: Any, rate: Array, bend: Array, part: int) -> Array:
@@ -122,7 +134,8 @@ class FloatingMujoco:
         vector[self._first : self._first + 3] = linear
         vector[self._first + 3 : self._first + 6] = angular
         for joint, values in self._spread(self._shape, rate, bend).items():
-            vector[self.model.jnt_dofadr[joint]] = values[part]
+            first = int(self.model.jnt_dofadr[joint])
+            vector[first : first + np.size(values[part])] = values[part]
         return vector
 
     def _momenta(self, vector: Array) -> Array:
@@ -136,7 +149,7 @@ class FloatingMujoco:
 
     def carried(self, rate: Array) -> Array:
         """The base's momenta (6,) that the joints' rates carry."""
-        return self._momenta(self._vector(0.0, 0.0, np.asarray(rate), np.zeros(len(self.joints)), 1))
+        return self._momenta(self._vector(0.0, 0.0, np.asarray(rate), np.zeros(self.width), 1))
 
     def base_force(self, bend: Array) -> Array:
         """What would keep the base from accelerating while the joints do (6,)."""
@@ -175,6 +188,19 @@ class FloatingMujoco:
         model = self.model
         lengths = [np.linalg.norm(each, axis=1) for each in (model.body_quat, model.body_iquat, model.jnt_axis)]
         return float(np.abs(np.concatenate(lengths) - 1.0).max())
+
+
+def _ball(numbers: Array, slopes: Array, bends: Array) -> tuple[Array, Array, Array]:
+    """Quaternion w, x, y, z of length one, rate in axes of the child and its derivative, by MuJoCo's own product."""
+    square, stretch = numbers @ numbers, 2.0 * (numbers @ slopes) / (numbers @ numbers)
+
+    def turned_back(four: Array) -> Array:
+        product, conjugate = np.zeros(4), np.roll(numbers * [-1.0, -1.0, -1.0, 1.0], 1)
+        mujoco.mju_mulQuat(product, conjugate, np.roll(four, 1))
+        return 2.0 * product[1:] / square
+
+    spin = turned_back(slopes)
+    return np.roll(numbers, 1) / np.sqrt(square), spin, turned_back(bends) - stretch * spin
 
 
 def _tree(written: Any) -> Any:

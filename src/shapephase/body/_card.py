@@ -20,7 +20,7 @@ _FEW = 4
 
 def body_card(self: Body) -> Card:
     """Name, mass, principal moments and joints, with its frames as sticks in the neutral shape."""
-    shape = np.zeros(self.n_shape)
+    shape = self.shape()
     moments = np.linalg.eigvalsh(self.locked_inertia(shape))
     named = ", ".join(self.joint_names[:_FEW]) + (", …" if self.n_shape > _FEW else "")
     rows = [
@@ -38,7 +38,7 @@ def _sticks(body: Body) -> tuple[Array, Array]:
     """From each frame to the joints that hang on it, and to the centre of mass of what moves with it."""
     chain = body.chain
     places, turns = [np.zeros(3)], [np.eye(3)]
-    neutral = chain.follows.coordinates(np.zeros((1, body.n_shape)))[0]
+    neutral = chain.follows.coordinates(body.shape()[None])[0]
     for k, parent in enumerate(chain.parents):
         at, turned = neutral[k], turns[parent] @ chain.turns[k]
         places.append(places[parent] + turns[parent] @ chain.places[k] + turned @ chain.slides[k] * at)

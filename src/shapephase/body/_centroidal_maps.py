@@ -53,7 +53,7 @@ def momentum_gradients(
         gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
     columns = joints.columns(gradients[:, :, _BASE:], shapes)
     if not joints.follows.is_linear:
-        columns += joints.bent_columns(full_map(model, data, joints, shapes)[:, :, 3:], shapes, rates)
+        columns += joints.bent_rates(full_map(model, data, joints, shapes)[:, :, 3:], shapes, rates)
     return columns
 
 

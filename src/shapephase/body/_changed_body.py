@@ -8,12 +8,13 @@ from collections.abc import Mapping
 from copy import copy
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pinocchio as pin
 
 from ..arrays import Array
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
-from ._model_tree import model_with
+from ._model_tree import model_with, moving_joints
 from .couplings.coupling import Coupling
 
 if TYPE_CHECKING:
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 def changed_body(body: Body, masses: Array, centres: Array, tensors: Array) -> Body:
     """A body with other inertias, of all frames of its chain and in their axes: (k + 1,), (k + 1, 3), (k + 1, 3, 3)."""
     changed = copy(body)
-    changed._model = model_with(body._model, masses, centres, tensors)
+    # The first two frames of a ball joint are none of the model's.
+    between = [frame for ball in body.chain.follows.balls for frame in (ball.row + 1, ball.row + 2)]
+    changed._model = model_with(body._model, *(np.delete(one, between, axis=0) for one in (masses, centres, tensors)))
     changed.mass = float(pin.computeTotalMass(changed._model))
     changed.chain = body.chain.with_inertias(masses, centres, tensors)
     # It is no longer what the file says.
@@ -38,8 +41,9 @@ def coupled_body(body: Body, couplings: Mapping[str, Coupling]) -> Body:
             "couplings by joint are needed, such as {'knee': Coupling.linear('hip', 0.5)}, got " + what_came(couplings)
         )
     for name, coupling in couplings.items():
-        if name not in body.chain.names:
-            raise unknown_name(f"joint of {body.name}", name, body.chain.names)
+        joints = tuple(moving_joints(body._model))
+        if name not in joints:
+            raise unknown_name(f"joint of {body.name}", name, joints)
         if not isinstance(coupling, Coupling):
             raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
     changed = type(body)(body._model, body.name, {**body.couplings, **couplings})

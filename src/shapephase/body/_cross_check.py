@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
 from ._link_tree import LinkTree
 from .body import Body
+from .couplings.ball_joints import coordinate_names
 
 _TOLERANCE = 1e-12
 """Difference allowed between body and file, a share of the largest terms of the sums: thousands of roundings."""
@@ -31,9 +33,10 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
         first = next(iter(tree.links.values()))
         raise ModelFileError(f"{first.where}: link {first.name!r}: neither it nor any other link has mass")
     expected = {name for name in tree.links if name not in tree.frames}
-    moving = {joint.name for joint in tree.joints if joint.kind != "fixed"}
+    moving = [joint for joint in tree.joints if joint.kind != "fixed" and joint.name not in tree.couplings]
     _compare_names(set(body.link_names), expected, "links", where)
-    _compare_names(set(body.joint_names), moving - set(tree.couplings), "joints", where)
+    names = (coordinate_names(joint.name) if joint.kind == "ball" else [joint.name] for joint in moving)
+    _compare_names(set(body.joint_names), {name for each in names for name in each}, "joints", where)
     mass = sum(link.mass for link in tree.links.values())
     if abs(body.mass - mass) > _TOLERANCE * mass:
         raise _differs(where, "mass", f"{body.mass!r} kg", f"{mass!r} kg")
@@ -78,7 +81,13 @@ def inertia_and_momentum(
     axes, places, afters = (each.reshape(-1, 3) for each in stacked[:3])
     axes = axes / np.sqrt((axes**2).sum(axis=-1, keepdims=True))
     turns = stacked[3].reshape(-1, 3, 3)
-    moved = turns @ _about(axes, np.where(sliding, 0.0, angles))
+    own = _about(axes, np.where(sliding, 0.0, angles))
+    # How the child turns or slides, in the joint's axes.
+    motions = axes * rates[:, None]
+    for number, joint in enumerate(tree.joints):
+        if joint.kind == "ball":
+            own[number], motions[number] = _ball_motion(*_four_numbers(joint.name, shape, rate))
+    moved = turns @ own
     slides = places + (turns @ (axes * np.where(sliding, angles, 0.0)[:, None])[..., None])[..., 0]
     slides += (moved @ afters[..., None])[..., 0]
     pose_turn, pose_place = np.zeros((len(names), 3, 3)), np.zeros((len(names), 3))
@@ -87,7 +96,7 @@ def inertia_and_momentum(
         pose_turn[child] = pose_turn[parent] @ moved[number]
         pose_place[child] = pose_place[parent] + pose_turn[parent] @ slides[number]
     # How each link moves: omega, and the velocity of its origin.
-    directions = (pose_turn[parents] @ (turns @ axes[..., None]))[..., 0] * rates[:, None]
+    directions = (pose_turn[parents] @ (turns @ motions[..., None]))[..., 0]
     omega, velocity = np.zeros((len(names), 3)), np.zeros((len(names), 3))
     for number, (parent, child) in enumerate(zip(parents, children, strict=True)):
         omega[child] = omega[parent] + (0.0 if sliding[number] else directions[number])
@@ -105,7 +114,7 @@ def inertia_and_momentum(
     distances = np.sqrt((centres**2).sum(axis=-1))
     extent = float(masses @ distances**2 + np.abs(tensors).sum())
     motion = float(distances.max() * (masses @ np.sqrt((speeds**2).sum(axis=-1))))
-    motion += extent * float(np.abs(rates).max(initial=0.0))
+    motion += extent * float(np.abs(motions).max(initial=0.0))
     centres = centres - masses @ centres / masses.sum()
     speeds = speeds - masses @ speeds / masses.sum()
     squares = (centres**2).sum(axis=-1)[:, None, None] * np.eye(3) - centres[:, :, None] * centres[:, None, :]
@@ -130,6 +139,26 @@ def _coordinates(tree: LinkTree, shape: dict[str, float], rate: dict[str, float]
         find(joint.name)
     names = [joint.name for joint in tree.joints]
     return [where.get(name, 0.0) for name in names], [speed.get(name, 0.0) for name in names]
+
+
+def _four_numbers(name: str, shape: dict[str, float], rate: dict[str, float]) -> Array:
+    """Of a ball joint, and their derivatives: (2, 4)."""
+    return np.array([[one[key] for key in coordinate_names(name)] for one in (shape, rate)])
+
+
+def _ball_motion(numbers: Array, derivatives: Array) -> tuple[Array, Array]:
+    """The turn of a ball joint and its angular velocity, axes of the parent: (4,), (4,) -> (3, 3), (3,).
+
+    R = (w^2 - v.v + 2 v v^T + 2 w v x)/|p|^2, and its rate times R^T.
+    """
+    (*vector, scalar), (*change, swing) = numbers, derivatives
+    v, dv, square = np.array(vector), np.array(change), float(numbers @ numbers)
+    whole = (scalar**2 - v @ v) * np.eye(3) + 2.0 * (np.outer(v, v) + scalar * so3.hat(v))
+    slope = 2.0 * (scalar * swing - v @ dv) * np.eye(3)
+    slope += 2.0 * (np.outer(dv, v) + np.outer(v, dv) + swing * so3.hat(v) + scalar * so3.hat(dv))
+    turn = whole / square
+    spin = (slope - 2.0 * float(numbers @ derivatives) * turn) @ turn.T / square
+    return turn, 0.5 * np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]])
 
 
 def _about(axes: Array, angles: Array) -> Array:

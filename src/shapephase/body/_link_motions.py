@@ -36,9 +36,10 @@ def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
     places, speeds, spins = np.zeros((3, count, frames, 3))
     turns[:, 0] = np.eye(3)
     # Of all joints at once, from the parent's axes to the child's.
-    turned = chain.turns @ so3.exp(all_coordinates[..., None] * chain.axes)
+    at_rest = chain.turns_at(shapes)
+    turned = at_rest @ so3.exp(all_coordinates[..., None] * chain.axes)
     for joints, parents in chain.generations:
-        before, spin = turns[:, parents] @ chain.turns[joints], spins[:, parents]
+        before, spin = turns[:, parents] @ at_rest[:, joints], spins[:, parents]
         coordinate, rate = all_coordinates[:, joints, None], all_rates[:, joints, None]
         slide = so3.apply(before, chain.slides[joints])
         step = so3.apply(turns[:, parents], chain.places[joints]) + slide * coordinate

@@ -63,11 +63,12 @@ class Joint:
 
     Attributes
     ----------
-    kind : "revolute", "continuous", "prismatic" or "fixed"
+    kind : "revolute", "continuous", "prismatic", "ball" or "fixed"
     place, turn : (3,) [m], (3, 3) the joint's axes in those of the parent
-    axis : (3,) in the joint's axes, of any length
+    axis : (3,) in the joint's axes, of any length; of a ball joint it means nothing
     after : (3,) the origin of the child in the joint's axes [m]
     limits : lower and upper [rad or m]
+    most : the largest effort and rate that a file states [N m or N], [rad/s or m/s]; zero: none
     """
 
     name: str
@@ -80,6 +81,7 @@ class Joint:
     axis: Array
     after: Array
     limits: tuple[float, float] = (-np.inf, np.inf)
+    most: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class LinkTree:
     couplings : of the joints that follow others, by name
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what the file says and is not taken up
-    text : the URDF that was checked, written anew; None for other formats
+    text : the URDF that was checked, written anew; None for other formats, and with ball joints
     base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
         it, as "zxy"; None where the file names none
     base_slides : names of three coordinates that move the root link along x, y and z; None where the file names none

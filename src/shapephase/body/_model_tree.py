@@ -14,10 +14,19 @@ from ._link_tree import Link, LinkTree, inertia_warnings
 
 # Name of the joint that lets the base move: no file is likely to have one of this name.
 _ROOT = "shapephase_free_flyer"
+BALL = "JointModelSpherical"
+"""Pinocchio's name of a ball joint: a unit quaternion, and the angular velocity in axes of the child."""
+# What stands for joints whose own coordinates would not do.
+_INSTEAD = {
+    "JointModelSphericalZYX": "its first and last axis can fall together; use the other",
+    "JointModelPlanar": "its slides turn with it; use two prismatic joints and a revolute one behind them",
+    "JointModelFreeFlyer": "only the base floats; use three prismatic joints and a ball joint behind them",
+    "JointModelTranslation": "use three prismatic joints in a row",
+}
 
 
 def model_of(tree: LinkTree, where: str) -> pin.Model:
-    """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF, else joint by joint.
+    """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF's text, else joint by joint.
 
     Raises
     ------
@@ -76,10 +85,10 @@ def moving_joints(model: pin.Model) -> dict[str, int]:
         joint = model.joints[number]
         kind = joint.shortname()
         single = joint.nv == 1 and (joint.nq == 1 or kind.startswith("JointModelRUB") or "Unbounded" in kind)
-        if not single or "Mimic" in kind:
+        if kind != BALL and (not single or "Mimic" in kind):
             raise ModelFileError(
                 f"joint {model.names[number]!r} is a {kind}; joints of one axis are supported (revolute, continuous, "
-                "prismatic): replace it by a chain of those"
+                f"prismatic), and ball joints ({BALL}): {_INSTEAD.get(kind, 'replace it by a chain of those')}"
             )
         moving[model.names[number]] = number
     return moving
@@ -97,7 +106,8 @@ def _built(tree: LinkTree, root: str) -> pin.Model:
         pose, after = pose * pin.SE3(joint.turn, joint.place), pin.SE3(np.eye(3), joint.after)
         if joint.kind != "fixed":
             axis = joint.axis / np.linalg.norm(joint.axis)
-            lower, upper, none = np.array([joint.limits[0]]), np.array([joint.limits[1]]), np.zeros(1)
+            lower, upper = np.reshape(joint.limits, (2, 1))
+            most = np.reshape(joint.most, (2, 1))
             sliding = joint.kind == "prismatic"
             moving = (pin.JointModelPrismaticUnaligned if sliding else pin.JointModelRevoluteUnaligned)(axis)
             if joint.kind == "continuous":
@@ -105,7 +115,9 @@ def _built(tree: LinkTree, root: str) -> pin.Model:
                 turned = pin.SE3(so3.between(np.array([1.0, 0.0, 0.0]), axis), np.zeros(3))
                 moving, pose, after = pin.JointModelRUBX(), pose * turned, turned.inverse() * after
                 lower, upper = -np.ones(2), np.ones(2)
-            number = model.addJoint(number, moving, pose, joint.name, none, none, lower, upper)
+            if joint.kind == "ball":
+                moving, lower, upper, most = pin.JointModelSpherical(), -np.ones(4), np.ones(4), np.zeros((2, 3))
+            number = model.addJoint(number, moving, pose, joint.name, most[0], most[1], lower, upper)
             pose = pin.SE3.Identity()
         hangs[joint.child] = number, pose * after
     for name, (number, pose) in hangs.items():

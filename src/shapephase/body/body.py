@@ -53,13 +53,20 @@ class Body:
     ----------
     name : str
     sha256, file : of the file it was loaded from, and where that was; None without a file
-    joint_names : tuple of the independent joints, in the order of the shape vector
-    n_shape : number of independent joints
+    joint_names : tuple of the independent joints, in the order of the shape vector; of a ball joint "shoulder" its
+        four numbers "shoulder.x", "shoulder.y", "shoulder.z" and "shoulder.w"
+    n_shape : number of their coordinates
+    rate_names : of the rates of the independent joints, in the same order; of a ball joint "shoulder" the components
+        "shoulder.wx", "shoulder.wy", "shoulder.wz" of its angular velocity in axes of the link that it moves
+    n_rates, rate_units, rate_columns : number of those, "rad" or "m" for each, and the coordinate of each; of a ball
+        joint its first
+    ball_joints : names of the ball joints
     mass : [kg]
     joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
     rate_limits : (n,) the largest rates that the file states [rad/s or m/s], infinite where it states none, or zero
     effort_limits : (n,) the same of the torques or forces of their motors [N m or N]
-    joint_units : "rad" or "m" for each joint
+    joint_units : "rad" or "m" for each joint, "1" for the four numbers of a ball joint, which may have any length: the
+        joint's turn is that of the quaternion of length one
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     chain : its links and joints as plain numbers
     couplings : by the name of each joint that follows others, how it does
@@ -95,6 +102,31 @@ class Body:
         return len(self.joint_names)
 
     @property
+    def ball_joints(self) -> tuple[str, ...]:
+        """The names of the ball joints."""
+        return tuple(ball.name for ball in self.chain.follows.balls)
+
+    @property
+    def rate_names(self) -> tuple[str, ...]:
+        """Of the rates of the independent joints."""
+        return self._joints.rate_names
+
+    @property
+    def rate_units(self) -> tuple[str, ...]:
+        """Of the joints that the rates are of, "rad" or "m"."""
+        return self._joints.rate_units
+
+    @property
+    def rate_columns(self) -> tuple[int, ...]:
+        """The place in the shape of what each rate is of; of a ball joint that of its first number."""
+        return self._joints.rate_columns
+
+    @property
+    def n_rates(self) -> int:
+        """The number of rates: one less than of coordinates for each ball joint."""
+        return len(self.rate_names)
+
+    @property
     def link_names(self) -> tuple[str, ...]:
         """The names of all links, those fixed to others included."""
         return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
@@ -120,8 +152,10 @@ class Body:
         self.__dict__.update(state)
         self._local = threading.local()
 
-    def shape(self, joints: Mapping[str, float] | None = None) -> Array:
+    def shape(self, joints: Mapping[str, ArrayLike] | None = None) -> Array:
         """The shape with the named joints at the given coordinates and all others neutral: -> (n,) [rad or m].
+
+        A ball joint is named as a whole, with its quaternion x, y, z, w.
 
         Raises
         ------
@@ -130,9 +164,15 @@ class Body:
         """
         if joints is not None and not isinstance(joints, Mapping):
             raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {what_came(joints)}")
-        shape = np.zeros(self.n_shape)
+        shape = self._joints.neutral.copy()
         for name, value in (joints or {}).items():
             coordinate = finite_array(value, f"joint {name}")
+            if name in self.ball_joints and coordinate.shape == (4,) and coordinate.any():
+                ball = self.chain.follows.balls[self.ball_joints.index(name)]
+                shape[ball.columns] = coordinate / np.linalg.norm(coordinate)
+                continue
+            if name in self.ball_joints:
+                raise ShapeError(f"ball joint {name}: a quaternion x, y, z, w is needed, got {what_came(value)}")
             if coordinate.ndim:
                 raise ShapeError(f"joint {name}: one number is needed, got an array of shape {coordinate.shape}")
             shape[self.joint_index(name)] = coordinate
@@ -208,6 +248,37 @@ class Body:
         if name not in self.joint_names:
             raise unknown_name(f"joint of {self.name}", name, self.joint_names)
         return self.joint_names.index(name)
+
+    def rate_frame(self, shape: ArrayLike) -> Array:
+        """What the coordinates of a shape do at unit rates of its joints: (..., n) -> (..., n, m), m = `n_rates`.
+
+        One column a rate: for a joint of one axis its coordinate alone; for a ball joint with the four numbers p, the
+        product of quaternions p (w, 0)/2, which keeps the length of p. So an array with an axis of coordinates, such as
+        a momentum matrix or the columns of a connection, times this frame is the same for rates; two-forms such as the
+        curvature take it twice.
+
+        Examples
+        --------
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> cat.rate_frame(cat.shape()).tolist()  # no ball joints: rates are derivatives of coordinates
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+        """
+        r = self._checked(shape)
+        return self._joints.frames(self._rows(r)).reshape(*r.shape, self.n_rates)
+
+    def joint_rates(self, shape: ArrayLike, rate: ArrayLike) -> Array:
+        """The rates of the joints from the derivatives of the shape: (..., n), (..., n) -> (..., m), m = `n_rates`.
+
+        Of a ball joint the angular velocity in axes of the link that it moves, against the link it hangs on [rad/s].
+
+        Examples
+        --------
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> cat.joint_rates(cat.shape(), [0.1, 0.2, 0.3]).tolist()
+        [0.1, 0.2, 0.3]
+        """
+        r, v = self._pair(shape, rate)
+        return self._joints.independent_rates(self._rows(r), self._rows(v)).reshape(*r.shape[:-1], self.n_rates)
 
     def locked_inertia(self, shape: ArrayLike) -> Array:
         """Inertia of the body frozen in a shape, about its centre of mass, base axes.

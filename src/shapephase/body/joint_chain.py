@@ -24,11 +24,12 @@ class JointChain:
     """Frame 0 is the base; frame k + 1 hangs on joint k, later in the list than its parent, with links fixed to it.
 
     The coordinate q_k of joint k moves frame k + 1 by a screw of constant axis: in the parent's axes its orientation is
-    turns[k] rot(q_k axes[k]) and its origin places[k] + turns[k] slides[k] q_k.
+    turns[k] rot(q_k axes[k]) and its origin places[k] + turns[k] slides[k] q_k. A ball joint is three of them, about x,
+    y and z at zero, of which the first lies behind the turn that the shape gives (`turns_at`).
 
     Attributes
     ----------
-    names : of the k joints, those that follow others included
+    names : of the k joints, those that follow others included; of a ball joint those of its rates
     parents : (k,) number of the frame that each hangs on
     turns, places : (k, 3, 3), (k, 3) pose in the parent's axes at coordinate zero [m]
     axes : (k, 3) unit vector of a joint that turns, else zero
@@ -69,10 +70,24 @@ class JointChain:
         """(k,) [rad or m]."""
         return self.follows.offset
 
+    @property
+    def has_rows(self) -> bool:
+        """Whether machine code knows all its joints; it does not know ball joints."""
+        return not self.follows.balls
+
     @cached_property
     def rows(self) -> LinkRows:
-        """The same for loops in machine code, made when first needed."""
+        """The same for loops in machine code, made when first needed; only where `has_rows`."""
         return link_rows(self)
+
+    def turns_at(self, shapes: Array) -> Array:
+        """`turns` at shapes, those of ball joints included: (N, n) -> (N or 1, k, 3, 3)."""
+        if not self.follows.balls:
+            return self.turns[None]
+        turns = np.repeat(self.turns[None], len(shapes), axis=0)
+        for ball in self.follows.balls:
+            turns[:, ball.row] = turns[:, ball.row] @ ball.turns(shapes)
+        return turns
 
     @cached_property
     def generations(self) -> tuple[tuple[Integers, Integers], ...]:
@@ -102,34 +117,41 @@ class JointChain:
 
 
 def joint_chain(model: Any, follows: CoordinateMap) -> JointChain:
-    """The numbers of a Pinocchio model with a free-flyer, whose joints have one axis each."""
-    moving = moving_joints(model)
-    names = tuple(moving)
-    poses, screws = [], []
-    for name in names:
-        joint = model.joints[moving[name]]
+    """The numbers of a Pinocchio model with a free-flyer, whose joints have one axis each or are ball joints."""
+    inertias = model.inertias.tolist()
+    # The last frame that moves with each joint of the model.
+    frame_of = {_BASE: 0}
+    parents, poses, screws, carried = [], [], [], [inertias[_BASE]]
+    for number in moving_joints(model).values():
+        joint, frame = model.joints[number], frame_of[int(model.parents[number])]
         data = joint.createData()
         neutral = np.zeros(model.nq)
-        # A joint without end is kept as (cos, sin).
-        neutral[joint.idx_q] = float(joint.nq == 2)
+        # A joint without end is kept as (cos, sin), a ball joint as a quaternion.
+        neutral[joint.idx_q + {2: 0, 4: 3}.get(joint.nq, 0)] = float(joint.nq > 1)
         joint.calc(data, neutral)
-        poses.append((model.jointPlacements[moving[name]] * data.M).homogeneous)
-        screws.append(np.array(data.S).reshape(6))
+        pose = (model.jointPlacements[number] * data.M).homogeneous
+        for screw in np.array(data.S).reshape(6, joint.nv).T:
+            parents.append(frame)
+            poses.append(pose)
+            screws.append(screw)
+            carried.append(None)
+            frame, pose = len(parents), np.eye(4)
+        carried[frame], frame_of[number] = inertias[number], frame
     pose, screw = np.array(poses).reshape(-1, 4, 4), np.array(screws).reshape(-1, 6)
-    carried = model.inertias.tolist()[_BASE:]
     return JointChain(
-        names,
-        tuple(int(model.parents[moving[name]]) - _BASE for name in names),
+        follows.names,
+        tuple(parents),
         pose[:, :3, :3],
         pose[:, :3, 3],
         screw[:, 3:],
         screw[:, :3],
-        np.array([inertia.mass for inertia in carried]),
-        np.array([inertia.lever for inertia in carried]),
-        np.array([inertia.inertia for inertia in carried]),
+        # Between the axes of a ball joint is nothing.
+        np.array([inertia.mass if inertia else 0.0 for inertia in carried]),
+        np.array([inertia.lever if inertia else np.zeros(3) for inertia in carried]),
+        np.array([inertia.inertia if inertia else np.zeros((3, 3)) for inertia in carried]),
         follows,
         {
-            frame.name: (int(frame.parentJoint) - _BASE, np.array(frame.placement.homogeneous))
+            frame.name: (frame_of[int(frame.parentJoint)], np.array(frame.placement.homogeneous))
             for frame in model.frames
             if frame.type.name == "BODY"
         },

@@ -178,17 +178,17 @@ def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     ends = drive(motion, np.array([0.0, motion.duration]))
     change = ends.energy[:, 1] - ends.energy[:, 0]
     from_outside = float(motion.work(motion.duration)) if isinstance(motion, ForcedMotion) else 0.0
-    positive = np.array([[_positive(found, b, k) for k in range(body.n_shape)] for b in range(len(change))])
-    positive = positive.reshape(len(change), body.n_shape)
+    positive = np.array([[_positive(found, b, k) for k in range(body.n_rates)] for b in range(len(change))])
+    positive = positive.reshape(len(change), body.n_rates)
     net, moved = found.work, found.moved
     looked, at = _between(found.torque), _places(found.edges)
-    flat = np.abs(looked).reshape(len(change), at.size, body.n_shape)
+    flat = np.abs(looked).reshape(len(change), at.size, body.n_rates)
     place = np.argmax(flat, axis=1)
-    single = (*motion.batch, body.n_shape)
+    single = (*motion.batch, body.n_rates)
     defect = np.abs(net.sum(axis=1) + from_outside - change) / np.where(moved > 0.0, moved, 1.0)
     return JointLoads(
-        joint_names=body.joint_names,
-        joint_units=body.joint_units,
+        joint_names=body.rate_names,
+        joint_units=body.rate_units,
         mass=body.mass,
         peak_torque=flat.max(axis=1, initial=0.0).reshape(single),
         peak_time=at.ravel()[place].reshape(single),
@@ -198,8 +198,8 @@ def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
         negative_work=(net - positive).reshape(single),
         energy_change=change.reshape(motion.batch)[()],
         energy_defect=defect.reshape(motion.batch)[()],
-        effort_limits=body.effort_limits,
-        rate_limits=body.rate_limits,
+        effort_limits=body.effort_limits[list(body.rate_columns)],
+        rate_limits=body.rate_limits[list(body.rate_columns)],
     )
 
 

@@ -241,4 +241,6 @@ def _starts(body: Body, free: Mapping[str, Any]) -> Array:
     for name in free:
         if name not in body.joint_names:
             raise unknown_name(f"joint of {body.name}", name, body.joint_names)
+        if body.joint_units[body.joint_index(name)] == "1":
+            raise ShapeError(f"free: {name} is a number of a ball joint; hinges and slides swing, of one axis each")
     return np.array([finite_array(pair, f"free, {name}", (2,)) for name, pair in free.items()]).T

@@ -35,7 +35,7 @@ class JointTorques:
     ----------
     motion : which they drive
     times : (...) [s]
-    joint_names, joint_units : "rad" for a torque in N m, "m" for a force in N
+    joint_names, joint_units : "rad" for a torque in N m, "m" for a force in N; a ball joint has three, about its axes
     mass : of the body [kg]
     torque : that the motor of each joint exerts, followers included [N m or N]
     rate : t.shape + (n,) of the joints [rad/s or m/s]
@@ -173,11 +173,11 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     return JointTorques(
         motion=motion,
         times=times,
-        joint_names=body.joint_names,
-        joint_units=body.joint_units,
+        joint_names=body.rate_names,
+        joint_units=body.rate_units,
         mass=body.mass,
-        torque=found.torque.reshape(*whole, body.n_shape),
-        rate=found.rate.reshape(*times.shape, body.n_shape),
-        power=found.power.reshape(*whole, body.n_shape),
+        torque=found.torque.reshape(*whole, body.n_rates),
+        rate=found.rate.reshape(*times.shape, body.n_rates),
+        power=found.power.reshape(*whole, body.n_rates),
         base_wrench=found.wrench.reshape(*whole, 6),
     )

@@ -63,7 +63,7 @@ class BodyAlong:
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """The same by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
         chain = self.body.chain
-        if not engine.is_ready():
+        if not engine.is_ready() or not chain.has_rows:
             each = [by_link_parameters(self._links, rows[:, k], spins[:, k]) for k in range(rows.shape[1])]
             return np.concatenate(each)
         found = gradients.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
-from ..body.couplings.coordinate_map import check_smooth
+from ..body.couplings.coordinate_map import check_no_balls, check_smooth
 from ..display import short_repr
 from ..errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ..integrator.casadi_calls import call_casadi
@@ -90,6 +90,7 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     if not isinstance(metric, str) or metric not in _COSTS:
         raise unknown_name("metric", metric, _COSTS)
     check_smooth(body.chain.follows, "the equations of extremals need")
+    check_no_balls(body.chain.follows, "the equations of extremals need")
     with _building:
         of_body = _built.setdefault(body, {})
         if not isinstance(metric, str) or metric not in of_body:

@@ -13,7 +13,7 @@ from .. import so3
 from ..arguments import positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
-from ..body.couplings.coordinate_map import check_smooth
+from ..body.couplings.coordinate_map import check_no_balls, check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
 
@@ -163,6 +163,7 @@ def reorientation(
     if not body.n_shape:
         raise ShapeError(f"{body.name} has no joints: nothing can turn it but its momentum")
     check_smooth(body.chain.follows, "plans need", kinks_only=True)
+    check_no_balls(body.chain.follows, "plans need")
     checked_goal, within = goal_argument(goal), Limits() if limits is None else limits
     mu = _momentum(momentum)
     windings, winding_axes = _windings(checked_goal, mu)

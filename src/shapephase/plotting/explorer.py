@@ -97,6 +97,9 @@ def explore_html(
     ):
         raise ShapeError(f"joints: two different joints of {body.name} are needed, got {what_came(joints)}")
     places = body.joint_index(joints[0]), body.joint_index(joints[1])
+    for name in joints:
+        if body.joint_units[body.joint_index(name)] not in _END:
+            raise ShapeError(f"joints: {name} is a number of a ball joint, which has no plane of angles; take others")
     still = body.shape() if rest is None else finite_array(rest, "rest", (body.n_shape,))
     upwards = up_axis(up, body)
     shown = _map_box(body, places)

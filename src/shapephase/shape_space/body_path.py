@@ -31,8 +31,17 @@ _VOIGT = [0, 4, 8, 5, 2, 1]
 
 
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:
-    """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,)."""
+    """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,).
+
+    Of a ball joint by quaternions of length one, whose sign is that of the start.
+    """
     gap = path.gap
+    if not isinstance(body, ParticleBody) and body.chain.follows.balls:
+        ends, _ = path.curve(np.array([0.0, path.duration]))
+        for ball in body.chain.follows.balls:
+            start, end = ball.quaternions(ends)
+            # Either sign is the same turn.
+            gap[ball.columns] = end * (1.0 if start @ end >= 0.0 else -1.0) - start
     return np.where(body.continuous, so3.wrap(gap), gap)
 
 
@@ -74,8 +83,8 @@ def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> 
 
 
 def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:
-    """The same at shapes and rates (N, n); None for particles, too, which have no links."""
-    if isinstance(body, ParticleBody):
+    """The same at shapes and rates (N, n); None for particles, too, which have no links, and for ball joints."""
+    if isinstance(body, ParticleBody) or not body.chain.has_rows:
         return None
     return tree_channels(body.chain.rows, shapes, rates)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_function, check_object, times_argument, tolerance_argument
+from ..arguments import check_choice, check_function, check_object, times_argument, tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
@@ -30,7 +30,7 @@ _GAUSS_RULE = np.polynomial.legendre.leggauss(16)
 _PIECES = (2, 4, 8, 16, 32, 64)
 
 
-def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike) -> Array:
+def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:
     """Rotation rate of the base that cancels the angular momentum of a joint motion.
 
     A(r) = I(r)^-1 J(r): with zero momentum the base turns at omega = -A(r) rate [rad/s, base axes].
@@ -38,10 +38,12 @@ def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike) -> Array:
     Parameters
     ----------
     shape : (..., n) joint coordinates [rad or m]
+    of : "coordinates", a column for each coordinate of the shape; "rates", for each rate of the joints. The two
+        differ for ball joints only, which have four coordinates and three rates (`Body.rate_names`)
 
     Returns
     -------
-    (..., 3, n) connection, base axes [rad per unit of joint]
+    (..., 3, n) connection, base axes [rad per unit of joint]; (..., 3, m) of rates
 
     Raises
     ------
@@ -50,7 +52,7 @@ def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike) -> Array:
 
     Notes
     -----
-    Equation :eq:`connection` of the documentation.
+    Equation :eq:`connection` of the documentation, for ball joints with :eq:`ball-rates`.
     Source: Cabrera 2006, sections 2.1 and 2.3.1 (a); theory.md B1.
 
     Examples
@@ -60,25 +62,36 @@ def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike) -> Array:
     [[0.0, 0.0, 0.5], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
     check_object(body, "Body", "body", or_kind="ParticleBody")
-    return inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
+    frame = _rate_frame(body, shape, of)
+    columns = inverse_inertia(body.locked_inertia(shape)) @ body.momentum_matrix(shape)
+    return columns if frame is None else columns @ frame
 
 
-def curvature(body: Body | ParticleBody, shape: ArrayLike) -> Array:
+def _rate_frame(body: Body | ParticleBody, shape: ArrayLike, of: str) -> Array | None:
+    """The frame (..., n, m) in which results are; None: that of the coordinates."""
+    check_choice(of, "value of of", ("coordinates", "rates"))
+    return None if of == "coordinates" or isinstance(body, ParticleBody) else body.rate_frame(shape)
+
+
+def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:
     """Curvature of the mechanical connection, F_ij = d_i A_j - d_j A_i - A_i x A_j.
 
     A small square of side e in the joints i, j, gone round from i to j, turns the body by exp(-e^2 F_ij).
 
+    Of rates, with e_a the directions in which one of them is 1, it is F(e_a, e_b) = e_a(A_b) - e_b(A_a) - A([e_a, e_b])
+    - A_a x A_b: those of a ball joint do not commute, [e_x, e_y] = e_z and so on.
+
     Parameters
     ----------
-    shape : (..., n) joint coordinates [rad or m]
+    shape, of : as for `mechanical_connection`
 
     Returns
     -------
-    (..., n, n, 3) antisymmetric in i, j; base axes [rad per product of the two joints' units]
+    (..., n, n, 3) antisymmetric in i, j; base axes [rad per product of the two joints' units]; (..., m, m, 3) of rates
 
     Notes
     -----
-    Equation :eq:`curvature` of the documentation.
+    Equation :eq:`curvature` of the documentation; of rates :eq:`ball-curvature`.
     Raises as `mechanical_connection`. Source: theory.md B6; numerics.md section 4.
 
     Examples
@@ -90,7 +103,9 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike) -> Array:
     check_object(body, "Body", "body", or_kind="ParticleBody")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
-    return slopes - np.swapaxes(slopes, -2, -3) - bracket
+    found = slopes - np.swapaxes(slopes, -2, -3) - bracket
+    frame = _rate_frame(body, shape, of)
+    return found if frame is None else np.einsum("...ia,...ijk,...jb->...abk", frame, found, frame)
 
 
 def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ class FamilyVariants:
     def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
         """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
         shapes, rates = self._path.at_samples(times)
-        if engine.is_ready():
+        if engine.is_ready() and self._family.body.chain.has_rows:
             masses = self._family.mass[rows]
             return trees_channels(self._family.body.chain.rows, self._family.rows[rows], masses, shapes, rates)
         return many_inverted(*self._family.some(rows).sample(shapes, rates), times)

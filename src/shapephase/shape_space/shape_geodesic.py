@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import check_no_balls
 from ..errors import TrajectoryError
 from .connection import mechanical_connection
 
@@ -66,6 +67,7 @@ def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesi
         If the shapes are so far apart that the approximation does not settle, or joints move nothing.
     """
     check_object(body, "Body", "body")
+    check_no_balls(body.chain.follows, "geodesics of shapes need")
     first, last = (
         finite_array(start, "start", (body.n_shape,)).copy(),
         finite_array(end, "end", (body.n_shape,)).copy(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -13,6 +13,7 @@ import numpy as np
 from ...arrays import Array, lock_arrays
 from ...display import short_repr
 from ...errors import ModelFileError, ShapeError
+from .ball_joints import BallJoint, coordinate_names, rate_names
 from .coupling import Coupling
 from .functions import JointFunction
 
@@ -34,14 +35,17 @@ class CurvedJoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CoordinateMap:
-    """Coordinates of all k joints from the n independent ones.
+    """Coordinates of all k joints of one axis from the n numbers of a shape.
+
+    A ball joint stands for three hinges behind a turn that differs from shape to shape, so that they are at zero.
 
     Attributes
     ----------
-    names : (k,) of all joints
-    independent : (n,) of those that follow no other
+    names : (k,) of all joints, of a ball joint those of its rates
+    independent : (n,) of those that follow no other, of a ball joint those of its four numbers
     matrix, offset : (k, n), (k,) of the joints that depend on the shape by matrix @ shape + offset; other rows are zero
     curved : the others, each behind those that it follows
+    balls : the ball joints
     """
 
     names: tuple[str, ...]
@@ -49,6 +53,7 @@ class CoordinateMap:
     matrix: Array
     offset: Array
     curved: tuple[CurvedJoint, ...] = ()
+    balls: tuple[BallJoint, ...] = ()
 
     __repr__ = short_repr
 
@@ -57,7 +62,7 @@ class CoordinateMap:
     @property
     def is_linear(self) -> bool:
         """Whether all joints depend on the shape by matrix and offset."""
-        return not self.curved
+        return not self.curved and not self.balls
 
     @cached_property
     def is_identity(self) -> bool:
@@ -116,6 +121,8 @@ class CoordinateMap:
                 there = function(full[:, source])
                 full[:, joint.row] += there.value
                 speeds[:, joint.row] += there.slope * speeds[:, source]
+        for ball in self.balls:
+            speeds[:, ball.rows] = ball.rates(shapes, rates)
         return full, speeds
 
     def slopes(self, shapes: Array) -> Array:
@@ -146,22 +153,43 @@ class CoordinateMap:
                 slopes[:, joint.row] += there.slope[:, None] * slopes[:, source]
                 bent = (there.bend * speeds[:, source])[:, None] * slopes[:, source]
                 changes[:, joint.row] += bent + there.slope[:, None] * changes[:, source]
+        for ball in self.balls:
+            slopes[:, ball.rows, ball.columns] = ball.slopes(shapes)
+            changes[:, ball.rows, ball.columns] = ball.hinge_slope_rates(shapes, rates)
         return slopes, changes
 
 
-def coordinate_map(names: tuple[str, ...], couplings: Mapping[str, Coupling]) -> CoordinateMap:
-    """The map of joints of which some follow others.
+def coordinate_map(
+    joints: tuple[str, ...], couplings: Mapping[str, Coupling], balls: Collection[str] = ()
+) -> CoordinateMap:
+    """The map of joints of which some follow others, and some are ball joints.
 
     Raises
     ------
     ModelFileError
-        If joints follow each other in a circle, or one that is not among them.
+        If joints follow each other in a circle, or one that is not among them; if a ball joint takes part.
     """
-    independent = tuple(name for name in names if name not in couplings)
+    for name, coupling in couplings.items():
+        for ball in {name, *coupling.drivers} & set(balls):
+            raise ModelFileError(
+                f"joint {name!r}: {ball!r} is a ball joint, whose turn is no one number that follows or leads another"
+            )
+    names = tuple(row for name in joints for row in (rate_names(name) if name in balls else [name]))
+    free = [name for name in joints if name not in couplings]
+    independent = tuple(part for name in free for part in (coordinate_names(name) if name in balls else [name]))
+    for each in (names, independent):
+        for name in each:
+            if balls and each.count(name) > 1:
+                raise ModelFileError(f"joint {name!r} has the name of a part of a ball joint; rename one of them")
     place = {name: row for row, name in enumerate(names)}
+    columns = {name: column for column, name in enumerate(independent)}
     matrix, offset = np.zeros((len(names), len(independent))), np.zeros(len(names))
-    for column, name in enumerate(independent):
-        matrix[place[name], column] = 1.0
+    for name in set(free) - set(balls):
+        matrix[place[name], columns[name]] = 1.0
+    spheres = tuple(
+        BallJoint(name, place[rate_names(name)[0]], columns[coordinate_names(name)[0]])
+        for name in joints if name in balls
+    )  # fmt: skip
     curved: list[CurvedJoint] = []
     rows_of_curved: set[int] = set()
     for name in _ordered(names, couplings):
@@ -176,7 +204,7 @@ def coordinate_map(names: tuple[str, ...], couplings: Mapping[str, Coupling]) ->
         else:
             curved.append(CurvedJoint(row, coupling.start, terms))
             rows_of_curved.add(row)
-    return CoordinateMap(names, independent, matrix, offset, tuple(curved))
+    return CoordinateMap(names, independent, matrix, offset, tuple(curved), spheres)
 
 
 def _ordered(names: tuple[str, ...], couplings: Mapping[str, Coupling]) -> list[str]:
@@ -225,3 +253,15 @@ def check_smooth(follows: CoordinateMap, what: str, *, kinks_only: bool = False)
                     f"{what} joints that follow others smoothly: {names} by a {rough} of {len(function.knots)} knots; "
                     f"state {better} in its place (Body.with_couplings)"
                 )
+
+
+def check_no_balls(follows: CoordinateMap, what: str) -> None:
+    """Raise ShapeError where a joint is a ball joint, whose rates are no derivatives of coordinates.
+
+    what : that needs such coordinates, with its verb: "extremals need"
+    """
+    if follows.balls:
+        raise ShapeError(
+            f"{what} a coordinate for each rate of the joints; ball joint {follows.balls[0].name} has four numbers for "
+            "three rates: write it as three hinges in one point"
+        )

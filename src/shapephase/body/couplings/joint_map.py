@@ -9,17 +9,23 @@ import numpy as np
 
 from ...arrays import Array
 from .._model_tree import moving_joints
+from .ball_joints import COORDINATES, RATES
 from .coordinate_map import coordinate_map
 from .coupling import Coupling
 
 # Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
 _BASE = 6
+# Rates of a ball joint.
+_BALL = 3
 # [rad/s, m/s, N m or N]; what is stated above stands for no limit.
 _NO_LIMIT = 1e30
 
 
 class JointMap:
     """Where each joint stands in Pinocchio's vectors, joints that follow others and joints kept as (cos, sin) included.
+
+    Pinocchio's rates of a ball joint are the angular velocity in axes of the child, as ours; its coordinates a unit
+    quaternion.
 
     Attributes
     ----------
@@ -29,35 +35,59 @@ class JointMap:
     limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
     rate_limits : (n,) the largest rates [rad/s or m/s], infinite where none is stated
     effort_limits : (n,) what their motors can do [N m or N], infinite where none is stated
-    units : "rad" or "m" for each joint
+    neutral : (n,) the shape in which the file has the body: zero, and no turn of ball joints
+    rate_names : of the rates of the independent joints
+    rate_columns : (m,) the coordinate that each rate is of, of a ball joint its first
+    rate_units : "rad" or "m" for each rate
+    units : "rad" or "m" for each joint, "1" for the numbers of a ball joint
     """
 
     def __init__(self, model: Any, neutral: Array, couplings: Mapping[str, Coupling]) -> None:
-        moving = moving_joints(model)
-        self.follows = coordinate_map(tuple(moving), couplings)
+        moving = {name: model.joints[number] for name, number in moving_joints(model).items()}
+        balls = [name for name, kind in moving.items() if kind.nv == _BALL]
+        self.follows = coordinate_map(tuple(moving), couplings, balls)
         self.names = self.follows.independent
-        kinds = [model.joints[i] for i in moving.values()]
+        # Of each row; the coordinates of a ball joint have places of their own.
+        kinds = [kind for kind in moving.values() for _ in range(kind.nv)]
+        self._round = np.array([kind.nv == _BALL for kind in kinds], dtype=bool)
         turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
         self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
-        self._velocity_index = np.array([kind.idx_v for kind in kinds], dtype=int) - _BASE
+        self._velocity_index = np.array(
+            [kind.idx_v + place for kind in moving.values() for place in range(kind.nv)], dtype=int
+        ) - _BASE  # fmt: skip
         self._turning = turning
         self._any_turning = bool(turning.any())
+        self._ball_places = [moving[ball.name].idx_q for ball in self.follows.balls]
         self._neutral = neutral
         self._nv = model.nv
-        independent = [list(moving).index(n) for n in self.names]
-        endless = turning[independent]
+        # The row that each coordinate of the shape is of; of a ball joint its first.
+        rows = {name: row for row, name in enumerate(self.follows.names)}
+        rows |= {name: ball.row for ball in self.follows.balls for name in self.names[ball.columns]}
+        independent = [rows[name] for name in self.names]
+        own = [row for row, name in enumerate(self.follows.names) if name not in couplings]
+        self._own_rows = np.array(own, dtype=int)
+        self.rate_names = tuple(self.follows.names[row] for row in own)
+        self.neutral = np.zeros(len(self.names))
+        self.neutral[[ball.columns.stop - 1 for ball in self.follows.balls]] = 1.0
+        self.neutral.setflags(write=False)
+        endless, spherical = turning[independent], self._round[independent]
         limits = np.stack([model.lowerPositionLimit, model.upperPositionLimit], axis=-1)
         self.limits = limits[self._configuration_index[independent]].reshape(-1, 2)
-        self.limits[endless] = [-np.inf, np.inf]
+        self.limits[endless | spherical] = [-np.inf, np.inf]
         self.limits.setflags(write=False)
         # What follows by a curve is elsewhere after a whole turn.
         self.continuous = endless & ~np.isin(np.array(self.names, dtype=str), self.follows.drivers)
-        self.rate_limits = self._slowest(np.array(model.velocityLimit)[[kind.idx_v for kind in kinds]])
-        efforts = np.array(model.effortLimit)[[kinds[one].idx_v for one in independent]]
-        self.effort_limits = np.where((efforts > 0.0) & (efforts < _NO_LIMIT), efforts, np.inf)
+        self.rate_limits = self._slowest(np.array(model.velocityLimit)[_BASE + self._velocity_index])
+        efforts = np.array(model.effortLimit)[_BASE + self._velocity_index[independent]]
+        known = (efforts > 0.0) & (efforts < _NO_LIMIT) & ~spherical
+        self.effort_limits = np.where(known, efforts, np.inf)
         self.effort_limits.setflags(write=False)
         sliding = [kind.shortname().startswith("JointModelP") for kind in kinds]
-        self.units = tuple("m" if sliding[i] else "rad" for i in independent)
+        columns = {name: column for column, name in enumerate(self.names)}
+        columns |= {row: ball.column for ball in self.follows.balls for row in self.follows.names[ball.rows]}
+        self.rate_columns = tuple(columns[name] for name in self.rate_names)
+        self.rate_units = tuple("m" if sliding[row] else "rad" for row in own)
+        self.units = tuple("1" if self._round[i] else "m" if sliding[i] else "rad" for i in independent)
 
     def _slowest(self, stated: Array) -> Array:
         """Of each independent joint, so that its followers keep theirs, too; a limit of zero says nothing: (n,)."""
@@ -89,6 +119,8 @@ class JointMap:
             q[:, turning + 1] = np.sin(full[:, self._turning])
         else:
             q[:, self._configuration_index] = full
+        for ball, place in zip(self.follows.balls, self._ball_places, strict=True):
+            q[:, place : place + len(COORDINATES)] = ball.quaternions(shapes)
         return q
 
     def velocities(self, shapes: Array, rates: Array) -> Array:
@@ -101,8 +133,21 @@ class JointMap:
         """Pinocchio's accelerations with the base at rest: (N, n), (N, n), (N, n) -> (N, nv)."""
         found = self.velocities(shapes, accelerations)
         if not self.follows.is_linear:
-            bent = (self.follows.slope_rates(shapes, rates) @ rates[..., None])[..., 0]
+            bent = (self._slope_rates(shapes, rates) @ rates[..., None])[..., 0]
             found[:, _BASE + self._velocity_index] += bent
+        return found
+
+    def independent_rates(self, shapes: Array, rates: Array) -> Array:
+        """Of the independent joints, of ball joints the angular velocity: (N, n), (N, n) -> (N, m)."""
+        return self.follows.with_rates(shapes, rates)[1][:, self._own_rows]
+
+    def frames(self, shapes: Array) -> Array:
+        """Derivatives of the shape at unit rates of the independent joints: (N, n) -> (N, n, m)."""
+        found = np.repeat(self.follows.matrix[self._own_rows].T[None], len(shapes), axis=0)
+        place = {row: column for column, row in enumerate(self._own_rows.tolist())}
+        for ball in self.follows.balls:
+            first = place[ball.row]
+            found[:, ball.columns, first : first + len(RATES)] = ball.frame(shapes)
         return found
 
     def columns(self, joints: Array, shapes: Array) -> Array:
@@ -111,4 +156,19 @@ class JointMap:
 
     def bent_columns(self, joints: Array, shapes: Array, rates: Array) -> Array:
         """The same, folded by how the fold changes along rates, as a second derivative needs it."""
-        return joints[..., self._velocity_index] @ self.follows.slope_rates(shapes, rates)
+        return joints[..., self._velocity_index] @ self._slope_rates(shapes, rates)
+
+    def bent_rates(self, joints: Array, shapes: Array, rates: Array) -> Array:
+        """The same, folded by how Pinocchio's rates change with the shape while its own rates stay. The two differ for
+        ball joints only, whose rates are no derivatives of coordinates: by the bracket of the rates."""
+        bent = self.follows.slope_rates(shapes, rates)
+        for ball in self.follows.balls:
+            bent[:, ball.rows, ball.columns] = ball.rates_by_shape(shapes, rates)
+        return joints[..., self._velocity_index] @ bent
+
+    def _slope_rates(self, shapes: Array, rates: Array) -> Array:
+        """How the derivatives of Pinocchio's rates by those of the shape change along a motion: (N, k, n)."""
+        bent = self.follows.slope_rates(shapes, rates)
+        for ball in self.follows.balls:
+            bent[:, ball.rows, ball.columns] = ball.slope_rates(shapes, rates)
+        return bent

@@ -134,15 +134,20 @@ class Chain:
         }  # fmt: skip
 
     def moving(self) -> list[str]:
-        """Names of the joints that have coordinates of their own."""
-        moving = (joint["name"] for joint in self.joints if joint["kind"] != "fixed")
-        return [name for name in moving if name not in self.couplings]
+        """Names of the coordinates of joints that follow no other; of a ball joint there are four."""
+        moving = (joint for joint in self.joints if joint["kind"] != "fixed")
+        return [
+            name
+            for joint in moving
+            if joint["name"] not in self.couplings
+            for name in (ball_names(joint["name"]) if joint["kind"] == "ball" else [joint["name"]])
+        ]
 
     def random_shapes(self) -> list[tuple[dict[str, float], dict[str, float]]]:
         """Coordinates and rates by joint, within a radian or metre, and within the limits."""
         random = np.random.default_rng(SEED)
-        own = set(self.moving())
-        limits = [joint["limits"] or (-1.0, 1.0) for joint in self.joints if joint["name"] in own]
+        limits_of = {joint["name"]: joint["limits"] for joint in self.joints}
+        limits = [limits_of.get(name) or (-1.0, 1.0) for name in self.moving()]
         lower, upper = np.clip(np.array(limits).reshape(-1, 2), -1.0, 1.0).T
         found = []
         for _ in range(POSES):
@@ -188,6 +193,19 @@ def check_name(name: str, owner: str, line: int) -> None:
         raise UnusableModelError(f"{owner[:60]}: {len(name)} characters; up to {_MOST_NAME} are allowed", line)
     if not name.isprintable() or name.isspace():
         raise UnusableModelError(f"{owner}: a name with characters that cannot be printed; rename it", line)
+
+
+def ball_names(joint: str) -> list[str]:
+    """Of the four numbers of a ball joint, a quaternion of any length."""
+    return [f"{joint}.{part}" for part in "xyzw"]
+
+
+def ball_state(numbers: Array, derivatives: Array) -> tuple[Array, Array]:
+    """Of length one, as w, x, y, z, and the angular velocity in axes of the child: (4,), (4,) -> (4,), (3,)."""
+    (*vector, scalar), (*change, swing) = numbers, derivatives
+    spin = scalar * np.array(change) - swing * np.array(vector) - np.cross(vector, change)
+    square = float(numbers @ numbers)
+    return np.roll(numbers, 1) / np.sqrt(square), 2.0 * spin / square
 
 
 def locked_inertia(masses: Array, centres: Array, tensors: Array) -> Array:

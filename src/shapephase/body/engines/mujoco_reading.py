@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arrays import Array
 from .._link_tree import MOST_LINKS, MOST_MASS
-from .chain import Chain, UnusableModelError, check_name, locked_inertia
+from .chain import Chain, UnusableModelError, ball_names, ball_state, check_name, locked_inertia
 from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
 
 _COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
@@ -118,21 +118,22 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         owner, line = f"joint {name!r}", compiled.line(joint, "joint")
         check_name(name, owner, line)
         _check_places(model.jnt_pos[joint], axis, owner, line)
-        if model.jnt_type[joint] == BALL:
-            raise UnusableModelError(f"{owner}: a ball joint; joints of one axis are supported: use three hinges", line)
+        ball = model.jnt_type[joint] == BALL
         sliding = model.jnt_type[joint] == SLIDE
         place = place + turn @ (model.jnt_pos[joint] - anchor)
         anchor = model.jnt_pos[joint]
         # The coordinate does not begin at zero where the file has the body.
-        by = -_reference(model, joint)
+        by = 0.0 if ball else -_reference(model, joint)
         place, turn = (place + by * (turn @ axis), turn) if sliding else (place, turn @ _about(axis, by))
         lower, upper = model.jnt_range[joint].tolist()
         if lower > upper:
             raise UnusableModelError(
                 f"{owner}: range: the lower limit {lower:g} is above the upper one, {upper:g}", line
             )
-        limits = [lower, upper] if model.jnt_limited[joint] else None
-        kind = "prismatic" if sliding else "continuous" if limits is None else "revolute"
+        limits = [lower, upper] if model.jnt_limited[joint] and not ball else None
+        kind = "ball" if ball else "prismatic" if sliding else "continuous" if limits is None else "revolute"
+        if ball and model.jnt_limited[joint]:
+            chain.notes.append(f"{owner}: the range of a ball joint is ignored")
         last = joint == joints[-1]
         below = child if last else f"{child}\0{name}"
         if not last:
@@ -311,7 +312,12 @@ def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[
             data.qpos[first : first + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     for shape, rate in chain.random_shapes():
         own = {joint: (shape[name], rate[name]) for joint, name in names.items() if name in shape}
-        for joint in names:
+        for joint, name in names.items():
+            if model.jnt_type[joint] == BALL:
+                four = [np.array([one[part] for part in ball_names(name)]) for one in (shape, rate)]
+                where, first = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+                data.qpos[where : where + 4], data.qvel[first : first + 3] = ball_state(*four)
+                continue
             value, speed = _coordinate(joint, rules, own)
             data.qpos[model.jnt_qposadr[joint]], data.qvel[model.jnt_dofadr[joint]] = value, speed
         mujoco.mj_kinematics(model, data)

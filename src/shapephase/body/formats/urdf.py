@@ -31,6 +31,12 @@ from .xml_text import (
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
+_BALL = "spherical"
+# Why joints of several directions are no chain of coordinates.
+_REASONS = {
+    "floating": ": inside a body it has the coordinates of a rigid motion, and only the base floats here",
+    "planar": ": its two slides turn with it",
+}
 _ROBOT_PARTS = ("link", "joint")
 _LINK_PARTS = ("inertial", "visual", "collision")
 _JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
@@ -85,7 +91,9 @@ def urdf_tree(root: Node) -> LinkTree:
     first, ordered = from_the_root(links, joints.values(), root.file)
     _check_mimics(reading.mimics, joints)
     found = {first: links[first]} | {joint.child: links[joint.child] for joint in ordered}
-    text = f"<robot name={quoteattr(name)}>{''.join(reading.text)}</robot>"
+    # The parser of Pinocchio knows no ball joints.
+    parsed = all(joint.kind != "ball" for joint in joints.values())
+    text = f"<robot name={quoteattr(name)}>{''.join(reading.text)}</robot>" if parsed else None
     couplings = {
         key: Coupling.linear(rule.leader, rule.multiplier, rule.offset) for key, (_, rule) in reading.mimics.items()
     }
@@ -168,11 +176,11 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     owner = f"joint {name!r}"
     no_misspelt_children(node, _JOINT_PARTS, owner)
     kind = node.get("type") or ""
-    if kind not in (*_AXIS_JOINTS, "fixed"):
+    if kind not in (*_AXIS_JOINTS, _BALL, "fixed"):
         raise node.fault(
             owner,
-            f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)} or fixed, several in a row for "
-            "a joint of several axes",
+            f"type {quoted(kind)!r} is not supported{_REASONS.get(kind, '')}; use {', '.join(_AXIS_JOINTS)}, {_BALL} "
+            "or fixed, several in a row for a joint of several axes",
         )
     ends = {end: needed_child(node, end, owner) for end in ("parent", "child")}
     for end in ends.values():
@@ -181,7 +189,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     place, turn, parts = _origin(node, owner)
     parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
     axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
-    if kind != "fixed":
+    if kind in _AXIS_JOINTS:
         written = child_of(node, "axis", owner)
         if written is not None:
             known_attributes(written, ("xyz",), owner)
@@ -201,7 +209,10 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
-    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits)
+    if kind == _BALL and child_of(node, "limit", owner) is not None:
+        reading.notes.append(f"{where}: {owner}: <limit> of a ball joint is ignored")
+    kind = "ball" if kind == _BALL else kind
+    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits, (effort, fastest))
 
 
 def _effort(limit: Node) -> float:
@@ -248,6 +259,8 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
     if kind == "fixed":
         reading.notes.append(f"{element.file}:{element.line}: {owner}: <mimic> of a fixed joint is ignored")
         return
+    if kind == _BALL:
+        raise element.fault(owner, "a ball joint follows no other: its turn is no one number; remove the <mimic>")
     known_attributes(element, ("joint", "multiplier", "offset"), owner)
     multiplier, offset = (number(element, k, owner, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
     reading.mimics[name] = (element, Mimic(name_of(element, "joint"), multiplier, offset))
@@ -260,7 +273,7 @@ def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint
         if leader is None:
             raise _mimic_fault(element, owner, f"mimics joint {rule.leader!r}, which does not exist")
         kinds = joints[name].kind, leader.kind
-        if kinds[1] == "fixed" or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
+        if kinds[1] in ("fixed", "ball") or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
             raise _mimic_fault(element, owner, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
         seen, follower = {name}, name
         while follower in mimics:
