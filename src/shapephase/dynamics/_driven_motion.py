@@ -47,43 +47,16 @@ def drive(motion: Motion | ForcedMotion, times: Array, turned: Array | None = No
     times : (N,)
     turned : (3,) a small turn of all attitudes, base axes, to see what it changes; None: none [rad]
     """
-<<<<<<< HEAD
     body, path = needed_body_and_path(motion, BY_JOINTS)
     moving = moving_body(motion, body, path, times, turned)
-    joints = moving.shapes, moving.rates, moving.accelerations
+    joints, frames = (moving.shapes, moving.rates, moving.accelerations), body.rate_frame(moving.shapes)
     torques, wrenches, energies = [], [], []
     for spins, slopes in zip(moving.spins, moving.spin_rates, strict=True):
         torque, wrench = falling_efforts(body, *joints, spins, slopes)
-        torques.append(torque)
+        # Seen by the rates of ball joints, which their four numbers are not.
+        torques.append((torque[:, None] @ frames)[:, 0])
         wrench[:, 3:] -= moving.push
         wrenches.append(wrench)
         energies.append(body.kinetic_energy(moving.shapes, moving.rates, spins))
-    return Drive(torque=np.array(torques), rate=moving.rates, wrench=np.array(wrenches), energy=np.array(energies))
-=======
-    body, path = body_and_path(motion)
-    shapes, rates = path.curve(times)
-    accelerations = path.acceleration(times)
-    inertia, matrix, inertia_rate, matrix_rate = body.sample_rates(shapes, rates)
-    inverse, frames = inverse_inertia(inertia, times), body.rate_frame(shapes)
-    internal = so3.apply(matrix, rates)
-    internal_rate = so3.apply(matrix_rate, rates) + so3.apply(matrix, accelerations)
-    momenta = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.body_momentum(times))
-    momenta = momenta.reshape(-1, len(times), 3)
-    if turned is not None:
-        momenta = so3.apply(so3.transpose(so3.exp(turned)), momenta)
-    push = np.zeros((len(times), 3))
-    if isinstance(motion, ForcedMotion):
-        push = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.torque(times))
-    torques, wrenches, energies = [], [], []
-    for pi in momenta:
-        spins = so3.apply(inverse, pi - internal)
-        slopes = so3.apply(inverse, np.cross(pi, spins) + push - so3.apply(inertia_rate, spins) - internal_rate)
-        torque, wrench = falling_efforts(body, shapes, rates, accelerations, spins, slopes)
-        # Seen by the rates of ball joints, which their four numbers are not.
-        torques.append((torque[:, None] @ frames)[:, 0])
-        wrench[:, 3:] -= push
-        wrenches.append(wrench)
-        energies.append(body.kinetic_energy(shapes, rates, spins))
-    speeds = body.joint_rates(shapes, rates)
+    speeds = body.joint_rates(moving.shapes, moving.rates)
     return Drive(torque=np.array(torques), rate=speeds, wrench=np.array(wrenches), energy=np.array(energies))
->>>>>>> 0fbbb30 (Ball joints in bodies: four numbers of any length are coordinates, the chain has three hinges about every shape)
