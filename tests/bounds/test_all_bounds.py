@@ -338,6 +338,33 @@ def test_crown_region_e8(rng):
     assert np.all(directions[crown.contains(directions)][:, 2] > 0.0)
 
 
+def test_the_region_as_printed_is_wider_e8(rng):
+    """R of the paper, from its definition: E_t between its extremes of the whole interval, at some time."""
+    deforming = moments_in_time(lambda t: (1.0, 1.5, 2.0 + 0.1 * np.sin(t)), 10.0)
+    momentum = np.array([0.3, 0.2, 0.9])
+    crown = crown_region(deforming, momentum)
+    directions = rng.normal(size=(4000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    printed, sharper = crown.contains_as_printed(directions), crown.contains(directions)
+    assert not np.any(sharper & ~printed)
+    assert np.mean(printed) > 1.1 * np.mean(sharper)
+    moments = np.linalg.inv(deforming.inertia(np.linspace(0.0, 10.0, 2001)))
+    energies = 0.5 * momentum @ momentum * np.einsum("ni,tij,nj->nt", directions, moments, directions)
+    low, high = crown.certificate.energy
+    # The component of the start: the threshold l^2/(2 I_2) is above E_max, so R does not reach the plane Pi_3 = 0.
+    assert high < momentum @ momentum / 3.0
+    expected = (energies.max(axis=1) >= low) & (energies.min(axis=1) <= high) & (directions[:, 2] > 0.0)
+    assert np.mean(printed != expected) < 2e-3
+    assert np.all(printed[expected])
+    # Where neither side is certain R goes round the sphere, with the momentum and its opposite.
+    passing = crown_region(moments_in_time(lambda t: (1.0, 1.5 + 0.4 * np.sin(t), 2.0), 10.0), [0.3, 0.9, 0.3])
+    found = passing.contains_as_printed(directions)
+    assert np.array_equal(found, passing.contains_as_printed(-directions))
+    assert np.array_equal(found, passing.contains_as_printed(3.0 * directions))
+    # A rigid body's energy does not change: both are its polhode.
+    assert not crown_region(sp.rigid(np.diag([1.0, 1.5, 2.0]), 3.0), momentum).contains_as_printed(np.zeros(3))
+
+
 def raw_scaled(momenta, momentum):
     """Onto the exact ellipsoid of the rigid body above, along the third axis."""
     goal = np.sum(momentum**2 / [1.0, 1.5, 2.0])

@@ -116,8 +116,9 @@ class RegimeCertificate:
 class CrownRegion:
     """The part of the momentum sphere that Pi can reach over an interval.
 
-    The union over time of the level sets of E_t between its bounds; where the regime is certain, only the part on the
-    side of the axis.
+    The union over time of the level sets of E_t between its bounds at that time; where the regime is certain, only the
+    part on the side of the axis. The region R of the paper is wider: it takes the bounds over the whole interval at
+    every time, and the connected component of the start (`contains_as_printed`).
 
     Attributes
     ----------
@@ -150,6 +151,31 @@ class CrownRegion:
         if self.certificate.certain:
             inside &= directions @ self.certificate.axis > 0.0
         return (inside & (magnitude[:, 0] > 0.0)).reshape(vectors.shape[:-1])[()]
+
+    def contains_as_printed(self, momenta: ArrayLike) -> Mask:
+        """Whether the paper's region R has these: (..., 3), of any norm above 0 -> (...).
+
+        The union over time of the level sets of E_t between E_min and E_max, bounds over the whole interval, of which R
+        is the connected component of the start. That is one side of a plane through the centre where E_min or E_max
+        keeps the momentum off the plane at all times; for inertias with fixed axes there is no other way to come apart.
+
+        Source: Cabrera 2006, section 4.1.1; theory.md C-E5, E8.
+        """
+        vectors = finite_array(momenta, "momenta", (3,))
+        flat = vectors.reshape(-1, 3)
+        magnitude = np.linalg.norm(flat, axis=1, keepdims=True)
+        directions = np.divide(flat, magnitude, out=np.zeros_like(flat), where=magnitude > 0.0)
+        bounds = self.certificate.bounds
+        low, high = (np.full(len(one), end) for one, end in zip(bounds.quotients, _ends(bounds.quotients), strict=True))
+        inside = magnitude[:, 0] > 0.0
+        step = max(1, _CHUNK // len(low))
+        for start in range(0, len(flat), step):
+            least, greatest = bounds.enclosure.quadratic(directions[start : start + step])
+            inside[start : start + step] &= (greatest.max(axis=-1) >= low[0]) & (least.min(axis=-1) <= high[0])
+        margin, _, axis, _ = _widest_margin(bounds.enclosure, low, high)
+        if margin > 0.0 and bounds.magnitude > 0.0:
+            inside &= directions @ (np.copysign(1.0, self.certificate.start @ axis) * axis) > 0.0
+        return inside.reshape(vectors.shape[:-1])[()]
 
     @property
     def cosines(self) -> tuple[float, float]:
@@ -253,6 +279,11 @@ def _widest_margin(known: Enclosure, low: Array, high: Array) -> tuple[float, fl
             if margin > best[0]:
                 best = (margin, sign, axis, sign * plane)
     return best
+
+
+def _ends(quotients: tuple[Array, Array]) -> tuple[float, float]:
+    """The least and the greatest of bounds that belong to cells."""
+    return float(quotients[0].min()), float(quotients[1].max())
 
 
 def _candidates(known: Enclosure) -> list[Array]:

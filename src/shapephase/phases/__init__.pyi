@@ -1,6 +1,7 @@
 from .continuation import OrbitBranch, continued_orbits
 from .error_estimates import ArcErrors, RunningErrors, SplitErrors
 from .forced_split import ForcedSplit
+from .momentum_bundle import momentum_connection, momentum_curvature, momentum_generator
 from .phase_split import PhaseSplit, SplitMotion
 from .phases import (
     ArcPhases,
@@ -33,7 +34,10 @@ __all__ = [
     "continued_orbits",
     "dynamic_phase_from_energy",
     "fixed_points",
+    "momentum_connection",
     "momentum_crossings",
+    "momentum_curvature",
+    "momentum_generator",
     "momentum_returns",
     "parallel_transport",
     "running_phases",

@@ -31,6 +31,7 @@ from .lagrange_top import (
 from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, rigid_body_pendulum
 from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
+from .pseudo_rigid import PseudoRigidBody, PseudoRigidSpin, pseudo_rigid_spin
 from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
 from .steady_gyrostats import (
     DualSpinTurn,
@@ -61,6 +62,8 @@ __all__ = [
     "PendulumEquilibrium",
     "PendulumMotion",
     "Poinsot",
+    "PseudoRigidBody",
+    "PseudoRigidSpin",
     "RigidBodyPendulum",
     "SleepingTop",
     "SpinInSpace",
@@ -90,6 +93,7 @@ __all__ = [
     "nutation",
     "polhodes",
     "precession_rate",
+    "pseudo_rigid_spin",
     "rigid_body_pendulum",
     "second_variation",
     "semidirect_bracket",

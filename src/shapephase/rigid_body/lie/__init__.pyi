@@ -36,6 +36,7 @@ from .group_kinematics import (
     space_momentum,
     space_velocity,
 )
+from .hamiltonian_attitude import HamiltonianMotion, hamiltonian_motion
 from .lagrangian import (
     ReducedBody,
     body_angular_velocity,
@@ -103,6 +104,7 @@ from .n_dimensional_rigid_body import (
 
 __all__ = [
     "EulerPoincareMotion",
+    "HamiltonianMotion",
     "InvariableHyperplane",
     "LieAlgebra",
     "MagneticEquilibrium",
@@ -140,6 +142,7 @@ __all__ = [
     "euler_poincare_rate",
     "gradient_at",
     "group_exponential",
+    "hamiltonian_motion",
     "hamiltonian_vector_field",
     "heisenberg",
     "inertia_operator",

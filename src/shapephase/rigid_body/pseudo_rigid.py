@@ -1,0 +1,257 @@
+"""Pseudo-rigid bodies: elastic bodies that deform homogeneously, their steady spins and whether these are stable.
+
+The places of the matter are x = Q X, Q(t) any matrix of positive determinant. With the reference's second moments
+E = diag(E_1, E_2, E_3), the integral of X X^T by mass, the energy is
+
+    H = tr(Q' E Q'^T)/2 + V(Q),    V = mu (tr Q^T Q - 3)/2 - mu log J + lambda (log J)^2/2,    J = det Q,
+
+V that of a compressible neo-Hookean material, isotropic and at rest at Q = 1; the equation of motion is
+Q'' E = -dV/dQ. A steady spin turns a constant stretch, Q = exp(t hat(Omega)) diag(q).
+
+Sources: Lewis and Simo 1990; Simo, Lewis and Marsden 1991; Marsden and Ratiu, section 15.9, remark 5; theory.md L8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import root
+
+from .. import so3
+from ..arguments import check_object
+from ..arrays import Array, finite_array
+from ..display import short_repr
+from ..errors import AccuracyNotReached, ShapeError, UnphysicalInertiaError
+from ..letters import what_came
+
+_GROWTH = 30.0 * float(np.sqrt(np.finfo(float).eps))
+"""Of the fastest mode: real parts of eigenvalues below it come from double eigenvalues and rounding."""
+_FLAT = 1e3 * float(np.finfo(float).eps)
+"""Of the largest second derivative: smaller ones are zero but for rounding."""
+_RESIDUAL = 1e-10
+"""Of the forces that balance in a steady spin, relative to their size."""
+
+
+@dataclass(frozen=True, eq=False)
+class PseudoRigidBody:
+    """A homogeneously deforming body of neo-Hookean material.
+
+    Parameters
+    ----------
+    second_moments : (3,) E_i > 0, the integrals of X_i^2 by mass in the reference, along its principal axes [kg m^2]
+    shear : mu > 0, shear modulus times volume [J]
+    bulk : lambda >= 0, Lame's first constant times volume [J]
+
+    Raises
+    ------
+    ShapeError, UnphysicalInertiaError
+        If they are not such numbers.
+
+    Notes
+    -----
+    Of a rigid body with principal moments I_i, E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
+
+    Examples
+    --------
+    >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
+    >>> print(body.moments())
+    [3. 4. 5.]
+    """
+
+    second_moments: Array
+    shear: float
+    bulk: float
+
+    __repr__ = short_repr
+
+    def __init__(self, second_moments: ArrayLike, shear: float, bulk: float) -> None:
+        moments = finite_array(second_moments, "second_moments", (3,), unit="kg m^2")
+        stiffness = finite_array(shear, "shear", unit="J"), finite_array(bulk, "bulk", unit="J")
+        if moments.shape != (3,) or any(value.shape for value in stiffness):
+            raise ShapeError("second_moments, shear, bulk: three numbers, one and one are needed")
+        if moments.min() <= 0.0 or stiffness[0] <= 0.0 or stiffness[1] < 0.0:
+            raise UnphysicalInertiaError("second_moments and shear must be above 0, bulk not below 0")
+        object.__setattr__(self, "second_moments", np.array(moments))
+        object.__setattr__(self, "shear", float(stiffness[0]))
+        object.__setattr__(self, "bulk", float(stiffness[1]))
+
+    def moments(self, stretches: ArrayLike = (1.0, 1.0, 1.0)) -> Array:
+        """Principal moments of inertia of the body stretched by q: (..., 3) -> (..., 3) [kg m^2]."""
+        parts = self.second_moments * _stretches(stretches) ** 2
+        return parts.sum(axis=-1, keepdims=True) - parts
+
+    def stored_energy(self, deformation: ArrayLike) -> Array:
+        """V(Q): (..., 3, 3) -> (...) [J]."""
+        q, log = self._deformation(deformation)
+        squares = np.sum(q * q, axis=(-2, -1))
+        return 0.5 * self.shear * (squares - 3.0) - self.shear * log + 0.5 * self.bulk * log * log
+
+    def force(self, deformation: ArrayLike) -> Array:
+        """DV/dQ: (..., 3, 3) -> (..., 3, 3) [J]; Q'' E = -force."""
+        q, log = self._deformation(deformation)
+        inverse = np.linalg.inv(so3.transpose(q))
+        return self.shear * (q - inverse) + (self.bulk * log)[..., None, None] * inverse
+
+    def _deformation(self, deformation: ArrayLike) -> tuple[Array, Array]:
+        q = finite_array(deformation, "deformation", (3, 3))
+        volume = np.linalg.det(q)
+        if np.any(volume <= 0.0):
+            raise ShapeError(f"deformation: its determinant must be above 0, got {float(volume.min()):.6g}")
+        return q, np.log(volume)
+
+    def _stiffness(self, stretches: Array) -> Array:
+        """The second derivative of V at diag(q), rows of Q one after the other: (9, 9) [J]."""
+        log, inverse = float(np.log(stretches.prod())), 1.0 / stretches
+        turned = np.einsum("i,j,ik,jl->ijlk", inverse, inverse, np.eye(3), np.eye(3)).reshape(9, 9)
+        volume = np.diag(inverse).ravel()
+        return self.shear * (np.eye(9) + turned) + self.bulk * (np.outer(volume, volume) - log * turned)
+
+
+@dataclass(frozen=True, eq=False)
+class PseudoRigidSpin:
+    """A steady spin of a pseudo-rigid body; see `pseudo_rigid_spin`.
+
+    Attributes
+    ----------
+    body : the `PseudoRigidBody`
+    axis : 0, 1 or 2
+    momentum : along the axis [kg m^2/s]
+    rate : Omega [rad/s]
+    stretches : (3,) q
+    curvatures : (8,) second derivatives of the amended potential V + mu.I(Q)^-1 mu/2, ascending, across the turn about
+        the momentum, to which it is indifferent [J]
+    eigenvalues : (18,) complex, of the linearised motion in the turning frame [1/s]
+    verdict : "stable" where all curvatures are positive (energy-momentum method: in the sense of Liapunov, up to the
+        turn about the momentum); "unstable" where an eigenvalue has a positive real part; else "spectrally stable", as
+        about the axis of the smallest moment, where friction would decide otherwise
+
+    Examples
+    --------
+    >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
+    >>> [sp.rigid_body.pseudo_rigid_spin(body, axis, 2.0).verdict for axis in range(3)]
+    ['spectrally stable', 'unstable', 'stable']
+    """
+
+    body: PseudoRigidBody
+    axis: int
+    momentum: float
+    rate: float
+    stretches: Array
+    curvatures: Array
+    eigenvalues: np.ndarray
+    verdict: str
+
+    __repr__ = short_repr
+
+    def deformation(self, t: ArrayLike) -> Array:
+        """Q(t) = exp(t hat(Omega)) diag(q): (...) [s] -> (..., 3, 3)."""
+        times = finite_array(t, "t", unit="s")
+        return so3.exp(times[..., None] * self.rate * np.eye(3)[self.axis]) * self.stretches
+
+
+def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> PseudoRigidSpin:
+    """The steady spin about a principal axis, how much it stretches the body, and its stability.
+
+    The stretches are a critical point of V + momentum^2/(2 I(q)), reached from the body at rest.
+
+    Parameters
+    ----------
+    axis : 0, 1 or 2, of the reference's principal axes
+    momentum : [kg m^2/s]
+
+    Raises
+    ------
+    ShapeError
+        If the axis is none of these, or the momentum not a finite number.
+    AccuracyNotReached
+        If no equilibrium is found.
+
+    Notes
+    -----
+    Source: Lewis and Simo 1990; Marsden and Ratiu, section 15.9, remark 5 (theory.md L8).
+
+    Examples
+    --------
+    >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
+    >>> spin = sp.rigid_body.pseudo_rigid_spin(body, 2, 6.0)
+    >>> print(f"{spin.rate:.6f} rad/s, as rigid {6.0 / 5.0:.6f} rad/s")
+    1.017854 rad/s, as rigid 1.200000 rad/s
+    """
+    check_object(body, "PseudoRigidBody", "body")
+    if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2):
+        raise ShapeError(f"axis: one of 0, 1, 2 is needed, got {what_came(axis)}")
+    value = finite_array(momentum, "momentum", unit="kg m^2/s")
+    if value.shape:
+        raise ShapeError(f"momentum: one number is needed, got {what_came(momentum)}")
+    size = float(value)
+    stretches = _stretched(body, int(axis), size)
+    rate = size / float(body.moments(stretches)[axis])
+    curvatures = _curvatures(body, int(axis), size, stretches)
+    eigenvalues = _spectrum(body, int(axis), rate, stretches)
+    if curvatures[0] > _FLAT * curvatures[-1]:
+        verdict = "stable"
+    elif np.real(eigenvalues).max() > _GROWTH * np.abs(eigenvalues).max():
+        verdict = "unstable"
+    else:
+        verdict = "spectrally stable"
+    return PseudoRigidSpin(
+        body=body,
+        axis=int(axis),
+        momentum=size,
+        rate=rate,
+        stretches=stretches,
+        curvatures=curvatures,
+        eigenvalues=eigenvalues,
+        verdict=verdict,
+    )
+
+
+def _stretches(value: ArrayLike) -> Array:
+    stretches = finite_array(value, "stretches", (3,))
+    if np.any(stretches <= 0.0):
+        raise ShapeError("stretches: they must be above 0")
+    return stretches
+
+
+def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:
+    """The stretches of a steady spin: by their logarithms, so that they stay positive."""
+    across = np.where(np.arange(3) == axis, 0.0, body.second_moments)
+
+    def balance(logs: Array) -> Array:
+        q = np.exp(logs)
+        pulled = momentum**2 * across * q * q / float(across @ (q * q)) ** 2
+        return (body.shear * (q * q - 1.0) + body.bulk * logs.sum() - pulled) / body.shear
+
+    found = root(balance, np.zeros(3), tol=1e-15)
+    stretches = np.exp(found.x)
+    if np.abs(balance(found.x)).max() > _RESIDUAL * (1.0 + float((stretches**2).max())):
+        raise AccuracyNotReached(f"no steady spin with momentum {momentum:.6g} kg m^2/s was found: {found.message}")
+    return stretches
+
+
+def _curvatures(body: PseudoRigidBody, axis: int, momentum: float, stretches: Array) -> Array:
+    """Second derivatives of the amended potential, across the turn about the momentum."""
+    q, second, unit = np.diag(stretches), np.diag(body.second_moments), np.eye(3)[axis]
+    inverse = np.diag(1.0 / body.moments(stretches))
+    omega = momentum * inverse @ unit
+    directions = np.eye(9).reshape(9, 3, 3)
+    products = directions @ second @ q.T
+    slopes = 2.0 * np.trace(products, axis1=1, axis2=2)[:, None, None] * np.eye(3) - products - so3.transpose(products)
+    # d^2 (mu.I^-1 mu/2) = omega.dI I^-1 dI omega - omega.d^2I omega/2, I quadratic in Q.
+    pushed = slopes @ omega
+    pairs = np.einsum("aij,j,bkj->abik", directions, body.second_moments, directions)
+    bends = np.trace(pairs, axis1=2, axis2=3) * (omega @ omega) - np.einsum("i,abik,k->ab", omega, pairs, omega)
+    hessian = body._stiffness(stretches) + pushed @ inverse @ pushed.T - 0.5 * (bends + bends.T)
+    turn = (so3.hat(unit) @ q).ravel()
+    basis = np.linalg.svd(turn[None])[2][1:]
+    return np.asarray(np.linalg.eigvalsh(basis @ hessian @ basis.T), dtype=float)
+
+
+def _spectrum(body: PseudoRigidBody, axis: int, rate: float, stretches: Array) -> np.ndarray:
+    """Eigenvalues of d'' = -2 hat(Omega) d' - hat(Omega)^2 d - V''[d] E^-1 in the frame that turns."""
+    turn = np.kron(so3.hat(rate * np.eye(3)[axis]), np.eye(3))
+    forces = body._stiffness(stretches) / np.tile(body.second_moments, 3)[:, None]
+    matrix = np.block([[np.zeros((9, 9)), np.eye(9)], [-turn @ turn - forces, -2.0 * turn]])
+    return np.linalg.eigvals(matrix)
