@@ -132,6 +132,74 @@ def test_a_base_without_mass_of_its_own(tmp_path):
     np.testing.assert_array_equal(body.locked_inertia(shape), whole.locked_inertia(shape))
 
 
+@pytest.mark.usefixtures("kept_locale")
+def test_momentum_of_floating_motions_is_biorbd_s(tmp_path, exact_acrobat, rng):
+    """The base moves and turns, too, as biorbd's own coordinates of it, about axes that each carry the next."""
+    text = exact_acrobat.replace("\tmeshfile pelvis.bvh // not there\n", "")
+    body = loaded(tmp_path, text, "a.bioMod")
+    model = biorbd.Model(str(tmp_path / "a.bioMod"))
+    for q, v in rng.uniform(-1.0, 1.0, (3, 2, model.nbQ())):
+        there, moves = biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v)
+        turn = Rotation.from_euler("XYZ", q[3:6]).as_matrix()
+        first, second = Rotation.from_euler("X", q[3]).as_matrix(), Rotation.from_euler("XY", q[3:5]).as_matrix()
+        omega = turn.T @ (v[3] * np.eye(3)[0] + v[4] * first[:, 1] + v[5] * second[:, 2])
+        inertia, centre = body.locked_inertia(q[6:]), body.centre_of_mass(q[6:])
+        momentum = turn @ (inertia @ omega + body.internal_momentum(q[6:], v[6:]))
+        extent = np.abs(inertia).max()
+        np.testing.assert_allclose(q[:3] + turn @ centre, model.CoM(there, True).to_array(), rtol=0, atol=1e-14)
+        expected = model.angularMomentum(there, moves, True).to_array()
+        np.testing.assert_allclose(momentum, expected, rtol=0, atol=1e-12 * extent * np.abs(v).sum())
+
+
+BESIDE = """
+segment Ground
+	parent root
+	rotations	x
+endsegment
+"""
+
+
+@pytest.mark.full
+def test_other_roots_are_left_out_or_named(tmp_path):
+    """Furniture without mass is left out; of two bodies one is named."""
+    (tmp_path / "two.bioMod").write_text(ACROBAT + BESIDE)
+    with pytest.warns(IgnoredElementWarning, match="1 segments on other roots are left out"):
+        body = sp.load_body(tmp_path / "two.bioMod")
+    assert (body.n_shape, len(body.link_names)) == (6, 5)
+    (tmp_path / "two.bioMod").write_text(ACROBAT + BESIDE.replace("rotations", "mass 90\n\trotations"))
+    with pytest.raises(ModelFileError, match="got 'Pelvis', 'Ground'; say which one by root_body='Ground'"):
+        sp.load_body(tmp_path / "two.bioMod")
+    with pytest.warns(IgnoredElementWarning, match="1 segments on other roots"):
+        assert sp.load_body(tmp_path / "two.bioMod", root_body="Pelvis").n_shape == 6
+    with pytest.raises(ModelFileError, match="'Thorax' is no root segment; there is 'Pelvis', 'Ground'"):
+        sp.load_body(tmp_path / "two.bioMod", root_body="Thorax")
+    (tmp_path / "two.bioMod").write_text("version 4\n" + BESIDE)
+    with pytest.raises(ModelFileError, match=":3: no segment has mass"):
+        sp.load_body(tmp_path / "two.bioMod")
+
+
+@pytest.mark.full
+def test_a_base_without_mass_that_lies_elsewhere(tmp_path):
+    """What biorbd gives a segment without mass, 1e-8 kg, is no part of the body where the segment is not."""
+    far = MASSLESS_ROOT.replace("rt 0.2 0 0 xyz 0 0 0", "rt 0.2 0 0 xyz 1 2 3")
+    assert far != MASSLESS_ROOT
+    shape = np.array([0.2, -0.3, 0.5, 0.1, 0.7, 0.05])
+    near, away = (loaded(tmp_path, text).locked_inertia(shape) for text in (MASSLESS_ROOT, far))
+    np.testing.assert_array_equal(away, near)
+
+
+@pytest.mark.full
+def test_other_words_for_the_same(tmp_path):
+    spelt = ACROBAT.replace("com 0 0 0.2", "CenterOfMass 0 0 0.2").replace(
+        "inertia\n\t\t0.03 0 0\n\t\t0 0.03 0\n\t\t0 0 0.003", "inertia_xxyyzz 0.03 0.03 0.003"
+    )
+    assert "inertia_xxyyzz" in spelt
+    spelt = spelt.replace("meshfile pelvis.bvh", "meshfile pelvis.bvh\n\tmeshrt 0 0 0 xyz 0 0 0\n\tmeshscale 1 1 1")
+    shape = np.array([0.2, -0.3, 0.5, 0.1, 0.7, 0.05])
+    found, expected = (loaded(tmp_path, text).locked_inertia(shape) for text in (spelt, ACROBAT))
+    np.testing.assert_array_equal(found, expected)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -230,6 +298,46 @@ def test_a_person_is_what_yeadon_measures(tmp_path, rng):
     np.testing.assert_allclose(body.centre_of_mass(shape), centre, rtol=0, atol=1e-14)
     np.testing.assert_allclose(body.locked_inertia(shape), inertia, rtol=0, atol=1e-14 * np.abs(inertia).max())
     assert (body.n_shape, len(body.link_names)) == (18, 11)
+
+
+MOVING = """
+import json, sys, numpy as np, yeadon
+human = yeadon.Human(sys.argv[1])
+turns, rates = json.loads(sys.argv[2])
+nodes = np.cos(np.pi * (np.arange(24) + 0.5) / 24)
+def at(time):
+    human.set_CFG_dict({name: turns[name] + time * rates[name] for name in human.CFGnames})
+    return [np.column_stack([part.center_of_mass, part.rot_mat]) for part in human.segments]
+series = np.polynomial.chebyshev.chebfit(nodes, np.array([at(time) for time in nodes]).reshape(24, -1), 23)
+(here, slope) = (np.polynomial.chebyshev.chebval(0.0, one) for one in (series, np.polynomial.chebyshev.chebder(series)))
+here, slope = np.array(at(0.0)), slope.reshape(-1, 3, 4)
+masses = np.array([part.mass for part in human.segments])
+centre, speed = masses @ here[:, :, 0] / masses.sum(), masses @ slope[:, :, 0] / masses.sum()
+total = np.zeros(3)
+for part, pose, rate in zip(human.segments, here, slope):
+    turn, spin = pose[:, 1:], rate[:, 1:] @ pose[:, 1:].T
+    omega = np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]) / 2
+    total += part.mass * np.cross(pose[:, 0] - centre, rate[:, 0] - speed) + turn @ part.rel_inertia @ turn.T @ omega
+pelvis = human.segments[0]
+spin = here[0, :, 1:].T @ slope[0, :, 1:]
+omega = [(spin[2, 1] - spin[1, 2]) / 2, (spin[0, 2] - spin[2, 0]) / 2, (spin[1, 0] - spin[0, 1]) / 2]
+print(json.dumps([total.tolist(), here[0, :, 1:].tolist(), omega]))
+"""
+
+
+def test_momentum_of_floating_motions_is_yeadon_s(tmp_path, rng):
+    """Somersault, tilt and twist go on, too; speeds are those of the package's poses, by a series of degree 23."""
+    body = loaded(tmp_path, measured())
+    low, high = 0.3 * np.array(body.joint_limits).T
+    shape, rate = low + (high - low) * rng.uniform(size=18), rng.uniform(-0.5, 0.5, 18)
+    free = ("somersault", "tilt", "twist")
+    asked = [dict(zip((*body.joint_names, *free), (*row, *rng.uniform(-0.5, 0.5, 3)), strict=True))
+             for row in (shape, rate)]  # fmt: skip
+    command = [sys.executable, "-c", MOVING, str(tmp_path / "file.txt"), json.dumps(asked)]
+    total, turn, omega = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    inertia = body.locked_inertia(shape)
+    momentum = np.array(turn) @ (inertia @ omega + body.internal_momentum(shape, rate))
+    np.testing.assert_allclose(momentum, total, rtol=0, atol=1e-12 * np.abs(inertia).max() * np.abs(rate).sum())
 
 
 def test_the_next_person_is_not_lighter(tmp_path):

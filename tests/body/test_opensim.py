@@ -74,6 +74,70 @@ def test_poses_inertia_and_momentum_are_opensims(gait, rng):
         assert abs(beta - found["assembled"]["knee_angle_r_beta"]) < 1e-6
 
 
+@pytest.fixture(scope="module")
+def acrobat(tmp_path_factory):
+    file = tmp_path_factory.mktemp("opensim") / "acrobat.osim"
+    file.write_text(osim_models.acrobat(), encoding="utf-8")
+    return sp.load_body(file)
+
+
+@needs_opensim
+@pytest.mark.parametrize(("name", "base", "free"), [
+    ("gait", "pelvis", osim_models.PELVIS), ("acrobat", "trunk", osim_models.ACROBAT_FREE)
+])  # fmt: skip
+def test_momentum_of_floating_motions_is_opensims(name, base, free, request, rng):
+    """The base moves and turns, too, as coordinates of its own joint; every kind of joint and function is there."""
+    file_body = request.getfixturevalue(name)
+    low, high = np.clip(file_body.joint_limits, -1.0, 1.0).T
+    shapes = rng.uniform(low, high, (3, file_body.n_shape))
+    rates = rng.normal(size=shapes.shape)
+    values, speeds = rng.uniform(-1.0, 1.0, (3, 6)), rng.normal(size=(3, 6))
+    named = [
+        [dict(zip((*file_body.joint_names, *free), row.tolist(), strict=True)) for row in np.hstack(pair)]
+        for pair in ((shapes, values), (rates, speeds))
+    ]
+    for shape, rate, found in zip(shapes, rates, opensim_oracle.asked(file_body.file, base, *named), strict=True):
+        inertia = file_body.locked_inertia(shape)
+        momentum = inertia @ found["omega"] + file_body.internal_momentum(shape, rate)
+        extent = np.abs(inertia).max()
+        assert abs(file_body.mass - found["mass"]) < 16.0 * EPS * file_body.mass
+        np.testing.assert_allclose(file_body.centre_of_mass(shape), found["centre"], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(inertia, found["inertia"], rtol=0, atol=1e-12 * extent)
+        fast = np.linalg.norm(found["omega"]) + np.abs(rate).max()
+        np.testing.assert_allclose(momentum, found["momentum"], rtol=0, atol=1e-12 * extent * fast)
+
+
+@needs_opensim
+@pytest.mark.full
+@pytest.mark.parametrize(("name", "base", "free", "turns"), [
+    ("gait", "pelvis", osim_models.PELVIS, osim_models.PELVIS[:3]),
+    ("acrobat", "trunk", osim_models.ACROBAT_FREE, ()),
+])  # fmt: skip
+def test_a_floating_motion_is_that_of_opensim(name, base, free, turns, request, rng):
+    """OpenSim integrates its own equations, with constraints for what is prescribed and what follows.
+
+    Of the gait model, with a knee that it accelerates wrongly, its momentum is kept.
+    """
+    file_body = request.getfixturevalue(name)
+    low, high = np.clip(file_body.joint_limits, -1.0, 1.0).T
+    middle, size, phase = 0.5 * (low + high), 0.3 * (high - low), rng.uniform(0.0, 6.0, file_body.n_shape)
+    harmonic = rng.integers(1, 3, file_body.n_shape)
+    cosines, sines = np.zeros((2, file_body.n_shape, 2))
+    rows = np.arange(file_body.n_shape)
+    cosines[rows, harmonic - 1], sines[rows, harmonic - 1] = size * np.sin(phase), size * np.cos(phase)
+    path = sp.ShapePath.fourier(middle, cosines, sines, 2.0, joint_names=file_body.joint_names)
+    times = [0.0, 0.5, 1.0]
+    waves = np.stack([middle, size, np.pi * harmonic, phase], axis=1).tolist()
+    start = dict(zip(free, np.stack([rng.uniform(-0.3, 0.3, 6), rng.normal(size=6)], axis=1).tolist(), strict=True))
+    found = opensim_oracle.flown(
+        file_body.file, base, dict(zip(file_body.joint_names, waves, strict=True)), start, times, turns
+    )
+    expected = np.array([one["attitude"] for one in found])
+    motion = sp.reconstruct(sp.articulated(file_body, path), found[0]["momentum"], expected[0], tolerance=1e-11)
+    assert sp.so3.angle(expected[0].T @ expected[-1]) > 0.3, "a motion that turns nothing shows nothing"
+    np.testing.assert_allclose(motion.attitude(np.array(times)), expected, rtol=0, atol=1e-8)
+
+
 MOT = """motion
 version=1
 nRows={rows}
@@ -200,3 +264,22 @@ def test_a_joint_to_the_ground_with_few_coordinates_floats(tmp_path):
     ):
         found = sp.load_body(tmp_path / "two.osim")
     assert found.joint_names == ("bend",)
+
+
+@needs_opensim
+@pytest.mark.full
+def test_one_of_several_trees_is_named_and_speeds_of_the_file_do_not_count(tmp_path):
+    """A ball beside the body is left out; the base's speed in the file has no part in the momentum of the joints."""
+    ball = body("ball", 0.4, "0 0 0", "0.001 0.001 0.001 0 0 0")
+    free = joint("FreeJoint", "flight", "ground", "ball", [coordinate(f"ball_{k}", clamped=False) for k in range(6)])
+    text = model([ball, *TWO], [free, TRUNK, ARM]).replace(
+        '<Coordinate name="pelvis_tilt">', '<Coordinate name="pelvis_tilt"><default_speed_value>2</default_speed_value>'
+    )
+    (tmp_path / "three.osim").write_text(text, encoding="utf-8")
+    with pytest.raises(ModelFileError, match="got 'flight', 'ground_pelvis'; say which by root_body='trunk'"):
+        sp.load_body(tmp_path / "three.osim")
+    with pytest.raises(ModelFileError, match="'arm' is not joined to the ground; there is 'ball', 'trunk'"):
+        sp.load_body(tmp_path / "three.osim", root_body="arm")
+    with pytest.warns(IgnoredElementWarning, match="1 bodies that hang elsewhere are left out"):
+        found = sp.load_body(tmp_path / "three.osim", root_body="trunk")
+    assert (found.joint_names, found.mass) == (("bend",), 3.0)

@@ -80,6 +80,14 @@ def points(kind: str, x: Iterable[float], y: Iterable[float]) -> str:
     return f'<{kind} name="function"><x>{_words(x)}</x><y>{_words(y)}</y></{kind}>'
 
 
+def gcv(x: Iterable[float], y: Iterable[float], half_order: int = 2) -> str:
+    """A natural spline of degree 2 half_order - 1."""
+    return (
+        f'<GCVSpline name="function"><half_order>{half_order}</half_order><error_variance>0</error_variance>'
+        f"<x>{_words(x)}</x><y>{_words(y)}</y></GCVSpline>"
+    )
+
+
 def polynomial(*coefficients: float) -> str:
     """The highest power first, as OpenSim has it."""
     words = _words(coefficients)
@@ -239,3 +247,54 @@ def gait() -> str:
         [coupler("patella_follows", "knee_angle_r_beta", "knee_angle_r",
                  points("SimmSpline", (-2.5, -1.5, -0.5, 0.3), (-2.3, -1.2, -0.6, 0.25)))],
     )  # fmt: skip
+
+
+ACROBAT_FREE = ("roll", "pitch", "yaw", "along", "up", "across")
+
+
+def acrobat() -> str:
+    """A trunk that floats by a FreeJoint, and every other kind of joint and function: 8 bodies."""
+    bodies = (
+        body("trunk", 30.0, "0.01 0.2 0", "1.2 0.6 1.1 0.02 0 0.01"),
+        body("thigh", 9.0, "0 -0.2 0.01", "0.13 0.04 0.14 0.001 0 0"),
+        body("shank", 4.0, "0.01 -0.2 0", "0.05 0.006 0.051 0 0.0002 0"),
+        body("foot", 1.1, "0.1 0.02 0", "0.0015 0.004 0.0042 0 0 0"),
+        body("arm", 2.2, "0 -0.16 0", "0.012 0.004 0.013 0 0 0.0001"),
+        body("hand", 0.5, "0 -0.06 0", "0.0009 0.0005 0.0013 0 0 0"),
+        body("head", 4.6, "0.01 0.1 0", "0.02 0.018 0.024 0 0.0005 0"),
+        body("pole", 3.0, "0.4 0 0.1", "0.02 0.5 0.5 0.001 0 0"),
+    )
+    joints = (
+        joint("FreeJoint", "floating", "ground", "trunk", [coordinate(name, clamped=False) for name in ACROBAT_FREE],
+              places=("0 1 0", "0.1 0.05 -0.02"), turns=("0.1 0.2 -0.3", "0.2 0 0.1")),
+        joint("PlanarJoint", "hip", "trunk", "thigh",
+              [coordinate("hip_bend"), coordinate("hip_along", -0.1, 0.1), coordinate("hip_up", -0.1, 0.1)],
+              places=("0 -0.1 0.1", "0 0.05 0"), turns=("0.3 0.1 0", "0 0 0.2")),
+        joint(
+            "CustomJoint", "knee", "thigh", "shank", [coordinate("knee_bend", -1.8, 0.2), coordinate(
+                "knee_play", value=0.3, locked=True)],
+            places=("0 -0.4 0", "0 0.02 0"), turns=("0 0.05 0", "0.02 0 0"),
+            transform=axes(
+                axis(0, "0 0 1", line(-1.0, 0.1), "knee_bend"),
+                axis(1, "0 1 0.2", points("SimmSpline", (-1.0, 0.0, 1.0), (0.1, 0.0, 0.2)), "knee_play"),
+                axis(2, "1 0 0", constant(0.05)),
+                axis(3, "1 0 0", gcv((-2.0, -1.4, -0.9, -0.3, 0.3), (0.01, 0.02, 0.015, 0.0, 0.01)), "knee_bend"),
+                axis(4, "0 1 0", line(0.02, -0.01, 0.03), "knee_bend knee_play"),
+            ),
+        ),
+        joint("PinJoint", "ankle", "shank", "foot", [coordinate("ankle_bend")], places=("0 -0.4 0", "0 0 0"),
+              turns=("0.2 -0.1 0", "0.2 -0.1 0")),
+        joint("GimbalJoint", "shoulder", "trunk", "arm",
+              [coordinate("shoulder_x"), coordinate("shoulder_y"), coordinate("shoulder_z")],
+              places=("0 0.4 0.2", "0 0.02 0")),
+        joint("WeldJoint", "wrist", "arm", "hand", places=("0 -0.5 0", "0 0 0.01"), turns=("0.1 0 0", "0 0 0.2")),
+        joint("UniversalJoint", "neck", "trunk", "head", [coordinate("nod"), coordinate("shake")],
+              places=("0 0.5 0", "0 -0.05 0")),
+        joint("SliderJoint", "grip", "hand", "pole", [coordinate("slip", -0.2, 0.2)], turns=("0 0.4 0", "0 0 0.3")),
+    )  # fmt: skip
+    couplers = (
+        coupler("ankle_of_knee", "ankle_bend", "knee_bend", polynomial(0.1, -0.4, 0.2)),
+        coupler("nod_of_ankle", "nod", "ankle_bend", line(0.5, 0.1)),
+        coupler("shake_of_both", "shake", "knee_bend shoulder_y", line(0.3, -0.6, 0.05)),
+    )
+    return model(bodies, joints, couplers)

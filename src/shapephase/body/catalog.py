@@ -29,7 +29,7 @@ from ._link_tree import inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree
-from .engines.formats import MJCF, format_of
+from .engines.formats import FORMATS, MJCF, format_of
 from .formats.urdf import urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 
@@ -66,7 +66,8 @@ def load_body(
         is an error; names of bodies that are installed are trusted
     root : "free" removes the hinges and slides between the world and an MJCF's body, as planar walkers have them; None:
         they are an error
-    root_body : the body of an MJCF that floats, with all that hangs on it; needed where the file has several trees
+    root_body : the body that floats, with all that hangs on it, of an MJCF, an OpenSim or a bioMod file; needed where
+        the file has several trees
 
     Raises
     ------
@@ -75,7 +76,7 @@ def load_body(
     ModelFileError, UnphysicalInertiaError
         If the file cannot be used, or a link cannot exist; the message begins with file and line.
     ShapeError
-        If `root` or `root_body` is given for what is no MJCF.
+        If `root` or `root_body` is given for a file that has no such choice.
     MissingExtraError
         For "example:..." without example-robot-data, and for a format whose engine is not installed.
 
@@ -249,8 +250,7 @@ def _from_file(
     root = xml_tree(content, where) if owned in (None, MJCF) else None
     if root is not None and root.tag == "mujoco":
         owned = MJCF
-    if owned != MJCF:
-        _check_unused(given, where)
+    _check_unused(given, where, owned)
     if root is None or owned == MJCF:
         tree, poses = engine_tree(path, owned or MJCF, given)
     else:
@@ -268,9 +268,11 @@ def _from_file(
     return body, found
 
 
-def _check_unused(given: dict[str, str], where: str) -> None:
-    if given:
-        raise ShapeError(f"{next(iter(given))} is for MJCF files; {quoted(where)} has one root, which floats")
+def _check_unused(given: dict[str, str], where: str, owned: str | None = None) -> None:
+    for name in given:
+        if owned is None or name not in FORMATS[owned].options:
+            files = "MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
+            raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")
 
 
 def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:

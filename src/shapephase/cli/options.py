@@ -101,7 +101,7 @@ class PrintOptions:
 @Parameter(name="*")
 @dataclass(frozen=True)
 class BodyOptions:
-    """What floats, of an MJCF file; each is an argument of `load_body`."""
+    """What floats; each is an argument of `load_body`."""
 
     root: Annotated[
         str | None,
@@ -115,8 +115,8 @@ class BodyOptions:
         str | None,
         Parameter(
             show_default=False,
-            help="Of an MJCF file: the body that floats, with all that hangs on it, without unit; needed where the "
-            "file has several. For example `--root-body torso`.",
+            help="Of an MJCF, OpenSim or bioMod file: the body that floats, with all that hangs on it, without unit; "
+            "needed where the file has several. For example `--root-body torso`.",
         ),
     ] = None
 

@@ -21,20 +21,26 @@ from .chain import Chain, UnusableModelError, check_name, locked_inertia
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 _WORDS = (
     *("parent", "rt", "rtinmatrix", "translations", "rotations", "ranges", "rangesq", "rangesqdot", "rangesqddot"),
-    *("jointdampings", "mass", "com", "inertia", "mesh", "meshfile", "meshcolor", "meshscale", "meshrt"),
-    *("meshrtinmatrix", "patch", "externalforceindex", "forceplate"),
+    *("jointdampings", "mass", "com", "centerofmass", "inertia", "inertiamatrix", "inertia_xxyyzz"),
+    *("mesh", "meshfile", "meshcolor", "meshscale", "meshrt", "meshrtinmatrix", "patch"),
+    *("externalforceindex", "forceplate"),
 )
 """That a segment may have, in lower case, as biorbd 1.12 knows them."""
-_COUNTS = {"parent": 1, "translations": 1, "rotations": 1, "rtinmatrix": 1, "mass": 1, "com": 3, "inertia": 9}
+_COUNTS = {
+    **dict.fromkeys(("parent", "translations", "rotations", "rtinmatrix", "mass"), 1),
+    **dict.fromkeys(("com", "centerofmass", "inertia_xxyyzz"), 3),
+    **dict.fromkeys(("inertia", "inertiamatrix"), 9),
+}
 """How many values follow a word; biorbd passes over those beyond, and over the last letters of `1,5`."""
 _FRAME = 16
 """Values of a frame as a matrix; otherwise three angles, the order of their axes, and three coordinates."""
 _ONCE = (*_COUNTS, "rt", "rangesq")
 """Words of which a second one takes the place of the first; meshes have many points."""
+_OF_NUMBERS = ("rt", "rangesq", "mass", "com", "centerofmass", "inertia", "inertiamatrix", "inertia_xxyyzz")
 _OPERAND = r"(\$\w+|[Pp][Ii]|(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(nan|NaN|inf|Infinity))"
 _VALUE = re.compile(rf"[+-]?(\(+[+-]?)?{_OPERAND}\)*([-+*/]\(*{_OPERAND}\)*)*", re.ASCII)
 """What biorbd reads right: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it."""
-_DROPPED = ("meshfile",)
+_DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")
 """A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
 _NO_ROOT = ("root", "base")
 _MASSLESS = 1e-7
@@ -47,21 +53,23 @@ _MOST_BYTES = 16 << 20
 """Of a file; a full body with muscles has some hundred thousand."""
 
 
-def chain_of(path: str) -> Chain:
-    """Links and joints of a bioMod file, on its root segment."""
+def chain_of(path: str, root_body: str | None = None) -> Chain:
+    """Links and joints of a bioMod file, on its root segment.
+
+    root_body : the root segment that floats, with all that hangs on it, where the file has several
+    """
     notes, starts = [], {}
     model = _model(path, notes, starts)
     chain = Chain(Path(path).stem, notes=notes)
-    segments = {model.segment(k).name().to_string(): k for k in range(model.nbSegment())}
-    base, dropped = _base(model, segments, starts)
+    segments = _tree(model, root_body, notes, starts)
+    base, dropped = _base(model, segments)
     _name_base(chain, [model.segment(segments[name]) for name in (*dropped, base)])
     for name in dropped:
         notes.append(f"segment {name!r} has no mass: its coordinates are the free base's, as those of {base!r}")
+        del segments[name]
     lack, flips = 0.0, {}
     for name, number in segments.items():
         segment, line = model.segment(number), starts.get(name, 1)
-        if name in dropped:
-            continue
         parent = segment.parent().to_string()
         frame = segment.localJCS().to_array()
         above = flips.get(parent, np.eye(3))
@@ -127,7 +135,7 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
         words = line.split("//")[0].split()
         word = words[0].lower() if words else ""
         if word in _DROPPED:
-            meshes += 1
+            meshes += word == "meshfile"
             kept.append("")
             said += [(text, number) for text in words[:1]]
             continue
@@ -211,7 +219,7 @@ def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int
             raise UnusableModelError(
                 f"segment {segment!r}: rangesQ has {len(values)} values of {axes} coordinates", line
             )
-    if word in ("rt", "mass", "com", "inertia", "rangesq"):
+    if word in _OF_NUMBERS:
         for text in numbers:
             if not _VALUE.fullmatch(text):
                 hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
@@ -220,18 +228,51 @@ def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int
                 )
 
 
-def _base(model: Any, segments: dict[str, int], starts: dict[str, int]) -> tuple[str, list[str]]:
+def _tree(model: Any, root_body: str | None, notes: list[str], starts: dict[str, int]) -> dict[str, int]:
+    """The root segment and all that hangs on it, with their numbers."""
+    known = {model.segment(k).name().to_string(): k for k in range(model.nbSegment())}
+    parents = {name: model.segment(k).parent().to_string() for name, k in known.items()}
+    for name, parent in parents.items():
+        if parent not in known and parent.lower() not in _NO_ROOT:
+            raise UnusableModelError(f"segment {name!r}: its parent {parent!r} does not exist", starts.get(name, 1))
+    trees: dict[str, dict[str, int]] = {}
+    for name, parent in parents.items():
+        # A parent stands above its children in the file.
+        tree = next((tree for tree in trees.values() if parent in tree), None)
+        if tree is None:
+            tree = trees[name] = {}
+        tree[name] = known[name]
+    masses = {
+        root: sum(model.segment(k).characteristics().mass() for k in tree.values() if _has_mass(model, k))
+        for root, tree in trees.items()
+    }
+    roots = [root for root, mass in masses.items() if mass > 0.0] or list(trees)
+    listed = ", ".join(map(repr, roots[:20])) or "none"
+    if root_body is not None and root_body not in trees:
+        raise UnusableModelError(f"root_body: {root_body[:60]!r} is no root segment; there is {listed}")
+    if len(roots) != 1 and root_body is None:
+        heaviest = max(roots, key=lambda root: masses[root], default="")
+        way = f"; say which one by root_body={heaviest!r} (--root-body {heaviest})" if roots else ""
+        raise UnusableModelError(
+            f"one root segment is needed, got {listed}{way}", starts.get(roots[1], 1) if roots else 1
+        )
+    root = root_body or roots[0]
+    if masses[root] == 0.0:
+        raise UnusableModelError("no segment has mass", starts.get(root, 1))
+    if len(trees[root]) < len(known):
+        notes.append(f"{len(known) - len(trees[root])} segments on other roots are left out")
+    return trees[root]
+
+
+def _has_mass(model: Any, number: int) -> bool:
+    return not model.segment(number).characteristics().mass() <= _MASSLESS
+
+
+def _base(model: Any, segments: dict[str, int]) -> tuple[str, list[str]]:
     """The segment that is the free base, and those above it that have no mass."""
     parents = {name: model.segment(k).parent().to_string() for name, k in segments.items()}
-    for name, parent in parents.items():
-        if parent not in segments and parent.lower() not in _NO_ROOT:
-            raise UnusableModelError(f"segment {name!r}: its parent {parent!r} does not exist", starts.get(name, 1))
-    roots = [name for name, parent in parents.items() if parent not in segments]
-    if len(roots) != 1:
-        listed = ", ".join(map(repr, roots[:20])) or "none"
-        raise UnusableModelError(f"one root segment is needed, got {listed}", starts.get(roots[1], 1) if roots else 1)
-    base, dropped = roots[0], []
-    while model.segment(segments[base]).characteristics().mass() <= _MASSLESS:
+    base, dropped = next(iter(segments)), []
+    while not _has_mass(model, segments[base]):
         below = [name for name, parent in parents.items() if parent == base]
         if len(below) != 1:
             break
@@ -285,7 +326,8 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
     # The scalar parts of quaternions, which only a base can have here, come last.
     still[model.nbQ() - model.nbQuat() :] = 1.0
     tolerance = _EXACT + _FRAMES * lack
-    traits = [model.segment(k).characteristics() for k in segments.values()]
+    numbers = list(segments.values())
+    traits = [model.segment(k).characteristics() for k in numbers]
     masses = np.array([part.mass() for part in traits])
     offsets = np.array([part.CoM().to_array() for part in traits])
     tensors = np.array([part.inertia().to_array() for part in traits])
@@ -293,10 +335,16 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
         q, v = still.copy(), np.zeros(model.nbQdot())
         for name, value in shape.items():
             q[names.index(name)], v[names.index(name)] = value, rate[name]
-        frames = np.array([frame.to_array() for frame in model.allGlobalJCS(biorbd.GeneralizedCoordinates(q))])
+        there, moves = biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v)
+        frames = np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
+        root, frames = frames[segments[base], :3, :3], frames[numbers]
         turns = frames[:, :3, :3]
         centres = frames[:, :3, 3] + (turns @ offsets[:, :, None])[:, :, 0]
-        inertia = locked_inertia(masses, centres, turns @ tensors @ np.swapaxes(turns, 1, 2))
-        momentum = model.angularMomentum(biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v), True)
-        root = turns[segments[base]]
-        chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum.to_array(), (tolerance, tolerance))
+        turned = turns @ tensors @ np.swapaxes(turns, 1, 2)
+        inertia = locked_inertia(masses, centres, turned)
+        # Part by part: not all segments need belong to the body.
+        speeds = np.array([speed.to_array() for speed in model.CoMdotBySegment(there, moves, True)])[numbers]
+        omega = np.array([model.segmentAngularVelocity(there, moves, k, False).to_array() for k in numbers])
+        apart = centres - masses @ centres / masses.sum()
+        momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
+        chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum, (tolerance, tolerance))

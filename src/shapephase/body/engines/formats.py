@@ -9,7 +9,7 @@ _HEAD = 65536
 """[bytes] of a file that are looked at to tell its format."""
 
 MJCF = "mjcf"
-"""The one of these formats in which what floats can be chosen."""
+"""The one of these formats that is XML throughout, and drawn."""
 
 
 class Format(NamedTuple):
@@ -20,12 +20,13 @@ class Format(NamedTuple):
     extra: str  # of this package, which installs it
     module: str  # the reader beside this module
     drawing: str = ""  # the reader of what can be drawn
+    options: tuple[str, ...] = ()  # arguments of `load_body` that the reader takes
 
 
 FORMATS = {
-    MJCF: Format("an MJCF model", "mujoco", "mjcf", ".mujoco_reading", ".mujoco_drawing"),
-    "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading"),
-    "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading"),
+    MJCF: Format("an MJCF model", "mujoco", "mjcf", ".mujoco_reading", ".mujoco_drawing", ("root", "root_body")),
+    "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading", options=("root_body",)),
+    "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading", options=("root_body",)),
     "yeadon": Format("measurements for Yeadon's model", "yeadon", "yeadon", ".yeadon_reading"),
 }
 """By our name."""

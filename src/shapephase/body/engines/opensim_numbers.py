@@ -60,6 +60,13 @@ def pose_of(transform: Any) -> tuple[Array, Array]:
     return np.array([[matrix.get(i, j) for j in range(3)] for i in range(3)]), vector_of(transform.p())
 
 
+def tensor_of(body: Any) -> Array:
+    """The inertia of a body about its centre of mass, in its axes."""
+    inertia = body.getInertia()
+    (xx, yy, zz), (xy, xz, yz) = vector_of(inertia.getMoments()), vector_of(inertia.getProducts())
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
 def vector_of(entries: Any, count: int = 3) -> Array:
     """The entries of one of Simbody's vectors."""
     return np.array([entries.get(k) for k in range(count)])

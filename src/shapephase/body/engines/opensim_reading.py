@@ -16,10 +16,9 @@ from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
 from .chain import Chain, UnusableModelError, check_name
-from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, refused, value_and_slope, vector_of
+from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_of, value_and_slope, vector_of
+from .opensim_poses import add_poses
 
-_EXACT = 1e-12
-"""Share of the largest terms by which the engine's numbers may differ from ours."""
 _MOST_BYTES = 64 << 20
 """Of a file; a full body with muscles has a few million."""
 _CUBIC = 3
@@ -67,32 +66,35 @@ class _Coordinate(NamedTuple):
     rule: _Rule | None
 
 
-def chain_of(path: str) -> Chain:
-    """Links and joints of an .osim file, on the body that is joined to the ground."""
+def chain_of(path: str, root_body: str | None = None) -> Chain:
+    """Links and joints of an .osim file, on the body that is joined to the ground.
+
+    root_body : that body, with all that hangs on it, where several are
+    """
     engine().Logger.setLevelString("Off")
     engine().Logger.removeFileSink()
     content = Path(path).read_bytes()
     if len(content) > _MOST_BYTES:
         raise UnusableModelError(f"it has {len(content) >> 20} MiB; up to {_MOST_BYTES >> 20} MiB are read")
-    return _Reading(path, content.decode("utf-8", "replace")).chain()
+    return _Reading(path, content.decode("utf-8", "replace"), root_body).chain()
 
 
 class _Reading:
     """A file on its way to a chain."""
 
-    def __init__(self, path: str, text: str) -> None:
+    def __init__(self, path: str, text: str, root_body: str | None) -> None:
         self._path, self._text = path, text
         self._model = loaded(path)
         self._joints = [self._model.getJointSet().get(k) for k in range(self._model.getNumJoints())]
         self._chain = Chain(Path(path).stem)
-        self._base = self._base_joint()
+        self._base = self._base_joint(root_body)
+        self._bodies = self._tree()
         self._coordinates = self._known_coordinates()
 
     def chain(self) -> Chain:
         """All of it, with what OpenSim computes at some shapes."""
-        bodies = [self._model.getBodySet().get(k) for k in range(self._model.getNumBodies())]
         base = ends(self._base)[1]
-        for body in sorted(bodies, key=lambda one: one.getName() != base):
+        for body in sorted(self._bodies, key=lambda one: one.getName() != base):
             self._add_body(body)
         axes = {joint.getName(): self._axes(joint) for joint in self._joints if joint is not self._base}
         carriers = self._carriers(axes)
@@ -104,7 +106,8 @@ class _Reading:
             if coordinate.rule is not None and any(name == joint["name"] for joint in self._chain.joints):
                 self._couple(name, coordinate.rule)
         self._chain.base_angles = self._base_angles()
-        self._add_poses(base)
+        locked = {name: one.locked for name, one in self._coordinates.items()}
+        add_poses(self._chain, self._path, base, {body.getName() for body in self._bodies}, locked)
         return self._chain
 
     def _fault(self, message: str, name: str) -> UnusableModelError:
@@ -112,13 +115,19 @@ class _Reading:
         before, found, _ = self._text.partition(f'name="{name}"')
         return UnusableModelError(message, before.count("\n") + 1 if found else 1)
 
-    def _base_joint(self) -> Any:
+    def _base_joint(self, root_body: str | None) -> Any:
         """The one joint to the ground. Raises UnusableModelError where there are several or none."""
         grounded = [joint for joint in self._joints if "ground" in ends(joint)]
-        if len(grounded) != 1:
+        bodies = [ends(joint)[1] for joint in grounded]
+        if root_body is not None and root_body not in bodies:
+            there = ", ".join(map(repr, bodies[:20])) or "none"
+            raise self._fault(f"root_body: {root_body[:60]!r} is not joined to the ground; there is {there}", "ground")
+        if len(grounded) != 1 and root_body is None:
             named = ", ".join(repr(joint.getName()) for joint in grounded[:20]) or "none"
+            most = max(bodies, key=lambda name: len(self._below(name)), default="")
+            way = f"; say which by root_body={most!r} (--root-body {most})" if bodies else ""
             raise self._fault(
-                f"one joint to the ground is needed, which is the base's, got {named}",
+                f"one joint to the ground is needed, which is the base's, got {named}{way}",
                 grounded[1].getName() if grounded else "ground",
             )
         above: dict[str, str] = {}
@@ -130,12 +139,28 @@ class _Reading:
                     name,
                 )
             above[child] = name
-        joint = grounded[0]
+        joint = grounded[0 if root_body is None else bodies.index(root_body)]
         name, count, body = joint.getName(), joint.numCoordinates(), ends(joint)[1]
         if count < _FREE:
             said = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
             self._chain.notes.append(said)
         return joint
+
+    def _below(self, root: str) -> set[str]:
+        """Names of the bodies that hang on one, and its own."""
+        reached, more = {root}, {root}
+        while more := {ends(one)[1] for one in self._joints if ends(one)[0] in more} - reached:
+            reached |= more
+        return reached
+
+    def _tree(self) -> list[Any]:
+        """The bodies that hang on the base; those of other trees and their joints are left out."""
+        bodies = [self._model.getBodySet().get(k) for k in range(self._model.getNumBodies())]
+        reached = self._below(ends(self._base)[1])
+        if len(reached) < len(bodies):
+            self._chain.notes.append(f"{len(bodies) - len(reached)} bodies that hang elsewhere are left out")
+        self._joints = [one for one in self._joints if ends(one)[1] in reached]
+        return [body for body in bodies if body.getName() in reached]
 
     def _base_angles(self) -> tuple[list[str], str] | None:
         """The angles of the base, where each turns about one of the ground's axes as the others have turned it."""
@@ -177,6 +202,8 @@ class _Reading:
                 rule = None if locked is not None else couplers.get(name)
                 found[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
         for name, rule in couplers.items():
+            if name not in found:
+                continue
             for driver, _ in rule.terms:
                 if driver not in found:
                     raise self._fault(f"coordinate {name!r} follows {driver!r}, which is the base's or unknown", name)
@@ -312,13 +339,10 @@ class _Reading:
                 self._step(base, f"{base}__{name}", (np.eye(3), np.zeros(3)), name, coordinate.kind, _Z)
 
     def _add_body(self, body: Any) -> None:
-        inertia = body.getInertia()
-        (xx, yy, zz), (xy, xz, yz) = vector_of(inertia.getMoments()), vector_of(inertia.getProducts())
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         name = body.getName()
         line = self._fault("", name).line
         check_name(name, f"body {name!r}", line)
-        self._chain.add_link(name, body.getMass(), vector_of(body.getMassCenter()), tensor, line)
+        self._chain.add_link(name, body.getMass(), vector_of(body.getMassCenter()), tensor_of(body), line)
 
     def _add_joint(self, joint: Any, axes: list[_Axis], carriers: dict[str, str]) -> None:
         """Steps from the parent to the child: fixed frames, and joints of one axis between them."""
@@ -357,65 +381,6 @@ class _Reading:
         plain = self._unlocked(rule)
         terms = [(driver, one.knots, one.centres, one.coefficients) for driver, one in plain.terms]
         self._chain.couple(name, plain.start, terms)
-
-    def _add_poses(self, base: str) -> None:
-        """What OpenSim computes with the base at rest."""
-        bare = loaded(self._path)
-        for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
-            components.clearAndDestroy()
-        coordinates = bare.updCoordinateSet()
-        everything = {coordinates.get(k).getName(): coordinates.get(k) for k in range(coordinates.getSize())}
-        for coordinate in everything.values():
-            coordinate.setDefaultLocked(False)
-            coordinate.setDefaultClamped(False)
-            coordinate.setDefaultIsPrescribed(False)
-        try:
-            state = bare.initSystem()
-        except RuntimeError as error:
-            raise refused(error) from None
-        matter, root = bare.getMatterSubsystem(), bare.getBodySet().get(base)
-        for shape, rate in self._chain.random_shapes():
-            for name, (value, speed) in self._of_all(shape, rate).items():
-                everything[name].setValue(state, value, False)
-                everything[name].setSpeedValue(state, speed)
-            bare.realizeVelocity(state)
-            turn, _ = pose_of(root.getTransformInGround(state))
-            whole = matter.calcSystemCentralInertiaInGround(state)
-            (xx, yy, zz), (xy, xz, yz) = vector_of(whole.getMoments()), vector_of(whole.getProducts())
-            inertia = turn.T @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn
-            # A part of it does not live longer than the whole.
-            both = matter.calcSystemCentralMomentum(state)
-            self._chain.add_pose(shape, rate, inertia, turn.T @ vector_of(both.get(0)), (_EXACT, _EXACT))
-
-    def _of_all(self, shape: dict[str, float], rate: dict[str, float]) -> dict[str, tuple[float, float]]:
-        """Values and speeds of all coordinates but the base's; dependent ones by OpenSim's own functions."""
-        functions = {}
-        constraints = self._model.getConstraintSet()
-        for k in range(constraints.getSize()):
-            coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
-            if coupler is not None and coupler.get_isEnforced():
-                names = coupler.getIndependentCoordinateNames()
-                drivers = [names.get(place) for place in range(names.getSize())]
-                functions[coupler.getDependentCoordinateName()] = (coupler.getFunction(), drivers)
-        found: dict[str, tuple[float, float]] = {}
-
-        def find(name: str) -> tuple[float, float]:
-            if name not in found:
-                locked = self._coordinates[name].locked
-                if locked is not None:
-                    found[name] = locked, 0.0
-                elif name in functions:
-                    function, drivers = functions[name]
-                    there = [find(driver) for driver in drivers]
-                    value, *slopes = value_and_slope(function, [value for value, _ in there])
-                    found[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, there, strict=True))
-                else:
-                    found[name] = shape.get(name, 0.0), rate.get(name, 0.0)
-            return found[name]
-
-        for name in self._coordinates:
-            find(name)
-        return found
 
 
 _SAME = polynomial(np.array([0.0, 1.0]))

@@ -1,0 +1,104 @@
+"""What OpenSim itself computes of a model at some shapes; in the reading process alone."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Array
+from .chain import Chain, locked_inertia
+from .opensim_numbers import engine, loaded, pose_of, refused, tensor_of, value_and_slope, vector_of
+
+_EXACT = 1e-12
+"""Share of the largest terms by which the engine's numbers may differ from ours."""
+
+
+def add_poses(
+    chain: Chain, path: str, base: str, bodies: Collection[str], coordinates: Mapping[str, float | None]
+) -> None:
+    """Add what OpenSim computes with the base at rest.
+
+    bodies : names of those that belong to the chain
+    coordinates : of these, and where they are locked
+    """
+    bare = loaded(path)
+    rules = _rules(bare)
+    for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
+        components.clearAndDestroy()
+    found = bare.updCoordinateSet()
+    known = {found.get(k).getName(): found.get(k) for k in range(found.getSize())}
+    for coordinate in known.values():
+        coordinate.setDefaultLocked(False)
+        coordinate.setDefaultClamped(False)
+        coordinate.setDefaultIsPrescribed(False)
+        coordinate.setDefaultSpeedValue(0.0)
+    try:
+        state = bare.initSystem()
+    except RuntimeError as error:
+        raise refused(error) from None
+    root, everything = bare.getBodySet().get(base), bare.getBodySet()
+    # Part by part: not all bodies of the file need belong to the chain.
+    parts = [everything.get(k) for k in range(everything.getSize()) if everything.get(k).getName() in bodies]
+    masses, tensors = np.array([part.getMass() for part in parts]), np.array([tensor_of(part) for part in parts])
+    for shape, rate in chain.random_shapes():
+        for name, (value, speed) in _of_all(shape, rate, coordinates, rules).items():
+            known[name].setValue(state, value, False)
+            known[name].setSpeedValue(state, speed)
+        bare.realizeVelocity(state)
+        turn, _ = pose_of(root.getTransformInGround(state))
+        turns = np.array([pose_of(part.getTransformInGround(state))[0] for part in parts])
+        centres, speeds, omega = np.swapaxes([_moving(part, state) for part in parts], 0, 1)
+        turned = turns @ tensors @ np.swapaxes(turns, 1, 2)
+        apart = centres - masses @ centres / masses.sum()
+        momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
+        inertia = turn.T @ locked_inertia(masses, centres, turned) @ turn
+        chain.add_pose(shape, rate, inertia, turn.T @ momentum, (_EXACT, _EXACT))
+
+
+def _moving(part: Any, state: Any) -> tuple[Array, Array, Array]:
+    """Of a body the centre of mass, its velocity, and the angular velocity, in the ground's axes."""
+    station = part.getMassCenter()
+    centre, speed = part.findStationLocationInGround(state, station), part.findStationVelocityInGround(state, station)
+    return vector_of(centre), vector_of(speed), vector_of(part.getAngularVelocityInGround(state))
+
+
+def _rules(model: Any) -> dict[str, tuple[Any, list[str]]]:
+    """Of coordinates that follow others a copy of OpenSim's function, and whom they follow."""
+    rules, constraints = {}, model.getConstraintSet()
+    for k in range(constraints.getSize()):
+        coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
+        if coupler is not None and coupler.get_isEnforced():
+            names = coupler.getIndependentCoordinateNames()
+            drivers = [names.get(place) for place in range(names.getSize())]
+            rules[coupler.getDependentCoordinateName()] = (coupler.getFunction().clone(), drivers)
+    return rules
+
+
+def _of_all(
+    shape: Mapping[str, float],
+    rate: Mapping[str, float],
+    coordinates: Mapping[str, float | None],
+    rules: Mapping[str, tuple[Any, list[str]]],
+) -> dict[str, tuple[float, float]]:
+    """Values and speeds of all coordinates but the base's; dependent ones by OpenSim's own functions."""
+    found: dict[str, tuple[float, float]] = {}
+
+    def find(name: str) -> tuple[float, float]:
+        if name not in found:
+            locked = coordinates[name]
+            if locked is not None:
+                found[name] = locked, 0.0
+            elif name in rules:
+                function, drivers = rules[name]
+                there = [find(driver) for driver in drivers]
+                value, *slopes = value_and_slope(function, [value for value, _ in there])
+                found[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, there, strict=True))
+            else:
+                found[name] = shape.get(name, 0.0), rate.get(name, 0.0)
+        return found[name]
+
+    for name in coordinates:
+        find(name)
+    return found
