@@ -1,11 +1,17 @@
+from .ccsds import AttitudeMessage, write_aem
 from .simulator_arrays import MujocoArrays, PinocchioArrays, mujoco_arrays, pinocchio_arrays
+from .spice import SpiceKernels, write_spice_ck
 from .tables import export_motion, motion_dataset
 
 __all__ = [
+    "AttitudeMessage",
     "MujocoArrays",
     "PinocchioArrays",
+    "SpiceKernels",
     "export_motion",
     "motion_dataset",
     "mujoco_arrays",
     "pinocchio_arrays",
+    "write_aem",
+    "write_spice_ck",
 ]

@@ -160,6 +160,12 @@ def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
     return turned if body_and_path(motion) is None else turned @ motion.deformation.frame(times)
 
 
+def base_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
+    """Angular velocity of the base of the body, base axes, in whatever gauge the motion is: (N,) -> (N, 3) [rad/s]."""
+    found = body_and_path(motion)
+    return motion.angular_velocity(times) if found is None else moving_body(motion, *found, times).spins[0]
+
+
 def continued_quaternions(attitudes: Array) -> Array:
     """Quaternions x y z w of attitudes that follow each other, of one sign throughout: (N, 3, 3) -> (N, 4)."""
     quaternions = so3.quat_from_matrix(attitudes)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_file_name
+from ..arguments import check_file_name, check_keywords
 from ..arrays import Array
 from ..dynamics.moving_body import body_and_path
 from ..errors import MissingExtraError, unknown_name
@@ -68,6 +68,7 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     >>> print(found.angular_velocity.sel(axis="z").values.round(9), found.angular_velocity.units)
     [2. 2.] rad/s
     """
+    check_keywords(fall, motion_dataset)
     try:
         import xarray
     except ImportError:
@@ -126,6 +127,7 @@ def export_motion(
     (101, 3, 3)
     """
     check_file_name(path, "path")
+    check_keywords(fall, export_motion)
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)

@@ -135,6 +135,7 @@ class MotionViews:
         MissingExtraError
             Without xarray.
         """
+        check_keywords(fall, MotionViews.to_xarray)
         return offered("Motion.to_xarray")(self, times, **fall)
 
     def plot(self: Any, kind: str | None = None, *, ax: Any = None, gauge: Any = "horizontal") -> Any:

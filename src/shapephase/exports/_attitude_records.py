@@ -1,0 +1,113 @@
+"""At which times an attitude is recorded, so that what a reader has between the records is as near as is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .. import so3
+from ..arguments import positive_argument
+from ..arrays import Array
+from ..errors import AccuracyNotReached
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ._whole_motion import base_attitude, checked_times, continued_quaternions
+
+# Records of a file; each takes some hundred bytes.
+_MOST_RECORDS = 2_000_000
+# Of the error that is asked for, what is used up at the places where it is looked at: between these it may be larger.
+_USED = 0.5
+# Places between two records at which the error is looked at; a constant rate is farthest off in the middle.
+_PLACES = np.array([0.25, 0.5, 0.75])
+# Of the pieces that the motion itself stands on, how many a first guess makes.
+_PARTS = 4
+# Of a motion with a torque, whose own steps are not known.
+_EVEN = 257
+# Records that polynomials go through, two at least on both sides of a time but at the ends.
+WINDOW = 8
+
+
+def error_argument(error: float) -> float:
+    """A user's largest error between records [rad]. Raises ShapeError."""
+    return positive_argument(error, "error", "an angle in rad")
+
+
+def slerp_times(motion: Motion | ForcedMotion, error: float) -> Array:
+    """Times between which a turn at a constant rate is within an error of the motion: (N,) [s].
+
+    Raises
+    ------
+    ShapeError
+        If the motion is a batch.
+    AccuracyNotReached
+        If that takes millions of records.
+    """
+    checked_times(motion, [0.0])
+    if isinstance(motion, ForcedMotion):
+        ends = np.union1d(np.linspace(0.0, motion.duration, _EVEN), motion.breaks)
+    else:
+        ends = np.union1d(motion.solution.times, motion.deformation.breaks)
+    times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS).ravel(), ends[-1])
+    while True:
+        off = _off_at_constant_rate(motion, times)
+        # Off by the square of the step.
+        parts = np.ceil(np.sqrt(off / (_USED * error))).astype(np.int64).clip(1)
+        if np.all(parts == 1):
+            return times
+        _check_count(int(parts.sum()) + 1, error)
+        begin, step = np.repeat(times[:-1], parts), np.repeat(np.diff(times) / parts, parts)
+        inside = np.arange(len(begin)) - np.repeat(np.cumsum(parts) - parts, parts)
+        times = np.append(begin + inside * step, times[-1])
+
+
+def even_times(motion: Motion | ForcedMotion, error: float) -> Array:
+    """Even times whose quaternions, by polynomials through `WINDOW` of them, are within an error: (N,) [s].
+
+    Raises as `slerp_times`.
+    """
+    checked_times(motion, [0.0])
+    count = 2 * WINDOW
+    while True:
+        times = np.linspace(0.0, motion.duration, count + 1)
+        quaternions = continued_quaternions(base_attitude(motion, times))
+        place = (np.arange(count)[:, None] + _PLACES).ravel()
+        between = interpolated(quaternions, place)
+        truth = base_attitude(motion, place * (motion.duration / count))
+        if so3.angle(so3.transpose(truth) @ so3.matrix_from_quat(between)).max() <= _USED * error:
+            return times
+        count *= 2
+        _check_count(count, error)
+
+
+def interpolated(quaternions: Array, place: Array) -> Array:
+    """Quaternions of length 1 between even records, by Lagrange's polynomials: (N, 4), (M,) -> (M, 4).
+
+    Parameters
+    ----------
+    place : in steps from the first record
+    """
+    first = np.clip(np.floor(place).astype(np.int64) - WINDOW // 2 + 1, 0, len(quaternions) - WINDOW)
+    nodes = np.arange(WINDOW)
+    at = (place - first)[:, None]
+    weights = np.ones((len(place), WINDOW))
+    for k in nodes:
+        others = nodes[nodes != k]
+        weights[:, k] = np.prod((at - others) / (k - others), axis=1)
+    found = np.einsum("mk,mkd->md", weights, quaternions[first[:, None] + nodes])
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
+
+
+def _off_at_constant_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
+    """How far a turn at a constant rate is from the motion, at most, in each step: (N - 1,) [rad]."""
+    ends = base_attitude(motion, times)
+    turns = so3.log(so3.transpose(ends[:-1]) @ ends[1:])
+    inside = times[:-1, None] + np.diff(times)[:, None] * _PLACES
+    truth = base_attitude(motion, inside.ravel()).reshape(*inside.shape, 3, 3)
+    there = ends[:-1, None] @ so3.exp(turns[:, None] * _PLACES[:, None])
+    return so3.angle(so3.transpose(truth) @ there).max(axis=1)
+
+
+def _check_count(count: int, error: float) -> None:
+    if count > _MOST_RECORDS:
+        raise AccuracyNotReached(
+            f"error: no {_MOST_RECORDS} records are within {error:g} rad of the motion; allow a larger error"
+        )

@@ -1,0 +1,162 @@
+"""Attitudes as an Attitude Ephemeris Message of CCSDS."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+
+from .. import __version__
+from ..arguments import check_choice, check_file_name
+from ..arrays import Array
+from ..display import short_repr
+from ..errors import UnknownNameError
+from ..files import write_whole
+from ..provenance import provenance
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ._attitude_records import WINDOW, error_argument, even_times
+from ._whole_motion import base_attitude, continued_quaternions
+
+TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")
+"""In which the epochs of a message may be."""
+# Digits of a second: a body that turns at 100 rad/s does not notice the next.
+_DIGITS = 15
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AttitudeMessage:
+    """A message that was written.
+
+    Attributes
+    ----------
+    file : that holds it
+    records : attitudes at even times
+    error : stated, of the attitude between them by polynomials of `degree` [rad]
+    degree : of the polynomials of each part of the quaternion, through the records nearest to a time
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> sp.exports.write_aem(motion, "spin.aem").degree
+    7
+    """
+
+    file: Path
+    records: int
+    error: float
+    degree: int
+
+    __repr__ = short_repr
+
+
+def write_aem(
+    motion: Motion | ForcedMotion,
+    path: str | os.PathLike[str],
+    *,
+    error: float = 1e-8,
+    epoch: str = "2000-01-01T12:00:00",
+    time_system: str = "TDB",
+    object_name: str = "SHAPEPHASE",
+    object_id: str = "2000-000A",
+    reference: str = "EME2000",
+) -> AttitudeMessage:
+    """Write the attitude of the base as an Attitude Ephemeris Message (CCSDS 504.0-B-1), in keywords and values.
+
+    Quaternions turn the inertial axes into those of the base, scalar part last, every digit kept. Records are at even
+    times, as near to each other as the error asks for of a reader that interpolates as the message says: each part of
+    the quaternion by Lagrange's polynomial of degree 7 through the eight records nearest to a time.
+
+    Parameters
+    ----------
+    motion : a single one, in any gauge
+    error : the largest of the attitude between records [rad], beside the motion's own
+    epoch : of the motion's start, as "2026-11-23T10:00:00.5"
+    time_system : of the epochs, one of "TDB", "TT", "TAI", "GPS", "UTC"; no second is inserted
+    object_name, object_id : of the body
+    reference : name of the inertial axes
+
+    Raises
+    ------
+    ShapeError
+        If the motion is a batch; for an error that is not above 0.
+    AccuracyNotReached
+        If millions of records were needed: the polynomials do not take kinks well.
+    UnknownNameError
+        For another time system, an epoch that is none.
+    OutputFileError
+        If it cannot be written.
+
+    Notes
+    -----
+    Source: CCSDS 504.0-B-1, Attitude Data Messages, section 4.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> written = sp.exports.write_aem(motion, "spin.aem", error=1e-6)
+    >>> print(written.file.read_text().splitlines()[0])
+    CCSDS_AEM_VERS = 1.0
+    """
+    check_file_name(path, "path")
+    check_choice(time_system, "time system", TIME_SYSTEMS)
+    begin, goal = _epoch(epoch), error_argument(error)
+    times = even_times(motion, goal)
+    quaternions = continued_quaternions(base_attitude(motion, times))
+    epochs = _epochs(begin, times)
+    made = str(provenance()["date"])[:19]
+    lines = [
+        "CCSDS_AEM_VERS = 1.0",
+        f"CREATION_DATE = {made}",
+        f"ORIGINATOR = SHAPEPHASE {__version__}",
+        "",
+        "META_START",
+        f"COMMENT within {goal!r} rad between records",
+        f"OBJECT_NAME = {object_name}",
+        f"OBJECT_ID = {object_id}",
+        f"REF_FRAME_A = {reference}",
+        "REF_FRAME_B = SC_BODY_1",
+        "ATTITUDE_DIR = A2B",
+        f"TIME_SYSTEM = {time_system}",
+        f"START_TIME = {epochs[0]}",
+        f"STOP_TIME = {epochs[-1]}",
+        "ATTITUDE_TYPE = QUATERNION",
+        "QUATERNION_TYPE = LAST",
+        "INTERPOLATION_METHOD = LAGRANGE",
+        f"INTERPOLATION_DEGREE = {WINDOW - 1}",
+        "META_STOP",
+        "",
+        "DATA_START",
+        *(" ".join([at, *map(repr, row)]) for at, row in zip(epochs, quaternions.tolist(), strict=True)),
+        "DATA_STOP",
+        "",
+    ]
+    write_whole(path, lambda stream: stream.write("\n".join(lines).encode()))
+    return AttitudeMessage(file=Path(path), records=len(times), error=goal, degree=WINDOW - 1)
+
+
+def _epoch(text: str) -> tuple[datetime.datetime, Decimal]:
+    """Whole seconds, and the rest [s]. Raises UnknownNameError."""
+    whole, _, rest = str(text).partition(".")
+    try:
+        if rest and not (rest.isascii() and rest.isdigit()):
+            raise ValueError
+        found = datetime.datetime.fromisoformat(whole)
+    except ValueError:
+        found = None
+    if found is None or found.tzinfo is not None:
+        raise UnknownNameError(f"epoch: a date and time as 2026-11-23T10:00:00.5 are needed, got {text!r}")
+    return found, Decimal(f"0.{rest or 0}")
+
+
+def _epochs(begin: tuple[datetime.datetime, Decimal], times: Array) -> list[str]:
+    """The epochs of times after the start."""
+    found, step = [], Decimal(1).scaleb(-_DIGITS)
+    for time in times.tolist():
+        after = (begin[1] + Decimal(time)).quantize(step)
+        whole = int(after)
+        fraction = f"{after - whole:.{_DIGITS}f}".removeprefix("0.")
+        found.append(f"{(begin[0] + datetime.timedelta(seconds=whole)).isoformat()}.{fraction}")
+    return found

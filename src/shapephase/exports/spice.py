@@ -1,0 +1,215 @@
+"""Attitudes as kernels of SPICE: a C-kernel of type 3, with a clock and a frame."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arguments import check_file_name, number_argument, whole_argument
+from ..arrays import Array
+from ..display import short_repr
+from ..errors import AccuracyNotReached, MissingExtraError, OutputFileError, UnknownNameError
+from ..files import write_whole
+from ..provenance import provenance
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ._attitude_records import error_argument, slerp_times
+from ._whole_motion import base_attitude, base_rate, continued_quaternions
+
+# Ticks of the clock in a second. Times of a C-kernel are counted in them, as floating-point numbers.
+_TICKS = 10**9
+# Seconds that the clock counts.
+_LONGEST = 10**6
+# Identifiers of a clock stand for this many of instruments.
+_OF_A_CLOCK = 1000
+# Of a line of comments, of which SPICE takes up to 255.
+_COMMENT = 100
+_SEGMENT = "shapephase"
+_CLOCK = """\
+KPL/SCLK
+
+The clock and the frame of a C-kernel written by shapephase.
+
+\\begindata
+SCLK_KERNEL_ID           = ( @2000-01-01 )
+SCLK_DATA_TYPE_{clock}   = ( 1 )
+SCLK01_TIME_SYSTEM_{clock} = ( 1 )
+SCLK01_N_FIELDS_{clock}  = ( 2 )
+SCLK01_MODULI_{clock}    = ( {longest} {ticks} )
+SCLK01_OFFSETS_{clock}   = ( 0 0 )
+SCLK01_OUTPUT_DELIM_{clock} = ( 1 )
+SCLK_PARTITION_START_{clock} = ( 0.0E+00 )
+SCLK_PARTITION_END_{clock} = ( {end} )
+SCLK01_COEFFICIENTS_{clock} = ( 0.0E+00 {epoch!r} 1.0E+00 )
+
+FRAME_{frame}            = {instrument}
+FRAME_{instrument}_NAME     = '{frame}'
+FRAME_{instrument}_CLASS    = 3
+FRAME_{instrument}_CLASS_ID = {instrument}
+FRAME_{instrument}_CENTER   = -{clock}
+CK_{instrument}_SCLK        = -{clock}
+CK_{instrument}_SPK         = -{clock}
+\\begintext
+"""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SpiceKernels:
+    """Kernels that were written.
+
+    Attributes
+    ----------
+    attitude, clock : files, the C-kernel and the text kernel with clock and frame, to be loaded by `furnsh`
+    records : of attitude and angular velocity
+    error : stated, of the attitude at any time between [rad]
+    instrument, clock_id : SPICE's identifiers
+    frame : name of the base's frame
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> written = sp.exports.write_spice_ck(motion, "spin.bc")
+    >>> written.frame, written.instrument, written.clock.name
+    ('SHAPEPHASE_BASE', -999001, 'spin.tsc')
+    """
+
+    attitude: Path
+    clock: Path
+    records: int
+    error: float
+    instrument: int
+    clock_id: int
+    frame: str
+
+    __repr__ = short_repr
+
+
+def write_spice_ck(
+    motion: Motion | ForcedMotion,
+    path: str | os.PathLike[str],
+    *,
+    error: float = 1e-8,
+    epoch: float = 0.0,
+    reference: str = "J2000",
+    instrument: int = -999001,
+    frame: str = "SHAPEPHASE_BASE",
+) -> SpiceKernels:
+    """Write the attitude of the base as a C-kernel (`.bc`), and beside it clock and frame as a text kernel (`.tsc`).
+
+    The C-kernel is of type 3: SPICE turns at a constant rate from one record to the next. Records are as near to each
+    other as the error asks for. The angular velocities are those of the records, and linear between them.
+
+    Parameters
+    ----------
+    motion : a single one, in any gauge
+    path : of the C-kernel
+    error : the largest of the attitude between records [rad], beside the motion's own
+    epoch : of the motion's start, TDB seconds past J2000 as `spiceypy.str2et` gives them. Such times are floating-point
+        numbers, in this year to 1e-7 s, within which a fast body turns
+    reference : SPICE's name of the inertial axes
+    instrument : SPICE's identifier of the base, below -1000; that of its clock is a thousandth of it
+    frame : name of the base's frame
+
+    Raises
+    ------
+    ShapeError
+        If the motion is a batch; for an error that is not above 0.
+    AccuracyNotReached
+        If times of SPICE at this epoch are too coarse for the error, or millions of records were needed.
+    MissingExtraError
+        Without spiceypy.
+    UnknownNameError
+        For another ending, another reference, an instrument that is not below -1000.
+    OutputFileError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
+    >>> sp.exports.write_spice_ck(motion, "spin.bc", error=1e-9).error
+    1e-09
+    """
+    check_file_name(path, "path")
+    where, goal, start = Path(path), error_argument(error), number_argument(epoch, "epoch", "s")
+    if where.suffix.lower() != ".bc":
+        raise UnknownNameError(f"{where}: the name of a C-kernel ends in .bc")
+    number = -whole_argument(-instrument, "minus instrument", _OF_A_CLOCK)
+    try:
+        import spiceypy
+    except ImportError:
+        raise MissingExtraError(
+            "SPICE kernels need spiceypy; install it with: pip install 'shapephase[space]'"
+        ) from None
+    times = slerp_times(motion, goal)
+    _check_epoch(motion, times, start, goal)
+    clock = -number // _OF_A_CLOCK
+    text = _CLOCK.format(
+        clock=clock,
+        longest=_LONGEST,
+        ticks=_TICKS,
+        end=float(_LONGEST * _TICKS),
+        epoch=start,
+        frame=frame,
+        instrument=number,
+    )
+    content = _c_kernel(spiceypy, motion, times, number, reference)
+    beside = where.with_suffix(".tsc")
+    write_whole(beside, lambda stream: stream.write(text.encode()))
+    write_whole(where, lambda stream: stream.write(content))
+    return SpiceKernels(
+        attitude=where,
+        clock=beside,
+        records=len(times),
+        error=goal,
+        instrument=number,
+        clock_id=-clock,
+        frame=frame,
+    )
+
+
+def _check_epoch(motion: Motion | ForcedMotion, times: Array, start: float, error: float) -> None:
+    """Raise AccuracyNotReached where the body turns too far within the last digit of a time."""
+    attitude = base_attitude(motion, times)
+    steps = so3.angle(so3.transpose(attitude[:-1]) @ attitude[1:])
+    digit = float(np.spacing(abs(start) + motion.duration))
+    turned = float((steps / np.diff(times)).max()) * digit
+    if turned > 0.25 * error:
+        raise AccuracyNotReached(
+            f"epoch: times of SPICE around {start:g} s have steps of {digit:.1e} s, in which this body turns "
+            f"{turned:.1e} rad; an error of {error:g} rad needs an epoch nearer to J2000, or allow a larger one"
+        )
+
+
+def _c_kernel(spiceypy: Any, motion: Motion | ForcedMotion, times: Array, instrument: int, reference: str) -> bytes:
+    """The bytes of the kernel. SPICE's matrices take inertial components to those of the base."""
+    attitude = base_attitude(motion, times)
+    # The quaternion of the inverse, w first.
+    inverse = continued_quaternions(attitude)[:, [3, 0, 1, 2]] * [1.0, -1.0, -1.0, -1.0]
+    quaternions = np.ascontiguousarray(inverse)
+    rates = np.ascontiguousarray(so3.apply(attitude, base_rate(motion, times)))
+    ticks = times * _TICKS
+    comments = textwrap.wrap(json.dumps(provenance(motion.deformation.made_from)), _COMMENT)
+    with tempfile.TemporaryDirectory() as folder:
+        file = str(Path(folder) / "attitude.bc")
+        try:
+            handle = spiceypy.ckopn(file, _SEGMENT, 0)
+            spiceypy.ckw03(
+                handle, ticks[0], ticks[-1], instrument, reference, True, _SEGMENT, len(ticks), ticks, quaternions,
+                rates, 1, ticks[:1],
+            )  # fmt: skip
+            spiceypy.dafac(handle, comments)
+            spiceypy.ckcls(handle)
+        except spiceypy.utils.exceptions.SpiceyError as fault:
+            said = str(getattr(fault, "short", "") or fault).strip()
+            if "FRAME" in said:
+                raise UnknownNameError(f"reference: SPICE knows no inertial frame {reference!r}") from None
+            raise OutputFileError(f"SPICE cannot write the kernel: {said}") from None
+        return Path(file).read_bytes()
