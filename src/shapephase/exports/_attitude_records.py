@@ -69,7 +69,7 @@ def even_times(motion: Motion | ForcedMotion, error: float) -> Array:
     while True:
         times = np.linspace(0.0, motion.duration, count + 1)
         quaternions = continued_quaternions(base_attitude(motion, times))
-        place = (np.arange(count)[:, None] + _PLACES).ravel()
+        place = (np.arange(count, dtype=np.float64)[:, None] + _PLACES).ravel()
         between = interpolated(quaternions, place)
         truth = base_attitude(motion, place * (motion.duration / count))
         if so3.angle(so3.transpose(truth) @ so3.matrix_from_quat(between)).max() <= _USED * error:
