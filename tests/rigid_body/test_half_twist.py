@@ -9,7 +9,8 @@ from scipy.integrate import solve_ivp
 
 from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError
-from shapephase.rigid_body._half_twist import half_twist, half_twist_from_tilt, twist_defect
+from shapephase.rigid_body._half_twist import half_twist, half_twist_from_tilt, racket_twist, twist_defect
+from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.stability import steady_rotations
 from support.independent import cross
 
@@ -179,6 +180,50 @@ def test_twist_defect_of_a_racket_that_is_integrated():
         run = solve_ivp(rates, (0.0, 200.0), state, method="DOP853", rtol=1e-12, atol=1e-14, events=half_turn)
         end = run.y_events[0][0]
         assert np.arctan2(abs(end[2]), abs(end[1])) == pytest.approx(float(twist_defect(moments)), abs=2e-10)
+
+
+@pytest.mark.parametrize(
+    ("moments", "momentum"),
+    [
+        ([1.0, 2.0, 2.1], [0.1, 1.0, 0.0]),
+        ([2.1, 1.0, 1.5], [0.7, 0.0, 1.0]),
+        ([1.0, 1.2, 2.1], [0.0, 0.3, 0.95]),
+        ([0.5, 1.2, 1.3], [0.9, 0.03, 0.0]),
+        ([0.7, 1.0, 1.6], [0.0, 0.6, 0.8]),
+    ],
+)
+def test_twist_of_a_racket_off_the_separatrix_by_the_exact_motion(moments, momentum):
+    """Half of it from the middle of the flip, Pi_2 = 0, until the handle has gone half round; in closed form too."""
+    order = np.argsort(moments)
+    low, middle, high = np.array(moments)[order]
+    a, b = middle / low - 1.0, 1.0 - middle / high
+    start = np.array(momentum)[order]
+    c = a * start[0] ** 2 - b * start[2] ** 2
+    # The same orbit at Pi_2 = 0, of unit length.
+    square = c / (start @ start)
+    across = (a - square) / (a + b)
+    top = EulerTop.principal([low, middle, high], [np.sqrt(1.0 - across), 0.0, np.sqrt(across)])
+    times = np.linspace(0.0, 8.0 * np.pi * high, 20001)
+    direction = so3.between(top.momentum, np.array([0.0, 0.0, 1.0]))
+    handle = direction @ top.attitude(times)[:, :, 0].T
+    azimuth = np.unwrap(np.arctan2(handle[1], handle[0]))
+    pi = top.body_momentum(times)
+    twist = np.unwrap(np.arctan2(pi[:, 1], pi[:, 2]))
+    turned = np.abs(azimuth - azimuth[0])
+    half = np.interp(np.pi, turned, (twist - twist[0]) * np.sign(twist[1] - twist[0]))
+    assert racket_twist(moments, momentum) == pytest.approx(2.0 * half, abs=1e-5)
+
+
+def test_twist_of_a_racket_next_to_the_separatrix_and_refusals():
+    on_it = np.pi - 2.0 * float(twist_defect([1.0, 2.0, 2.1]))
+    assert racket_twist([1.0, 2.0, 2.1], [0.0, 3.0, 0.0]) == pytest.approx(on_it, abs=1e-14)
+    both = racket_twist([1.0, 2.0, 2.1], [[1e-5, 1.0, 0.0], [0.0, 1.0, 1e-5]])
+    np.testing.assert_allclose(both, on_it, rtol=0, atol=1e-8)
+    assert both[1] < on_it < both[0]
+    with pytest.raises(ShapeError, match="two are equal"):
+        racket_twist([1.0, 1.0, 2.0], [0.0, 1.0, 0.0])
+    with pytest.raises(ShapeError, match="needs a momentum"):
+        racket_twist([1.0, 2.0, 3.0], [0.0, 0.0, 0.0])
 
 
 def test_twist_defect_limits():

@@ -53,6 +53,39 @@ def test_nutation_period_by_quadrature_and_released_from_a_cusp_m3():
     assert 2.0 * np.pi / fast.period == pytest.approx(40.0 / 1.3, rel=1e-2)
 
 
+def test_precession_beside_the_nutation_by_quadrature_m3():
+    """phi' = (p_phi - p_psi u)/(I_1 (1 - u^2)), with u from the integrated top, over more than a period both ways."""
+    rng = np.random.default_rng(11)
+    for _ in range(3):
+        top = random_lagrange(rng)
+        momentum, gamma = rng.normal(size=3) * [1.0, 1.0, 3.0], so3.normalised(rng.normal(size=3))
+        motion = top.heavy_top.motion(momentum, gamma, duration=4.0, tolerance=1e-11)
+        found, vertical = nutation(top, momentum, gamma), momentum @ gamma
+
+        def rate(t, motion=motion, top=top, vertical=vertical, axial=momentum[2]):
+            height = motion.gamma(t)[2]
+            return (vertical - axial * height) / (top.transverse * (1.0 - height) * (1.0 + height))
+
+        for end in (0.7, 4.0):
+            expected = quad(rate, 0.0, end, epsabs=1e-11, epsrel=1e-11, limit=200)[0]
+            assert found.precession(end) == pytest.approx(expected, abs=1e-8)
+        gained = found.precession([-1.0, found.period - 1.0])
+        assert gained[1] - gained[0] == pytest.approx(found.precession_per_period, abs=1e-12)
+
+
+def test_precession_of_tops_that_do_not_nutate_m3():
+    """Slow and fast steady precession: Mgl = rate (p_psi - I_1 rate u); a pendulum in a plane does not precess."""
+    top, height = LagrangeTop(1.3, 0.7, 2.0), 0.8
+    gamma = np.array([0.6, 0.0, height])
+    for rate in (0.5, 3.0):
+        axial = 2.0 / rate + 1.3 * rate * height
+        steady = nutation(top, [1.3 * rate * 0.6, 0.0, axial], gamma)
+        assert steady.precession(2.0) == pytest.approx(2.0 * rate, abs=1e-6)
+    plane = nutation(top, [0.0, 0.3, 0.0], gamma)
+    assert plane.precession_per_period == 0.0
+    assert np.all(plane.precession([0.0, 1.0]) == 0.0)
+
+
 def test_nutation_where_the_axis_stands_or_creeps_up_m3():
     top = LagrangeTop(1.3, 0.7, 2.0)
     for momentum, gamma in ((3.0, UP), (5.0, UP), (0.0, -UP)):

@@ -107,7 +107,8 @@ class SteppedRotation:
     def dynamic_phase(self, t: Array) -> Array:
         """The integral of omega . Pi/|Pi| from 0 to t: (N,) -> (B, N) [rad]; zero without momentum."""
         before = np.cumsum(self.dynamics, axis=1) - self.dynamics
-        return (before[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)) * self._moving
+        found = before[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)
+        return self._exact_at_ends(t, self.dynamics, found) * self._moving
 
     def solid_angle(self, t: Array) -> Array:
         """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
@@ -127,7 +128,16 @@ class SteppedRotation:
         steps = so3.transpose(so3.matrix_from_quat(self.quaternions[:, index])) @ attitude
         turn = np.where(t == self.times[index], 0.0, so3.angle_about(steps @ so3.between(near, there), near))
         part = sphere.triangle_area(start, near, there) + self._dense.dynamic_phase(t) - turn
-        return (before[:, index] + part) * self._moving
+        return self._exact_at_ends(t, fans, before[:, index] + part) * self._moving
+
+    def _exact_at_ends(self, t: Array, of_steps: Array, found: Array) -> Array:
+        """What is found between the ends of steps, and there the sum over steps, free of the polynomials' errors.
+
+        (N,), (B, S), (B, N) -> (B, N).
+        """
+        place = np.minimum(np.searchsorted(self.times, t), len(self.times) - 1)
+        whole = np.concatenate([np.zeros((len(of_steps), 1)), np.cumsum(of_steps, axis=1)], axis=1)
+        return np.where(self.times[place] == t, whole[:, place], found)
 
     @property
     def _moving(self) -> Array:

@@ -278,8 +278,8 @@ class Motion(MotionViews):
 
         Times (...) -> batch + (...) [sr]; zero without momentum. It grows continuously from zero as long as Pi keeps
         away from the point opposite its start, where it jumps by 4 pi: at the end of the motion it is that of
-        `split(motion, "base")` up to multiples of 4 pi, and dynamic_phase - solid_angle turns the start into the
-        attitude, up to the transport along the great circle.
+        `split(motion, "base")` up to multiples of 4 pi, as exactly, and dynamic_phase - solid_angle turns the start
+        into the attitude, up to the transport along the great circle.
 
         Source: theory.md D; numerics.md section 3.
         """

@@ -1,7 +1,7 @@
 from . import geodesics, lie
 from ._andoyer_pendulum import AndoyerPendulum, andoyer_pendulum
 from ._flow import ascending_times, flow
-from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, twist_defect
+from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, racket_twist, twist_defect
 from ._momentum_orbit import (
     MomentumOrbit,
     WeierstrassForm,
@@ -94,6 +94,7 @@ __all__ = [
     "polhodes",
     "precession_rate",
     "pseudo_rigid_spin",
+    "racket_twist",
     "rigid_body_pendulum",
     "second_variation",
     "semidirect_bracket",

@@ -1,4 +1,10 @@
-"""The nutation of a Lagrange top in closed form: how its axis rises and falls.
+"""The nutation of a Lagrange top in closed form: how its axis rises and falls, and goes round the vertical meanwhile.
+
+With u = cos(theta) and the momenta along the vertical and the axis, the azimuth of the axis grows by
+
+    phi' = (p_phi - p_psi u)/(I_1 (1 - u²)) = (p_phi - p_psi)/(2 I_1 (1 - u)) + (p_phi + p_psi)/(2 I_1 (1 + u)),
+
+both parts of which are Legendre integrals of the third kind in t.
 
 Source: Whittaker, Analytical Dynamics, sections 71-72; Goldstein, Classical Mechanics, section 5.7; theory.md M3.
 """
@@ -13,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..display import short_repr
-from ..elliptic import complete_k, incomplete_f, jacobi
+from ..elliptic import complete_k, complete_pi, incomplete_f, incomplete_pi, jacobi
 from ..errors import ShapeError
 from .lagrange_top import LagrangeTop
 
@@ -48,6 +54,8 @@ class Nutation:
     complement: float
     period: float
     _phase: float = field(repr=False)
+    _turns: tuple[float, float] = field(repr=False)
+    _rooms: tuple[float, float] = field(repr=False)
 
     __repr__ = short_repr
 
@@ -55,6 +63,34 @@ class Nutation:
         """cos(theta) at times t: (...) -> (...)."""
         sn, _, _, _ = jacobi(self.rate * finite_array(t, "t", unit="s") + self._phase, self.complement)
         return self.lowest + (self.highest - self.lowest) * sn * sn
+
+    def precession(self, t: ArrayLike) -> Array:
+        """The angle by which the axis has gone round the vertical since t = 0: times (...) -> (...) [rad].
+
+        Counted through the motion, positive counter-clockwise seen from above. Half a turn by which the azimuth jumps
+        where the axis goes through the vertical itself is not counted; very near to it digits are lost.
+
+        Source: Whittaker, section 72; theory.md M3.
+        """
+        times = finite_array(t, "t", unit="s")
+        if self.lowest == self.highest:
+            return (times * sum(rate / room for rate, room in zip(self._turns, self._rooms) if rate))[()]
+        amplitudes = jacobi(self.rate * np.stack([np.zeros_like(times), times]) + self._phase, self.complement)[3]
+        swept = np.zeros_like(times)
+        for n, factor in _integrals(self):
+            start, end = incomplete_pi(n, amplitudes, self.complement)
+            swept += factor * (end - start)
+        return swept[()]
+
+    @property
+    def precession_per_period(self) -> float:
+        """By which the axis goes round the vertical in a period, as `precession` counts [rad].
+
+        Infinite where there is no finite period, and the axis goes round.
+        """
+        if np.isfinite(self.period):
+            return float(sum(2.0 * factor * complete_pi(n, self.complement) for n, factor in _integrals(self)))
+        return float(self.precession(1.0)) * np.inf if self.precession(1.0) else 0.0
 
 
 def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutation:
@@ -98,6 +134,7 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
 def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
     """The closed form, from the cubic in w = u - u(0): there the terms of its coefficients do not cancel."""
     i1, height = top.transverse, float(gamma[2])
+    turns = _turns(top, momentum, gamma)
     beta, spin = 2.0 * top.mgl / i1, float(momentum[2]) / i1
     speed = float(momentum[0] ** 2 + momentum[1] ** 2) / i1**2
     turn = float(momentum[0] * gamma[0] + momentum[1] * gamma[1]) / i1
@@ -117,11 +154,12 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
     width = high - low
     rate = float(np.sqrt(0.25 * beta * (third - low)))
     if width == 0.0 or third == low:
-        return _without_nutation(height, third, rate)
+        return _without_nutation(height, third, rate, turns)
     complement = (third - high) / (third - low)
+    below = _room_below(height + low, turns, beta * (1.0 + height + high), height + third)
     amplitude = np.copysign(np.arctan2(np.sqrt(-low), np.sqrt(high)), climb)
     if complement == 0.0 and abs(amplitude) >= 0.5 * np.pi:
-        return _without_nutation(height, third, rate)
+        return _without_nutation(height, third, rate, turns)
     return Nutation(
         lowest=height + low,
         highest=height + high,
@@ -130,10 +168,39 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
         complement=complement,
         period=2.0 * float(complete_k(complement)) / rate,
         _phase=float(incomplete_f(amplitude, complement)),
+        _turns=turns,
+        _rooms=(1.0 - (height + low), below),
     )
 
 
-def _without_nutation(height: float, third: float, rate: float) -> Nutation:
+def _turns(top: LagrangeTop, momentum: Array, gamma: Array) -> tuple[float, float]:
+    """(p_phi -+ p_psi)/(2 I_1), the numerators of the azimuth's rate, without loss next to the vertical."""
+    level = float(momentum[0] * gamma[0] + momentum[1] * gamma[1])
+    across, height = float(gamma[0] ** 2 + gamma[1] ** 2), float(gamma[2])
+    near = across / (1.0 + abs(height))
+    above, below = (near, 2.0 - near) if height >= 0.0 else (2.0 - near, near)
+    minus, plus = level - float(momentum[2]) * above, level + float(momentum[2]) * below
+    return minus / (2.0 * top.transverse), plus / (2.0 * top.transverse)
+
+
+def _room_below(lowest: float, turns: tuple[float, float], slope: float, third: float) -> float:
+    """1 + u_1: by the cubic at u = -1, where that keeps digits which the root does not have."""
+    return 4.0 * turns[1] ** 2 / (slope * (1.0 + third)) if lowest < -0.5 else 1.0 + lowest
+
+
+def _integrals(nutation: Nutation) -> list[tuple[float, float]]:
+    """Characteristic and factor of the integrals of the third kind whose sum is the azimuth."""
+    width = nutation.highest - nutation.lowest
+    (minus, plus), (above, below) = nutation._turns, nutation._rooms
+    parts = []
+    if minus:
+        parts.append((min(width / above, float(np.nextafter(1.0, 0.0))), minus / (above * nutation.rate)))
+    if plus:
+        parts.append((-width / below, plus / (below * nutation.rate)))
+    return parts
+
+
+def _without_nutation(height: float, third: float, rate: float, turns: tuple[float, float]) -> Nutation:
     """The axis stays at its height: steady precession, or the approach to the vertical that rounding cannot resolve."""
     return Nutation(
         lowest=height,
@@ -143,6 +210,8 @@ def _without_nutation(height: float, third: float, rate: float) -> Nutation:
         complement=1.0,
         period=np.inf,
         _phase=0.0,
+        _turns=turns,
+        _rooms=(1.0 - height, 1.0 + height),
     )
 
 

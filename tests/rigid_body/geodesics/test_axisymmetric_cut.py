@@ -54,6 +54,31 @@ def all_ways(pair, q, on_su2=False, samples=200):
     return best
 
 
+@pytest.mark.parametrize("pair", SOME, ids=lambda pair: f"{pair[0]:g}-{pair[1]:g}")
+def test_distances_on_su2_are_the_least_of_all_ways_q6(pair):
+    closed = axisymmetric_metric(*pair)
+    quats = Rotation.random(6, random_state=5).as_quat() * np.array([[1.0], [-1.0]] * 3)
+    expected = [all_ways(pair, quat, on_su2=True) for quat in quats]
+    np.testing.assert_allclose(closed.distance_on_su2(quats), expected, rtol=0, atol=1e-10)
+    rotations = Rotation.from_quat(quats).as_matrix()
+    nearer = np.minimum(closed.distance_on_su2(quats), closed.distance_on_su2(-quats))
+    np.testing.assert_allclose(closed.distance(rotations), nearer, rtol=0, atol=1e-11)
+    assert closed.distance_on_su2([0.0, 0.0, 0.0, 1.0]) == 0.0
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=IDS)
+def test_the_diameter_of_su2_is_the_greatest_length_up_to_the_cut_q6(pair):
+    """The farthest points are on the cut locus: by the cut times of geodesics of 4,001 axial parts."""
+    closed = axisymmetric_metric(*pair)
+    axial = np.linspace(0.0, 1.0, 4001)[:-1]
+    momenta = np.stack([np.sqrt(1.0 - axial**2), 0.0 * axial, axial], axis=-1)
+    speed = np.sqrt((1.0 - axial**2) / pair[0] + axial**2 / pair[1])
+    lengths = closed.cut_time_on_su2(momenta) * speed
+    assert lengths.max() <= closed.diameter_on_su2 * (1.0 + 1e-12)
+    assert lengths.max() == pytest.approx(closed.diameter_on_su2, rel=1e-7)
+    assert closed.distance_on_su2([0.0, 0.0, 0.0, -1.0]) <= closed.diameter_on_su2 * (1.0 + 1e-12)
+
+
 @pytest.mark.parametrize("pair", PAIRS, ids=IDS)
 def test_conjugate_times_are_those_of_the_search_q6(pair):
     metric, start = unit_momenta(pair, 1, 60)

@@ -11,7 +11,7 @@ from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError
 from shapephase.rigid_body.geodesics import distance
 from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric
-from shapephase.rigid_body.geodesics.distance import shortest_geodesic
+from shapephase.rigid_body.geodesics.distance import nearest_attitude, shortest_geodesic
 from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
 from support.long_runs import full_but
 
@@ -145,6 +145,21 @@ def test_special_ends():
         half = shortest_geodesic(metric, so3.exp(np.pi * np.eye(3)[k]))
         assert half.length <= np.pi * np.sqrt(moment) + 1e-11
     assert abs(half.length - np.pi) < 1e-11
+
+
+def test_the_nearest_of_a_set_is_the_nearest_of_all_q6():
+    """Small turns about the axes are as far as the roots of their moments say."""
+    metric = left_invariant_metric([3.0, 2.0, 1.0])
+    attitudes = so3.exp(np.diag([0.5, 0.6, 0.7]))
+    number, found = nearest_attitude(metric, attitudes)
+    assert number == 2
+    assert found.length == pytest.approx(0.7, abs=1e-11)
+    number, found = nearest_attitude(metric, attitudes[[0, 1]])
+    assert number == 1
+    assert found.length == pytest.approx(0.6 * np.sqrt(2.0), abs=1e-11)
+    for wrong in (np.eye(3), np.zeros((0, 3, 3))):
+        with pytest.raises(ShapeError, match="one or more rotations"):
+            nearest_attitude(metric, wrong)
 
 
 def test_refusals(monkeypatch):

@@ -20,6 +20,8 @@ from shapephase.rigid_body.geodesics._ellipsoid import (
     astroid,
     ellipsoid,
     ellipsoid_period,
+    geodetic_latitude,
+    latitude_of_geodetic,
     meridian_length,
     metric_coefficients,
 )
@@ -406,3 +408,34 @@ def test_bad_arguments_are_refused():
         ellipsoid_period(0.5, 1.1)
     with pytest.raises(ShapeError, match="momentum"):
         ellipsoid(0.5).first_return(1.1)
+
+
+def test_geodetic_latitudes_of_the_earth_against_geographiclib_p1():
+    """The length of the meridian from the equator: GeographicLib's is good to 15 nm."""
+    radius, flattening = 6378137.0, 1.0 / 298.257223563
+    model, degrees = Geodesic(radius, flattening), np.array([-90.0, -33.3, 0.0, 1e-7, 20.0, 45.0, 89.999, 90.0])
+    lengths = [model.Inverse(0.0, 0.0, x, 0.0)["s12"] * np.sign(x) for x in degrees]
+    found = latitude_of_geodetic(1.0 - flattening, np.radians(degrees), radius)
+    np.testing.assert_allclose(found, lengths, rtol=0, atol=2e-8)
+
+
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 1.3])
+def test_geodetic_latitudes_by_quadrature_and_back_p1(aspect):
+    """The meridian has the radius of curvature eps^2 (cos^2 + eps^2 sin^2)^(-3/2) by the geodetic latitude."""
+    degrees = np.array([-90.0, -33.3, 0.0, 1e-7, 20.0, 89.999, 90.0])
+    found = latitude_of_geodetic(aspect, np.radians(degrees))
+    for angle, length in zip(np.radians(degrees), found, strict=True):
+        nodes, weights = np.polynomial.legendre.leggauss(60)
+        inside = 0.5 * angle * (nodes + 1.0)
+        curvature = aspect**2 * (np.cos(inside) ** 2 + (aspect * np.sin(inside)) ** 2) ** -1.5
+        assert length == pytest.approx(0.5 * angle * (weights @ curvature), abs=1e-14)
+    assert found[-1] == pytest.approx(ellipsoid(aspect).reach, abs=1e-14)
+    np.testing.assert_allclose(np.degrees(geodetic_latitude(aspect, found)), degrees, rtol=0, atol=1e-13)
+    assert geodetic_latitude(aspect, 0.0) == latitude_of_geodetic(aspect, 0.0) == 0.0
+
+
+def test_latitudes_beyond_a_pole_are_refused():
+    with pytest.raises(ShapeError, match="between -pi/2 and pi/2"):
+        latitude_of_geodetic(0.9, 45.0)
+    with pytest.raises(ShapeError, match="poles are at"):
+        geodetic_latitude(0.9, 2.0)

@@ -9,7 +9,16 @@ from ._conjugate_locus import (
     conjugate_points_of_momentum,
 )
 from ._cut_locus import CutLocus, cut_locus, cut_time
-from ._ellipsoid import EllipsoidStretch, astroid, ellipsoid, ellipsoid_period, meridian_length, metric_coefficients
+from ._ellipsoid import (
+    EllipsoidStretch,
+    astroid,
+    ellipsoid,
+    ellipsoid_period,
+    geodetic_latitude,
+    latitude_of_geodetic,
+    meridian_length,
+    metric_coefficients,
+)
 from ._extremal import Extremal, Start, extremal, start_of, stretch_at, variational_jacobi_field
 from ._sadov_variables import SadovVariables, andoyer_from_sadov, sadov_frequencies, sadov_variables
 from ._serret_andoyer_constants import (
@@ -20,7 +29,7 @@ from ._serret_andoyer_constants import (
     separatrix_constants,
 )
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
-from .distance import ShortestGeodesic, shortest_geodesic
+from .distance import ShortestGeodesic, nearest_attitude, shortest_geodesic
 from .left_invariant import LeftInvariantMetric, left_invariant_metric
 from .metric_profile import Assumptions, TabulatedStretch, assumptions, surface_of_metric
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
@@ -67,9 +76,12 @@ __all__ = [
     "ellipsoid",
     "ellipsoid_period",
     "extremal",
+    "geodetic_latitude",
+    "latitude_of_geodetic",
     "left_invariant_metric",
     "meridian_length",
     "metric_coefficients",
+    "nearest_attitude",
     "sadov_frequencies",
     "sadov_variables",
     "separatrix_constants",

@@ -21,12 +21,15 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import what_came
+from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 _LEAST_ASPECT = 1e-3
 """Far beyond any body of use, and its square, of which the closed forms are made, keeps ten digits beside 1."""
 _LARGEST_ASPECT = 1e3
+_BEYOND_A_POLE = 1e-12
+"""Relative: latitudes so little further are taken for the pole's."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +176,80 @@ def astroid(aspect: float, direction: ArrayLike) -> tuple[Array, Array]:
     angle = finite_array(direction, "direction", unit="rad")
     radius = np.pi * (1.0 - _number(aspect, "aspect"))
     return -radius * np.sin(angle) ** 3, np.pi - radius * np.cos(angle) ** 3
+
+
+def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: float = 1.0) -> Array:
+    """phi, the length of the meridian from the equator, of geodetic latitudes: (...) [rad] -> (...).
+
+    The geodetic latitude is the angle of the normal above the equator, as on maps; tan(psi) = epsilon tan(geodetic)
+    gives the parametric one. With the radius in metres, phi is in metres, too.
+
+    Parameters
+    ----------
+    aspect, equatorial_radius : as for `ellipsoid`
+    geodetic : (...) from -pi/2 to pi/2 [rad]
+
+    Raises
+    ------
+    ShapeError
+        If a latitude is beyond a pole, or another argument is not such a number.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> north = geodesics.latitude_of_geodetic(1.0 - 1.0 / 298.257223563, np.radians(45.0), 6378137.0)
+    >>> print(f"{north:.3f} m from the equator of the Earth")
+    4984944.378 m from the equator of the Earth
+    """
+    epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
+    angle = finite_array(geodetic, "geodetic", unit="rad")
+    if np.any(np.abs(angle) > 0.5 * np.pi * (1.0 + _BEYOND_A_POLE)):
+        raise ShapeError("geodetic: latitudes are between -pi/2 and pi/2 rad")
+    bounded = np.clip(angle, -0.5 * np.pi, 0.5 * np.pi)
+    parametric = np.arctan2(epsilon * np.sin(bounded), np.cos(bounded))
+    return radius * _from_equator(epsilon, parametric)
+
+
+def geodetic_latitude(aspect: float, latitude: ArrayLike, equatorial_radius: float = 1.0) -> Array:
+    """The geodetic latitude of phi, the inverse of `latitude_of_geodetic`: (...) -> (...) [rad].
+
+    Raises
+    ------
+    ShapeError
+        If a latitude is beyond a pole, or another argument is not such a number.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> print(f"{np.degrees(geodesics.geodetic_latitude(0.5, geodesics.latitude_of_geodetic(0.5, 0.7))):.6f}")
+    40.107046
+    """
+    epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
+    phi = finite_array(latitude, "latitude") / radius
+    quarter = float(_from_equator(epsilon, np.asarray(0.5 * np.pi)))
+    if np.any(np.abs(phi) > quarter * (1.0 + _BEYOND_A_POLE)):
+        raise ShapeError(f"latitude: the poles are at {quarter * radius:.17g}")
+    distance = np.minimum(np.abs(phi), quarter).ravel()
+
+    def step(angle: Array) -> tuple[Array, Array]:
+        gap = _from_equator(epsilon, angle) - distance
+        return gap, angle - gap / np.hypot(epsilon * np.cos(angle), np.sin(angle))
+
+    low, high = np.zeros_like(distance), np.full_like(distance, 0.5 * np.pi)
+    parametric = safe_newton(step, 0.5 * np.pi * distance / quarter, low, high, ROUNDING)
+    found = np.arctan2(np.sin(parametric), epsilon * np.cos(parametric)).reshape(phi.shape)
+    return np.copysign(found, phi)[()]
+
+
+def _from_equator(aspect: float, parametric: Array) -> Array:
+    """The meridian from the equator to a parametric latitude, unit equator: (...) -> (...)."""
+    if aspect >= 1.0:
+        return aspect * elliptic.incomplete_e(parametric, 1.0 / aspect**2)
+    # E(psi) with the parameter 1 - 1/epsilon^2, below 0: both terms have one sign (DLMF 19.25.9).
+    sine, square = np.sin(parametric), np.cos(parametric) ** 2
+    second = square + (sine / aspect) ** 2
+    bent = (1.0 - aspect) * (1.0 + aspect) / (3.0 * aspect**2) * sine**3 * elliprd(square, second, 1.0)
+    return aspect * (sine * elliprf(square, second, 1.0) + bent)
 
 
 def _number(value: float, name: str) -> float:

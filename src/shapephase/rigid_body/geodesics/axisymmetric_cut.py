@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from ... import so3
 from ...arrays import Array, finite_array
@@ -27,6 +27,9 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import what_came
 from ...roots import safe_newton
+
+_SAMPLES = 129
+"""Axial parts of momenta, among which the longest geodesic up to its cut is looked for."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,30 @@ class AxisymmetricMetric:
             return float(np.pi * np.sqrt(self.axial))
         ratio = self.equatorial / self.axial
         return float(np.pi * np.sqrt(self.equatorial * (3.0 - 4.0 * ratio) / (1.0 - ratio)))
+
+    @property
+    def diameter_on_su2(self) -> float:
+        """The largest distance of two unit quaternions, where q and −q are two points.
+
+        2 pi sqrt(I_1) for I_3 >= I_1, across the axis. Else the greatest length of a geodesic up to its cut, which is
+        searched for by the axial part of its momentum.
+
+        Source: Podobryaev 2018 for the question; the cut times are those of `cut_time_on_su2`.
+        """
+        if self.eta <= 0.0:
+            return float(2.0 * np.pi * np.sqrt(self.equatorial))
+
+        def length(axial: Array) -> Array:
+            """Up to the cut, for axial parts of the momentum's direction."""
+            stretch = np.sqrt(1.0 + self.eta * axial**2)
+            return 2.0 * np.sqrt(self.equatorial) * self._first_root(axial, on_su2=True) * stretch
+
+        samples = np.linspace(0.0, 1.0, _SAMPLES)
+        lengths = length(samples)
+        best = int(np.argmax(lengths))
+        low, high = samples[max(best - 1, 0)], samples[min(best + 1, _SAMPLES - 1)]
+        found = minimize_scalar(lambda p: -float(length(np.asarray(p))), bounds=(low, high), method="bounded")
+        return float(max(lengths[best], -found.fun))
 
     def conjugate_time(self, momentum: ArrayLike) -> Array:
         """When a geodesic first meets a conjugate point: (..., 3) -> (...) [s].
@@ -140,9 +167,7 @@ class AxisymmetricMetric:
         ShapeError
             If a matrix is further than 1e-6 from a proper rotation.
         """
-        momentum = self.shortest_momentum(attitude)
-        equator, axis = np.sum(momentum[..., :2] ** 2, axis=-1), momentum[..., 2] ** 2
-        return np.sqrt(equator / self.equatorial + axis / self.axial)
+        return self._length(self.shortest_momentum(attitude))
 
     def shortest_momentum(self, attitude: ArrayLike) -> Array:
         """The momentum whose geodesic comes to the attitude at t = 1 by the shortest way: (..., 3, 3) -> (..., 3).
@@ -155,9 +180,37 @@ class AxisymmetricMetric:
         ShapeError
             If a matrix is further than 1e-6 from a proper rotation.
         """
-        quats = so3.quat_from_matrix(so3.rotation_argument(attitude, "attitude"))
+        return self._shortest_of_each(so3.quat_from_matrix(so3.rotation_argument(attitude, "attitude")))
+
+    def distance_on_su2(self, quat_xyzw: ArrayLike) -> Array:
+        """The distance of unit quaternions from 1, where −1 is another point: (..., 4) -> (...).
+
+        Raises
+        ------
+        ShapeError
+            If a quaternion's length is further than 1e-3 from 1.
+        """
+        return self._length(self.shortest_momentum_on_su2(quat_xyzw))
+
+    def shortest_momentum_on_su2(self, quat_xyzw: ArrayLike) -> Array:
+        """As `shortest_momentum`, to a unit quaternion and not to its negative: (..., 4) -> (..., 3).
+
+        Raises
+        ------
+        ShapeError
+            If a quaternion's length is further than 1e-3 from 1.
+        """
+        so3.quat_argument(quat_xyzw, "quat_xyzw")
+        return self._shortest_of_each(so3.normalised(np.asarray(quat_xyzw, dtype=float)))
+
+    def _shortest_of_each(self, quats: Array) -> Array:
         flat = [self._shortest(quat) for quat in quats.reshape(-1, 4)]
         return np.array(flat).reshape(*quats.shape[:-1], 3)
+
+    def _length(self, momentum: Array) -> Array:
+        """Of the geodesic in a unit of time."""
+        equator, axis = np.sum(momentum[..., :2] ** 2, axis=-1), momentum[..., 2] ** 2
+        return np.sqrt(equator / self.equatorial + axis / self.axial)
 
     def _shortest(self, quat: Array) -> Array:
         across, along = float(np.hypot(quat[0], quat[1])), float(np.hypot(quat[2], quat[3]))

@@ -133,6 +133,52 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     )
 
 
+def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple[int, ShortestGeodesic]:
+    """The attitude of a set that is nearest to the identity, and the shortest geodesic there: the distance to the set.
+
+    A set may be attitudes that look the same, such as those of a symmetric body, or many samples of a curve of goals.
+    Distances of axisymmetric metrics bound those to each from below, so that few of them are searched for.
+
+    Parameters
+    ----------
+    metric : of `left_invariant_metric`
+    attitudes : (N, 3, 3), one or more
+
+    Returns
+    -------
+    its number in the set, and its `ShortestGeodesic`
+
+    Raises
+    ------
+    ShapeError, AccuracyNotReached
+        As `shortest_geodesic`; if there is no attitude.
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import geodesics
+    >>> metric = geodesics.left_invariant_metric([1.0, 2.0, 3.0])
+    >>> same = sp.so3.exp(np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0 - np.pi]]))
+    >>> number, found = geodesics.nearest_attitude(metric, same)
+    >>> print(number, f"{found.length:.6f}")
+    1 1.414214
+    """
+    check_object(metric, "LeftInvariantMetric", "metric")
+    matrices = so3.rotation_argument(attitudes, "attitudes")
+    if matrices.ndim != 3 or not len(matrices):
+        raise ShapeError(f"attitudes: one or more rotations (N, 3, 3) are needed, got {matrices.shape}")
+    lower = np.array([_bounds(metric, metric.axes.T @ matrix @ metric.axes)[0] for matrix in matrices])
+    order = np.argsort(lower, kind="stable")
+    best = int(order[0])
+    nearest = shortest_geodesic(metric, matrices[best])
+    for number in order[1:]:
+        if lower[number] >= nearest.length:
+            break
+        other = shortest_geodesic(metric, matrices[number])
+        if other.length < nearest.length:
+            best, nearest = int(number), other
+    return best, nearest
+
+
 def _shortest_arrival(
     metric: LeftInvariantMetric, target: Array, count: int, upper: float
 ) -> tuple[Array, float, float]:
