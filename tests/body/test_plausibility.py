@@ -44,6 +44,18 @@ def test_two_boxes_of_water_are_a_body(load_urdf):
     assert said_of(load_urdf, box("a", visual=DRAWN), box("b"), joint("b")) == ()
 
 
+@pytest.mark.parametrize(("place", "where"), [("0 0 0", "in one point"), ("0 0 0.4", "on one line")])
+def test_a_body_without_a_moment_of_inertia(load_urdf, place, where):
+    """Two point masses in the same place or apart; a third beside their line makes a body of them."""
+    point = "<link name='{}'><inertial><mass value='2'/><inertia ixx='0' iyy='0' izz='0' ixy='0' ixz='0' iyz='0'/>"
+    point += "<origin xyz='0.1 0 0'/></inertial></link>"
+    parts = [point.format("a"), point.format("b"), joint("b", place=place)]
+    (said,) = said_of(load_urdf, *parts)
+    assert said.startswith(f"all mass is {where} in the neutral shape: its turns about that are not determined; ")
+    aside = said_of(load_urdf, *parts, point.format("c"), joint("c", place="0.3 0 0.1"))
+    assert (aside == ()) == (where == "on one line")
+
+
 @pytest.mark.parametrize("name", sp.robot_names())
 def test_our_bodies_are_plausible(name):
     assert implausible(sp.load_body(name)) == ()

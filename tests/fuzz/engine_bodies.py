@@ -88,12 +88,14 @@ def yeadon(chance: Random) -> Trial:
     for _ in range(chance.randrange(3)):
         place = chance.randrange(len(lines))
         name, _, value = lines[place].partition(":")
+        # A line that was made odd before may be no measurement any more.
+        usual = entries.get(name, 1.0)
         match chance.randrange(7):
             case 0 | 1:
                 factor = odd_one(chance, 1.0 + amount(chance, 0.05), (-1.0, 0.0, 10.0, 1e-9, 1e300), 2)
-                lines[place] = f"{name}: {float(value) * factor!r}"
+                lines[place] = f"{name}: {usual * factor!r}"
             case 2:
-                lines[place] = f"{name}: {entry(chance, float(value), 1)}"
+                lines[place] = f"{name}: {entry(chance, usual, 1)}"
             case 3:
                 lines.append(f"{name}: {chance.choice((value.strip(), '0.5'))}")
             case 4:

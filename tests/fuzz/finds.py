@@ -270,6 +270,15 @@ CASES = {
         said="70000 characters; up to 256 are allowed",
         slow=True,
     ),
+    "a body whose mass is in one point, of which rounding leaves moments": Case(
+        make=lambda: _body(
+            "body.bioMod",
+            "version 4\nsegment part0\n\trotations x\n\tmass 0.395\n\tinertia\n\t0 0 0\n\t0 0 0\n\t0 0 0\n"
+            "\tcom 0 0.01 0.0888\nendsegment\n",
+        ),
+        outcome="accepted",
+        slow=True,
+    ),
     "a store whose name has 300 letters": Case(
         make=lambda: Trial(kind="store", source="find", main="x" * 300),
         outcome="StudyStoreError",

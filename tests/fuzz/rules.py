@@ -110,12 +110,14 @@ def body_faults(file: Path, body: Any, warned: Sequence[str], options: Mapping[s
     inertia = body.locked_inertia(shape)
     moments = np.linalg.eigvalsh(inertia) if np.isfinite(inertia).all() else np.full(3, np.nan)
     allowed = options.get("on_unphysical") == "warn"
+    # Of a body whose mass is in one point, moments are what rounding leaves of those about the base's origin.
+    floor = _ROUNDING * body.mass * float(np.sum(body.centre_of_mass(shape) ** 2))
     if not (body.mass > 0.0 and np.isfinite(body.mass)):
         yield f"mass {body.mass}"
     if not np.isfinite(body.internal_momentum(shape, np.ones(body.n_shape))).all() or not np.isfinite(moments).all():
         yield "numbers that are not finite"
     elif not warned and (
-        moments[0] < -_SAME * moments[2] or moments[2] > (1.0 + _TRIANGLE) * (moments[0] + moments[1])
+        moments[0] < -_SAME * moments[2] - floor or moments[2] > (1.0 + _TRIANGLE) * (moments[0] + moments[1]) + floor
     ):
         yield f"a body with moments {moments} and no warning"
     if not all(lower <= upper for lower, upper in body.joint_limits):

@@ -26,6 +26,8 @@ _WIDEST_MASS = 3.0
 _NARROWEST_MASS = 0.01
 # A joint that is limited at a whole turn, as rounded in a file.
 _WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)
+# Of moments of inertia, relative to those about the base's origin: what rounding leaves of zero.
+_ON_A_LINE = 1e-12
 # Names in one message.
 _MOST_NAMED = 10
 
@@ -35,7 +37,8 @@ def implausible(body: Body) -> tuple[str, ...]:
 
     Links that are denser than any matter or lighter than air, by the box of their inertia or by what is drawn of them;
     masses of neighbours that differ ten thousandfold; joints that are not limited although their kind is, or beyond a
-    whole turn; lengths that look like millimetres. Nothing of this makes a body unusable.
+    whole turn; lengths that look like millimetres; mass that is all on one line. Nothing of this makes a body
+    unusable.
 
     Examples
     --------
@@ -60,7 +63,20 @@ def implausible(body: Body) -> tuple[str, ...]:
         _judge_density(links, frame, mass, edges, widths.get(frame), shapes.get(frame, ()))
     _judge_neighbours(links, chain.parents, masses)
     _judge_lengths(links, chain.places, chain.centres)
-    return (*links.sentences(), *_limit_doubts(body))
+    return (*links.sentences(), *_line_doubts(body), *_limit_doubts(body))
+
+
+def _line_doubts(body: Body) -> Iterable[str]:
+    """Whether all mass is on one line, so that nothing says how the body turns about it."""
+    shape = body.shape()
+    moments = np.linalg.eigvalsh(body.locked_inertia(shape))
+    largest = moments[-1] + body.mass * float(np.sum(body.centre_of_mass(shape) ** 2))
+    if moments[0] <= _ON_A_LINE * largest:
+        where = "on one line" if moments[-1] > _ON_A_LINE * largest else "in one point"
+        yield (
+            f"all mass is {where} in the neutral shape: its turns about that are not determined; give the links "
+            "moments of inertia"
+        )
 
 
 class _Links:

@@ -37,6 +37,20 @@ def recorded(body, seed, closed=False, count=9):
     return times, shapes
 
 
+def test_a_pipe_without_an_ending_gets_csv(tmp_path, satellite):
+    times, shapes = recorded(satellite, 1)
+    path = sp.ShapePath.spline(times, shapes, joint_names=satellite.joint_names)
+    sp.write_shape_path(path, tmp_path / "motion.csv")
+    os.mkfifo(tmp_path / "pipe")
+    # Open for reading and writing, it waits for nobody, and holds more than this.
+    pipe = os.open(tmp_path / "pipe", os.O_RDWR)
+    try:
+        sp.write_shape_path(path, tmp_path / "pipe")
+        assert os.read(pipe, 65536) == (tmp_path / "motion.csv").read_bytes()
+    finally:
+        os.close(pipe)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".CSV", ".tsv"])
 @pytest.mark.parametrize("closed", [False, True])
 def test_a_spline_comes_back_as_it_was(tmp_path, satellite, suffix, closed):

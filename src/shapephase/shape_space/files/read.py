@@ -19,7 +19,7 @@ from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
-from ...files import write_whole
+from ...files import output_target, write_whole
 from ...letters import what_came
 from ...provenance import provenance
 from ..shape_path import ShapePath
@@ -303,6 +303,8 @@ def read_shape_path(
 def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: ArrayLike | None = None) -> None:
     """Write a joint motion as CSV, TSV or NPZ, by the file's ending; what `read_shape_path` reads.
 
+    A pipe or a device without such an ending gets CSV.
+
     Parameters
     ----------
     times : (N,) of the samples [s]; None: `path.sample_times`. A spline is read back as it was.
@@ -327,7 +329,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     check_file_name(file, "file")
     where = Path(file)
     suffix = where.suffix.lower()
-    if suffix not in _WRITTEN:
+    if suffix not in _WRITTEN and not output_target(where).is_stream:
         raise unknown_name(f"ending of the motion file {where}:", where.suffix, _WRITTEN)
     if path.joint_names is None:
         raise TrajectoryError("a motion file names its joints, and this path has no joint names; make it with them")
