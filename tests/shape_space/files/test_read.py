@@ -3,6 +3,8 @@
 `ODD_FILES` lists hostile and odd files of every kind with what must become of each.
 """
 
+import os
+
 import numpy as np
 import pytest
 
