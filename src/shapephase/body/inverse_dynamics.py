@@ -49,6 +49,20 @@ def falling_efforts(
     return joints.columns(whole[:, _BASE:], shapes), whole[:, :_BASE]
 
 
+def floating_velocities(body: Body, shapes: Array, rates: Array, spins: Array) -> tuple[Array, Array]:
+    """Configurations and velocities of Pinocchio's model while the centre of mass rests, as `floating_states` has them.
+
+    Joints that follow others may have kinks.
+    """
+    check_object(body, "Body", "body")
+    model, data, joints = body._model, body._data(), body._joints
+    configurations, velocities = joints.configurations(shapes), joints.velocities(shapes, rates)
+    for row, (q, v) in enumerate(zip(configurations, velocities, strict=True)):
+        pin.centerOfMass(model, data, q, v)
+        v[:3], v[3:_BASE] = -data.vcom[0] - _cross(spins[row], data.com[0]), spins[row]
+    return configurations, velocities
+
+
 def floating_states(
     body: Body, shapes: Array, rates: Array, accelerations: Array, spins: Array, spin_rates: Array
 ) -> tuple[Array, Array, Array]:

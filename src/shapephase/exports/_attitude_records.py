@@ -27,7 +27,7 @@ WINDOW = 8
 
 
 def error_argument(error: float) -> float:
-    """A user's largest error between records [rad]. Raises ShapeError."""
+    """A user's largest error between records [rad]. Raises TrajectoryError."""
     return positive_argument(error, "error", "an angle in rad")
 
 

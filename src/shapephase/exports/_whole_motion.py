@@ -1,4 +1,4 @@
-"""All that other programs ask of one motion at some times: base, joints, their rates and accelerations."""
+"""What other programs ask of one motion at some times: base, joints, their rates, and accelerations where needed."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from .. import so3
 from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.inverse_dynamics import floating_states
+from ..body.inverse_dynamics import floating_states, floating_velocities
 from ..dynamics.moving_body import body_and_path, moving_body, needed_body_and_path
 from ..errors import ShapeError
+from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 
+ORIGIN = {"start": (0.0, 0.0, 0.0), "velocity": (0.0, 0.0, 0.0), "gravity": (0.0, 0.0, 0.0)}
+"""Of a centre of mass that rests: what nobody has said otherwise."""
 # Of a table, where no times are given.
 _ROWS = 201
 
@@ -57,10 +60,9 @@ class WholeMotion:
     times : (N,) [s]
     attitude : (N, 3, 3) base axes to inertial axes
     configurations : (N, nq) of the body's own model of Pinocchio
-    velocities, accelerations : (N, nv) of it: linear and angular of the base, base axes, then the joints; and the
-        derivatives of these numbers
+    velocities : (N, nv) of it: linear and angular of the base, base axes, then the joints
     names : of all k joints, those that follow others included
-    joints, rates, slopes : (N, k) [rad or m], a second, a second squared
+    joints, rates : (N, k) [rad or m], a second
     shapes, shape_rates : (N, n) of the independent joints
     """
 
@@ -69,11 +71,9 @@ class WholeMotion:
     attitude: Array
     configurations: Array
     velocities: Array
-    accelerations: Array
     names: tuple[str, ...]
     joints: Array
     rates: Array
-    slopes: Array
     shapes: Array
     shape_rates: Array
 
@@ -121,37 +121,55 @@ def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> Who
         If the body has no joints along a path.
     """
     body, path = needed_body_and_path(motion, "this export needs")
-    moving = moving_body(motion, body, path, times)
-    shapes, rates, spins = moving.shapes, moving.rates, moving.spins[0]
-    configurations, velocities, accelerations = floating_states(
-        body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0]
-    )
+    shapes, rates = path.curve(times)
+    spins = _spins(motion, body, times, shapes, rates)
+    configurations, velocities = floating_velocities(body, shapes, rates, spins)
     attitude = base_attitude(motion, times)
-    backwards = so3.transpose(attitude)
-    speed = so3.apply(backwards, fall.speed(times))
     configurations[:, :3] = fall.centre(times) - so3.apply(attitude, body.centre_of_mass(shapes))
     configurations[:, 3:7] = continued_quaternions(attitude)
-    velocities[:, :3] += speed
-    accelerations[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
-    follows = body.chain.follows
-    joints, joint_rates = follows.with_rates(shapes, rates)
-    slopes = follows.with_rates(shapes, moving.accelerations)[1]
-    if not follows.is_linear:
-        slopes = slopes + (follows.slope_rates(shapes, rates) @ rates[..., None])[..., 0]
+    velocities[:, :3] += so3.apply(so3.transpose(attitude), fall.speed(times))
+    joints, joint_rates = body.chain.follows.with_rates(shapes, rates)
     return WholeMotion(
         body=body,
         times=times,
         attitude=attitude,
         configurations=configurations,
         velocities=velocities,
-        accelerations=accelerations,
-        names=follows.names,
+        names=body.chain.follows.names,
         joints=joints,
         rates=joint_rates,
-        slopes=slopes,
         shapes=shapes,
         shape_rates=rates,
     )
+
+
+def whole_accelerations(motion: Motion | ForcedMotion, whole: WholeMotion, fall: Fall) -> tuple[Array, Array]:
+    """The derivatives of its velocities, (N, nv), and of the rates of its joints, (N, k).
+
+    Raises
+    ------
+    ShapeError
+        If joints follow others with kinks.
+    """
+    body, path = needed_body_and_path(motion, "this export needs")
+    moving = moving_body(motion, body, path, whole.times)
+    shapes, rates, spins = moving.shapes, moving.rates, moving.spins[0]
+    found = floating_states(body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0])[2]
+    backwards = so3.transpose(whole.attitude)
+    speed = so3.apply(backwards, fall.speed(whole.times))
+    found[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
+    follows = body.chain.follows
+    slopes = follows.with_rates(shapes, moving.accelerations)[1]
+    if not follows.is_linear:
+        slopes = slopes + (follows.slope_rates(shapes, rates) @ rates[..., None])[..., 0]
+    return found, slopes
+
+
+def _spins(motion: Motion | ForcedMotion, body: Body, times: Array, shapes: Array, rates: Array) -> Array:
+    """Angular velocity of the base, base axes: (N, 3) [rad/s]."""
+    inertia, internal = body.sample(shapes, rates)
+    momenta = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.body_momentum(times))
+    return so3.apply(inverse_inertia(inertia, times), momenta - internal)
 
 
 def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
@@ -163,7 +181,9 @@ def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
 def base_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
     """Angular velocity of the base of the body, base axes, in whatever gauge the motion is: (N,) -> (N, 3) [rad/s]."""
     found = body_and_path(motion)
-    return motion.angular_velocity(times) if found is None else moving_body(motion, *found, times).spins[0]
+    if found is None:
+        return motion.angular_velocity(times)
+    return _spins(motion, found[0], times, *found[1].curve(times))
 
 
 def continued_quaternions(attitudes: Array) -> Array:

@@ -81,7 +81,9 @@ def write_aem(
     Raises
     ------
     ShapeError
-        If the motion is a batch; for an error that is not above 0.
+        If the motion is a batch.
+    TrajectoryError
+        For an error that is not above 0.
     AccuracyNotReached
         If millions of records were needed: the polynomials do not take kinks well.
     UnknownNameError

@@ -13,7 +13,7 @@ from ..display import short_repr
 from ..errors import UnknownNameError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import Fall, WholeMotion, checked_times, whole_motion
+from ._whole_motion import Fall, WholeMotion, checked_times, whole_accelerations, whole_motion
 
 # Numbers of a free joint among the configurations, and among the velocities.
 _FREE_Q = 7
@@ -159,7 +159,7 @@ def pinocchio_arrays(
     Raises
     ------
     ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
+        If the motion is a batch, for times outside of it; if joints follow others with kinks, where there is no `a`.
     WrongObjectError
         If the body has no joints along a path.
     UnknownNameError
@@ -172,13 +172,15 @@ def pinocchio_arrays(
     >>> print(found.q[0, 3:7])  # the identity, w last
     [0. 0. 0. 1.]
     """
-    whole = whole_motion(motion, checked_times(motion, times), Fall.of(start, velocity, gravity))
+    fall = Fall.of(start, velocity, gravity)
+    whole = whole_motion(motion, checked_times(motion, times), fall)
+    accelerations, slopes = whole_accelerations(motion, whole, fall)
     if model is None:
         return PinocchioArrays(
             time=whole.times,
             q=whole.configurations,
             v=whole.velocities,
-            a=whole.accelerations,
+            a=accelerations,
             joint_names=whole.names,
         )
     kinds = list(model.joints)
@@ -189,12 +191,12 @@ def pinocchio_arrays(
     q, v, a = np.zeros((count, model.nq)), np.zeros((count, model.nv)), np.zeros((count, model.nv))
     _fill(q, whole.configurations[:, :_FREE_Q], kinds[1].idx_q)
     _fill(v, whole.velocities[:, :_FREE_V], kinds[1].idx_v)
-    _fill(a, whole.accelerations[:, :_FREE_V], kinds[1].idx_v)
+    _fill(a, accelerations[:, :_FREE_V], kinds[1].idx_v)
     for place, kind in zip(order, kinds[2:], strict=True):
         column = whole.joints[:, [place]]
         _fill(q, np.hstack([np.cos(column), np.sin(column)]) if kind.nq == 2 else column, kind.idx_q)
         _fill(v, whole.rates[:, [place]], kind.idx_v)
-        _fill(a, whole.slopes[:, [place]], kind.idx_v)
+        _fill(a, slopes[:, [place]], kind.idx_v)
     return PinocchioArrays(time=whole.times, q=q, v=v, a=a, joint_names=tuple(names))
 
 

@@ -121,7 +121,9 @@ def write_spice_ck(
     Raises
     ------
     ShapeError
-        If the motion is a batch; for an error that is not above 0.
+        If the motion is a batch.
+    TrajectoryError
+        For an error that is not above 0.
     AccuracyNotReached
         If times of SPICE at this epoch are too coarse for the error, or millions of records were needed.
     MissingExtraError

@@ -22,9 +22,8 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import Fall, WholeMotion, checked_times, continued_quaternions, whole_motion
+from ._whole_motion import ORIGIN, Fall, WholeMotion, checked_times, continued_quaternions, whole_motion
 
-_ORIGIN = (0.0, 0.0, 0.0)
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
@@ -137,7 +136,7 @@ def export_motion(
 
 def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
     at = checked_times(motion, times)
-    falling = Fall.of(**({"start": _ORIGIN, "velocity": _ORIGIN, "gravity": _ORIGIN} | fall))
+    falling = Fall.of(**(ORIGIN | fall))
     whole = None if body_and_path(motion) is None else whole_motion(motion, at, falling)
     found = _Samples() if whole is None else _of_joints(whole)
     attitude = motion.attitude(at) if whole is None else whole.attitude

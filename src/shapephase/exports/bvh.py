@@ -1,0 +1,167 @@
+"""Motions as skeletons in motion: BVH, as programs of animation and motion capture read it."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_choice, check_file_name, check_keywords, positive_argument
+from ..arrays import Array
+from ..body.joint_chain import JointChain
+from ..errors import ShapeError, UnknownNameError
+from ..files import write_whole
+from ..reconstruction.attitude_angles import euler_angles
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ._whole_motion import ORIGIN, Fall, WholeMotion, checked_times, whole_motion
+
+# Places first, then angles about z, x and y, one after the other: what all readers take.
+_PLACES = "Xposition Yposition Zposition"
+_TURNS = "Zrotation Xrotation Yrotation"
+_ORDER = "ZXY"
+# Inertial and base axes to those of a skeleton, whose y is up.
+_UPWARD = {
+    "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+    "y": np.eye(3),
+    "z": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+}
+# A link whose centre of mass is nearer to its joint ends there [m]: some readers drop bones of no length.
+_SHORTEST = 1e-3
+_MOST_FRAMES = 1_000_000
+
+
+def write_bvh(
+    motion: Motion | ForcedMotion,
+    path: str | os.PathLike[str],
+    *,
+    rate: float = 120.0,
+    up: str = "z",
+    scale: float = 1.0,
+    **fall: ArrayLike,
+) -> None:
+    """Write base and joints as a BVH file: a skeleton at zero coordinates, and angles of every bone in time.
+
+    Bones are named as the joints that move them, the root as the body; a bone ends in the centre of mass of its link. A
+    joint that slides has places instead of an offset. Angles are in degrees.
+
+    Parameters
+    ----------
+    motion : of an articulated body, in any gauge
+    rate : frames in a second, the first at the motion's start
+    up : the inertial axis "x", "y" or "z" that becomes the y of the file, which is up there
+    scale : units of the file in a metre; 100 for centimetres
+    fall : start, velocity, gravity as in `Motion.base_position`
+
+    Raises
+    ------
+    ShapeError
+        If the motion is a batch; for more than a million frames.
+    TrajectoryError
+        For a rate or a scale that is not above 0.
+    WrongObjectError
+        If the body has no joints along a path.
+    UnknownNameError
+        For another ending, another axis.
+    OutputFileError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+    >>> sp.exports.write_bvh(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), "turn.bvh", rate=60.0)
+    >>> with open("turn.bvh") as file:
+    ...     print([line.strip() for line in file if line.startswith(("Frames", "Frame Time"))])
+    ['Frames: 61', 'Frame Time: 0.016666666666666666']
+    """
+    check_file_name(path, "path")
+    check_keywords(fall, write_bvh)
+    check_choice(up, "axis", tuple(_UPWARD))
+    where, often = Path(path), positive_argument(rate, "rate", "a number of frames in a second")
+    longer = positive_argument(scale, "scale", "a number of units in a metre")
+    if where.suffix.lower() != ".bvh":
+        raise UnknownNameError(f"{where}: the name of a BVH file ends in .bvh")
+    checked_times(motion, [0.0])
+    frames = int(np.floor(motion.duration * often * (1.0 + np.finfo(float).eps))) + 1
+    if frames > _MOST_FRAMES:
+        raise ShapeError(f"rate: {frames} frames are more than {_MOST_FRAMES}; ask for fewer in a second")
+    times = np.minimum(np.arange(frames) / often, motion.duration)
+    whole = whole_motion(motion, times, Fall.of(**(ORIGIN | fall)))
+    chain, axes = whole.body.chain, _UPWARD[up]
+    rest = _rest_orientations(chain)
+    lines = ["HIERARCHY", *_skeleton(whole, rest, axes, longer), "MOTION", f"Frames: {frames}"]
+    lines += [f"Frame Time: {1.0 / often!r}"]
+    lines += [" ".join(map(repr, row)) for row in np.hstack(_channels(whole, rest, axes, longer)).tolist()]
+    write_whole(where, lambda stream: stream.write(("\n".join(lines) + "\n").encode()))
+
+
+def _rest_orientations(chain: JointChain) -> Array:
+    """Of all frames at zero coordinates, base axes: (k + 1, 3, 3)."""
+    found = np.empty((len(chain.names) + 1, 3, 3))
+    found[0] = np.eye(3)
+    for joint, parent in enumerate(chain.parents):
+        found[joint + 1] = found[parent] @ chain.turns[joint]
+    return found
+
+
+def _order(chain: JointChain) -> list[int]:
+    """Joints as a skeleton lists them: each before what hangs on it, and that before the next."""
+    found: list[int] = []
+    waiting = [joint for joint, parent in enumerate(chain.parents) if parent == 0][::-1]
+    while waiting:
+        joint = waiting.pop()
+        found.append(joint)
+        waiting += [below for below, parent in enumerate(chain.parents) if parent == joint + 1][::-1]
+    return found
+
+
+def _skeleton(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[str]:
+    chain, lines = whole.body.chain, []
+    names = [re.sub(r"\s", "_", name) for name in (whole.body.name, *chain.names)]
+    depths = [0]
+    for parent in chain.parents:
+        depths.append(depths[parent] + 1)
+    previous = 0
+    for frame in [0, *(joint + 1 for joint in _order(chain))]:
+        lines += [f"{'  ' * depth}}}" for depth in range(previous, depths[frame], -1)]
+        if frame and depths[frame] <= previous:
+            lines.append(f"{'  ' * depths[frame]}}}")
+        pad, joint = "  " * depths[frame], frame - 1
+        slides = frame > 0 and bool(chain.slides[joint].any())
+        parent = 0 if frame == 0 else chain.parents[joint]
+        offset = np.zeros(3) if frame == 0 or slides else rest[parent] @ chain.places[joint]
+        placed = frame == 0 or slides
+        channels = f"CHANNELS 6 {_PLACES} {_TURNS}" if placed else f"CHANNELS 3 {_TURNS}"
+        lines += [f"{pad}{'JOINT' if frame else 'ROOT'} {names[frame]}", f"{pad}{{"]
+        lines += [f"{pad}  OFFSET {_numbers(scale * axes @ offset)}", f"{pad}  {channels}"]
+        if frame not in chain.parents:
+            tip = rest[frame] @ chain.centres[frame]
+            tip = tip if np.linalg.norm(tip) > _SHORTEST else np.zeros(3)
+            lines += [f"{pad}  End Site", f"{pad}  {{", f"{pad}    OFFSET {_numbers(scale * axes @ tip)}", f"{pad}  }}"]
+        previous = depths[frame]
+    return [*lines, *(f"{'  ' * depth}}}" for depth in range(previous, -1, -1))]
+
+
+def _channels(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[Array]:
+    """Columns of all bones in the order of the skeleton."""
+    chain = whole.body.chain
+    found = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
+    for joint in _order(chain):
+        coordinate, parent = whole.joints[:, joint], rest[chain.parents[joint]]
+        if chain.slides[joint].any():
+            along = chain.places[joint] + coordinate[:, None] * (chain.turns[joint] @ chain.slides[joint])
+            found.append(scale * along @ (axes @ parent).T)
+        found.append(_degrees(so3.exp(coordinate[:, None] * (axes @ rest[joint + 1] @ chain.axes[joint]))))
+    return found
+
+
+def _degrees(rotations: Array) -> Array:
+    return np.degrees(euler_angles(rotations, _ORDER))
+
+
+def _numbers(vector: Array) -> str:
+    return " ".join(map(repr, vector.tolist()))
