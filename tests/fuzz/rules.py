@@ -204,9 +204,10 @@ def _mjcf_faults(file: Path, body: Any) -> Iterator[str]:
         return
     if not np.isclose(model.body_mass.sum(), body.mass, rtol=1e-9, atol=0.0):
         yield f"mass {body.mass}, and MuJoCo finds {model.body_mass.sum()}"
-    hinges = int(np.isin(model.jnt_type, (2, 3)).sum())
-    if hinges != body.n_shape:
-        yield f"{body.n_shape} coordinates, and MuJoCo finds {hinges}"
+    # Of the kinds of joints 1 is a ball, which has a quaternion, 2 slides and 3 is a hinge.
+    coordinates = int(np.isin(model.jnt_type, (2, 3)).sum() + 4 * (model.jnt_type == 1).sum())
+    if coordinates != body.n_shape:
+        yield f"{body.n_shape} coordinates, and MuJoCo finds {coordinates}"
         return
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -217,7 +218,7 @@ def _mjcf_faults(file: Path, body: Any) -> Iterator[str]:
     ):
         inertia += turn @ np.diag(moments) @ turn.T + mass * (place @ place * np.eye(3) - np.outer(place, place))
     turn = data.xmat[1].reshape(3, 3)
-    found = body.locked_inertia(np.zeros(body.n_shape))
+    found = body.locked_inertia(body.shape())
     expected = turn.T @ inertia @ turn
     if not np.allclose(found, expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max()):
         yield f"inertia {found.tolist()}, and MuJoCo finds {expected.tolist()}"
