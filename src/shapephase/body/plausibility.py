@@ -144,7 +144,11 @@ def _judge_lengths(links: _Links, places: Array, centres: Array) -> None:
 
 def _limit_doubts(body: Body) -> Iterable[str]:
     joints = list(zip(body.joint_names, body.joint_limits.tolist(), body.joint_units, body.continuous, strict=True))
-    missing = [repr(name) for name, limits, _, endless in joints if not endless and not all(map(math.isfinite, limits))]
+    missing = [
+        repr(name)
+        for name, limits, unit, endless in joints
+        if not endless and unit != "1" and not all(map(math.isfinite, limits))
+    ]
     if missing:
         yield f"{'joint' if len(missing) == 1 else 'joints'} {_listed(missing)}: not limited on both sides"
     beyond = [

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, lock_arrays
+from ..body.couplings.coordinate_map import check_no_balls
 from ..display import short_repr
 from ..errors import UnknownNameError
 from ..reconstruction.forced_motion import ForcedMotion
@@ -120,6 +121,7 @@ def mujoco_arrays(
     [1. 0. 0. 0.]
     """
     whole = whole_motion(motion, checked_times(motion, times), Fall.of(start, velocity, gravity))
+    check_no_balls(whole.body.chain.follows, "arrays of MuJoCo need")
     quaternions = whole.quat_xyzw[:, _SCALAR_FIRST]
     base = np.hstack([whole.position, quaternions]), np.hstack([whole.world_velocity, whole.angular_velocity])
     if model is None:
@@ -183,6 +185,7 @@ def pinocchio_arrays(
             a=accelerations,
             joint_names=whole.names,
         )
+    check_no_balls(whole.body.chain.follows, "arrays by the order of another model need")
     kinds = list(model.joints)
     free = len(kinds) > 1 and (kinds[1].nq, kinds[1].nv) == (_FREE_Q, _FREE_V)
     names = list(model.names)[2:]

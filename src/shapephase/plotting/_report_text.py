@@ -243,4 +243,4 @@ def _with_error(angle: float, error: Array) -> tuple[str, str]:
 def _amount(value: float, unit: str) -> str:
     if abs(value) > _NO_LIMIT:
         return "none"
-    return f"{np.degrees(value):z.1f}°" if unit == "rad" else f"{value:z.4g} m"
+    return f"{np.degrees(value):z.1f}°" if unit == "rad" else f"{value:z.4g} {unit}".removesuffix(" 1")

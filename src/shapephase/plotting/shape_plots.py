@@ -52,7 +52,7 @@ _MARGIN = 0.25
 # Level over the largest value [1] that is zero up to rounding.
 _ZERO_LEVEL = 1e-9
 # Units of joints as the legend has them: what turns is read in degrees.
-_SHOWN = {"rad": "deg", "m": "m", "rad or m": "rad or m"}
+_SHOWN = {"rad": "deg", "m": "m", "1": "1", "rad or m": "rad or m"}
 # Of the range of the joints drawn: limits farther than that from where a joint goes are not in the figure.
 _NEAR_LIMIT = 0.3
 # Of the height of the figure: a band beyond a limit.
@@ -106,7 +106,7 @@ def plot_shape_path(
     if not len(chosen):
         raise ShapeError("joints: none of them moves along this path; name those to draw")
     chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MAX_NAMED else chosen
-    scales = sorted({units[k] for k in chosen}, key=("rad", "m", "rad or m").index)
+    scales = sorted({units[k] for k in chosen}, key=("rad", "m", "1", "rad or m").index)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
     named = chosen[:_MAX_NAMED]
     shown = [names[int(k)] for k in named]

@@ -11,6 +11,7 @@ from .curves import (
     Curve,
     Fourier,
     Joined,
+    Multiplied,
     PiecewisePolynomial,
     Reordered,
     Repeated,
@@ -37,6 +38,9 @@ def exact_accelerations(curve: Curve, times: Array) -> Array | None:
     if isinstance(curve, Reordered):
         found = exact_accelerations(curve.curve, times)
         return None if found is None else found[:, curve.order]
+    if isinstance(curve, Multiplied):
+        found = exact_accelerations(curve.curve, times)
+        return None if found is None else found * curve.factors
     if isinstance(curve, Widened):
         inner = exact_accelerations(curve.curve, times)
         if inner is None:

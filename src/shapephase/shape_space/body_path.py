@@ -50,9 +50,10 @@ def check_closed(body: Body | ParticleBody, path: ShapePath) -> None:
     gap = path_gap(body, path)
     worst = int(np.argmax(np.abs(gap))) if len(gap) else 0
     if len(gap) and abs(gap[worst]) > CLOSED:
+        off = f"{gap[worst]:.6g} {body.joint_units[worst]}".removesuffix(" 1")
         raise OpenPathError(
-            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {gap[worst]:.6g} "
-            f"{body.joint_units[worst]} from its start; close the path, or take the end of its horizontal_lift"
+            f"the holonomy of an open path is undefined: joint {body.joint_names[worst]} ends {off} "
+            f"from its start; close the path, or take the end of its horizontal_lift"
         )
 
 

@@ -163,9 +163,12 @@ def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
         if first is None or second is None:
             return None
         return _joined_pieces([first, second], [np.zeros_like(curve.offset), curve.offset])
-    inner = polynomial_pieces(curve.curve) if isinstance(curve, Reversed | Stretched | Reordered | Repeated) else None
+    made = isinstance(curve, Reversed | Stretched | Reordered | Repeated | Multiplied)
+    inner = polynomial_pieces(curve.curve) if made else None
     if inner is None:
         return None
+    if isinstance(curve, Multiplied):
+        return PiecewisePolynomial(inner.knots, inner.coefficients * curve.factors)
     if isinstance(curve, Reversed):
         return _reversed_pieces(inner)
     if isinstance(curve, Stretched):
@@ -318,6 +321,23 @@ class Reordered:
         """As `Curve`."""
         shapes, rates = self.curve(times)
         return shapes[:, self.order], rates[:, self.order]
+
+
+@dataclass(frozen=True, eq=False)
+class Multiplied:
+    """The columns of a curve, each times a factor."""
+
+    curve: Curve
+    factors: Array
+
+    __repr__ = short_repr
+
+    __post_init__ = lock_arrays
+
+    def __call__(self, times: Array) -> tuple[Array, Array]:
+        """As `Curve`."""
+        shapes, rates = self.curve(times)
+        return shapes * self.factors, rates * self.factors
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,10 +15,12 @@ from numpy.polynomial import chebyshev
 from ..arguments import check_object
 from ..arrays import Array, Mask
 from ..body.body import Body
+from ..body.couplings.ball_joints import BallJoint
 from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.particles.point_masses import ParticleBody
 from ..chebyshev import inside, nodes_on, values_to_coefficients
-from .curves import Curve
+from ..errors import TrajectoryError
+from .curves import Curve, PiecewisePolynomial
 from .shape_path import ShapePath
 
 _DEGREE = 16
@@ -52,6 +54,8 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     if isinstance(body, ParticleBody):
         return route
     follows = body.chain.follows
+    for ball in follows.balls:
+        _check_signs(ball, route)
     if follows.is_linear:
         return route
     if route.loops > 1 and _winds(body, route):
@@ -67,6 +71,20 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     starts = route.duration / route.loops * np.arange(route.loops)
     breaks = _merged(known, (starts[:, None] + found).ravel())
     return replace(route, breaks=breaks, smooth_loop=False, scanner=None)
+
+
+def _check_signs(ball: BallJoint, route: ShapePath) -> None:
+    """Raise TrajectoryError where a spline goes from a quaternion of a ball joint to one of the other sign."""
+    if not isinstance(route.curve, PiecewisePolynomial):
+        return
+    four = route.curve(route.breaks)[0][:, ball.columns]
+    across = np.flatnonzero(np.sum(four[1:] * four[:-1], axis=1) < 0.0)
+    if len(across):
+        raise TrajectoryError(
+            f"ball joint {ball.name}: from {route.breaks[across[0]]:.9g} s to {route.breaks[across[0] + 1]:.9g} s its "
+            "quaternion goes to the far side: give the path joint_names, by which samples get the signs of their "
+            "neighbours, or samples nearer to each other"
+        )
 
 
 def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:

@@ -25,6 +25,7 @@ from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
+from .ball_columns import ball_columns, factors_between, neighbours_signs
 from .curves import (
     CLOSED,
     Curve,
@@ -33,6 +34,7 @@ from .curves import (
     Interpolation,
     Joined,
     KeptValues,
+    Multiplied,
     PiecewisePolynomial,
     Reordered,
     Repeated,
@@ -148,7 +150,8 @@ class ShapePath:
         Parameters
         ----------
         times : (N,) ascending [s]; the path starts at 0, so times are shifted
-        shapes : (N, n) [rad or m]
+        shapes : (N, n) [rad or m]; the numbers of ball joints, which names tell, are taken with the sign that is
+            nearer to the sample before: a quaternion and its negative are one turn
         periodic : smooth where the end meets the start; None: when the last sample equals the first to 1e-9.
             Otherwise the ends are not-a-knot.
 
@@ -157,8 +160,9 @@ class ShapePath:
         TrajectoryError
             If times do not ascend, there are fewer than two samples, or a periodic path does not close.
         """
-        t, r = _samples(times, shapes)
-        closes = _closes(r[0], r[-1]) and len(t) > 2
+        t, r, balls = _samples(times, shapes, joint_names)
+        factors = factors_between(r[-1], r[0], balls)
+        closes = _closes(r[-1], r[0] * factors) and len(t) > 2
         if periodic and not closes:
             joint = int(np.argmax(np.abs(r[-1] - r[0])))
             raise TrajectoryError(
@@ -166,6 +170,8 @@ class ShapePath:
                 f"{joint} ends {r[-1, joint] - r[0, joint]:.6g} from its start"
             )
         use_period = closes if periodic is None else periodic
+        if use_period and np.any(np.abs(factors - 1.0) > CLOSED):
+            return _piecewise(t, _flipping_coefficients(t, r[:-1], factors), joint_names, "not-a-knot")
         if use_period:
             r = np.concatenate([r[:-1], r[:1]])
         through: Interpolation = "periodic" if use_period else "not-a-knot"
@@ -178,7 +184,7 @@ class ShapePath:
         r = r_i + (r_(i+1) - r_i) (10 s^3 - 15 s^4 + 6 s^5), s = (t - t_i)/(t_(i+1) - t_i).
         Parameters and errors as `spline`.
         """
-        t, r = _samples(times, shapes)
+        t, r, _ = _samples(times, shapes, joint_names)
         moves = np.diff(r, axis=0)
         steps = np.diff(t)[:, None]
         coefficients = np.zeros((6, *moves.shape))
@@ -322,7 +328,7 @@ class ShapePath:
         """This path, and after it another.
 
         A start that differs from this path's end by whole turns of joints is shifted by them, so that the
-        shape stays continuous.
+        shape stays continuous; a quaternion of a ball joint is the same turn with another sign or length.
 
         Raises
         ------
@@ -331,6 +337,8 @@ class ShapePath:
         """
         names = _joined_names(self, other)
         end, start = self.shape(self.duration), other.shape(0.0)
+        factors = factors_between(end, start, ball_columns(names))
+        start = start * factors
         offset = np.round((end - start) / _WHOLE_TURN) * _WHOLE_TURN
         if not _closes(end, start + offset):
             joint = int(np.argmax(np.abs(end - start - offset)))
@@ -341,7 +349,8 @@ class ShapePath:
         duration = self.duration + other.duration
         breaks = np.concatenate([self.breaks, self.duration + other.breaks[1:]])
         breaks[-1] = duration
-        curve = Joined(self.curve, self.duration, other.curve, other.duration, offset)
+        following = other.curve if np.all(factors == 1.0) else Multiplied(other.curve, factors)
+        curve = Joined(self.curve, self.duration, following, other.duration, offset)
         return ShapePath(
             curve,
             duration,
@@ -349,7 +358,7 @@ class ShapePath:
             self.n_shape,
             names,
             _larger(self.oscillations, other.oscillations),
-            scanner=JoinedScan([self, other]),
+            scanner=JoinedScan([self, other]) if following is other.curve else None,
         )
 
     def repeated(self, count: int) -> ShapePath:
@@ -358,11 +367,13 @@ class ShapePath:
         Raises
         ------
         OpenPathError
-            If the path does not end where it begins (to whole turns of joints).
+            If the path does not end where it begins (to whole turns of joints, and signs of quaternions of ball joints,
+            which jump at the ends of loops, where they mean the same turn).
         """
         if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
             raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {what_came(count)}")
-        gap = self.gap
+        (start, end), _ = self.curve(np.array([0.0, self.duration]))
+        gap = end - start * factors_between(end, start, ball_columns(self.joint_names))
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
         if not _closes(gap, turns):
             joint = int(np.argmax(np.abs(gap - turns)))
@@ -441,7 +452,19 @@ def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
     return np.ascontiguousarray(pieces)
 
 
-def _samples(times: ArrayLike, shapes: ArrayLike) -> tuple[Array, Array]:
+def _flipping_coefficients(times: Array, shapes: Array, factors: Array) -> Array:
+    """Of the spline whose columns are multiplied by factors from one end to the other, of ball joints -1, and go on as
+    smoothly: the first half of one that is gone through twice."""
+    signs = np.where(factors < 0.0, -1.0, 1.0)
+    twice = np.concatenate([times, times[-1] + times[1:]])
+    coefficients = _spline_coefficients(twice, np.concatenate([shapes, shapes * signs, shapes[:1]]), True)
+    return np.ascontiguousarray(coefficients[:, : len(times) - 1])
+
+
+def _samples(
+    times: ArrayLike, shapes: ArrayLike, joint_names: Sequence[str] | None
+) -> tuple[Array, Array, tuple[slice, ...]]:
+    """Times, shapes, and which columns are ball joints."""
     t = finite_array(times, "times", (None,), unit="s")
     r = finite_array(shapes, "shapes", (None, None))
     if t.ndim != 1 or r.ndim != 2 or len(t) != len(r):
@@ -454,7 +477,8 @@ def _samples(times: ArrayLike, shapes: ArrayLike) -> tuple[Array, Array]:
         row = int(late[0]) + 1
         raise TrajectoryError(f"times must ascend: sample {row} at {t[row]:.9g} s follows {t[row - 1]:.9g} s")
     check_time_steps(t - t[0])
-    return t - t[0], r
+    balls = ball_columns(_names(joint_names, r.shape[1]))
+    return t - t[0], neighbours_signs(r, balls), balls
 
 
 def _closes(a: Array, b: Array) -> bool:

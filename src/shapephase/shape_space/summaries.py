@@ -17,6 +17,7 @@ from .body_path import path_gap
 from .shape_path import CLOSED, ShapePath
 from .unit_doubts import followed_by
 
+_KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
 _SAMPLES = 401
 """Even times at which extremes are sought, beside the breaks."""
 
@@ -24,6 +25,8 @@ _SAMPLES = 401
 @dataclass(frozen=True, eq=False)
 class JointSummary:
     """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit.
+
+    Of a ball joint ("ball") it is one of its four numbers.
 
     Examples
     --------
@@ -156,7 +159,7 @@ def body_summary(body: Body) -> BodySummary:
     inertia = body.locked_inertia(neutral)
     moments, axes = principal_axes(inertia)
     kinds = [
-        "continuous" if endless else "prismatic" if unit == "m" else "revolute"
+        "continuous" if endless else _KINDS[unit]
         for endless, unit in zip(body.continuous, body.joint_units, strict=True)
     ]
     joints = zip(body.joint_names, kinds, body.joint_limits.tolist(), body.joint_units, strict=True)

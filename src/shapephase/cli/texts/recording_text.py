@@ -161,7 +161,7 @@ def _base_lines(record: Any) -> list[str]:
 def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
     """The noise of joints that turn, and of those that slide."""
     found = []
-    for unit in ("rad", "m"):
+    for unit in ("rad", "1", "m"):
         own = {name: level for name, level in smoothed.items() if body.joint_units[body.joint_index(name)] == unit}
         levels = sorted((level, name) for name, level in own.items() if level > 0.0)
         if levels:
@@ -219,7 +219,9 @@ def _closing_lines(closing: Closing) -> list[str]:
 def _value(body: Body, name: str, value: float) -> str:
     """A coordinate of a joint in degrees or metres."""
     turns = body.joint_units[body.joint_index(name)] == "rad"
-    return f"{np.degrees(value) + 0.0:.4g} deg" if turns else f"{value:.4g} m"
+    if turns:
+        return f"{np.degrees(value) + 0.0:.4g} deg"
+    return f"{value:.4g} {body.joint_units[body.joint_index(name)]}".removesuffix(" 1")
 
 
 def _listed(names: list[str]) -> str:

@@ -86,8 +86,10 @@ def orbit_data(
 def body_lines(summary: BodySummary) -> list[str]:
     """The summary of a body for people."""
     width = max(map(len, ("joint", *(joint.name for joint in summary.joints))))
+    balls = sum(joint.kind == "ball" for joint in summary.joints) // 4
+    count = len(summary.joints) - 3 * balls
     lines = [
-        f"{summary.name}: {summary.mass:.6g} kg, {len(summary.links)} links, {len(summary.joints)} joints",
+        f"{summary.name}: {summary.mass:.6g} kg, {len(summary.links)} links, {count} joints",
         f"{'centre of mass':24}{_numbers(summary.centre_of_mass)}   m, base axes, neutral shape",
         f"{'principal moments':24}{_numbers(summary.principal_moments)}   kg m^2",
         f"{'sha256':24}{summary.sha256 or 'none: not from a file'}",
@@ -97,7 +99,8 @@ def body_lines(summary: BodySummary) -> list[str]:
     for joint in summary.joints:
         limits = "".join(f"{_limit(value):>12}" for value in (joint.lower, joint.upper))
         span = _limit(joint.upper - joint.lower)
-        lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {joint.unit:<3}{span:>12}")
+        unit = "" if joint.kind == "ball" else joint.unit
+        lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {unit:<3}{span:>12}")
     if summary.followers:
         width = max(map(len, ("follower", *summary.followers)))
         lines += [
@@ -147,7 +150,7 @@ def gap_text(body: Body, gap: Array) -> str:
     worst = int(np.argmax(np.abs(gap)))
     unit, off = body.joint_units[worst], float(gap[worst])
     turned = f" ({math.degrees(off):.4g} deg)" if unit == "rad" else ""
-    return f"{body.joint_names[worst]} ends {off:.6g} {unit}{turned}"
+    return f"{body.joint_names[worst]} ends {off:.6g} {unit}".removesuffix(" 1") + turned
 
 
 def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from ...arrays import Array
 from ...body.appearance import Visual
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
+from ...shape_space.ball_columns import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
 # Where a slider ends for a joint without a limit [rad or m], and from where on a limit is none.
@@ -45,7 +46,9 @@ def motion_data(scene: MovingScene, *, speed: float, ghost: bool, up: Array) -> 
         "joints": [],
     }
     if scene.body is not None and scene.shapes is not None:
-        data |= body_data(scene.body) | {"shapes": _single(scene.shapes)}
+        data |= body_data(scene.body) | {
+            "shapes": _single(neighbours_signs(scene.shapes, ball_columns(scene.body.joint_names)))
+        }
         data["nodes"] = frame_nodes(scene.body, {node.name: node.shapes for node in scene.nodes}, meshes, stored)
     else:
         data["nodes"] = [_moving_node(node, meshes, stored) for node in scene.nodes]
@@ -57,12 +60,14 @@ def body_data(body: Body) -> dict[str, Any]:
     chain = body.chain
     names = ("turns", "places", "axes", "slides", "masses", "centres", "matrix", "offset")
     open_ended = np.abs(body.joint_limits) > _NO_LIMIT
-    limits = np.where(open_ended, np.array([-_SLIDER_END, _SLIDER_END]), body.joint_limits)
+    ends = np.where(np.array(body.joint_units) == "1", 1.0, _SLIDER_END)[:, None] * [-1.0, 1.0]
+    limits = np.where(open_ended, ends, body.joint_limits)
     return {
         "chain": {
             "parents": list(chain.parents),
             **{name: np.asarray(getattr(chain, name), dtype=float) for name in names},
             "curved": [_curved_joint(joint) for joint in chain.follows.curved],
+            "balls": [{"row": ball.row, "column": ball.column} for ball in chain.follows.balls],
         },
         "joints": [
             {"name": name, "unit": unit, "lower": float(lower), "upper": float(upper)}

@@ -62,7 +62,8 @@ def _turn_plot(motion: Motion, times: Array) -> dict[str, Any]:
 
 def _joint_plots(body: Body, shapes: Array) -> list[dict[str, Any]]:
     found = []
-    for unit, title, shown in (("rad", "joints that turn", "°"), ("m", "joints that slide", "m")):
+    kinds = (("rad", "joints that turn", "°"), ("1", "ball joints, quaternions", ""), ("m", "joints that slide", "m"))
+    for unit, title, shown in kinds:
         columns = np.flatnonzero([own == unit for own in body.joint_units])
         ranges = np.ptp(shapes[:, columns], axis=0)
         moving = columns[ranges > 0.0]

@@ -13,8 +13,9 @@ from ...arrays import FARTHEST, Array, Integers
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import what_came
+from ._ball_columns import continued_balls, with_quaternions
 from ._base_columns import BaseChoices, BaseColumns, BaseMotion
-from ._labels import ANGLES, LENGTHS, SI, Label, in_square_brackets, label, quantity
+from ._labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, in_square_brackets, label, quantity
 from ._recording import LONGEST_NAME, Recording
 from ._unit_doubts import check_unit, warn_of_values
 
@@ -95,10 +96,12 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     TrajectoryWarning
         Where a joint leaves its limits, or jumps by about a whole turn from one sample to the next.
     """
-    table, where = recording.table, recording.table.where
-    for text in table.columns:
+    where = recording.table.where
+    for text in recording.table.columns:
         if len(text) > LONGEST_NAME:
             raise TrajectoryError(f"{where}: a column's name has {len(text)} characters: {text[:40]!r}...")
+    recording, turned = with_quaternions(recording, body, choices.names, choices.degrees)
+    table = recording.table
     shapes = np.empty((len(recording.times), body.n_shape))
     found: dict[int, str] = {}
     units: dict[str, str] = {}
@@ -124,7 +127,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         found[joint] = text
         units[body.joint_names[joint]] = unit
         known |= {joint} if stated else set()
-        shapes[:, joint] = (ANGLES | LENGTHS)[unit] * values
+        shapes[:, joint] = (1.0 if unit == NO_UNIT else (ANGLES | LENGTHS)[unit]) * values
     _check_unread(found, body, recording, choices)
     at_rest = _rest_of_missing(found, body, where, choices)
     for name, value in at_rest.items():
@@ -135,8 +138,9 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
             check_unit(shapes[:, joint], joint, body, recording)
     for joint in range(body.n_shape):
         warn_of_values(shapes[:, joint], joint, body, recording)
+    shapes = continued_balls(shapes, body, recording)
     base_motion = base.motion(ignore_extra=choices.ignore_extra)
-    columns = {body.joint_names[joint]: text for joint, text in found.items()}
+    columns = {body.joint_names[joint]: turned.get(text, text) for joint, text in found.items()}
     return Matched(shapes, base_motion, columns, units, at_rest, left_out | base_motion.left_out)
 
 
@@ -185,6 +189,10 @@ def _unit(
     # A column keeps its unit when it is given another name.
     own = table.units.get(text) or (label(text).unit if text not in body.joint_names else None)
     said = target.unit or own
+    if body.joint_units[joint] == NO_UNIT:
+        if said not in (None, SI, NO_UNIT):
+            raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; a quaternion has no unit")
+        return NO_UNIT, True
     if target.unit and own and target.unit != own:
         raise TrajectoryError(f"{table.where}: column {text!r} is in {own}, and names says {target.unit}")
     if said == SI:
@@ -244,7 +252,8 @@ def _rest_of_missing(found: Mapping[int, str], body: Body, where: str, choices: 
     missing = [name for i, name in enumerate(body.joint_names) if i not in found and name not in at_rest]
     if choices.rest_missing:
         limits = {name: body.joint_limits[body.joint_index(name)] for name in missing}
-        at_rest |= {name: float(np.clip(0.0, *limits[name])) for name in missing}
+        neutral = dict(zip(body.joint_names, body.shape().tolist(), strict=True))
+        at_rest |= {name: float(np.clip(neutral[name], *limits[name])) for name in missing}
     elif missing:
         raise TrajectoryError(
             f"{where}: no column for {', '.join(missing)}; add them (zeros where the joint rests), or say where they "

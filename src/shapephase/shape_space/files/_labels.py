@@ -20,6 +20,8 @@ IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
 """Units of time -> how many there are in a second: whole milliseconds are divided by it without loss."""
 SI = "SI"
 """The unit of a column in rad or m, whichever its joint has; `write_shape_path` says so where else one would ask."""
+NO_UNIT = "1"
+"""Of the numbers of a quaternion."""
 _SPELLINGS = {
     "rad": ("rad", "rads", "radian", "radians"),
     "deg": ("deg", "degs", "degree", "degrees", "°"),
@@ -33,6 +35,7 @@ _SPELLINGS = {
     "ns": ("ns", "nsec", "nanosecond", "nanoseconds"),
     "min": ("min", "minute", "minutes"),
     SI: ("si",),
+    NO_UNIT: ("1",),
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))", re.DOTALL)
@@ -89,12 +92,14 @@ def time_unit_argument(unit: str | None) -> str | None:
 
 
 def quantity(value: object, unit: str, what: str) -> float:
-    """A number in the unit of a joint, "rad" or "m", or a text such as `30deg` or `5 mm`: in SI units.
+    """A number in the unit of a joint, "rad", "m" or none, or a text such as `30deg` or `5 mm`: in SI units.
 
     Raises TrajectoryError, which begins with `what`.
     """
     number, said = _number_and_unit(value, what)
     sizes = ANGLES if unit == "rad" else LENGTHS
+    if said is not None and unit == NO_UNIT:
+        raise TrajectoryError(f"{what}: {value!r:.40} is in {said}, and a quaternion has no unit")
     if said is not None and said not in sizes:
         kind = "turns" if unit == "rad" else "slides"
         raise TrajectoryError(
@@ -104,7 +109,7 @@ def quantity(value: object, unit: str, what: str) -> float:
 
 
 def amounts(value: object, what: str) -> dict[str, float]:
-    """How much of an angle and of a length: {"rad": ..., "m": ...}.
+    """How much of an angle, a length, and a quaternion, which has half of its turn: {"rad": ..., "m": ..., "1": ...}.
 
     A number is both; a text such as `3deg` or `3deg,5mm` says which, and what it does not name is zero.
 
@@ -120,7 +125,8 @@ def amounts(value: object, what: str) -> dict[str, float]:
             if kind in found:
                 raise TrajectoryError(f"{what}: {value!r:.40} says two amounts of one kind")
             found[kind] = number * (1.0 if said is None else (ANGLES | LENGTHS)[said])
-    return {"rad": 0.0, "m": 0.0} | found
+    found = {"rad": 0.0, "m": 0.0} | found
+    return found | {NO_UNIT: 0.5 * found["rad"]}
 
 
 def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:

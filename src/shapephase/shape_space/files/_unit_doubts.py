@@ -8,7 +8,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
 from ..unit_doubts import looks_like
-from ._labels import ANGLES, LENGTHS
+from ._labels import ANGLES, LENGTHS, NO_UNIT
 from ._recording import Recording, warn
 
 _WHOLE_TURN = 2.0 * np.pi
@@ -30,6 +30,8 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
     values : (N,) [rad or m], if these are the units
     """
     name, unit, table = body.joint_names[joint], body.joint_units[joint], recording.table
+    if unit == NO_UNIT:
+        return
     lower, upper = body.joint_limits[joint]
     outside = values.min() < lower or values.max() > upper
     limited = bool(np.isfinite([lower, upper]).all())

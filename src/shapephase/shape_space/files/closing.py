@@ -95,6 +95,12 @@ def closed_path(
     if not isinstance(way, str) or way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)
     whole = recorded.shapes[-1] - recorded.shapes[0]
+    for ball in body.chain.follows.balls:
+        if recorded.shapes[-1, ball.columns] @ recorded.shapes[0, ball.columns] < 0.0:
+            raise TrajectoryError(
+                f"ball joint {ball.name} ends more than half a turn from its start, as its quaternion went; leave "
+                "close (--close) out"
+            )
     turns = np.where(body.continuous, _WHOLE_TURN * np.round(whole / _WHOLE_TURN), 0.0)
     gap = whole - turns
     _check_gap(gap, amounts(within, "close"), body)
@@ -124,7 +130,7 @@ def _check_gap(gap: Array, within: dict[str, float], body: Body) -> None:
     if np.any(excess > 0.0):
         joint = int(np.argmax(excess))
         name, unit = body.joint_names[joint], body.joint_units[joint]
-        shown = f"{np.degrees(gap[joint]):.4g} deg" if unit == "rad" else f"{gap[joint]:.4g} m"
+        shown = f"{np.degrees(gap[joint]):.4g} deg" if unit == "rad" else f"{gap[joint]:.4g} {unit.replace('1', '')}"
         raise TrajectoryError(
             f"joint {name} ends {shown} from its start, and gaps up to {allowed[joint]:.6g} {unit} are to be closed; "
             "cut the recording at a full cycle (trim, --trim), or allow more (close, --close)"

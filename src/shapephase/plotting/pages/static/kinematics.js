@@ -25,12 +25,20 @@ function followed(term, coordinate) {
   return term.coefficients[piece].reduceRight((value, coefficient) => value * since + coefficient, 0);
 }
 
+// Of the four numbers of a ball joint, whatever their length.
+function ballTurn(shape, column) {
+  const four = [0, 1, 2, 3].map(k => shape[column + k]), length = Math.hypot(...four);
+  return poseOfQuaternion(length > 0 ? four.map(value => value / length) : [0, 0, 0, 1], [0, 0, 0]);
+}
+
 // Of the base and of what each joint moves, in base axes.
 function framePoses(chain, shape) {
   const poses = [IDENTITY];
   jointCoordinates(chain, shape).forEach((q, k) => {
     const slide = times(row(chain.slides, k, 3), q);
-    const rest = poseOfRows(row(chain.turns, k, 9), row(chain.places, k, 3));
+    const ball = chain.balls.find(one => one.row === k);
+    const fixed = poseOfRows(row(chain.turns, k, 9), row(chain.places, k, 3));
+    const rest = ball ? product(fixed, ballTurn(shape, ball.column)) : fixed;
     const motion = poseOfTurn(row(chain.axes, k, 3), q, slide);
     poses.push(product(poses[chain.parents[k]], product(rest, motion)));
   });

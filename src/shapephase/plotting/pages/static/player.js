@@ -96,6 +96,7 @@ function sceneControls(holder, scene, figure) {
 
 // A joint's coordinate for people.
 function jointValue({unit}, value) {
+  if (unit === "1") return typeset(value.toFixed(4));
   return typeset(unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} m`);
 }
 

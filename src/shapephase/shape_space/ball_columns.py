@@ -1,0 +1,53 @@
+"""Columns of a path that are the four numbers of a ball joint, known by their names: where two of them are one turn.
+
+A quaternion and its negative are the same turn, and so is any multiple: samples are given the signs of their
+neighbours, so that curves through them go the short way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Array
+
+_PARTS = ("x", "y", "z", "w")
+"""Behind the dot in the names of the four."""
+_SAME = 1e-9
+"""Difference of two quaternions of length one that are the same turn."""
+
+
+def ball_columns(names: Sequence[str] | None) -> tuple[slice, ...]:
+    """Where four names in a row are `joint.x`, `joint.y`, `joint.z` and `joint.w` of one joint."""
+    known, found = list(names or ()), []
+    for first in range(len(known) - len(_PARTS) + 1):
+        four = known[first : first + len(_PARTS)]
+        joint = four[0].removesuffix(".x")
+        if joint and tuple(four) == tuple(f"{joint}.{part}" for part in _PARTS):
+            found.append(slice(first, first + len(_PARTS)))
+    return tuple(found)
+
+
+def neighbours_signs(samples: Array, balls: Sequence[slice]) -> Array:
+    """The samples (N, n), quaternions with the sign that is nearer to the one before."""
+    if not balls:
+        return samples
+    found = samples.copy()
+    for ball in balls:
+        four = samples[:, ball]
+        flips = np.where(np.sum(four[1:] * four[:-1], axis=1) < 0.0, -1.0, 1.0)
+        found[1:, ball] *= np.cumprod(flips)[:, None]
+    return found
+
+
+def factors_between(end: Array, start: Array, balls: Sequence[slice]) -> Array:
+    """By what the columns of `start` are to be multiplied to be those of `end`, where these are the same turn: (n,)."""
+    factors = np.ones(len(end))
+    for ball in balls:
+        length = float(start[ball] @ start[ball])
+        factor = float(end[ball] @ start[ball]) / length if length else 1.0
+        size = float(np.linalg.norm(end[ball]))
+        if factor and np.linalg.norm(end[ball] - factor * start[ball]) <= _SAME * size:
+            factors[ball] = factor
+    return factors

@@ -1,0 +1,119 @@
+"""Columns of a recording that say how ball joints are turned: four of a quaternion, or three angles in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...errors import TrajectoryError
+from ..ball_columns import ball_columns, neighbours_signs
+from ._labels import ANGLES, SI, Label, label
+from ._recording import Recording
+
+_AXES = "xyz"
+_OFF_UNIT = 0.1
+"""A quaternion's length may be off one by so much: smooth curves between unit quaternions are shorter."""
+_MOST_ANGLE = 2.0 * np.pi
+"""[rad] An angle beyond it, of which nobody has said the unit, is rather in degrees."""
+
+
+def with_quaternions(
+    recording: Recording, body: Body, names: Mapping[str, str | None], degrees: bool | None
+) -> tuple[Recording, dict[str, str]]:
+    """The recording with quaternions of ball joints in the place of angles; and which columns each is made of.
+
+    The columns `shoulder.rz`, `shoulder.rx`, `shoulder.ry` of a ball joint, in the order in which they stand, are turns
+    about z, x and y, each about its axis as those before have turned it.
+
+    names : label -> name of the joint, as a caller has said
+
+    Raises
+    ------
+    TrajectoryError
+        If one of the three is missing, is no angle, or has a unit that can only be guessed.
+    """
+    table = recording.table
+    made: dict[str, str] = {}
+    for joint in body.ball_joints:
+        found: dict[str, tuple[str, Array]] = {}
+        for text in table.columns:
+            target = names.get(text, text)
+            parts = Label("", None) if target is None else label(target)
+            axis = parts.name[-1:]
+            if not axis or axis not in _AXES or parts.name != f"{joint}.r{axis}" or parts.name in body.joint_names:
+                continue
+            if axis in found:
+                both = f"columns {found[axis][0]!r} and {text!r} are both {parts.name}"
+                raise TrajectoryError(f"{table.where}: {both}; keep one")
+            table.check_column(text)
+            found[axis] = text, _angles(text, parts.unit, recording, degrees)
+        if not found:
+            continue
+        lacking = [f"{joint}.r{axis}" for axis in _AXES if axis not in found]
+        if lacking:
+            raise TrajectoryError(f"{table.where}: ball joint {joint} turns about three axes; add {', '.join(lacking)}")
+        turned = np.broadcast_to(np.eye(3), (len(recording.times), 3, 3))
+        for axis, (_, angles) in found.items():
+            turned = turned @ so3.exp(angles[:, None] * np.eye(3)[_AXES.index(axis)])
+        taken = [text for text, _ in found.values()]
+        columns, said = {text: each for text, each in table.columns.items() if text not in taken}, ", ".join(taken)
+        for part, values in zip("xyzw", so3.quat_from_matrix(turned).T, strict=True):
+            if f"{joint}.{part}" in columns:
+                raise TrajectoryError(
+                    f"{table.where}: ball joint {joint} stands twice, as {said} and as {joint}.{part}"
+                )
+            columns[f"{joint}.{part}"] = values
+            made[f"{joint}.{part}"] = said
+        table = replace(table, columns=columns)
+    return replace(recording, table=table), made
+
+
+def _angles(text: str, said: str | None, recording: Recording, degrees: bool | None) -> Array:
+    """A column in rad."""
+    table = recording.table
+    values, unit = table.columns[text], said or table.units.get(text) or label(text).unit
+    if unit is not None and unit != SI and unit not in ANGLES:
+        raise TrajectoryError(f"{table.where}: column {text!r} is in {unit}, and a turn is in rad or degrees")
+    if unit is not None and unit != SI and degrees is not None and degrees != (unit == "deg"):
+        raise TrajectoryError(f"{table.where}: column {text!r} is in {unit}, and degrees={degrees} was given")
+    if unit is None:
+        given = degrees if degrees is not None else table.degrees
+        if given is None:
+            raise TrajectoryError(
+                f"{table.where}: the header does not say inDegrees=yes or no; add that, or give degrees=True or False "
+                "(--degrees, --radians)"
+            )
+        widest = int(np.argmax(np.abs(values)))
+        if degrees is None and not table.by_format and abs(values[widest]) > _MOST_ANGLE:
+            raise TrajectoryError(
+                f"{recording.place(widest)}: column {text!r} is at {values[widest]:.6g} rad, more than a turn: "
+                f"degrees? Name it {text}_deg or give degrees=True (--degrees); for radians, give degrees=False "
+                "(--radians)"
+            )
+        unit = "deg" if given else "rad"
+    return values * (1.0 if unit == SI else ANGLES[unit])
+
+
+def continued_balls(shapes: Array, body: Body, recording: Recording) -> Array:
+    """Shapes (N, n) with the quaternions of ball joints in the sign that is nearer to the sample before.
+
+    Raises
+    ------
+    TrajectoryError
+        If the length of one is far from one.
+    """
+    balls = ball_columns(body.joint_names) if body.ball_joints else ()
+    for ball, joint in zip(balls, body.ball_joints, strict=True):
+        lengths = np.linalg.norm(shapes[:, ball], axis=1)
+        worst = int(np.argmax(np.abs(lengths - 1.0)))
+        if not abs(lengths[worst] - 1.0) <= _OFF_UNIT:
+            raise TrajectoryError(
+                f"{recording.place(worst)}: the quaternion x, y, z, w of ball joint {joint} has the length "
+                f"{lengths[worst]:.6g}; 1 is needed"
+            )
+    return neighbours_signs(shapes, balls)
