@@ -7,6 +7,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
+from shapephase.examples.dives import full_dive
 from shapephase.examples.scenarios import (
     CLOSED_ORBITS,
     MOTIONS,
@@ -89,6 +90,29 @@ def test_the_diver_makes_one_and_a_half_somersaults_and_a_twist(duration):
     twist = np.unwrap(np.arctan2(-attitudes[:, 1, 0], attitudes[:, 1, 1]))
     np.testing.assert_allclose([somersault[-1], twist[-1]], [3.0 * np.pi, 2.0 * np.pi], atol=1e-6)
     assert so3.angle(turned("diver_twist", path)) < 1e-11
+
+
+@pytest.mark.parametrize("duration", [1.5, 2.3])
+def test_the_dive_of_five_stages_lands_f10(duration):
+    """With the stated somersaults and twist to 1e-9; by DOP853 too, and the pieces of the phase add up."""
+    dive = full_dive(duration)
+    motion = sp.reconstruct(dive.deformation, dive.momentum, tolerance=1e-10)
+    landing = so3.exp(np.array([0.0, 3.0 * np.pi, 0.0]))
+    assert so3.angle(motion.final_attitude.T @ landing) < 1e-9
+    attitudes = motion.attitude(np.linspace(0.0, duration, 300))
+    somersault = np.unwrap(np.arctan2(attitudes[:, 0, 2], attitudes[:, 2, 2]))
+    twist = np.unwrap(np.arctan2(-attitudes[:, 1, 0], attitudes[:, 1, 1]))
+    np.testing.assert_allclose([somersault[-1], twist[-1]], [3.0 * np.pi, 2.0 * np.pi], atol=1e-9, rtol=0)
+    # First and last nothing but a somersault about the momentum.
+    breaks = dive.deformation.description.path.breaks
+    for time in (breaks[1], breaks[4]):
+        alone = so3.exp(np.array([0.0, dive.momentum[1] / dive.deformation.inertia(0.0)[1, 1] * breaks[1], 0.0]))
+        expected = alone if time == breaks[1] else landing @ alone.T
+        assert so3.angle(motion.attitude(time).T @ expected) < 1e-9
+    other = sp.reconstruct(dive.deformation, dive.momentum, method="dop853", tolerance=1e-10)
+    assert so3.angle(other.final_attitude.T @ landing) < 1e-9
+    split = sp.split(motion, "base")
+    assert so3.wrap(split.montgomery_phase - dive.phase) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_pace_of_a_named_motion_does_not_matter():

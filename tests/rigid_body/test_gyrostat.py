@@ -52,6 +52,21 @@ def test_the_committed_values_are_those_of_the_script(reference):
     assert np.all(off < 1e-7 * reference["condition"])
 
 
+def test_half_periods_are_counted_where_the_sine_is_exactly_zero():
+    """Among neighbouring doubles is one at which it is; the angle there was once without the last half period."""
+    found = 0
+    for sign in (1.0, -1.0):
+        top = sp.Gyrostat(np.diag([11.0, 12.0, 1.0]), [sign * 60.0, 0.0, 0.0], [0.0, 80.0, 0.0])
+        orbit = top._orbit
+        for half in range(-3, 4):
+            near = (half * orbit.half_period * orbit.rate - orbit.phase) / orbit.rate
+            times = near + np.arange(-40, 41) * np.spacing(abs(near) + 1e-3)
+            found += np.count_nonzero(sp.elliptic.jacobi(orbit.rate * times + orbit.phase, orbit.complement)[0] == 0.0)
+            quat = top.quat_xyzw(times)
+            assert np.abs(quat - quat[0]).max() < 1e-11
+    assert found > 3
+
+
 @pytest.mark.parametrize("case", [0, 25, pytest.param(slice(5, 100, 5), marks=pytest.mark.full)])
 def test_it_is_what_reconstruct_integrates(reference, case):
     rows = np.arange(100)[case] if isinstance(case, slice) else [case]

@@ -8,6 +8,7 @@ from ._closed_form_motions import (
     expansion,
     pulsation,
 )
+from .dives import diver_twist, five_stage_dive, full_dive
 from .example_deformations import (
     EXAMPLES,
     astronaut,
@@ -31,7 +32,6 @@ from .scenarios import (
     astronaut_leg_swing,
     cat_righting,
     closed_orbit,
-    diver_twist,
     kane_scher,
     named_motion,
     satellite_sweep,
@@ -69,6 +69,8 @@ __all__ = [
     "diver_twist",
     "expansion",
     "first_loop",
+    "five_stage_dive",
+    "full_dive",
     "furniture",
     "homothety",
     "kane_scher",

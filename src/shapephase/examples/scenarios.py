@@ -17,15 +17,10 @@ from ..errors import TrajectoryError, unknown_name
 from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
+from .dives import diver_twist, five_stage_dive
 
 # Joints of the waist of both cats, in the order of their angles.
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
-# Of the diver's arms [rad].
-_ARM_UP = 3.0
-_ARM_DOWN = 0.2
-# Of the whole dive: how long an arm moves, and half of how long it stays down.
-_ARM_MOVES = 0.2
-_ARM_STAYS = 0.13155869448710526
 # Of the reconstruction of a closed orbit [rad]: its phases are then good to ten digits.
 _TOLERANCE = 1e-11
 
@@ -189,33 +184,6 @@ def satellite_sweep(duration: float = 60.0) -> ShapePath:
     )
 
 
-def diver_twist(duration: float = 1.5) -> ShapePath:
-    """A dive of the `diver`: forward, one and a half somersaults with a twist, by one arm that goes down and up.
-
-    Both arms are overhead. In a fifth of the time the left one comes down to the side, which tilts the body away from
-    the plane of the somersault, so that it twists, and goes up again when the tilt is such that this takes it away.
-    With the momentum (0, 92.338247 / duration, 0) kg m^2/s and upright at the start (the somersault is about +y) it
-    ends after exactly one and a half somersaults and one twist, 0.016 degrees from the plane. Momentum and the time
-    that the arm stays down were solved for. Without momentum nothing is left of it: an arm comes back on its own way.
-
-    From a platform of ten metres a dive takes about 1.5 s. In the manner of Yeadon 1993 and of Dullin and Tong,
-    arXiv:1510.08046; the numbers are our own.
-
-    Examples
-    --------
-    >>> dive = sp.examples.diver_twist()
-    >>> print(dive.duration, dive.shape(0.75))
-    1.5 [ 0.2 -3. ]
-    """
-    period = positive_argument(duration)
-    body = load_body("diver")
-    both_up = {"left_shoulder_abduction": _ARM_UP, "right_shoulder_abduction": -_ARM_UP}
-    up, down = body.shape(both_up), body.shape(both_up | {"left_shoulder_abduction": _ARM_DOWN})
-    moves = 0.5 + np.array([-_ARM_STAYS - _ARM_MOVES, -_ARM_STAYS, _ARM_STAYS, _ARM_STAYS + _ARM_MOVES])
-    times = period * np.array([0.0, *moves, 1.0])
-    return ShapePath.waypoints(times, [up, up, down, down, up, up], joint_names=body.joint_names)
-
-
 MOTIONS: Mapping[str, NamedMotion] = {
     "kane_scher": NamedMotion(
         body="cat_two_halves",
@@ -239,6 +207,11 @@ MOTIONS: Mapping[str, NamedMotion] = {
     ),
     "diver_twist": NamedMotion(
         body="diver", path=diver_twist, about="1.5 somersaults with a twist by one arm, momentum 0 61.558831 0"
+    ),
+    "five_stage_dive": NamedMotion(
+        body="diver",
+        path=five_stage_dive,
+        about="1.5 somersaults with a twist, into the plane again, momentum 0 61.584734426 0",
     ),
 }
 

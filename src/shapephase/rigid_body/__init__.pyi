@@ -32,6 +32,7 @@ from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, ri
 from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
 from .pseudo_rigid import PseudoRigidBody, PseudoRigidSpin, pseudo_rigid_spin
+from .rotor_dive import RotorDive, rotor_dive, rotor_dive_lasting, tilt_of_ratio
 from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
 from .steady_gyrostats import (
     DualSpinTurn,
@@ -65,6 +66,7 @@ __all__ = [
     "PseudoRigidBody",
     "PseudoRigidSpin",
     "RigidBodyPendulum",
+    "RotorDive",
     "SleepingTop",
     "SpinInSpace",
     "StabilityChart",
@@ -96,6 +98,8 @@ __all__ = [
     "pseudo_rigid_spin",
     "racket_twist",
     "rigid_body_pendulum",
+    "rotor_dive",
+    "rotor_dive_lasting",
     "second_variation",
     "semidirect_bracket",
     "separatrix_solid_angle",
@@ -107,6 +111,7 @@ __all__ = [
     "stability_chart",
     "steady_rotation",
     "steady_rotations",
+    "tilt_of_ratio",
     "twist_defect",
     "upright_potential",
     "weierstrass_form",

@@ -91,13 +91,14 @@ class GyrostatOrbit:
             # Of whole half turns of the amplitude sn and cn change their signs together.
             top, weight = scale * cn * cn, sn * sn
             slope = -2.0 * scale * self.rate * cn * dn * sn
-            return top, weight, slope, turns, np.sign(sn * cn)
+            return top, weight, slope, turns, _side(am - np.pi * turns)
         scale = float(np.abs(self.roots[0]))
         low = cn < 0.0
         above = np.where(low, sn * sn / np.where(low, 1.0 - cn, 1.0), 1.0 + cn)
         below = np.where(low, 1.0 - cn, sn * sn / np.where(low, 1.0, 1.0 + cn))
         slope = -2.0 * scale * self.rate * sn * dn
-        return scale * above, below, slope, np.rint(am / (2.0 * np.pi)), np.sign(sn)
+        turns = np.rint(am / (2.0 * np.pi))
+        return scale * above, below, slope, turns, _side(am - 2.0 * np.pi * turns)
 
     def directions(self, times: Array) -> Array:
         """x: (...) -> (..., 3) unit vectors."""
@@ -169,6 +170,11 @@ class Swing:
         third = scaled**1.5 / (3.0 * pole) * elliprj(*args, weight - scaled / pole)
         factor = -2.0 / (pole * np.abs(first) * np.sqrt(self.orbit.leading))
         return np.where(top > 0.0, factor * (np.sqrt(scaled) * elliprf(*args) + third), 0.0)
+
+
+def _side(rest: Array) -> Array:
+    """-1 below zero, else 1: also at P1 itself, where the sine vanishes and the integral is that of half a period."""
+    return np.where(rest < 0.0, -1.0, 1.0)
 
 
 def gyrostat_orbit(rates: Array, shift: Array, start: Array, speed: float) -> GyrostatOrbit:
