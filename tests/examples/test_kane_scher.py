@@ -13,8 +13,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.errors import TrajectoryError
+from shapephase.errors import TrajectoryError, UnknownNameError
+from shapephase.examples import kane_scher
 from support.independent import apart, body_of, turn
+from support.places import ROBOTS
 
 RIGHTING = [(0, 59.426459), (10, 60.036246), (20, 61.813873), (30, 64.618733), (45, 70.316222), (60, 77.132402)]
 JOINTS = ("waist_pitch", "waist_yaw", "waist_roll")
@@ -132,6 +134,50 @@ def test_any_cone_turns_as_the_paper_s_equation_says(alpha: float, beta: float):
     psi = 360.0 * np.mean(j * s / ((1.0 - t) * (1.0 - t + j * (1.0 + t)) * np.sqrt(1.0 + t)))
     motion = sp.reconstruct(sp.articulated(body_of("cat_two_halves"), paper_path(a, b)), np.zeros(3), tolerance=1e-11)
     assert abs(turn_of_the_bend(motion, a, b) - psi) < 1e-7
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(0, 30.0), (20, 61.813873), (60, 77.132402)])
+def test_the_waist_that_cannot_twist_does_what_the_other_does(alpha: float, beta: float):
+    a, b = np.radians([alpha, beta])
+    known = sp.holonomy(body_of("cat_two_halves"), library_path(a, b))
+    found = sp.holonomy(body_of("cat_untwisted"), kane_scher(a, b, body="cat_untwisted"))
+    assert apart(found, known) < 1e-9
+    body, times = body_of("cat_untwisted"), np.linspace(0.0, 1.0, 9)
+    poses = [body.link_pose(shape, "rear")[:3, :3] for shape in kane_scher(a, b, body="cat_untwisted").shape(times)]
+    np.testing.assert_allclose(poses, untwisted(*rear_axis(a, b, 2.0 * np.pi * times))[0], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("alpha", "beta"), [(0, 90.0), (0, 140.0), (20, 90.0), (30, 120.0)])
+def test_bends_beyond_a_quarter_turn_turn_as_the_paper_s_equation_says(alpha: float, beta: float):
+    """Equation (5) by quadrature, where the three angles of the other waist are singular or go round."""
+    a, b, j = np.radians(alpha), np.radians(beta), 0.25
+    theta = 2.0 * np.pi * np.arange(4000) / 4000
+    t = np.cos(a) * np.cos(b) - np.sin(a) * np.sin(b) * np.cos(theta)
+    s = np.sqrt(2.0) * (np.cos(a) * np.sin(b) + np.sin(a) * np.cos(b) * np.cos(theta)) * np.sin(b)
+    psi = 2.0 * np.pi * np.mean(j * s / ((1.0 - t) * (1.0 - t + j * (1.0 + t)) * np.sqrt(1.0 + t)))
+    # The halves end where psi says, less a whole turn.
+    found = sp.holonomy(body_of("cat_untwisted"), kane_scher(a, b, body="cat_untwisted"))
+    assert apart(found, turn(bisector(a, b), psi)) < 1e-9
+
+
+def test_other_cones_and_bodies_are_refused():
+    with pytest.raises(TrajectoryError, match="beta < pi - alpha"):
+        kane_scher(0.5, np.pi - 0.4, body="cat_untwisted")
+    with pytest.raises(TrajectoryError, match="beta < pi/2"):
+        kane_scher(0.5, 0.5 * np.pi)
+    with pytest.raises(UnknownNameError, match="cat_untwisted"):
+        kane_scher(0.1, 0.5, body="dog")
+
+
+@pytest.mark.parametrize("offset", [0.05, 0.1225])
+def test_centres_of_mass_off_the_waist_change_nothing(tmp_path, offset: float):
+    """The halves stay mirror images, so that what their centres' distance adds cancels; (20, 40) is no righting."""
+    path, (front, rear) = library_path(*np.radians([20.0, 40.0])), (f"{offset} 0 0", f"{-offset} 0 0")
+    first, second, rest = (ROBOTS / "cat_two_halves.urdf").read_text().split('<origin xyz="0 0 0"/>')
+    file = tmp_path / "moved.urdf"
+    file.write_text(f'{first}<origin xyz="{front}"/>{second}<origin xyz="{rear}"/>{rest}')
+    found = sp.holonomy(sp.load_body(file), path)
+    assert apart(found, sp.holonomy(body_of("cat_two_halves"), path)) < 1e-12
 
 
 def test_constant_bend_in_closed_form():

@@ -148,7 +148,7 @@ def robot_names() -> tuple[str, ...]:
     Examples
     --------
     >>> len(sp.robot_names()), sp.robot_names()[0]
-    (5, 'astronaut')
+    (8, 'astronaut')
     """
     return tuple(sorted(p.stem for p in robots_folder().glob("*.urdf")))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arguments import number_argument, positive_argument
+from ..arguments import check_choice, number_argument, positive_argument
 from ..arrays import Array
 from ..body.catalog import load_body
 from ..deformation.deformation import articulated
@@ -21,6 +21,8 @@ from .dives import diver_twist, five_stage_dive
 
 # Joints of the waist of both cats, in the order of their angles.
 _WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
+# Of the waist that cannot twist.
+_BEND = ("waist_pitch", "waist_yaw")
 # Of the reconstruction of a closed orbit [rad]: its phases are then good to ten digits.
 _TOLERANCE = 1e-11
 
@@ -43,8 +45,8 @@ class NamedMotion:
     __repr__ = short_repr
 
 
-def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
-    """The righting of the cat of two halves, `cat_two_halves`: it bends without twisting, and the bend goes once round.
+def kane_scher(alpha: float, beta: float, duration: float = 1.0, *, body: str = "cat_two_halves") -> ShapePath:
+    """The righting of the cat of two halves: it bends without twisting, and the bend goes once round.
 
     The rear half's axis b goes round a cone of half angle `beta` about a line that leans by `alpha` from the
     front half's axis towards the belly; the waist does not twist. The bend goes from alpha + beta (belly)
@@ -52,8 +54,9 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
 
     Parameters
     ----------
-    alpha, beta : [rad], 0 <= alpha < beta < pi/2
+    alpha, beta : [rad], 0 <= alpha < beta < pi/2; of "cat_untwisted" beta < pi - alpha
     duration : of one loop [s]
+    body : whose waist it is, "cat_two_halves" or "cat_untwisted", whose angles are singular at no bend
 
     Notes
     -----
@@ -73,9 +76,16 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0) -> ShapePath:
     alpha = number_argument(alpha, "alpha", "rad")
     beta = number_argument(beta, "beta", "rad")
     duration = number_argument(duration, "duration", "s")
-    if not 0.0 <= alpha < beta < 0.5 * np.pi:
-        raise TrajectoryError(f"0 <= alpha < beta < pi/2 [rad] is needed, got alpha = {alpha:.9g}, beta = {beta:.9g}")
-    return replace(_loop(_KaneScher(float(alpha), float(beta), float(duration)), duration, _WAIST), smooth_loop=True)
+    check_choice(body, "body that bends", ("cat_two_halves", "cat_untwisted"))
+    joints, limit, words = _WAIST, 0.5 * np.pi, "pi/2"
+    if body == "cat_untwisted":
+        joints, limit, words = _BEND, np.pi - alpha, "pi - alpha"
+    if not 0.0 <= alpha < beta < limit:
+        raise TrajectoryError(
+            f"0 <= alpha < beta < {words} [rad] is needed, got alpha = {alpha:.9g}, beta = {beta:.9g}"
+        )
+    curve = _KaneScher(float(alpha), float(beta), float(duration), angles=len(joints))
+    return replace(_loop(curve, duration, joints), smooth_loop=True)
 
 
 def cat_righting(duration: float = 0.5) -> ShapePath:
@@ -272,11 +282,12 @@ def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
 
 @dataclass(frozen=True)
 class _KaneScher:
-    """Waist angles of `kane_scher` and their rates at times (N,)."""
+    """Waist angles of `kane_scher` and their rates at times (N,), three or the two of the waist that cannot twist."""
 
     alpha: float
     beta: float
     duration: float
+    angles: int
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         frequency = 2.0 * np.pi / self.duration
@@ -284,7 +295,7 @@ class _KaneScher:
         ca, sa, cb, sb = np.cos(self.alpha), np.sin(self.alpha), np.cos(self.beta), np.sin(self.beta)
         axis = np.stack([ca * cb - sa * sb * c, -sb * s, sa * cb + ca * sb * c], axis=-1)
         rate = frequency * np.stack([sa * sb * s, -sb * c, -ca * sb * s], axis=-1)
-        return _untwisted(axis, rate)
+        return _untwisted(axis, rate) if self.angles == len(_WAIST) else _bent(axis, rate)
 
 
 @dataclass(frozen=True)
@@ -369,6 +380,22 @@ def _untwisted(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
         axis=-1,
     )
     return angles, rates
+
+
+def _bent(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
+    """Pitch and yaw (Ry Rz Ry, the pitch twice) that carry the x axis to `axis`, and their rates; all (N, 2) of (N, 3).
+
+    1 + x = cos^2(pitch) (1 + cos(yaw)), so the only singular axis is -x.
+    """
+    (x, y, z), (dx, dy, dz) = axis.T, axis_rate.T
+    reach = 1.0 + x
+    pitch = np.arctan2(-z, reach)
+    pitch_rate = (z * dx - reach * dz) / (reach**2 + z**2)
+    across = y * np.cos(pitch)
+    across_rate = dy * np.cos(pitch) - y * np.sin(pitch) * pitch_rate
+    yaw = 2.0 * np.arctan2(across, reach)
+    yaw_rate = 2.0 * (across_rate * reach - across * dx) / (reach**2 + across**2)
+    return np.stack([pitch, yaw], axis=-1), np.stack([pitch_rate, yaw_rate], axis=-1)
 
 
 def _loop(curve: Callable[[Array], tuple[Array, Array]], duration: float, names: tuple[str, ...]) -> ShapePath:
