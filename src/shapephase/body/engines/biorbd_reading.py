@@ -134,6 +134,8 @@ def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
     for number, line in enumerate(without_blocks.splitlines(), 1):
         words = line.split("//")[0].split()
         word = words[0].lower() if words else ""
+        if any(word.startswith("/*") for word in words):
+            raise UnusableModelError("a comment that begins with /* has no end", number)
         if word in _DROPPED:
             meshes += word == "meshfile"
             kept.append("")

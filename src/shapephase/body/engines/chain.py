@@ -58,6 +58,8 @@ class Chain:
         """With its centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2], in its axes."""
         if any(link["name"] == name for link in self.links):
             raise UnusableModelError(f"two links are named {name!r}; give each a name of its own", line)
+        if not np.isfinite(centre).all():
+            raise UnusableModelError(f"link {name!r}: its centre of mass is {np.ravel(centre).tolist()}", line)
         entry = {"name": name, "mass": float(mass), "centre": np.ravel(centre).tolist(), "line": line}
         self.links.append(entry | {"inertia": np.ravel(inertia).tolist()})
 
