@@ -12,6 +12,7 @@ from shapephase.optimal_control import Limits, symbolic_body
 from shapephase.optimal_control.nodes.node_functions import node_functions
 from shapephase.optimal_control.symbolic import solve_linear
 from shapephase.optimal_control.task import Reorientation, reorientation
+from support.ball_bodies import BALLS
 from support.coupled_bodies import LEG, TURN, couplings
 
 EPS = np.finfo(float).eps
@@ -28,14 +29,18 @@ CASES = {
     "rate": ("satellite", "rate", 0.0, {}),
     "curves": ("leg", "kinetic", MU, {}),
     "curves and rate": ("leg", "rate", 0.0, {}),
+    "ball joints": ("balls", "kinetic", MU, {}),
 }
 
 
 @pytest.fixture(scope="module")
-def leg(tmp_path_factory):
-    path = tmp_path_factory.mktemp("leg") / "leg.urdf"
-    path.write_text(LEG)
-    return sp.load_body(path).with_couplings(couplings(next(iter(TURN.values()))[0]))
+def made(tmp_path_factory):
+    """Bodies that are no robots: with joints that follow others, and with ball joints."""
+    paths = {name: tmp_path_factory.mktemp(name) / f"{name}.urdf" for name in ("leg", "balls")}
+    for name, text in (("leg", LEG), ("balls", BALLS)):
+        paths[name].write_text(text)
+    leg = sp.load_body(paths["leg"]).with_couplings(couplings(next(iter(TURN.values()))[0]))
+    return {"leg": leg, "balls": sp.load_body(paths["balls"])}
 
 
 def differentiated(task: Reorientation):
@@ -60,10 +65,10 @@ def differentiated(task: Reorientation):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_derivatives_are_those_of_the_whole_expression(case: str, leg, rng):
+def test_derivatives_are_those_of_the_whole_expression(case: str, made, rng):
     """Bodies with turning, sliding and following joints, at random shapes and rates."""
     name, cost, momentum, options = CASES[case]
-    body = leg if name == "leg" else sp.load_body(name)
+    body = made[name] if name in made else sp.load_body(name)
     limits = Limits(joint_limits=False, rate_limits=1.0)
     task = reorientation(
         body, so3.exp(np.array([0.5, 0.0, 0.0])), momentum=momentum, cost=cost, limits=limits, **options

@@ -101,3 +101,12 @@ def shapes_of_both(hinged, random: np.random.Generator, count: int) -> tuple[Arr
     shapes[:, 8] = angles[:, place["elbow"]]
     rates[:, 6, place["elbow"]] = slopes[:, 8, place["elbow"]] = 1.0
     return shapes, angles, rates, slopes
+
+
+TWO_LINKS = (
+    link("chest", 1.0, _tensor(0.02, 0.03, 0.025), (0.0, 0.0, 0.1)),
+    link("hip", 1.0, _tensor(0.03, 0.02, 0.035), (0.02, 0.0, -0.2)),
+)
+WAIST = ("chest", "hip", (0.0, 0.0, -0.1), (0.0, 0.0, 0.0))
+TWO_AND_A_BALL = urdf(*TWO_LINKS, _ball("waist", *WAIST), name="two")
+TWO_AND_HINGES = urdf(*TWO_LINKS, *_hinges("waist", *WAIST), name="two")

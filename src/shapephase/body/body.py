@@ -6,7 +6,7 @@ from __future__ import annotations
 # pyright: reportAttributeAccessIssue=false
 import math
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -248,6 +248,25 @@ class Body:
         if name not in self.joint_names:
             raise unknown_name(f"joint of {self.name}", name, self.joint_names)
         return self.joint_names.index(name)
+
+    def joint_columns(self, names: Iterable[str]) -> list[int]:
+        """The places of joints in the shape vector; of a ball joint, by its name or that of a number, all four.
+
+        Raises
+        ------
+        UnknownNameError
+            For a name that is no joint.
+
+        Examples
+        --------
+        >>> sp.load_body("cat_two_halves").joint_columns(["waist_roll", "waist_pitch"])
+        [0, 2]
+        """
+        found: set[int] = set()
+        for name in names:
+            balls = [ball for ball in self.chain.follows.balls if name == ball.name or name in ball.names]
+            found |= set(range(self.n_shape)[balls[0].columns]) if balls else {self.joint_index(name)}
+        return sorted(found)
 
     def rate_frame(self, shape: ArrayLike) -> Array:
         """What the coordinates of a shape do at unit rates of its joints: (..., n) -> (..., n, m), m = `n_rates`.

@@ -115,7 +115,7 @@ class SymbolicBody:
         if key not in self._made:
             shape = casadi.SX.sym("shape", self.n_shape)
             frame, pose = self.chain.link_frames[link]
-            turn, place = joint_frames(self.chain, joint_coordinates(self.chain, shape))[frame]
+            turn, place = joint_frames(self.chain, joint_coordinates(self.chain, shape), shape)[frame]
             last = casadi.SX([[0.0, 0.0, 0.0, 1.0]])
             seen = casadi.horzcat(turn @ constant(pose[:3, :3]), place + turn @ constant(pose[:3, 3]))
             self._made[key] = casadi.Function(key, [shape], [casadi.densify(casadi.vertcat(seen, last))])
@@ -171,7 +171,7 @@ def _symbolic(body: Body) -> SymbolicBody:
 
     chain = body.chain
     shape = casadi.SX.sym("shape", body.n_shape)
-    frames = joint_frames(chain, joint_coordinates(chain, shape))
+    frames = joint_frames(chain, joint_coordinates(chain, shape), shape)
     masses, moments, tensors = _composites(chain, frames)
     centre = moments[0] / masses[0]
     inertia = _about(tensors[0], moments[0], centre)
@@ -187,7 +187,7 @@ def _symbolic(body: Body) -> SymbolicBody:
     full_angular = casadi.horzcat(none, *(angular - casadi.cross(centre, linear) for linear, angular in carried))
     fold = constant(chain.matrix)
     if not chain.follows.is_linear:
-        fold = casadi.jacobian(joint_coordinates(chain, shape), shape)
+        fold = coordinate_slopes(chain, shape)
     linear, momentum_matrix = full_linear @ fold, full_angular @ fold
     connection = solve_linear(inertia, momentum_matrix)
     mass_matrix = fold.T @ _joint_mass_matrix(chain, speeds, carried) @ fold
@@ -213,16 +213,22 @@ def constant(array: Array) -> Any:
     return casadi.SX(casadi.sparsify(casadi.DM(array)))
 
 
-def joint_frames(chain: JointChain, joints: Any) -> list[tuple[Any, Any]]:
-    """Orientation and origin of each frame of the chain, base axes, from the coordinates of all joints."""
+def joint_frames(chain: JointChain, joints: Any, shape: Any) -> list[tuple[Any, Any]]:
+    """Orientation and origin of each frame of the chain, base axes, from the coordinates of all joints.
+
+    shape : behind whose turns of ball joints the coordinates of their three hinges are counted
+    """
     import casadi
 
+    balls = {ball.row: _turn(shape[ball.columns]) for ball in chain.follows.balls}
     frames = [(casadi.SX.eye(3), casadi.SX(3, 1))]
     for number, parent in enumerate(chain.parents):
         turn, place = frames[parent]
         coordinate = joints[number]
         place = place + turn @ constant(chain.places[number])
         turn = turn @ constant(chain.turns[number])
+        if number in balls:
+            turn = turn @ balls[number]
         if chain.slides[number].any():
             place = place + turn @ (constant(chain.slides[number]) * coordinate)
         if chain.axes[number].any():
@@ -231,14 +237,43 @@ def joint_frames(chain: JointChain, joints: Any) -> list[tuple[Any, Any]]:
     return frames
 
 
-def joint_coordinates(chain: JointChain, shape: Any) -> Any:
-    """Of all joints, from the shape."""
+def coordinate_slopes(chain: JointChain, shape: Any) -> Any:
+    """Derivatives of the coordinates of all joints by the shape, those of ball joints counted from the shape itself."""
+    import casadi
+
+    about = casadi.SX.sym("about", shape.shape[0])
+    return casadi.substitute(casadi.jacobian(joint_coordinates(chain, shape, about), shape), about, shape)
+
+
+def joint_coordinates(chain: JointChain, shape: Any, about: Any = None) -> Any:
+    """Of all joints, from the shape.
+
+    about : a shape from whose turns the three hinges of ball joints are counted; None: the same, so that they are at
+        zero
+    """
     import casadi
 
     joints = constant(chain.matrix) @ shape + casadi.DM(chain.offset)
     for joint in chain.follows.curved:
         joints[joint.row] = joint.start + sum(_followed(function, joints[k]) for k, function in joint.terms)
+    if about is None:
+        return joints
+    for ball in chain.follows.balls:
+        turn = _turn(about[ball.columns]).T @ _turn(shape[ball.columns])
+        joints[ball.row] = casadi.atan2(-turn[1, 2], turn[2, 2])
+        joints[ball.row + 1] = casadi.asin(turn[0, 2])
+        joints[ball.row + 2] = casadi.atan2(-turn[0, 1], turn[0, 0])
     return joints
+
+
+def _turn(numbers: Any) -> Any:
+    """Of the four numbers of a ball joint: (3, 3)."""
+    import casadi
+
+    vector, scalar = numbers[:3], numbers[3]
+    square = casadi.dot(numbers, numbers)
+    along = scalar**2 - casadi.dot(vector, vector)
+    return (along * casadi.SX.eye(3) + 2.0 * (vector @ vector.T + scalar * casadi.skew(vector))) / square
 
 
 def _followed(function: JointFunction, coordinate: Any) -> Any:

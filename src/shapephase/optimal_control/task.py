@@ -13,8 +13,9 @@ from .. import so3
 from ..arguments import positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
-from ..body.couplings.coordinate_map import check_no_balls, check_smooth
+from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from ._ball_chart import BallChart
 from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "time")
@@ -35,6 +36,8 @@ _RIGHT_ANGLE_TOLERANCE = 1e-9
 @dataclass(frozen=True, eq=False)
 class Reorientation:
     """A reorientation task in the m coordinates that are free: shape = coupling @ coordinates + offset.
+
+    Of a ball joint that moves there are three, the tangent of half its turn from the start, times the axis.
 
     Attributes
     ----------
@@ -163,7 +166,11 @@ def reorientation(
     if not body.n_shape:
         raise ShapeError(f"{body.name} has no joints: nothing can turn it but its momentum")
     check_smooth(body.chain.follows, "plans need", kinks_only=True)
-    check_no_balls(body.chain.follows, "plans need")
+    if body.ball_joints and cost != "kinetic":
+        raise ShapeError(
+            f"cost={cost!r}: it is told by the coordinates of joints, and {body.ball_joints[0]} is a ball joint, of "
+            "which others would tell another cost; use 'kinetic', or three hinges in one point"
+        )
     checked_goal, within = goal_argument(goal), Limits() if limits is None else limits
     mu = _momentum(momentum)
     windings, winding_axes = _windings(checked_goal, mu)
@@ -178,7 +185,7 @@ def reorientation(
             "cost='time' needs rate_limits for every joint: without them there is no least time, and there is none for "
             f"{unstated}; give limits=Limits(rate_limits=...)"
         )
-    moving = set(range(body.n_shape)) if joints is None else {body.joint_index(name) for name in joints}
+    moving = set(range(body.n_shape)) if joints is None else set(body.joint_columns(joints))
     fixed_joints = sorted(set(range(body.n_shape)) - moving)
     coupling, leaders, factors = _coupling(body, symmetric or {}, fixed_joints)
     offset = np.zeros(body.n_shape)
@@ -187,6 +194,12 @@ def reorientation(
         if shape is not None:
             _check_coupling(body, shape, coupling @ shape[leaders] + offset, name)
     lower, upper, rate_limit = _coordinate_limits(coupling, factors, first[leaders], bounds, rates)
+    chart = BallChart.of(body, first, leaders)
+    start, end = first[leaders], None if last is None else last[leaders]
+    if chart is not None:
+        coupling, offset = chart.shapes(coupling, offset)
+        start, end = chart.coordinates(start, "start"), None if end is None else chart.coordinates(end, "end")
+        lower, upper, rate_limit = chart.limits(lower, upper, rate_limit)
     return Reorientation(
         body=body,
         target=_target(checked_goal, windings, winding_axes),
@@ -195,8 +208,8 @@ def reorientation(
         winding_axes=winding_axes,
         momentum=mu,
         duration=positive_argument(duration),
-        start=first[leaders],
-        end=None if last is None else last[leaders],
+        start=start,
+        end=end,
         cost=cost,
         lower=lower,
         upper=upper,
@@ -239,7 +252,7 @@ def _target(goal: Goal, windings: Array | None, winding_axes: Array) -> Array | 
 
 def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) -> tuple[Array, Array | None]:
     """The shapes at both ends, within the bounds (n, 2); None for a free end."""
-    first = np.clip(np.zeros(body.n_shape), *bounds.T) if start is None else _shape(body, start, "start")
+    first = np.clip(body.shape(), *bounds.T) if start is None else _shape(body, start, "start")
     if isinstance(end, str):
         if end != "free":
             raise unknown_name("end", end, ("free", "a shape"))

@@ -39,6 +39,11 @@ class BallJoint(NamedTuple):
     column: int
 
     @property
+    def names(self) -> list[str]:
+        """Of its four numbers."""
+        return coordinate_names(self.name)
+
+    @property
     def rows(self) -> slice:
         """Its three rates."""
         return slice(self.row, self.row + len(RATES))

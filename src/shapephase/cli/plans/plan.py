@@ -212,7 +212,7 @@ def _shape_at_end(body: Body, start: Array | None, end: Array | str | None) -> A
         return None
     if end is not None:
         return end
-    return np.clip(np.zeros(body.n_shape), *body.joint_limits.T) if start is None else start
+    return np.clip(body.shape(), *body.joint_limits.T) if start is None else start
 
 
 @contextmanager

@@ -25,7 +25,7 @@ def posture(body: Body, text: str, option: str, *, first: bool) -> Array:
 
         path = read_shape_path(Path(text), body)
         return path.shape(0.0 if first else path.duration)
-    shape = np.clip(np.zeros(body.n_shape), *body.joint_limits.T)
+    shape = np.clip(body.shape(), *body.joint_limits.T)
     for pair in text.split(","):
         name, found, value = pair.partition("=")
         if not found:
@@ -46,7 +46,7 @@ def moving_joints(body: Body, joints: str | None, hold: str | None) -> list[str]
     if joints is not None and hold is not None:
         raise ShapeError("--joints and --hold each say which joints move; give one of them")
     if hold is not None:
-        held = {body.joint_index(name) for name in names(hold)}
+        held = body.joint_columns(names(hold))
         return [name for number, name in enumerate(body.joint_names) if number not in held]
     return None if joints is None else names(joints)
 

@@ -51,7 +51,8 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     joints = _joints(task)
     y = casadi.MX.sym("y", 2 * m + 5)
     place, rate, onward, back = joints.values(y[: 2 * m])
-    numbers, by_place, by_rate = mechanics.values(place, rate)
+    shape = casadi.DM(task.coupling) @ y[:m] + casadi.DM(task.offset)
+    numbers, by_place, by_rate = mechanics.values(place, rate, shape)
     bare = casadi.DM(task.coupling) @ y[m : 2 * m]
     effort = 0.5 * casadi.dot(bare, bare)
     seen = casadi.vertcat(numbers, effort, y[2 * m :])
@@ -65,7 +66,7 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     jacobian = casadi.densify(by_seen @ through)
     multipliers, factor = casadi.MX.sym("multipliers", 4), casadi.MX.sym("factor")
     gradient, bend = ends.hessian(seen, multipliers, factor)
-    places, mixed, rates = mechanics.second(place, rate, gradient[:SIZE])
+    places, mixed, rates = mechanics.second(place, rate, shape, gradient[:SIZE])
     # Second derivatives by joints' coordinates and rates, seen from shape and its rate.
     lower = mixed @ onward + rates @ back
     corner = onward.T @ (places @ onward + mixed.T @ back) + back.T @ lower
@@ -102,16 +103,21 @@ def _joints(task: Reorientation) -> _Joints:
 
     m, chain = task.dimension, task.body.chain
     both = casadi.SX.sym("both", 2 * m)
-    shape, rate = both[:m], both[m:]
-    place = joint_coordinates(chain, casadi.DM(task.coupling) @ shape + casadi.DM(task.offset))
-    onward = casadi.jacobian(place, shape)
+    coordinates, rate = both[:m], both[m:]
+    shape = casadi.DM(task.coupling) @ coordinates + casadi.DM(task.offset)
+    # Ball joints are three hinges counted from this very shape, which their derivatives are taken at.
+    about = casadi.SX.sym("about", shape.shape[0])
+    place = joint_coordinates(chain, shape, about)
+    onward = casadi.jacobian(place, coordinates)
     rates = onward @ rate
-    back = casadi.jacobian(rates, shape)
-    values = casadi.Function("joints", [both], [casadi.densify(place), casadi.densify(rates), onward, back])
+    back = casadi.jacobian(rates, coordinates)
+    found = [casadi.substitute(one, about, shape) for one in (place, rates, onward, back)]
+    values = casadi.Function("joints", [both], [casadi.densify(found[0]), casadi.densify(found[1]), *found[2:]])
     if chain.follows.is_linear:
         return _Joints(values=values, bend=None)
     of_place, of_rate = (casadi.SX.sym(name, len(chain.parents)) for name in ("of_place", "of_rate"))
     bend, _ = casadi.hessian(casadi.dot(of_place, place) + casadi.dot(of_rate, rates), both)
+    bend = casadi.substitute(bend, about, shape)
     return _Joints(values=values, bend=casadi.Function("joints_bend", [both, of_place, of_rate], [bend]))
 
 

@@ -39,13 +39,13 @@ _INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 @dataclass(frozen=True, eq=False)
 class NodeMechanics:
-    """CasADi functions of coordinates and rates of all k joints of a tree.
+    """CasADi functions of coordinates and rates of all k joints of a tree, and the shape its ball joints are about.
 
     Attributes
     ----------
-    values : coordinates (k,), rates (k,) -> z (16,), its derivatives by both, (16, k) each
-    second : coordinates, rates, factors (16,) -> second derivatives of their product with z: by coordinates (k, k), by
-        rates and coordinates (k, k), by rates (k, k)
+    values : coordinates (k,), rates (k,), shape (n,) -> z (16,), its derivatives by both, (16, k) each
+    second : coordinates, rates, shape, factors (16,) -> second derivatives of their product with z: by coordinates
+        (k, k), by rates and coordinates (k, k), by rates (k, k)
     """
 
     values: Any
@@ -61,11 +61,13 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
 
     count = len(chain.parents)
     place, rate, factors = (casadi.SX.sym(name, size) for name, size in (("q", count), ("u", count), ("c", SIZE)))
-    tree = _Tree(chain, place, rate)
-    values = casadi.Function("mechanics", [place, rate], [*tree.values()], {"cse": True})
-    rows = casadi.Function("mechanics_rows", [place, rate, factors], [*tree.rows(factors)], {"cse": True})
+    shape = casadi.SX.sym("shape", len(chain.follows.independent))
+    tree = _Tree(chain, place, rate, shape)
+    values = casadi.Function("mechanics", [place, rate, shape], [*tree.values()], {"cse": True})
+    rows = casadi.Function("mechanics_rows", [place, rate, shape, factors], [*tree.rows(factors)], {"cse": True})
     q, u, c = (casadi.MX.sym(name, size) for name, size in (("q", count), ("u", count), ("c", SIZE)))
-    carrying, carried, screws, forces, turned, lent = rows(q, u, c)
+    r = casadi.MX.sym("r", shape.shape[0])
+    carrying, carried, screws, forces, turned, lent = rows(q, u, r, c)
     above = casadi.DM(_carries(chain))
     apart = casadi.DM(_carries(chain) - np.eye(count))
     upper = above * (carrying.T @ carried)
@@ -73,7 +75,7 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
     mixed = (apart * (screws.T @ lent)) - (above * (turned.T @ forces)).T
     energies = above * (screws.T @ forces)
     rates = 2.0 * c[-1] * (energies + (apart * energies).T)
-    second = casadi.Function("mechanics_second", [q, u, c], [places, mixed, rates])
+    second = casadi.Function("mechanics_second", [q, u, r, c], [places, mixed, rates])
     return NodeMechanics(values=values, second=second)
 
 
@@ -85,10 +87,10 @@ def _carries(chain: JointChain) -> Array:
 class _Tree:
     """Screws, twists, inertias and momenta of a tree, as expressions."""
 
-    def __init__(self, chain: JointChain, place: Any, rate: Any) -> None:
+    def __init__(self, chain: JointChain, place: Any, rate: Any, shape: Any) -> None:
         import casadi
 
-        frames = joint_frames(chain, place)
+        frames = joint_frames(chain, place, shape)
         joints = range(len(chain.parents))
         self._screws = [_Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
         none = casadi.SX(3, 1)

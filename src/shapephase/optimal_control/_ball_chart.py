@@ -1,0 +1,78 @@
+"""Three coordinates for each ball joint of a plan: the turn from its start, by the tangent of half the angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..body.body import Body
+from ..body.couplings.ball_joints import BallJoint, vector_part
+from ..errors import TrajectoryError
+
+_FARTHEST = np.tan(np.radians(80.0))
+"""Of each of the three: 160 degrees from the start about an axis; a half turn is infinitely far."""
+_NO_TURN = 1e-9
+"""Cosine of half the turn to an end that is half a turn away."""
+
+
+@dataclass(frozen=True, eq=False)
+class BallChart:
+    """Some of the coordinates of a plan, four at a time, as three: p = start (s, 1), a product of quaternions.
+
+    The shape is affine in s, and every turn but those of half a turn has one s: a chart of the group about the start.
+
+    Attributes
+    ----------
+    starts : each ball joint, the place of its first number among the coordinates, and its quaternion at the start
+    """
+
+    starts: tuple[tuple[BallJoint, int, Array], ...]
+
+    @classmethod
+    def of(cls, body: Body, start: Array, leaders: Sequence[int]) -> BallChart | None:
+        """For coordinates that are those of some joints (m,), from a shape (n,); None: no ball joint moves."""
+        found = [
+            (ball, list(leaders).index(ball.column), ball.quaternions(start[None])[0])
+            for ball in body.chain.follows.balls
+            if ball.column in leaders
+        ]
+        return cls(starts=tuple(found)) if found else None
+
+    def shapes(self, coupling: Array, offset: Array) -> tuple[Array, Array]:
+        """What makes a shape of the coordinates, by the new ones: (n, m), (n,) -> (n, m - balls), (n,)."""
+        coupling, offset = coupling.copy(), offset.copy()
+        for _, first, quaternion in self.starts:
+            # Of joints that are its mirror images, too.
+            four = coupling[:, first : first + 4]
+            offset += four @ quaternion
+            coupling[:, first : first + 3] = four @ vector_part(quaternion[None])[0].T
+        return np.delete(coupling, self._left_out, axis=1), offset
+
+    def coordinates(self, values: Array, name: str) -> Array:
+        """The new of the old, those of a shape called so: (m,) -> (m - balls,). Raises TrajectoryError."""
+        found = values.copy()
+        for ball, first, quaternion in self.starts:
+            four = values[first : first + 4]
+            along = float(quaternion @ four)
+            if not abs(along) > _NO_TURN * float(np.linalg.norm(four)):
+                raise TrajectoryError(
+                    f"{name}: ball joint {ball.name} is half a turn from its start, which a plan does not reach; go "
+                    "there in two plans"
+                )
+            found[first : first + 3] = vector_part(quaternion[None])[0] @ four / along
+        return np.delete(found, self._left_out)
+
+    def limits(self, lower: Array, upper: Array, rates: Array) -> tuple[Array, Array, Array]:
+        """Of the new coordinates; ball joints have none of their own."""
+        lower, upper = lower.copy(), upper.copy()
+        for _, first, _ in self.starts:
+            lower[first : first + 3], upper[first : first + 3] = -_FARTHEST, _FARTHEST
+        gone = self._left_out
+        return np.delete(lower, gone), np.delete(upper, gone), np.delete(rates, gone)
+
+    @property
+    def _left_out(self) -> list[int]:
+        return [first + 3 for _, first, _ in self.starts]
