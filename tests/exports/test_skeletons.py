@@ -13,6 +13,7 @@ import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.examples import kane_scher
 from support import osim_models
+from support.ball_bodies import BALLS
 from support.independent import apart, body_of, random_loop, random_rotation
 from support.opensim_replay import replayed
 
@@ -148,6 +149,24 @@ def test_a_skeleton_moves_as_the_body_does(tmp_path, name, up, scale):
         reach = np.abs(ours[:, :3, 3]).max()
         np.testing.assert_allclose(theirs[:, :3, 3] / scale @ axes, ours[:, :3, 3], rtol=0, atol=1e-13 * reach)
         assert apart(axes.T @ theirs[:, :3, :3] @ axes @ rest, ours[:, :3, :3]) < 1e-13
+
+
+def test_a_skeleton_with_ball_joints(tmp_path, load_urdf):
+    """The last of the three bones of a ball joint is the link; files of OpenSim have no place for quaternions."""
+    body = load_urdf(BALLS)
+    loop = random_loop(91, 9, size=0.3)
+    deformation = sp.articulated(body, replace(loop, mean=loop.mean + body.shape()).path)
+    motion = sp.reconstruct(deformation, 0.3 * np.ones(3), random_rotation(92))
+    sp.exports.write_bvh(motion, tmp_path / "flight.bvh", rate=10.0, up="y", scale=1.0, **FALL)
+    names, poses, step = bones(tmp_path / "flight.bvh")
+    for link, bone in (("arm", "shoulder.wz"), ("hand", "elbow"), ("head", "neck.wz")):
+        ours = world_poses(motion, body, link, step * np.arange(len(poses)))
+        rest = body.link_pose(body.shape(), link)[:3, :3]
+        theirs = poses[:, names.index(bone)]
+        np.testing.assert_allclose(theirs[:, :3, 3], ours[:, :3, 3], rtol=0, atol=1e-13 * np.abs(ours).max())
+        assert apart(theirs[:, :3, :3] @ rest, ours[:, :3, :3]) < 1e-13
+    with pytest.raises(ShapeError, match="ball joint shoulder"):
+        sp.exports.write_opensim_motion(motion, tmp_path / "turn.mot")
 
 
 def test_what_no_skeleton_can_be_is_refused(tmp_path):

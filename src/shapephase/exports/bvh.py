@@ -149,13 +149,17 @@ def _skeleton(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> lis
 def _channels(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[Array]:
     """Columns of all bones in the order of the skeleton."""
     chain = whole.body.chain
+    # The first of the three hinges of a ball joint has all of its turn, the others none.
+    balls = {ball.row: ball.turns(whole.shapes) for ball in chain.follows.balls}
     found = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
     for joint in _order(chain):
         coordinate, parent = whole.joints[:, joint], rest[chain.parents[joint]]
         if chain.slides[joint].any():
             along = chain.places[joint] + coordinate[:, None] * (chain.turns[joint] @ chain.slides[joint])
             found.append(scale * along @ (axes @ parent).T)
-        found.append(_degrees(so3.exp(coordinate[:, None] * (axes @ rest[joint + 1] @ chain.axes[joint]))))
+        about = axes @ rest[joint + 1]
+        turned = so3.exp(coordinate[:, None] * (about @ chain.axes[joint]))
+        found.append(_degrees(about @ balls[joint] @ about.T if joint in balls else turned))
     return found
 
 

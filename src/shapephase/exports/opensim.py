@@ -12,6 +12,7 @@ from .. import so3
 from ..arguments import check_file_name, check_keywords
 from ..arrays import Array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import check_no_balls
 from ..errors import ShapeError, UnknownNameError
 from ..files import write_whole
 from ..reconstruction.attitude_angles import euler_angles
@@ -74,6 +75,7 @@ def write_opensim_motion(
     if where.suffix.lower() not in _ENDINGS:
         raise UnknownNameError(f"{where}: the name of OpenSim's motions ends in {' or '.join(_ENDINGS)}")
     whole = whole_motion(motion, checked_times(motion, times), Fall.of(**(ORIGIN | fall)))
+    check_no_balls(whole.body.chain.follows, "motions of OpenSim need")
     angles, order = whole.body.base_angles or _ANGLES
     turned = whole.attitude @ so3.transpose(_axes(whole.body, base_axes))
     names = ["time", *angles, *_places(whole.body), *whole.body.joint_names]
