@@ -124,13 +124,18 @@ def test_every_function_that_hands_keywords_on_names_one_that_it_does_not_have(t
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 0.0, 0.0])
     calls = {
         "Motion.to_dataframe": (motion.to_dataframe,),
+        "Motion.to_xarray": (motion.to_xarray,),
         "Motion.view": (motion.view,),
         "Motion.write_csv": (motion.write_csv, tmp_path / "m.csv"),
+        "export_motion": (sp.exports.export_motion, motion, tmp_path / "m.nc"),
+        "motion_dataset": (sp.exports.motion_dataset, motion),
         "motion_html": (sp.plotting.motion_html, motion),
         "motion_page": (sp.motion_page, motion, tmp_path / "m.html"),
         "motion_video": (sp.plotting.motion_video, motion, tmp_path / "m.gif"),
         "moving_scene": (sp.plotting.moving_scene, motion, 5),
         "view": (sp.view, motion),
+        "write_bvh": (sp.exports.write_bvh, motion, tmp_path / "m.bvh"),
+        "write_opensim_motion": (sp.exports.write_opensim_motion, motion, tmp_path / "m.mot"),
     }
     assert set(handing_on()) == set(calls)
     for place, (call, *arguments) in calls.items():
