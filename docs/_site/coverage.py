@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import ast
 import re
+import tomllib
 from collections import defaultdict
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 from .code_links import CODE
 
@@ -27,11 +31,15 @@ def _codes(text: str) -> set[str]:
 
 
 def _definitions(file: Path) -> list[tuple[str, str]]:
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    source = file.read_text(encoding="utf-8")
+    if "theory.md" not in source:
+        return [(name, "") for name in re.findall(r"^ *def (\w+)", source, re.MULTILINE)]
+    tree = ast.parse(source)
     kinds = (ast.FunctionDef, ast.ClassDef)
     return [(node.name, ast.get_docstring(node) or "") for node in ast.walk(tree) if isinstance(node, kinds)]
 
 
+@cache
 def coverage(root: Path) -> dict[str, tuple[str, list[str], list[str]]]:
     """Each code with its entry, the functions that cite it, and the tests named after it or citing it."""
     entries = dict(_ENTRY.findall((root / "docs" / "theory.md").read_text(encoding="utf-8")))
@@ -45,11 +53,45 @@ def coverage(root: Path) -> dict[str, tuple[str, list[str], list[str]]]:
     for file in sorted((root / "tests").rglob("test_*.py")):
         for name, text in _definitions(file):
             if name.startswith("test_"):
-                ending = re.search(r"_((?:[cbm]_e|[a-z])\d+[a-z]?)$", name)
-                code = lower.get(ending[1]) or lower.get(ending[1].rstrip("abc")) if ending else None
-                for one in _codes(text) | ({code} if code else set()):
+                ending = re.search(r"(?:_(?:[cbm]_e|[a-u])\d+[a-z]?)+$", name)
+                named = re.findall(r"_((?:[cbm]_e|[a-u])\d+[a-z]?)", ending[0]) if ending else []
+                codes = {lower.get(one) or lower.get(one.rstrip("abc")) for one in named} - {None}
+                for one in _codes(text) | codes:
                     tests[one].append(f"{file.relative_to(root / 'tests')}: {name}")
+    more = _listed(root)
+    for found, table in ((functions, "functions"), (tests, "tests")):
+        for code, names in more[table].items():
+            found[code] = [*found[code], *(name for name in names if name.rpartition(".")[2] not in found[code])]
     return {code: (text, functions[code], tests[code]) for code, text in entries.items()}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What one of the texts says at a place, and what of the library holds it."""
+
+    text: str
+    place: str
+    says: str
+    codes: tuple[str, ...]
+    functions: tuple[str, ...]
+    tests: tuple[str, ...]
+    reason: str
+
+
+def statements(root: Path) -> list[Statement]:
+    """Every statement of the three texts, with the functions and tests of its codes, or why there are none."""
+    rows, listed = coverage(root), _listed(root)
+    found = []
+    for text, place, says, codes, *reason in listed["statements"]:
+        its = tuple(codes.split())
+        parts = [tuple(dict.fromkeys(name for code in its for name in rows[code][k])) for k in (1, 2)]
+        why = "; ".join([*reason, *(listed["reasons"][code] for code in its if code in listed["reasons"])])
+        found.append(Statement(text, place, says, its, *parts, why))
+    return found
+
+
+def _listed(root: Path) -> dict[str, Any]:
+    return tomllib.loads((root / "docs" / "theory" / "statements.toml").read_text(encoding="utf-8"))
 
 
 def _some(names: list[str]) -> str:
@@ -73,3 +115,13 @@ def write_tables(root: Path) -> None:
         text = "\n".join(lines) + "\n"
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")
+    lines = ["| place | what it says | codes | functions | tests |", "|---|---|---|---|---|"]
+    for one in statements(root):
+        codes = " ".join(f"[{code}](../theory.md#code-{code.lower()})" for code in one.codes)
+        held = [_some(list(one.functions)) or one.reason, _some(list(one.tests)) or one.reason]
+        lines.append(
+            f"| {one.text} {one.place} | {one.says.replace('|', chr(92) + '|')} | {codes} | {held[0]} | {held[1]} |"
+        )
+    file, text = folder / "statements.inc", "\n".join(lines) + "\n"
+    if not file.exists() or file.read_text(encoding="utf-8") != text:
+        file.write_text(text, encoding="utf-8")

@@ -32,7 +32,6 @@ from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, ri
 from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
 from .pseudo_rigid import PseudoRigidBody, PseudoRigidSpin, pseudo_rigid_spin
-from .twisting_somersault import RotorDive, rotor_dive, rotor_dive_lasting, tilt_of_ratio
 from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
 from .steady_gyrostats import (
     DualSpinTurn,
@@ -41,6 +40,7 @@ from .steady_gyrostats import (
     dual_spin_turn,
     gyrostat_equilibria,
 )
+from .twisting_somersault import RotorDive, rotor_dive, rotor_dive_lasting, tilt_of_ratio
 
 __all__ = [
     "ZXZ",
