@@ -8,12 +8,14 @@ import sys
 import tomllib
 import zipfile
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import shapephase as sp
+from shapephase.body.engines.formats import FORMATS
 from shapephase.cli.main import main
 
 ROOT = Path(__file__).parents[1]
@@ -97,6 +99,22 @@ def test_the_readme_s_recording_is_split_as_it_says(tmp_path, monkeypatch, capsy
     estimates = re.compile(r" \d\.\de-\d\d ")
     printed = estimates.sub("", capsys.readouterr().out)
     assert printed.startswith(estimates.sub("", table))
+
+
+@pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.full) for k in (1, 2, 3))])
+def test_the_readme_s_bodies_of_other_formats_are_checked_and_split(number, monkeypatch, capsys):
+    """Each by one command, where its extra is installed, without a warning."""
+    monkeypatch.chdir(ROOT)
+    lines = re.findall(r"^shapephase split (robots/formats/.*?) *# .*\[(\w+)\]$", _readme(), re.MULTILINE)
+    assert sorted(extra for _, extra in lines) == sorted(known.extra for known in FORMATS.values())
+    words, extra = lines[number]
+    if not any(find_spec(known.engine) for known in FORMATS.values() if known.extra == extra):
+        pytest.skip(f"needs {extra}")
+    for command, said in (("check", "verdict: "), ("split", "total rotation")):
+        main([command, *words.split()])
+        printed = capsys.readouterr()
+        assert said in printed.out
+        assert printed.err == ""
 
 
 def test_the_readme_s_links_lead_to_files_from_anywhere():
