@@ -37,7 +37,10 @@ COMMANDS = {
     "doctor": ("doctor",),
     "torques": ("torques", "cat", "cat_righting"),
 }
-ALL_COMMANDS = (*COMMANDS, "plan", "view", "explore", "plot", "compile", "sweep")
+ALL_COMMANDS = (
+    *(*COMMANDS, "plan", "view", "explore", "plot", "compile", "reach"),
+    *("sweep", "sweep status", "sweep export", "plot sweep"),
+)
 
 
 def ran(*arguments, **options):
@@ -151,6 +154,8 @@ def test_endings_in_any_case(capfd, tmp_path, ending):
         ("torques", *CAT[1:], "--out"),
         ("rigid", "1", "2", "3", "--momentum", "1", "0", "2", "--out"),
         ("rigid", "1", "2", "3", "--momentum", "1", "0", "2", "--html"),
+        ("reach", "cat", "--out"),
+        ("explore", "cat", "--joints", "waist_pitch", "waist_yaw", "--html"),
     ],
 )
 def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_path, monkeypatch, command):
@@ -161,8 +166,8 @@ def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_p
     monkeypatch.setattr("shapephase.rigid_body.geodesics.serret_andoyer_metric", never)
     monkeypatch.setattr("shapephase.rigid_body.euler_top.EulerTop.principal", never)
     endings = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html"}
-    ending = (endings | {"torques": ".csv", "rigid": ".svg"})[command[0]]
-    ending = ".html" if command[-1] == "--html" else ending
+    of_command = endings | {"torques": ".csv", "rigid": ".svg", "reach": ".svg"}
+    ending = ".html" if command[-1] == "--html" else of_command[command[0]]
     folder = tmp_path / f"folder{ending}"
     folder.mkdir()
     for name, words in ((f"folder{ending}", "it is a folder"), ("x" * 300 + ending, "name too long")):
@@ -480,7 +485,7 @@ from shapephase.cli.main import main
 pages = {{}}
 for name in {ALL_COMMANDS!r}:
     with contextlib.redirect_stdout(io.StringIO()) as page:
-        main([name, "--help"])
+        main([*name.split(), "--help"])
     pages[name] = page.getvalue()
 print(json.dumps(pages))
 """

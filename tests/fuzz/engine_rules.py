@@ -17,7 +17,7 @@ from .plain_readers import NotPlain, strict_number
 _NUMBERS = {"mass": (1, 1), "com": (3, 3), "inertia": (9, 9), "rt": (6, 16)}
 """Words of a segment -> the fewest and the most numbers that follow."""
 _WORDS = (*_NUMBERS, "rtinmatrix", "translations", "rotations", "parent", "rangesq", "rangesqdot", "rangesqddot")
-_SUM = re.compile(r"[$*/()]")
+_SUM = re.compile(r"[$*/()]|[\d.][-+]")
 """In what is no plain number, and biorbd may compute: the library's own rule says what it reads right."""
 _OF_ROUNDING = 1e-9
 """Of a mass: a sum of a few rounded terms."""

@@ -279,6 +279,25 @@ CASES = {
         outcome="accepted",
         slow=True,
     ),
+    "an anchor that stands twice in YAML, which other readers refuse": Case(
+        make=lambda: _motion(
+            "motion.yaml",
+            "joint_names: [hip, wrist, boom]\npoints:\n- {positions: [0, &a 0.1, 0], time_from_start: 0}\n"
+            "- {positions: [0, 0, 0], time_from_start: &a 1}\n",
+        ),
+        said="line 4: the anchor &a stands twice",
+    ),
+    "a number of full width in a workbook, which openpyxl reads": Case(
+        make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 7, 0.1, 0.1).replace("7", "\uff11")),
+        said="a cell has the number '\uff11'",
+    ),
+    "a number with an underscore in a workbook": Case(
+        make=lambda: _workbook(_HEADER + _FIRST + _row(3, 1, 7, 0.1, 0.1).replace("7", "1_0")),
+        said="a cell has the number '1_0'",
+    ),
+    "a seed of 400 digits, which is one": Case(
+        make=lambda: _study(f"seed = {'9' * 400}\n{RIGID}[over.tolerance]\nvalues = [1e-9]\n"), outcome="accepted"
+    ),
     "a store whose name has 300 letters": Case(
         make=lambda: Trial(kind="store", source="find", main="x" * 300),
         outcome="StudyStoreError",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import math
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -66,8 +65,9 @@ def _flat(axis: Any) -> Iterator[tuple[str, Any]]:
 def _is_number(value: Any) -> bool:
     if isinstance(value, list):
         return all(map(_is_number, value))
-    plain = isinstance(value, int | float) and not isinstance(value, bool | datetime.date)
-    return plain and math.isfinite(value)
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _case_faults(case: Any, said: Mapping[str, Any], over: Mapping[str, Any], *, last: bool) -> Iterator[str]:

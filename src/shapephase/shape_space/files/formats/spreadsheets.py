@@ -32,6 +32,13 @@ _FLAT = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
 """Types of Parquet whose values take no more memory than is known before they are read."""
 _ROW = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["']([^"']*)["']""")
 _PLAIN_ROW = re.compile(rb"[0-9]{1,18}")
+_CELL = re.compile(
+    rb"""<(?:\w+:)?c\b(?:[^<>]*?\st=["'](\w*)["'])?[^<>]*>\s*"""
+    rb"""(?:<(?:\w+:)?f\b[^<]*(?:</(?:\w+:)?f>\s*)?)?<(?:\w+:)?v\b[^<>]*>([^<]*)"""
+)
+"""The type of a cell and its value, whether or not it has a formula."""
+_OTHER_DIGITS = re.compile(rb"_|[^\x00-\x7f]|&#")
+"""In what is no number but for Python: `1_0`, and digits of other scripts."""
 _SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
 
 
@@ -71,6 +78,7 @@ def read_workbook(where: Path, data: bytes, sheet: str | None = None) -> Table:
         for name, part in zip_members(data, _MOST_UNPACKED).items():
             if _SHEETS.fullmatch(name):
                 _check_rows(part, where)
+                _check_numbers(part, where)
         with _silent_openpyxl():
             book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
             sheets = {name: _cells(book[name], where) for name in book.sheetnames if hasattr(book[name], "iter_rows")}
@@ -95,6 +103,14 @@ def _check_rows(part: bytes, where: Path) -> None:
         if number <= before:
             raise TrajectoryError(f"{where}: row {number} comes after row {before}; the file is damaged, save it anew")
         before = number
+
+
+def _check_numbers(part: bytes, where: Path) -> None:
+    """Raise TrajectoryError for a cell whose number is written as Python alone reads it, and with it openpyxl."""
+    for found in _CELL.finditer(part):
+        if _OTHER_DIGITS.search(found[2]) and (found[1] or b"n") == b"n":
+            text = found[2].decode("utf-8", errors="replace").strip()
+            raise TrajectoryError(f"{where}: a cell has the number {text!r:.40}; the file is damaged, save it anew")
 
 
 @contextlib.contextmanager

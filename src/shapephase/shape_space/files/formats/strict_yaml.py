@@ -32,7 +32,7 @@ def yaml_documents(text: str, where: str) -> list[Any]:
     MissingExtraError
         Without PyYAML.
     TrajectoryError
-        For what is no YAML, aliases, tags, doubled keys, or too many or too deep entries; the line is named.
+        For what is no YAML, aliases, tags, doubled keys or anchors, or too many or too deep entries; the line is named.
     """
     try:
         import yaml
@@ -41,6 +41,7 @@ def yaml_documents(text: str, where: str) -> list[Any]:
     documents: list[Any] = []
     stack: list[Any] = []
     keys: list[str | None] = []
+    anchors: set[str] = set()
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
         for count, event in enumerate(yaml.parse(text, Loader=loader)):
@@ -53,8 +54,14 @@ def yaml_documents(text: str, where: str) -> list[Any]:
                 keys.pop()
                 stack.pop()
                 continue
+            if isinstance(event, yaml.DocumentStartEvent):
+                anchors.clear()
             if not isinstance(event, yaml.ScalarEvent | yaml.MappingStartEvent | yaml.SequenceStartEvent):
                 continue
+            if event.anchor in anchors:
+                raise TrajectoryError(f"{place}: the anchor &{event.anchor} stands twice; remove anchors")
+            if event.anchor is not None:
+                anchors.add(event.anchor)
             if event.tag is not None:
                 raise TrajectoryError(f"{place}: tags ({event.tag}) are not read; write plain numbers and names")
             if isinstance(event, yaml.ScalarEvent):
