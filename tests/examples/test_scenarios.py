@@ -115,6 +115,23 @@ def test_the_dive_of_five_stages_lands_f10(duration):
     assert so3.wrap(split.montgomery_phase - dive.phase) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.full
+def test_a_plan_makes_the_dive_of_five_stages_too_f10():
+    """With the momentum of the dive, counted in somersaults and twists, and for less than its cost."""
+    dive, body = full_dive(), sp.load_body("diver")
+    path = dive.deformation.description.path
+    goal = sp.optimal_control.Goal(somersaults=1.5, half_twists=2)
+    plan = sp.plan_reorientation(body, goal, momentum=dive.momentum, duration=1.5, start=path.shape(0.0), cost="rate")
+    attitudes = plan.motion.attitude(np.linspace(0.0, 1.5, 600))
+    somersault = np.unwrap(np.arctan2(attitudes[:, 0, 2], attitudes[:, 2, 2]))
+    twist = np.unwrap(np.arctan2(attitudes[:, 1, 0], attitudes[:, 1, 1]))
+    assert somersault[-1] == pytest.approx(3.0 * np.pi, abs=1e-8)
+    assert abs(twist[-1] - twist[0]) == pytest.approx(2.0 * np.pi, abs=1e-8)
+    times = np.linspace(0.0, 1.5, 20001)
+    rates = path.curve(times)[1]
+    assert plan.cost < 0.2 * np.trapezoid(np.sum(rates**2, axis=1), times)
+
+
 def test_the_pace_of_a_named_motion_does_not_matter():
     slow = turned("kane_scher", kane_scher(np.radians(20.0), np.radians(61.813873), 3.0))
     assert so3.angle(slow.T @ turned("kane_scher")) < 1e-11
