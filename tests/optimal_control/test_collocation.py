@@ -16,11 +16,11 @@ from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, plan_reorientation
 from shapephase.optimal_control._gauss import gauss_tableau
-from shapephase.optimal_control._guesses import guesses
 from shapephase.optimal_control._polish import end_derivative, polish
 from shapephase.optimal_control._reduced import ReducedProgram
 from shapephase.optimal_control._spline_basis import SplineBasis
 from shapephase.optimal_control.collocation import CollocationProgram
+from shapephase.optimal_control.guesses.loops import guesses
 from shapephase.optimal_control.task import reorientation
 
 HALF_TURN = so3.exp(np.array([np.pi, 0.0, 0.0]))

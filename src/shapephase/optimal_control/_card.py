@@ -13,6 +13,8 @@ from ..so3 import angle
 if TYPE_CHECKING:
     from .plan import Plan
 
+_SECOND_ORDER = {True: "a minimum among paths near by", False: "not met", None: "not known"}
+
 
 def plan_card(self: Plan) -> Card:
     """What turns by how much at which cost, how far off the goal, and how it was found; with its joints in time."""
@@ -25,8 +27,11 @@ def plan_card(self: Plan) -> Card:
         ("cost", f"{numbers(self.cost, self.cost_unit)} ({self.cost_name})"),
         ("rates at the ends", self.rates_at_ends),
         ("found by", f"{self.method}, {self.iterations} iterations, {self.seconds:.3g} s"),
-        ("starts", f"{len(self.starts)}, {converged} of them converged"),
+        ("starts", f"{len(self.starts)}, {converged} of them converged, {self.agreeing_starts} to this cost"),
         ("KKT residual", f"{self.kkt_residual:.1e}"),
+        ("second order", _SECOND_ORDER[self.second_order]),
     ]
+    if self.hamiltonian_spread is not None:
+        rows.append(("Hamiltonian", f"constant to {self.hamiltonian_spread:.1e}"))
     shapes = self.path.shape(np.linspace(0.0, self.path.duration, MOST_POINTS))
     return Card(f"Plan for {self.body.name}", rows, curves_picture(shapes, "joints in time"))

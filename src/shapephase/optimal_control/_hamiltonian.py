@@ -146,20 +146,25 @@ def integrated(
     return answer
 
 
-def checked_metric(body: Body, equations: Hamiltonian, shapes: Array) -> Array:
-    """g of each shape, (N, n) -> (N, n, n). Raises SingularInertiaError where a motion of the joints has no energy."""
-    metrics = np.array([np.array(equations.metric(shape)) for shape in shapes])
+def checked_metric(body: Body, equations: Hamiltonian, shapes: Array, coupling: Array | None = None) -> Array:
+    """g of each shape, (N, n) -> (N, n, n). Raises SingularInertiaError where a motion of the joints has no energy.
+
+    With a coupling (n, m) that is asked of its motions only.
+    """
+    whole = np.array([np.array(equations.metric(shape)) for shape in shapes])
+    metrics = whole if coupling is None else coupling.T @ whole @ coupling
     unit = np.sqrt(np.maximum(np.diagonal(metrics, axis1=1, axis2=2), 0.0))
     unit = np.where(unit > 0.0, unit, 1.0)
     values, vectors = np.linalg.eigh(metrics / unit[:, None] / unit[:, :, None])
     if not body.n_shape or values.min() <= _LEAST_METRIC:
         worst = vectors[int(np.argmin(values[:, 0])), :, 0] if body.n_shape else np.zeros(0)
-        joint = body.joint_names[int(np.argmax(np.abs(worst)))] if body.n_shape else "none"
+        moved = worst if coupling is None else coupling @ worst
+        joint = body.joint_names[int(np.argmax(np.abs(moved)))] if body.n_shape else "none"
         raise SingularInertiaError(
             f"{body.name}: a motion of its joints (most of it joint {joint}) has no kinetic energy, so no extremal "
             "determines its rate; give mass to what the joint moves, or leave it out"
         )
-    return metrics
+    return whole
 
 
 def _hamiltonian(body: Body, cost: str) -> Hamiltonian:

@@ -14,11 +14,11 @@ from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
-from ._guesses import start_metric
 from ._polish import end_conditions, end_derivative, movable_points
 from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
 from .collocation import NlpSolution
+from .guesses.loops import start_metric
 from .symbolic import symbolic_body
 from .task import COSTS, Reorientation
 

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..shape_space.shape_path import ShapePath
 
 # Cubic: twice differentiable, so that the acceleration cost is finite, and what `ShapePath.spline` reads back.
@@ -56,6 +56,14 @@ class SplineBasis:
         spread = self.knots[_DEGREE + 1 : -1] - self.knots[1 : -_DEGREE - 1]
         return _DEGREE / spread[:, None] * np.diff(np.eye(self.dimension), axis=0)
 
+    @cached_property
+    def rate_reaches(self) -> Mask:
+        """Into which pieces each control point of the derivative reaches: (pieces, k - 1)."""
+        from scipy.interpolate import BSpline
+
+        middles = 0.5 * (self.nodes[1:] + self.nodes[:-1])
+        return np.asarray(BSpline(self.knots[1:-1], np.eye(self.dimension - 1), _DEGREE - 1)(middles)) > 0.0
+
     def end_conditions(self, equal: int, *, end_moves: bool, periodic: bool) -> Array:
         """Rows whose products with the control points are zero: (j, k).
 
@@ -84,6 +92,12 @@ class SplineBasis:
         rest = values - weights @ control
         control[1:-1] = np.linalg.lstsq(weights[:, 1:-1], rest, rcond=None)[0]
         return control
+
+    def through(self, values: Array) -> Array:
+        """Control points of the spline with these values at the ends of the pieces: (pieces + 1, m) -> (k, m)."""
+        from scipy.interpolate import make_interp_spline
+
+        return np.asarray(make_interp_spline(self.nodes, values, k=_DEGREE).c)
 
     def path(self, control: Array, duration: float, joint_names: tuple[str, ...]) -> ShapePath:
         """The spline as a path of the joints: control points (k, n)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,12 +13,13 @@ from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..display import short_repr
-from ..errors import AccuracyNotReached
+from ..errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
 from ..integrator.casadi_calls import call_casadi
 from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._hamiltonian import Hamiltonian, checked_metric, hamiltonian
+from .task import joint_coupling
 
 # Gauss nodes of a panel: the residual of a smooth path is then exact to rounding on few panels.
 _STAGES = 12
@@ -33,6 +34,11 @@ _CONVERGED = 1e-9
 _CONVERGED_SHARE = 1e-3
 # A combination of charges whose effect is below this share of all charges' is not felt by the motion, and set to 0.
 _LEAST_FELT = 1e-9
+
+# Times at which a path is compared with how its joints are said to move.
+_LOOKS = 65
+# [rad or m] by which it may differ: rounding of what the user computed.
+_FOLLOWS = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +66,14 @@ class WongFit:
     __repr__ = short_repr
 
 
-def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> WongFit:
+def wong_residual(
+    body: Body,
+    path: ShapePath,
+    *,
+    metric: str = "kinetic",
+    joints: Sequence[str] | None = None,
+    symmetric: Mapping[str, tuple[str, float]] | None = None,
+) -> WongFit:
     """How far a path of the joints, at zero momentum, is from an extremal: the optimality check of a plan.
 
     Wong's equations are taken in integrated form (du Bois-Reymond), p = g r' + A^T l = p(0) + integral of dL/dr: so a
@@ -70,11 +83,14 @@ def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> Wo
     ----------
     path : open or closed; between its breaks smooth
     metric : as for `extremal`
+    joints, symmetric : as for `plan_reorientation`: the path is compared with the extremals of the motions that these
+        leave
 
     Raises
     ------
     UnknownNameError, TrajectoryError
-        For another metric; if the path has other joints than the body.
+        For another metric; if the path has other joints than the body, or moves otherwise than `joints` and `symmetric`
+        say.
     SingularInertiaError
         As `extremal`, at any shape of the path.
     AccuracyNotReached
@@ -94,11 +110,18 @@ def wong_residual(body: Body, path: ShapePath, *, metric: str = "kinetic") -> Wo
     check_object(path, "ShapePath", "path")
     route = route_along(body, path)
     equations = hamiltonian(body, metric)
+    coupling = joint_coupling(body, joints, symmetric)
+    _check_follows(body, route, coupling)
     lift = horizontal_lift(body, route)
     last: WongFit | None = None
     for panels in _PANELS:
         edges = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)])
-        fit = _fit(body, equations, route, lift.attitude, np.append(edges, route.duration))
+        try:
+            fit = _fit(body, equations, coupling, route, lift.attitude, np.append(edges, route.duration))
+        except np.linalg.LinAlgError as error:
+            raise SingularInertiaError(
+                f"{body.name}: along this path a motion has nearly no kinetic energy: no extremal fits it ({error})"
+            ) from error
         if last is not None and abs(fit.residual - last.residual) <= _CONVERGED + _CONVERGED_SHARE * fit.residual:
             return fit
         last = fit
@@ -125,7 +148,12 @@ class _SampledEquations:
 
 
 def _sampled(
-    body: Body, known: Hamiltonian, route: ShapePath, attitude: Callable[[Array], Array], edges: Array
+    body: Body,
+    known: Hamiltonian,
+    coupling: Array,
+    route: ShapePath,
+    attitude: Callable[[Array], Array],
+    edges: Array,
 ) -> _SampledEquations:
     half = 0.5 * np.diff(edges)
     times = (edges[:-1, None] + half[:, None] * (_NODES + 1.0)).ravel()
@@ -138,10 +166,11 @@ def _sampled(
     back = so3.transpose(attitude(times))
     momenta = np.concatenate([gradients[:, n : 2 * n, None], columns @ back], axis=2)
     forces = np.concatenate([gradients[:, :n, None], np.einsum("nija,nj->nia", by_shape, rates) @ back], axis=2)
+    momenta, forces = coupling.T @ momenta, coupling.T @ forces
     panels = forces.reshape(len(half), len(_NODES), -1) * half[:, None, None]
     before = np.cumsum(np.einsum("k,pkx->px", _WEIGHTS, panels), axis=0)
     impulses = np.concatenate([np.zeros((1, before.shape[1])), before[:-1]])[:, None] + _INTEGRAL @ panels
-    root = np.linalg.cholesky(checked_metric(body, known, shapes))
+    root = np.linalg.cholesky(coupling.T @ checked_metric(body, known, shapes, coupling) @ coupling)
     weights = np.sqrt((half[:, None] * _WEIGHTS).ravel())[:, None, None]
     return _SampledEquations(
         missing=np.asarray(weights * np.linalg.solve(root, momenta - impulses.reshape(momenta.shape)), float),
@@ -150,12 +179,19 @@ def _sampled(
     )
 
 
-def _fit(body: Body, known: Hamiltonian, route: ShapePath, attitude: Callable[[Array], Array], edges: Array) -> WongFit:
+def _fit(
+    body: Body,
+    known: Hamiltonian,
+    coupling: Array,
+    route: ShapePath,
+    attitude: Callable[[Array], Array],
+    edges: Array,
+) -> WongFit:
     """Charge and initial momentum by least squares."""
-    sampled = _sampled(body, known, route, attitude, edges)
+    sampled = _sampled(body, known, coupling, route, attitude, edges)
     missing = sampled.missing.reshape(-1, 4)
     # p(0) is eliminated first: the part of a charge that only shifts p(0) has no effect.
-    initial, triangle = np.linalg.qr(sampled.initial.reshape(-1, body.n_shape))
+    initial, triangle = np.linalg.qr(sampled.initial.reshape(-1, coupling.shape[1]))
     left = missing - initial @ (initial.T @ missing)
     felt, values, axes = np.linalg.svd(left[:, 1:], full_matrices=False)
     kept = values > _LEAST_FELT * np.linalg.norm(missing[:, 1:])
@@ -164,9 +200,23 @@ def _fit(body: Body, known: Hamiltonian, route: ShapePath, attitude: Callable[[A
     residual = float(np.linalg.norm(left @ combined)) / sampled.speed if sampled.speed else 0.0
     momentum = np.linalg.solve(triangle, initial.T @ (missing @ combined))
     here = route.shape(0.0)
-    kinetic = momentum - mechanical_connection(body, here).T @ charge
-    rate = np.asarray(np.linalg.solve(np.array(known.metric(here)), kinetic), float)
+    kinetic = momentum - coupling.T @ mechanical_connection(body, here).T @ charge
+    metric = coupling.T @ np.array(known.metric(here)) @ coupling
+    rate = coupling @ np.asarray(np.linalg.solve(metric, kinetic), float)
     return WongFit(charge=charge, rate=rate, residual=residual)
+
+
+def _check_follows(body: Body, route: ShapePath, coupling: Array) -> None:
+    """Whether all joints of a path move as the coupling has it."""
+    shapes = route.shape(np.linspace(0.0, route.duration, _LOOKS))
+    moves = shapes - shapes[0]
+    beside = np.abs(moves - moves @ np.linalg.pinv(coupling).T @ coupling.T).max(axis=0)
+    worst = int(np.argmax(beside))
+    if beside[worst] > _FOLLOWS:
+        raise TrajectoryError(
+            f"joint {body.joint_names[worst]} of the path moves by up to {beside[worst]:.3g} otherwise than joints and "
+            "symmetric say"
+        )
 
 
 def _integral() -> Array:

@@ -27,6 +27,15 @@ _DEGENERATE = 1e-3
 _TOLERANCE = 1e-8
 # The shortest duration as a share of the longest, for the cost "time": only to keep the division by T away from 0.
 _SHORTEST = 1e-3
+# Long motions may end where the cost has settled: their last digits take hundreds of iterations, as strokes slide along
+# themselves. Accuracy that they have to have, scaled;
+_SETTLED_TOLERANCE = 1e-3
+# relative change of the cost in an iteration;
+_SETTLED_CHANGE = 3e-4
+# iterations for which it changes by no more;
+_SETTLED_ITERATIONS = 3
+# and what IPOPT takes for no bound.
+_UNBOUNDED = 1e10
 # What IPOPT reports of a local optimum.
 GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 # CasADi handles Ctrl-C itself: in the middle of an iteration IPOPT then returns this status,
@@ -50,6 +59,8 @@ class NlpSolution:
     kkt_residual : largest remaining violation of the Karush-Kuhn-Tucker conditions, scaled
     infeasibility : largest violation of a constraint
     iterations : number taken
+    second_order : whether the Hessian of the Lagrangian, projected on what the constraints leave, is positive definite
+        there, by the inertia of the last factorised matrix; None where that is not known
     """
 
     control: Array
@@ -61,6 +72,7 @@ class NlpSolution:
     kkt_residual: float
     infeasibility: float
     iterations: int
+    second_order: bool | None = None
 
 
 class CollocationProgram:
@@ -209,22 +221,35 @@ class CollocationProgram:
         *,
         iterations: int,
         tolerance: float = _TOLERANCE,
+        settles: bool = False,
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
-        """A local optimum from a guess: control points (k, m), T, and the attitude at places (N,) -> (N, 4)."""
+        """A local optimum from a guess: control points (k, m), T, and the attitude at places (N,) -> (N, 4).
+
+        With `settles` it may end before, where the cost changes no more.
+        """
         guess = np.concatenate(
             [control.ravel(), [duration], quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
         )
         best = BestIterate(iteration_callback)
         # A local name keeps it alive: CasADi does not.
         callback = ipopt_callback(best, len(guess), self._low, self._high)
-        solver = self._ipopt(callback, 1.0 / self._cost_scale(control, duration), iterations, tolerance)
+        solver = self._ipopt(callback, 1.0 / self._cost_scale(control, duration), iterations, tolerance, settles)
         low, high = self._bounds()
         found = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=self._low, ubg=self._high)
         return self._solution(np.array(found["x"]).ravel(), float(found["f"]), solver.stats(), best)
 
-    def _ipopt(self, callback: Any, cost_factor: float, iterations: int, tolerance: float) -> Any:
+    def _ipopt(self, callback: Any, cost_factor: float, iterations: int, tolerance: float, settles: bool) -> Any:
         import casadi
+
+        settled = {
+            "acceptable_tol": _SETTLED_TOLERANCE,
+            "acceptable_constr_viol_tol": _SETTLED_TOLERANCE,
+            # That of complementarity is not scaled: the tolerance above stands for it.
+            "acceptable_compl_inf_tol": _UNBOUNDED,
+            "acceptable_obj_change_tol": _SETTLED_CHANGE,
+            "acceptable_iter": _SETTLED_ITERATIONS,
+        }
 
         options = {
             "print_level": 0,
@@ -236,6 +261,7 @@ class CollocationProgram:
             "bound_relax_factor": 0.0,
             "linear_solver": "mumps",
             "mu_strategy": "adaptive",
+            **(settled if settles else {}),
         }
         return casadi.nlpsol(
             "plan",
@@ -252,6 +278,7 @@ class CollocationProgram:
         if status == _INTERRUPTED or (status == _STOPPED and not best.stopped):
             raise KeyboardInterrupt
         history = stats["iterations"]
+        shifts = history.get("regularization_size", []) if status in GOOD_STATUS else []
         dual, primal = (float(history[key][-1]) if history[key] else np.inf for key in ("inf_du", "inf_pr"))
         if status in GOOD_STATUS and dual > _DEGENERATE:
             # IPOPT scales by the multipliers, which are unbounded where the constraints leave only one motion.
@@ -269,6 +296,9 @@ class CollocationProgram:
             kkt_residual=max(dual, primal),
             infeasibility=primal,
             iterations=int(stats["iter_count"]),
+            # IPOPT adds a multiple of the identity to the Hessian until the matrix has n positive and m negative
+            # eigenvalues, n unknowns and m rows: with none, that of the projected Hessian are all positive.
+            second_order=shifts[-1] == 0.0 if shifts else None,
         )
 
     def _cost_scale(self, control: Array, duration: float) -> float:

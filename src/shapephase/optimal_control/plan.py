@@ -14,6 +14,9 @@ from ._card import plan_card
 COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "time": "s"}
 """Of each cost; metres stand for radians where joints slide."""
 
+AGREEMENT = 1e-3
+"""Relative difference of costs up to which starts have come to the same."""
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -57,6 +60,8 @@ class Start:
     kkt_residual, infeasibility : remaining violation of the optimality conditions and of the constraints, scaled
     iterations : of the solver
     seconds : time it took
+    second_order : whether the projected Hessian of the Lagrangian is positive definite there, so that no path near by
+        is cheaper; None where the solver does not tell
 
     Examples
     --------
@@ -73,6 +78,7 @@ class Start:
     infeasibility: float
     iterations: int
     seconds: float
+    second_order: bool | None = None
 
     __repr__ = short_repr
 
@@ -99,6 +105,11 @@ class Plan:
     iterations : over all starts
     seconds : over all starts
     starts : one for each start, in their order
+    second_order : as `Start.second_order`, of the start that gave the plan
+    hamiltonian_spread : by how much Pontryagin's Hamiltonian varies, relative to its mean: along an optimal path of the
+        costs "kinetic" and "rate" without momentum it is constant where no rate is at its limit. Means of the pieces of
+        the spline, without three at both ends, where the joints start and stop; None for other costs, with momentum,
+        and where all pieces are at a rate limit
 
     Examples
     --------
@@ -124,6 +135,14 @@ class Plan:
     iterations: int
     seconds: float
     starts: tuple[Start, ...]
+    second_order: bool | None = None
+    hamiltonian_spread: float | None = None
+
+    @property
+    def agreeing_starts(self) -> int:
+        """How many starts came to the least cost, within a thousandth: what is known of its being the least of all."""
+        costs = [start.cost for start in self.starts if start.converged]
+        return sum(cost <= min(costs) * (1.0 + AGREEMENT) for cost in costs)
 
     @property
     def cost_unit(self) -> str:

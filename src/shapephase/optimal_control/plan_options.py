@@ -158,10 +158,12 @@ class Search:
         the first leaves a KKT residual of 1e-9, the second of some 1e-6, and for the astronaut it may need more than
         300 iterations: so the first is the default
     starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. Where none leads
-        to a plan of a body with up to eight free joints, two further guesses are tried
+        to a plan of a body with up to eight free joints, two further guesses are tried, and then a motion of many
+        strokes
     seed : of the random guesses; the same seed gives the same plan
     pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
-        else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the goal
+        else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the
+        goal; six for each of many strokes
     iterations : the most that the solver may take for each start
 
     Raises

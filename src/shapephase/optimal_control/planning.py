@@ -8,8 +8,9 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,15 @@ from ..arguments import check_executor, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import PlanNotFound, ShapePhaseError, UnstatedLimitWarning
-from ._guesses import PLACES, Guess, guess_of, guesses
+from ._certificates import hamiltonian_spread
 from ._path_cost import path_cost
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
 from ._solver_callback import IterationCallback, heard_interrupts
 from ._spline_basis import SplineBasis
 from .collocation import GOOD_STATUS, CollocationProgram
+from .guesses.loops import PLACES, Guess, guess_of, guesses
+from .guesses.strokes import guess_of_strokes
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search
 from .task import Reorientation, reorientation
@@ -168,7 +171,10 @@ def plan_reorientation(
             if reporter.stopped:
                 break
         if not reporter.stopped and not any(attempt.report.converged for attempt in attempts):
-            for attempt in _searched_here(task, basis, chosen, spare, reporter):
+            further = chain(
+                _searched_here(task, basis, chosen, spare, reporter), _searched_by_strokes(task, chosen, reporter)
+            )
+            for attempt in further:
                 attempts.append(attempt)
                 if reporter.stopped or attempt.report.converged:
                     break
@@ -187,6 +193,17 @@ def _searched_here(
     local = _LocalSearch.of(task, basis, search)
     for number, guess in enumerate(guesses):
         yield local.attempt(guess, reporter.solver_callback("search", number + 1, len(guesses)))
+
+
+def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
+    """From a motion of many strokes, for few joints."""
+    if task.dimension > _MANY_JOINTS or search.method != "collocation":
+        return
+    stroked = guess_of_strokes(task, search.seed, search.pieces)
+    if stroked is not None:
+        basis, guess = stroked
+        local = _LocalSearch.of(task, basis, replace(search, pieces=basis.pieces), settles=basis.pieces > _PIECES)
+        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
 
 
 def _searched_by(
@@ -346,6 +363,7 @@ class _LocalSearch:
     basis : of the path's spline at first
     program : for this basis
     halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
+    settles : whether the solver may end where the cost changes no more, as that of a long motion
     """
 
     task: Reorientation
@@ -353,11 +371,12 @@ class _LocalSearch:
     program: CollocationProgram | ReducedProgram
     iterations: int
     halvings: int
+    settles: bool = False
 
     @classmethod
-    def of(cls, task: Reorientation, basis: SplineBasis, search: Search) -> _LocalSearch:
+    def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> _LocalSearch:
         halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
-        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings)
+        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings, settles)
 
     def attempt(self, guess: Guess, callback: IterationCallback) -> _Attempt:
         """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
@@ -386,12 +405,14 @@ class _LocalSearch:
     ) -> tuple[_Attempt, Array]:
         """The attempt on some basis, and the control points that the solver found."""
         task, began = self.task, time.perf_counter()
+        attitudes, settling = _guessed_attitudes(task, guess), {"settles": True} if self.settles else {}
         solution = program.solve(
             guess.control,
             task.duration,
-            _guessed_attitudes(task, guess),
+            attitudes,
             iterations=self.iterations,
             iteration_callback=callback,
+            **settling,
         )
         try:
             polished = polish(task, basis, solution.control, solution.duration)
@@ -411,6 +432,7 @@ class _LocalSearch:
             infeasibility=solution.infeasibility,
             iterations=solution.iterations,
             seconds=time.perf_counter() - began,
+            second_order=solution.second_order,
         )
         attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
         return attempt, solution.control
@@ -466,6 +488,8 @@ def _plan(
         iterations=sum(attempt.report.iterations for attempt in attempts),
         seconds=seconds,
         starts=tuple(attempt.report for attempt in attempts),
+        second_order=best.report.second_order,
+        hamiltonian_spread=hamiltonian_spread(task, best.basis, best.polished.control, best.polished.duration),
     )
 
 

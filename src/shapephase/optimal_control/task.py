@@ -185,8 +185,7 @@ def reorientation(
             "cost='time' needs rate_limits for every joint: without them there is no least time, and there is none for "
             f"{unstated}; give limits=Limits(rate_limits=...)"
         )
-    moving = set(range(body.n_shape)) if joints is None else set(body.joint_columns(joints))
-    fixed_joints = sorted(set(range(body.n_shape)) - moving)
+    fixed_joints = _fixed_joints(body, joints)
     coupling, leaders, factors = _coupling(body, symmetric or {}, fixed_joints)
     offset = np.zeros(body.n_shape)
     offset[fixed_joints] = first[fixed_joints]
@@ -296,6 +295,18 @@ def _rate_limits(body: Body, rate_limits: ArrayLike | str | None) -> Array:
             f"got {len(rates)} numbers"
         )
     return np.array(np.broadcast_to(rates, body.n_shape))
+
+
+def joint_coupling(
+    body: Body, joints: Sequence[str] | None, symmetric: Mapping[str, tuple[str, float]] | None
+) -> Array:
+    """Rates of all joints from those of the free ones: (n, m). Raises UnknownNameError, TrajectoryError."""
+    return _coupling(body, symmetric or {}, _fixed_joints(body, joints))[0]
+
+
+def _fixed_joints(body: Body, joints: Sequence[str] | None) -> list[int]:
+    moving = set(range(body.n_shape)) if joints is None else set(body.joint_columns(joints))
+    return sorted(set(range(body.n_shape)) - moving)
 
 
 def _coupling(

@@ -264,6 +264,9 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
         "iterations": found.iterations,
         "seconds": found.seconds,
         "searches": len(found.starts),
+        "searches_that_agree": found.agreeing_starts,
+        "second_order_met": found.second_order,
+        "hamiltonian_spread": found.hamiltonian_spread,
     }
 
 

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .. import so3
-from ..arrays import Array
-from ..deformation.deformation import articulated
-from ..errors import PlanNotFound, ShapePhaseError
-from ..reconstruction.reconstruction import Motion, reconstruct
-from ..shape_space.connection import curvature, mechanical_connection
-from ._spline_basis import SplineBasis
-from .symbolic import symbolic_body
-from .task import Reorientation
+from ... import so3
+from ...arrays import Array
+from ...deformation.deformation import articulated
+from ...errors import PlanNotFound, ShapePhaseError
+from ...reconstruction.reconstruction import Motion, reconstruct
+from ...shape_space.connection import curvature, mechanical_connection
+from .._spline_basis import SplineBasis
+from ..symbolic import symbolic_body
+from ..task import Reorientation
 
 # Where guesses are sampled along [0, 1]: dense enough for two rounds of a loop on any spline.
 PLACES = np.linspace(0.0, 1.0, 101)
@@ -181,8 +181,12 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
     """A curve (101, m) over `PLACES`, taken within the limits and from start to end; None where it has no motion."""
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
-    control = basis.fitted(np.clip(curve, task.lower, task.upper), PLACES)
-    equal = task.equal_points
+    return guess_of_control(task, basis, basis.fitted(np.clip(curve, task.lower, task.upper), PLACES))
+
+
+def guess_of_control(task: Reorientation, basis: SplineBasis, control: Array) -> Guess | None:
+    """The spline of control points, taken within the limits and at rest at its ends; None where it has no motion."""
+    control, equal = control.copy(), task.equal_points
     control[:equal], control[-equal:] = control[0], control[-1]
     if task.rates_at_ends == "periodic":
         half = 0.5 * (control[1] - control[0] + control[-1] - control[-2])

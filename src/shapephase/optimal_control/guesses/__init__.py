@@ -1,0 +1,1 @@
+"""Motions that the search for a plan starts from."""

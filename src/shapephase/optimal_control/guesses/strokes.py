@@ -1,0 +1,334 @@
+"""Guesses of many strokes: where one loop of the joints turns a body by far too little, it goes round many times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...shape_space.connection import connection_slopes, mechanical_connection
+from .._spline_basis import SplineBasis
+from ..task import Reorientation
+from .loops import Guess, guess_of_control, start_metric
+
+# Control points of a stroke, a periodic cubic spline: a loop with two harmonics.
+_POINTS = 8
+# Steps round a stroke: it turns the body by little, so that midpoints are good to a part in a thousand.
+_STEPS = 32
+# Random loops from which the best stroke about an axis is looked for.
+_STARTS = 4
+# The most steps of each search: they are a guess.
+_ITERATIONS = 30
+# Turns below this have no digits left in the quotients of their Jacobian [rad].
+_SMALL = 1e-4
+# How far from the start strokes go in joints without limits [rad or m].
+_FARTHEST = np.pi
+# Turns of three legs that Newton's method starts from for each three strokes.
+_TRIES = 48
+# Its steps: those that come to a goal take ten.
+_NEWTON_STEPS = 40
+# Of its steps, relative to the turn: small enough to end at rounding.
+_DAMPING = 1e-3
+# [rad] miss of three legs that counts as none: far below one stroke.
+_STEERED = 1e-6
+# Turn for its length below which a stroke is none [rad].
+_IDLE = 1e-6
+# Rounds of aiming, as the ways between strokes turn the body too.
+_AIMS = 3
+# Pieces of the spline for each stroke.
+PIECES_OF_STROKE = 6
+# And the most in all, for which the solver takes a minute.
+MOST_PIECES = 2000
+# The least pieces of all.
+_LEAST_PIECES = 40
+# Ridge on the metric, as a share of its mean eigenvalue, so that no motion is free.
+_RIDGE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """A loop of the joints that turns the body far for its length.
+
+    Attributes
+    ----------
+    curve : (S + 1, m) its shapes, the last the first
+    turn : (3,) rotation vector of the body, base axes at its start [rad]
+    length : in the metric of the task
+    """
+
+    curve: Array
+    turn: Array
+    length: float
+
+    def begun_near(self, coordinates: Array, metric: Array) -> Stroke:
+        """The same loop from its shape nearest to some coordinates."""
+        gaps = self.curve[:-1] - coordinates
+        first = int(np.argmin(np.sum((gaps @ metric) * gaps, axis=1)))
+        curve = np.concatenate([self.curve[first:-1], self.curve[: first + 1]])
+        return Stroke(curve=curve, turn=self.turn, length=self.length)
+
+
+@dataclass(frozen=True, eq=False)
+class _Leg:
+    """Some rounds of a stroke, whole or not; backwards below zero."""
+
+    stroke: Stroke
+    rounds: float
+
+    @property
+    def curve(self) -> Array:
+        """Whole rounds (N, m), each made smaller about its middle, so that together they turn as far as `rounds`."""
+        whole = int(np.ceil(abs(self.rounds)))
+        if whole == 0:
+            return self.stroke.curve[:0]
+        # A small loop turns the body by its area.
+        shrunk = np.sqrt(abs(self.rounds) / whole)
+        middle = self.stroke.curve[:-1].mean(axis=0)
+        once = middle + shrunk * (self.stroke.curve - middle)
+        once = once if self.rounds > 0.0 else once[::-1]
+        return np.concatenate([np.tile(once[:-1], (whole, 1)), once[-1:]])
+
+
+def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) -> tuple[SplineBasis, Guess] | None:
+    """A motion of many strokes that comes near the goal, on a spline fine enough; None where there is none.
+
+    That spline has the pieces given, if those are enough.
+
+    Each stroke turns the body furthest for its length about some axis, within the limits. Three legs, each some rounds
+    of one of the strokes, make any rotation if their axes differ enough, as Euler's angles do; of those that reach the
+    goal the shortest are taken.
+    """
+    if task.momentum.any() or task.windings is not None or np.count_nonzero(task.movable) < 2:
+        return None
+    if task.body.chain.follows.balls or (pieces is not None and pieces < _LEAST_PIECES):
+        return None
+    metric = _metric(task)
+    strokes = [stroke.begun_near(task.start, metric) for stroke in best_strokes(task, metric, seed)]
+    goal = so3.exp(task.turn_to_goal())
+    aim, best = goal, None
+    for _ in range(_AIMS):
+        legs = _steered(strokes, aim, seed)
+        if legs is None:
+            break
+        curve = _joined(task, legs)
+        beside = goal @ _turned(task, curve[None])[0].T
+        if best is None or so3.angle(beside) < best[0]:
+            best = so3.angle(beside), curve, sum(abs(leg.rounds) for leg in legs)
+        aim = beside @ aim
+    if best is None:
+        return None
+    _, curve, rounds = best
+    needed = max(int(np.ceil(PIECES_OF_STROKE * (rounds + 1.0))), _LEAST_PIECES)
+    if needed > (pieces or MOST_PIECES):
+        return None
+    basis = SplineBasis(pieces or needed)
+    guess = guess_of_control(task, basis, basis.through(paced(task, curve, basis.nodes)))
+    return None if guess is None else (basis, guess)
+
+
+def best_strokes(task: Reorientation, metric: Array, seed: int) -> list[Stroke]:
+    """The strokes that turn the body furthest for their length about the main axes of loops' turns, and the goal's.
+
+    Length is the root of the energy over the same time, so that a stroke comes evenly paced.
+    """
+    rng = np.random.default_rng(seed)
+    reach = _reach(task)
+    first = [_random_loop(task, reach, rng) for _ in range(_STARTS)]
+    turns = so3.log(_turned(task, np.stack([_curve(loop) for loop in first])))
+    axes = [*np.linalg.svd(turns)[2], so3.normalised(task.turn_to_goal())]
+    found = []
+    for axis in axes:
+        tried = [_improved(task, metric, reach, loop, axis) for loop in first]
+        best = max(tried, key=lambda stroke: abs(stroke.turn @ axis) / stroke.length)
+        if abs(best.turn @ axis) > _IDLE * best.length:
+            found.append(best)
+    return found
+
+
+def _metric(task: Reorientation) -> Array:
+    """By which lengths are measured: (m, m), the cost's own as far as it is one."""
+    if task.cost == "time":
+        return np.diag(task.rate_limit**-2.0)
+    metric = start_metric(task) if task.cost == "kinetic" else task.coupling.T @ task.coupling
+    return metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric))
+
+
+def _reach(task: Reorientation) -> Array:
+    """(m, 2) within which strokes stay."""
+    return np.stack(
+        [np.maximum(task.lower, task.start - _FARTHEST), np.minimum(task.upper, task.start + _FARTHEST)], axis=1
+    )
+
+
+def _random_loop(task: Reorientation, reach: Array, rng: np.random.Generator) -> Array:
+    """Control points (K, m) of an ellipse somewhere within reach."""
+    width = reach[:, 1] - reach[:, 0]
+    middle = rng.uniform(reach[:, 0] + 0.25 * width, reach[:, 1] - 0.25 * width)
+    phase = 2.0 * np.pi * np.arange(_POINTS)[:, None] / _POINTS
+    cosine, sine = rng.normal(size=(2, task.dimension)) * 0.25 * width
+    return np.clip(middle + np.cos(phase) * cosine + np.sin(phase) * sine, *reach.T)
+
+
+def _curve(control: Array) -> Array:
+    """Shapes round loops, the last the first: control points (..., K, m) -> (..., S + 1, m)."""
+    return _ROUND @ control
+
+
+def _round() -> Array:
+    """The periodic splines at equal steps: (S + 1, K)."""
+    from scipy.interpolate import BSpline
+
+    knots = np.arange(-3, _POINTS + 4) / _POINTS
+    values = np.asarray(BSpline(knots, np.eye(_POINTS + 3), 3)(np.arange(_STEPS) / _STEPS))
+    values[:, :3] += values[:, _POINTS:]
+    return np.concatenate([values[:, :_POINTS], values[:1, :_POINTS]])
+
+
+def _turned(task: Reorientation, curves: Array) -> Array:
+    """How curves turn the body, by midpoints: (L, N + 1, m) -> (L, 3, 3)."""
+    steps = np.diff(curves, axis=1)
+    shapes = task.shapes(0.5 * (curves[:, 1:] + curves[:, :-1]))
+    connection = mechanical_connection(task.body, shapes.reshape(-1, shapes.shape[-1])).reshape(
+        *shapes.shape[:2], 3, -1
+    )
+    turns = so3.exp(-so3.apply(connection @ task.coupling, steps))
+    # Products of neighbours, halving their number each time.
+    while turns.shape[1] > 1:
+        odd = turns[:, -1:] if turns.shape[1] % 2 else turns[:, :0]
+        turns = np.concatenate([turns[:, 0:-1:2] @ turns[:, 1::2], odd], axis=1)
+    return turns[:, 0]
+
+
+def _improved(task: Reorientation, metric: Array, reach: Array, loop: Array, axis: Array) -> Stroke:
+    """The stroke next to a loop that turns the body furthest about an axis for its length."""
+    from scipy.optimize import minimize
+
+    first, _ = _turn_for_length(task, metric, loop, axis)
+    # The optimiser's tolerances are absolute.
+    scale = -np.copysign(1.0, first) / max(abs(first), _IDLE)
+
+    def missing(values: Array) -> tuple[float, Array]:
+        rate, slope = _turn_for_length(task, metric, values.reshape(loop.shape), axis)
+        return scale * rate, scale * (slope * task.movable).ravel()
+
+    bounds = np.tile(reach, (_POINTS, 1))
+    found = minimize(
+        missing, loop.ravel(), jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _ITERATIONS}
+    )
+    curve = _curve(found.x.reshape(loop.shape))
+    return Stroke(
+        curve=curve,
+        turn=so3.log(_turned(task, curve[None]))[0],
+        length=float(_length(curve[None], metric)[0]),
+    )
+
+
+def _turn_for_length(task: Reorientation, metric: Array, control: Array, axis: Array) -> tuple[float, Array]:
+    """The turn about an axis for its length, of a loop of control points (K, m), and its exact slope (K, m).
+
+    The body turns by the product of exp(phi_k), phi_k = -A(r_k) d_k, r_k the middle of a step d_k.
+    """
+    curve = _curve(control)
+    steps, middles = np.diff(curve, axis=0), 0.5 * (curve[1:] + curve[:-1])
+    columns, slopes = connection_slopes(task.body, task.shapes(middles))
+    columns = np.einsum("kja,jm->kma", columns, task.coupling)
+    slopes = np.einsum("kija,im,jn->kmna", slopes, task.coupling, task.coupling)
+    turns = -np.einsum("kma,km->ka", columns, steps)
+    rotations = so3.exp(turns)
+    before = np.empty_like(rotations)
+    whole = np.eye(3)
+    for number, rotation in enumerate(rotations):
+        before[number], whole = whole, whole @ rotation
+    turn = so3.log(whole)
+    # A change of the product by a rotation vector changes its logarithm by the inverse of `left_jacobian`; that of a
+    # small step changes its exponential by nearly 1 + hat(phi)/2.
+    felt: Array = np.linalg.solve(_left_jacobian(turn).T, axis)
+    seen = so3.apply(so3.transpose(before), np.broadcast_to(felt, turns.shape))
+    seen = seen - 0.5 * so3.cross(turns, seen)
+    by_middle = -np.einsum("kmna,kn,ka->km", slopes, steps, seen)
+    by_step = -np.einsum("kma,ka->km", columns, seen)
+    length = float(_length(curve[None], metric)[0])
+    by_step = by_step / length - (axis @ turn) * len(steps) * (steps @ metric) / length**3
+    by_middle = by_middle / length
+    on_curve = np.zeros_like(curve)
+    on_curve[1:] += by_step + 0.5 * by_middle
+    on_curve[:-1] += 0.5 * by_middle - by_step
+    return float(axis @ turn) / length, _ROUND.T @ on_curve
+
+
+def _left_jacobian(turn: Array) -> Array:
+    """J with exp(turn + d) = exp(J d) exp(turn) to first order: (3,) -> (3, 3)."""
+    angle = float(np.linalg.norm(turn))
+    spin = so3.hat(turn)
+    if angle < _SMALL:
+        return np.eye(3) + 0.5 * spin
+    return np.eye(3) + (1.0 - np.cos(angle)) / angle**2 * spin + (angle - np.sin(angle)) / angle**3 * spin @ spin
+
+
+def _length(curves: Array, metric: Array) -> Array:
+    steps = np.diff(curves, axis=1)
+    return np.sqrt(steps.shape[1] * np.sum((steps @ metric) * steps, axis=(1, 2)))
+
+
+def step_lengths(task: Reorientation, curve: Array) -> Array:
+    """Of the steps of a curve, by the cost's own measure where the body then is: (N + 1, m) -> (N,)."""
+    steps = np.diff(curve, axis=0)
+    if task.cost == "time":
+        return np.max(np.abs(steps) / task.rate_limit, axis=1)
+    joints = steps @ task.coupling.T
+    if task.cost != "kinetic":
+        return np.linalg.norm(joints, axis=1)
+    shapes = task.shapes(0.5 * (curve[1:] + curve[:-1]))
+    turning = -so3.apply(mechanical_connection(task.body, shapes), joints)
+    return np.sqrt(2.0 * np.maximum(task.body.kinetic_energy(shapes, joints, turning), 0.0))
+
+
+def _steered(strokes: list[Stroke], goal: Array, seed: int) -> list[_Leg] | None:
+    """The shortest three legs that turn the body to the goal, each of a stroke; None where none do."""
+    if not strokes:
+        return None
+    sizes = np.array([np.linalg.norm(stroke.turn) for stroke in strokes])
+    axes = np.array([stroke.turn for stroke in strokes]) / sizes[:, None]
+    dear = np.array([stroke.length for stroke in strokes]) / sizes
+    chosen = np.repeat(list(product(range(len(strokes)), repeat=3)), _TRIES, axis=0)
+    angles = np.random.default_rng(seed).uniform(-np.pi, np.pi, size=(len(chosen), 3))
+    missing = np.full_like(angles, np.inf)
+    for _ in range(_NEWTON_STEPS):
+        first, second, third = (so3.exp(angles[:, [k]] * axes[chosen[:, k]]) for k in range(3))
+        missing = so3.log(so3.transpose(first @ second @ third) @ goal)
+        back = so3.transpose(third)
+        columns = [so3.apply(back @ so3.transpose(second), axes[chosen[:, 0]]), so3.apply(back, axes[chosen[:, 1]])]
+        slopes = np.stack([*columns, axes[chosen[:, 2]]], axis=-1)
+        damped = so3.transpose(slopes) @ slopes + _DAMPING * np.sum(missing**2, axis=1)[:, None, None] * np.eye(3)
+        damped = damped + np.finfo(float).eps * np.eye(3)
+        angles = angles + so3.apply(np.linalg.inv(damped), so3.apply(so3.transpose(slopes), missing))
+    angles = np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi
+    costs = np.where(np.linalg.norm(missing, axis=1) < _STEERED, np.sum(np.abs(angles) * dear[chosen], axis=1), np.inf)
+    best = int(np.argmin(costs))
+    if not np.isfinite(costs[best]):
+        return None
+    return [_Leg(strokes[k], float(angle / sizes[k])) for k, angle in zip(chosen[best], angles[best], strict=True)]
+
+
+def _joined(task: Reorientation, legs: list[_Leg]) -> Array:
+    """Start, legs and end, joined by straight ways: (N, m)."""
+    end = task.start if task.end is None else task.end
+    stations = [task.start[None], *(leg.curve for leg in legs), end[None]]
+    parts = [stations[0]]
+    for station in stations[1:]:
+        if len(station):
+            parts.append(np.linspace(parts[-1][-1], station[0], _STEPS // 2)[1:])
+            parts.append(station[1:])
+    return np.concatenate(parts)
+
+
+def paced(task: Reorientation, curve: Array, places: Array) -> Array:
+    """A curve at a steady pace, as a cheapest one has it, seen at places of [0, 1]: (N, m) -> (P, m)."""
+    passed = np.append(0.0, np.cumsum(step_lengths(task, curve)))
+    return np.stack([np.interp(places, passed / passed[-1], column) for column in curve.T], axis=1)
+
+
+_ROUND = _round()

@@ -1,0 +1,144 @@
+"""Guesses of many strokes: their slopes, the turns that the integrator gives them, and where they lead."""
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.optimal_control import Limits, Search, plan_reorientation
+from shapephase.optimal_control.guesses import strokes as module
+from shapephase.optimal_control.guesses.strokes import best_strokes, guess_of_strokes
+from shapephase.optimal_control.task import reorientation
+
+SIDEWAYS = so3.exp(np.radians(25.0) * np.array([0.0, 0.0, 1.0]))
+
+
+def task_of(name, goal=SIDEWAYS, **options):
+    return reorientation(sp.load_body(name), goal, **options)
+
+
+@pytest.fixture(scope="module")
+def diver():
+    task = task_of("diver")
+    return task, best_strokes(task, module._metric(task), 0)
+
+
+@pytest.mark.parametrize("name", ["diver", "cat_two_halves"])
+def test_slopes_are_those_of_differences(name):
+    """Midpoints leave the square of a step's turn out of the slope."""
+    task = task_of(name)
+    metric, rng = module._metric(task), np.random.default_rng(3)
+    axis = so3.normalised(np.array([0.2, 0.5, -0.3]))
+    control = module._random_loop(task, 0.5 * module._reach(task), rng)
+    change = rng.normal(size=control.shape)
+    _, slope = module._turn_for_length(task, metric, control, axis)
+    step = 1e-5
+    ahead, behind = (
+        module._turn_for_length(task, metric, control + sign * step * change, axis)[0] for sign in (1.0, -1.0)
+    )
+    size = np.linalg.norm(slope) * np.linalg.norm(change)
+    assert abs((ahead - behind) / (2.0 * step) - np.sum(slope * change)) < 2e-3 * size
+
+
+def test_strokes_turn_the_body_as_the_integrator_says(diver):
+    """A midpoint's error is of the square of a step."""
+    task, found = diver
+    assert len(found) == 4
+    for stroke in found:
+        times = np.linspace(0.0, 1.0, len(stroke.curve))
+        loop = sp.ShapePath.spline(times, stroke.curve, joint_names=task.body.joint_names)
+        turn = so3.log(sp.holonomy(task.body, loop))
+        assert np.linalg.norm(turn - stroke.turn) < 0.03 * np.linalg.norm(turn)
+
+
+def test_strokes_keep_to_the_limits(diver):
+    task, found = diver
+    for stroke in found:
+        assert np.all(stroke.curve >= task.lower)
+        assert np.all(stroke.curve <= task.upper)
+
+
+def test_the_best_stroke_of_the_diver_is_better_than_any_circle(diver):
+    """Circles of all sizes about a grid of middles, by the integrator."""
+    task, found = diver
+    metric = module._metric(task)
+    best = max(abs(stroke.turn[2]) / stroke.length for stroke in found)
+    phase = np.linspace(0.0, 2.0 * np.pi, module._STEPS + 1)[:, None]
+    circles = np.array(
+        [
+            np.array([a, b]) + radius * np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
+            for a in np.linspace(-2.0, 2.0, 7)
+            for b in np.linspace(-2.0, 2.0, 7)
+            for radius in (0.3, 0.6, 0.9, 1.2)
+        ]
+    )
+    turns = so3.log(module._turned(task, circles))
+    assert best > np.max(np.abs(turns[:, 2]) / module._length(circles, metric))
+
+
+def test_three_legs_are_euler_angles_where_axes_are_orthogonal():
+    strokes = [
+        module.Stroke(curve=np.zeros((3, 2)), turn=turn, length=1.0)
+        for turn in (np.array([0.0, 0.0, 0.02]), np.array([0.03, 0.0, 0.0]))
+    ]
+    angles = np.array([0.7, 1.1, -0.4])
+    axes = np.eye(3)[[2, 0, 2]]
+    goal = so3.exp(angles[0] * axes[0]) @ so3.exp(angles[1] * axes[1]) @ so3.exp(angles[2] * axes[2])
+    legs = module._steered(strokes, goal, 0)
+    assert legs is not None
+    made = np.eye(3)
+    for leg in legs:
+        made = made @ so3.exp(leg.rounds * leg.stroke.turn)
+    assert so3.angle(made.T @ goal) < 1e-6
+    dear = sum(abs(angle) / size for angle, size in zip(angles, (0.02, 0.03, 0.02), strict=True))
+    assert sum(abs(leg.rounds) for leg in legs) < dear * (1.0 + 1e-6)
+
+
+def test_a_stroke_alone_does_not_turn_about_another_axis():
+    stroke = module.Stroke(curve=np.zeros((3, 2)), turn=np.array([0.0, 0.0, 0.02]), length=1.0)
+    assert module._steered([stroke], so3.exp(np.array([0.5, 0.0, 0.0])), 0) is None
+    assert module._steered([], np.eye(3), 0) is None
+
+
+@pytest.mark.full
+def test_a_guess_of_strokes_comes_near_the_goal():
+    """One stroke of the diver turns him by 1.4 degrees: the guess leaves less than two of them."""
+    task = task_of("diver", limits=Limits(rate_limits=None))
+    found = guess_of_strokes(task, 0)
+    assert found is not None
+    basis, guess = found
+    assert basis.pieces > 15 * module.PIECES_OF_STROKE
+    assert guess.goal_error < np.radians(3.0)
+    assert np.all(guess.control >= task.lower)
+    assert np.all(guess.control <= task.upper)
+    assert np.all(guess.control[:2] == 0.0)
+    assert np.all(guess.control[-2:] == 0.0)
+    assert guess_of_strokes(task, 0, pieces=20) is None
+
+
+def test_no_strokes_with_momentum():
+    assert guess_of_strokes(task_of("diver", momentum=[0.0, 1.0, 0.0]), 0) is None
+    assert guess_of_strokes(task_of("diver", joints=["left_shoulder_abduction"]), 0) is None
+
+
+def test_a_motion_at_a_steady_pace_has_equal_steps():
+    """Midpoints of the steps of an ellipse that is sampled unevenly."""
+    task = task_of("cat_two_halves")
+    phase = 2.0 * np.pi * np.linspace(0.0, 1.0, 20001)[:, None] ** 1.5
+    curve = np.concatenate([np.cos(phase), 0.3 * np.sin(phase), 0.5 * np.sin(phase + 1.0)], axis=1)
+    assert np.ptp(module.step_lengths(task, curve)) > 1e-5
+    lengths = module.step_lengths(task, module.paced(task, curve, np.linspace(0.0, 1.0, 1001)))
+    assert np.ptp(lengths) < 2e-3 * lengths.mean()
+
+
+@pytest.mark.full
+def test_the_diver_turns_by_many_strokes():
+    body = sp.load_body("diver")
+    plan = plan_reorientation(body, SIDEWAYS, duration=30.0, search=Search())
+    assert plan.goal_error < 1e-8
+    again = sp.reconstruct(sp.articulated(body, plan.path), [0.0, 0.0, 0.0], tolerance=1e-11)
+    assert so3.angle(SIDEWAYS.T @ again.final_attitude) < 1e-8
+    times = np.linspace(0.0, 30.0, 20001)
+    assert np.abs(plan.path.shape(times)).max() <= 3.2 + 1e-9
+    assert np.abs(plan.path.rate(times)).max() <= 20.0 * (1.0 + 1e-6)
+    assert len(plan.coefficients) > 15 * module.PIECES_OF_STROKE
