@@ -245,7 +245,7 @@ def _turn_for_length(task: Reorientation, metric: Array, control: Array, axis: A
     turn = so3.log(whole)
     # A change of the product by a rotation vector changes its logarithm by the inverse of `left_jacobian`; that of a
     # small step changes its exponential by nearly 1 + hat(phi)/2.
-    felt: Array = np.linalg.solve(_left_jacobian(turn).T, axis)
+    felt = np.asarray(np.linalg.solve(_left_jacobian(turn).T, axis), float)
     seen = so3.apply(so3.transpose(before), np.broadcast_to(felt, turns.shape))
     seen = seen - 0.5 * so3.cross(turns, seen)
     by_middle = -np.einsum("kmna,kn,ka->km", slopes, steps, seen)
