@@ -12,6 +12,7 @@ from shapephase.examples.scenarios import (
     CLOSED_ORBITS,
     MOTIONS,
     cat_righting,
+    cat_righting_twist,
     closed_orbit,
     diver_twist,
     kane_scher,
@@ -36,6 +37,7 @@ def turned(name, path=None):
 # Found by DOP853 on Pinocchio's ccrba and (all but the last) by fourth-order Magnus steps on kinematics in NumPy.
 KNOWN = {
     "cat_righting": np.diag([1.0, -1.0, -1.0]),
+    "cat_righting_twist": np.diag([1.0, -1.0, -1.0]),
     "astronaut_arm_circles": so3.exp(np.array([0.0, 0.206386036527, 0.0])),
     "astronaut_leg_swing": so3.exp(np.array([0.0, 0.215596595975, 0.0])),
     "antenna_deployment": so3.exp(np.array([-0.003736510923, -0.085913209531, 0.048278938397])),
@@ -75,6 +77,20 @@ def test_the_cat_rights_itself_from_rest_to_rest():
     np.testing.assert_allclose(ends, 0.0, atol=1e-12, rtol=0)
     np.testing.assert_allclose(path.shape([0.0, 0.7]), 0.0, atol=1e-12, rtol=0)
     assert so3.angle(turned("cat_righting", path) @ np.diag([1.0, -1.0, -1.0])) < 1e-10
+
+
+def test_the_cat_that_twists_bends_less_and_rights_itself_too():
+    """From rest to rest, by DOP853; the waist's largest bend is the angle between the halves' long axes."""
+    body, paths = sp.load_body("cat"), [cat_righting(), cat_righting_twist()]
+    bends = []
+    for path in paths:
+        poses = np.array([body.link_pose(shape, "trunk_rear") for shape in path.shape(np.linspace(0.0, 0.5, 101))])
+        bends.append(np.degrees(np.arccos(poses[:, 0, 0])).max())
+        np.testing.assert_allclose(path.rate([0.0, 0.5]), 0.0, atol=1e-12, rtol=0)
+    np.testing.assert_allclose(bends, [100.77, 91.10], atol=0.01)
+    moving = sp.articulated(body, paths[1])
+    end = sp.reconstruct(moving, np.zeros(3), method="dop853", tolerance=1e-10).final_attitude
+    assert so3.angle(end @ np.diag([1.0, -1.0, -1.0])) < 1e-9
 
 
 @pytest.mark.parametrize("duration", [1.5, 2.0])

@@ -75,7 +75,7 @@ def explore_page(
     --------
     >>> series = sp.plotting.explore_page(sp.load_body("cat"), ("waist_pitch", "waist_yaw"), "explore.html")
     >>> print(series.box.round(3).tolist(), series.error < 1e-9)  # the map's ends [rad]
-    [[-2.352, 2.352], [-1.68, 1.68]] True
+    [[-2.286, 1.186], [-1.68, 1.68]] True
     """
     check_object(body, "Body", "body")
     check_file_name(path, "path")
