@@ -191,7 +191,11 @@ def test_robots_lists_bodies_and_motions(capsys):
         ([*CAT, "--tolerance", "1e-20"], 2, "tolerance"),
         ([*CAT, "--out", "result.txt"], 2, ".npz"),
         ([*CAT, "--out", "no/such/folder/r.npz"], 2, "no such folder"),
-        (["split", "dog", "cat_righting"], 2, "astronaut, cat, cat_two_halves, diver, satellite"),
+        (
+            ["split", "dog", "cat_righting"],
+            2,
+            "astronaut, astronaut_female, astronaut_suited, cat, cat_two_halves, cat_untwisted, diver, satellite",
+        ),
         (["split", "no/such.urdf", "cat_righting"], 2, "no such file"),
         (["split", "cat", "dancing"], 2, "cat_righting"),
         (["split", "cat", "no/such.csv"], 2, "no such file"),
