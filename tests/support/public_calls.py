@@ -64,7 +64,7 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
     found: dict[str, Callable[[], Any]] = {}
     given = {**GIVEN, "shape": 0.3 * np.ones(on.body.n_shape), "rate": 0.2 * np.ones(on.body.n_shape)}
     given |= {"link": on.body.link_names[-1], "name": on.body.joint_names[0], "reference": given["shape"]}
-    given |= {"joint_names": on.path.joint_names, "other": on.path}
+    given |= {"names": on.body.joint_names[:1], "joint_names": on.path.joint_names, "other": on.path}
     for field in dataclasses.fields(on):
         thing = getattr(on, field.name)
         for name, _ in inspect.getmembers(type(thing), inspect.isfunction):

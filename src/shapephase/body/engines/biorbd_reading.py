@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import biorbd
 import numpy as np
 
 from ...arrays import Array
-from .chain import Chain, UnusableModelError, check_name, locked_inertia
+from .chain import Chain, UnusableModelError, ball_names, check_name, locked_inertia
 
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 _WORDS = (
@@ -42,6 +43,14 @@ _VALUE = re.compile(rf"[+-]?(\(+[+-]?)?{_OPERAND}\)*([-+*/]\(*{_OPERAND}\)*)*", 
 """What biorbd reads right: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it."""
 _DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")
 """A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
+_QUATERNION = "_Quat"
+"""Behind the name of a segment, that of its ball joint; biorbd calls its numbers so, with X, Y, Z, and Z again."""
+_STEP = 0.01
+"""[s] of the differences that give the rates of segments with quaternions: the eighth power is near rounding."""
+_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
+"""Of the differences over so many steps to both sides (Fornberg 1988)."""
+_COARSE = 1e-9
+"""Share of the largest terms by which a momentum by differences may be off: short quaternions turn fast."""
 _NO_ROOT = ("root", "base")
 _MASSLESS = 1e-7
 """[kg]; biorbd gives a segment without mass 1e-8 kg."""
@@ -85,10 +94,6 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
         chain.add_link(name, traits.mass(), flip @ traits.CoM().to_array(), tensor, line)
         if name == base:
             continue
-        if segment.isRotationAQuaternion():
-            raise UnusableModelError(
-                f"segment {name!r} turns by a quaternion; joints of one axis are supported: write `rotations xyz`", line
-            )
         lack = max(lack, missing)
         chain.add_joints(parent, name, above @ frame[:3, 3], turn, _axes(segment, name), line)
     if lack > _EXACT:
@@ -299,12 +304,18 @@ def _name_base(chain: Chain, way: list[Any]) -> None:
         chain.base_slides = [f"{slides[axis].name().to_string()}_Trans{axis.upper()}" for axis in _AXES]
 
 
-def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float]]]:
-    """Slides, then hinges, each moved by those before it."""
+def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float] | None]]:
+    """Slides, then hinges or a ball joint, each moved by those before it."""
     ranges = [[found.min(), found.max()] for found in segment.QRanges()]
     kinds = [("prismatic", axis) for axis in segment.seqT().to_string()]
     kinds += [("revolute", axis) for axis in segment.seqR().to_string()]
     words = {"prismatic": "Trans", "revolute": "Rot"}
+    if segment.isRotationAQuaternion():
+        slides = [
+            (f"{name}_Trans{axis.upper()}", "prismatic", _AXES[axis], ranges[k])
+            for k, (_, axis) in enumerate(kinds[:-1])
+        ]
+        return [*slides, (f"{name}{_QUATERNION}", "ball", _AXES["x"], None)]
     return [
         (f"{name}_{words[kind]}{axis.upper()}", kind, _AXES[axis], limits)
         for (kind, axis), limits in zip(kinds, ranges, strict=True)
@@ -325,20 +336,39 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
     """What biorbd computes with the base at rest."""
     names = [name.to_string() for name in model.nameDof()]
     still = np.zeros(model.nbQ())
-    # The scalar parts of quaternions, which only a base can have here, come last.
+    # The scalar parts of quaternions come last, in the order of the segments.
     still[model.nbQ() - model.nbQuat() :] = 1.0
+    round_ones = [k for k in range(model.nbSegment()) if model.segment(k).isRotationAQuaternion()]
+    scalars = {model.segment(k).name().to_string(): len(still) - len(round_ones) + n for n, k in enumerate(round_ones)}
     tolerance = _EXACT + _FRAMES * lack
+
+    def coordinates(shape: dict[str, float]) -> Array:
+        q = still.copy()
+        for joint in {name.rpartition(".")[0] for name in shape if name.rpartition(".")[0].endswith(_QUATERNION)}:
+            four = np.array([shape[part] for part in ball_names(joint)])
+            segment, first = joint.removesuffix(_QUATERNION), names.index(f"{joint}X")
+            four /= np.sqrt(four @ four)
+            q[first : first + 3], q[scalars[segment]] = four[:3], four[3]
+        for name, value in shape.items():
+            if name in names:
+                q[names.index(name)] = value
+        return q
+
+    def poses(shape: dict[str, float]) -> Array:
+        there = biorbd.GeneralizedCoordinates(coordinates(shape))
+        return np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
+
     numbers = list(segments.values())
     traits = [model.segment(k).characteristics() for k in numbers]
     masses = np.array([part.mass() for part in traits])
     offsets = np.array([part.CoM().to_array() for part in traits])
     tensors = np.array([part.inertia().to_array() for part in traits])
     for shape, rate in chain.random_shapes():
-        q, v = still.copy(), np.zeros(model.nbQdot())
-        for name, value in shape.items():
-            q[names.index(name)], v[names.index(name)] = value, rate[name]
-        there, moves = biorbd.GeneralizedCoordinates(q), biorbd.GeneralizedVelocity(v)
-        frames = np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
+        there, v = biorbd.GeneralizedCoordinates(coordinates(shape)), np.zeros(model.nbQdot())
+        for name in names[: len(v)]:
+            v[names.index(name)] = rate.get(name, 0.0)
+        moves = biorbd.GeneralizedVelocity(v)
+        frames = poses(shape)
         root, frames = frames[segments[base], :3, :3], frames[numbers]
         turns = frames[:, :3, :3]
         centres = frames[:, :3, 3] + (turns @ offsets[:, :, None])[:, :, 0]
@@ -347,6 +377,28 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
         # Part by part: not all segments need belong to the body.
         speeds = np.array([speed.to_array() for speed in model.CoMdotBySegment(there, moves, True)])[numbers]
         omega = np.array([model.segmentAngularVelocity(there, moves, k, False).to_array() for k in numbers])
+        coarse = tolerance
+        if any(name.endswith(f"{_QUATERNION}.w") for name in shape):
+            # biorbd leaves the rates of quaternions out.
+            speeds, omega, coarse = *_by_differences(poses, shape, rate, numbers, offsets), max(tolerance, _COARSE)
         apart = centres - masses @ centres / masses.sum()
         momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
-        chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum, (tolerance, tolerance))
+        chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum, (tolerance, coarse))
+
+
+def _by_differences(
+    poses: Callable[[dict[str, float]], Array],
+    shape: dict[str, float],
+    rate: dict[str, float],
+    numbers: list[int],
+    offsets: Array,
+) -> tuple[Array, Array]:
+    """Velocities of the centres and angular velocities of segments, from where they are a little earlier and later."""
+    slopes = np.zeros((len(numbers), 4, 4))
+    for steps, weight in _WEIGHTS:
+        for side in (1.0, -1.0):
+            moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
+            slopes += side * weight / _STEP * poses(moved)[numbers]
+    spins = slopes[:, :3, :3] @ np.swapaxes(poses(shape)[numbers, :3, :3], 1, 2)
+    omega = 0.5 * np.stack([spins[:, i, j] - spins[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
+    return slopes[:, :3, 3] + (slopes[:, :3, :3] @ offsets[:, :, None])[:, :, 0], omega

@@ -69,13 +69,14 @@ class Chain:
         child: str,
         place: Array,
         turn: Array,
-        axes: list[tuple[str, str, Array, list[float]]],
+        axes: list[tuple[str, str, Array, list[float]]] | list[tuple[str, str, Array, list[float] | None]],
         line: int = 1,
     ) -> None:
         """The joints between two links, each moved by the one before it.
 
         place, turn : the first joint's axes in those of the parent (3,) [m], (3, 3)
-        axes : name, "revolute" or "prismatic", axis (3,), limits [rad or m]; none: the links are fixed to each other
+        axes : name, "revolute", "prismatic" or "ball", axis (3,), limits [rad or m]; none: the links are fixed to each
+            other
         """
         if not axes:
             ahead = np.array([1.0, 0.0, 0.0])
