@@ -276,6 +276,28 @@ run()
     assert (done.returncode, done.stdout, done.stderr) == (ExitCode.STOPPED, "", "shapephase: stopped\n")
 
 
+def test_ctrl_c_that_passed_through_text_that_a_compiled_module_ran(tmp_path):
+    """`python -m` ends by the signal then, though the exception was caught."""
+    source = f"""
+import ctypes, sys
+import shapephase.cli.motion as motion
+from shapephase.cli.start import run
+
+def running(*_, **__):
+    ctypes.pythonapi.PyRun_String.restype = ctypes.py_object
+    file_input, names = 257, ctypes.py_object({{}})
+    ctypes.pythonapi.PyRun_String(b"raise KeyboardInterrupt", file_input, names, names)
+
+motion.flight = running
+sys.argv[1:] = {list(CAT)!r}
+run()
+"""
+    (tmp_path / "pressed.py").write_text(source)
+    command = [sys.executable, "-m", "pressed"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (ExitCode.STOPPED, "", "shapephase: stopped\n")
+
+
 # ---- Exit codes -----------------------------------------------------------------------------------------------------
 
 

@@ -298,6 +298,19 @@ CASES = {
     "a seed of 400 digits, which is one": Case(
         make=lambda: _study(f"seed = {'9' * 400}\n{RIGID}[over.tolerance]\nvalues = [1e-9]\n"), outcome="accepted"
     ),
+    "a duration that is true": Case(
+        make=lambda: _study(RIGID.replace("3.0", "true")),
+        outcome="StudyError",
+        said="rigid.duration: true and false",
+    ),
+    "a time limit that is true": Case(
+        make=lambda: _study("time_limit = true\n" + RIGID), outcome="StudyError", said="time_limit: true and false"
+    ),
+    "momenta that may be drawn larger than any number": Case(
+        make=lambda: _study(RIGID + '[over.momentum_z]\ndistribution = "lognormal"\ndeviation = 1e308\n'),
+        outcome="StudyError",
+        said="no number holds what may be drawn",
+    ),
     "a store whose name has 300 letters": Case(
         make=lambda: Trial(kind="store", source="find", main="x" * 300),
         outcome="StudyStoreError",

@@ -24,6 +24,17 @@ def was_pressed() -> bool:
     return bool(_PRESSED)
 
 
+def forget() -> None:
+    """Make Python forget KeyboardInterrupt that was caught, so that it ends with the code that it is given.
+
+    Where one has passed through text that a compiled module had run, `python -m` would end by the signal instead;
+    running any text that ends well resets that.
+    """
+    import ctypes
+
+    ctypes.pythonapi.PyRun_SimpleString(b"")
+
+
 def _stop(number: int, _: FrameType | None) -> None:
     _PRESSED.append(number)
     raise KeyboardInterrupt

@@ -20,7 +20,7 @@ from ..errors import OutputFileError, ShapePhaseError
 from ..integrator.fast.switch import begin_command
 from ..provenance import command_line, provenance
 from .check import check_command
-from .ctrl_c import was_pressed
+from .ctrl_c import forget, was_pressed
 from .doctor import doctor_command
 from .exit_codes import ExitCode, exit_code_list, exit_code_of
 from .explore import explore_command
@@ -94,6 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 abandon(stream)
             code = ExitCode.BROKEN_PIPE
         except KeyboardInterrupt:
+            forget()
             say("shapephase: stopped", Verbosity.QUIET)
             code = ExitCode.STOPPED
     if code:

@@ -25,5 +25,6 @@ def run() -> None:
 
 
 def _end() -> None:
+    ctrl_c.forget()
     print("shapephase: stopped", file=sys.stderr)
     raise SystemExit(_STOPPED)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -15,6 +15,9 @@ from ..display import short_repr
 from ..errors import ShapeError
 
 Numbers = float | Sequence[float]
+
+_FARTHEST_DRAWN = 10.0
+"""Deviations from the mean; once in 1e23 draws one lies farther."""
 
 
 class Distribution(Protocol):
@@ -57,9 +60,11 @@ class Normal:
 
     def check(self, name: str, shape: tuple[int, ...]) -> None:
         """Raise ShapeError where it cannot give such values."""
-        _fitting(f"mean of {name}", self.mean, shape)
-        if np.any(_fitting(f"deviation of {name}", self.deviation, shape) < 0.0):
+        mean = _fitting(f"mean of {name}", self.mean, shape)
+        deviation = _fitting(f"deviation of {name}", self.deviation, shape)
+        if np.any(deviation < 0.0):
             raise ShapeError(f"deviation of {name}: 0 or more is needed, got {self.deviation}")
+        _check_drawn(name, lambda: np.abs(mean) + _FARTHEST_DRAWN * deviation)
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,7 @@ class LogNormal:
         for what, value in (("deviation", self.deviation), ("median", self.median)):
             if np.any(_fitting(f"{what} of {name}", value, shape) < 0.0):
                 raise ShapeError(f"{what} of {name}: 0 or more is needed, got {value}")
+        _check_drawn(name, lambda: np.asarray(self.median) * np.exp(_FARTHEST_DRAWN * np.asarray(self.deviation)))
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,7 @@ class Uniform:
         """Raise ShapeError where it cannot give such values."""
         if np.any(_fitting(f"high of {name}", self.high, shape) < _fitting(f"low of {name}", self.low, shape)):
             raise ShapeError(f"{name}: the high end lies below the low one, {self.high} and {self.low}")
+        _check_drawn(name, lambda: np.asarray(self.high) - np.asarray(self.low))
 
 
 @dataclass(frozen=True)
@@ -246,6 +253,13 @@ def drawn_values(seed: int, axis: str, cases: Integers, what: Distribution, shap
     for row, rng in enumerate(generators(seed, axis, cases)):
         values[row] = what.drawn(rng, shape)
     return values
+
+
+def _check_drawn(name: str, largest: Callable[[], Array]) -> None:
+    """Raise ShapeError where what is drawn may be larger than any number."""
+    with np.errstate(over="ignore"):
+        if not np.isfinite(largest()).all():
+            raise ShapeError(f"{name}: it is spread so widely that no number holds what may be drawn")
 
 
 def _fitting(name: str, value: Numbers, shape: tuple[int, ...]) -> Array:

@@ -87,6 +87,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 
 def _made(said: Mapping[str, Any], folder: Path) -> Study:
     _check_names("entry", said, _ENTRIES)
+    _check_truths(said, "")
     given: dict[str, Any] = {name: said[name] for name in _PLAIN if name in said}
     if ("body" in said or "body" in said.get("over", {})) == ("rigid" in said):
         raise StudyError("one of body and rigid is needed")
@@ -194,11 +195,16 @@ def _check_names(kind: str, said: Mapping[str, Any], known: Any, *, needed: Any 
 
 
 def _numbers(value: Any, name: str) -> Array:
-    if _has_truth(value):
-        raise StudyError(f"{name}: true and false are no numbers")
     return finite_array(value, name)
 
 
-def _has_truth(value: Any) -> bool:
-    """Whether something that is true or false stands where numbers may, which NumPy reads as 1 and 0."""
-    return isinstance(value, bool) or (isinstance(value, list) and any(map(_has_truth, value)))
+def _check_truths(value: Any, name: str) -> None:
+    """Raise StudyError for what is true or false, as no entry is: NumPy reads it as 1 and 0."""
+    if isinstance(value, bool):
+        raise StudyError(f"{name}: true and false are no numbers")
+    if isinstance(value, Mapping):
+        for key, entry in value.items():
+            _check_truths(entry, f"{name}.{key}" if name else key)
+    elif isinstance(value, list):
+        for entry in value:
+            _check_truths(entry, name)
