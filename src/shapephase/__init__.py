@@ -4,7 +4,8 @@ The folders are the rooms of the theory, from the bottom up: `body` (a model and
 `rigid_body` (rotations, in general and in closed form), `shape_space` (paths, connection, holonomy), `deformation`
 (inertia and internal momentum in time), `reconstruction` (the attitude), `dynamics` (what drives it), `phases`,
 `bounds` and `optimal_control`,
-`plotting` and `examples`, `study` (many of all that). Names are loaded when they are first used.
+`plotting` and `examples`, `study` (many of all that), `auditing` (is somebody else's trajectory right?). Names are
+loaded when they are first used.
 """
 
 from lazy_loader import attach_stub

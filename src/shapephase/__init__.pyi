@@ -1,4 +1,5 @@
 from . import (
+    auditing,
     body,
     bounds,
     deformation,
@@ -21,6 +22,10 @@ from . import (
     sphere,
     study,
 )
+from .auditing.audit_result import Audit
+from .auditing.floating_trajectory import FloatingTrajectory
+from .auditing.reading import read_trajectory
+from .auditing.trajectory_audit import audit
 from .body.body import Body
 from .body.catalog import load_body, robot_names
 from .body.family import BodyFamily
@@ -89,6 +94,7 @@ from .shape_space.summaries import BodySummary, PathSummary, body_summary, path_
 __version__: str
 __all__ = [
     "ArcPhases",
+    "Audit",
     "BaseDifference",
     "Body",
     "BodyFamily",
@@ -102,6 +108,7 @@ __all__ = [
     "ExternalTorque",
     "FinalAttitudes",
     "FixedPoints",
+    "FloatingTrajectory",
     "ForcedMotion",
     "ForcedSplit",
     "FreeHinges",
@@ -135,6 +142,8 @@ __all__ = [
     "UnphysicalInertiaWarning",
     "arc_phases",
     "articulated",
+    "audit",
+    "auditing",
     "base_difference",
     "body",
     "body_summary",
@@ -196,6 +205,7 @@ __all__ = [
     "reaction_null_space",
     "read_recorded_motion",
     "read_shape_path",
+    "read_trajectory",
     "reconstruct",
     "reconstruction",
     "rigid",

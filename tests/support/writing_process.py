@@ -23,6 +23,7 @@ from typing import Any
 from support.asked_process import Answers, AskedProcess, requests
 
 AS_NOBODY = 65534
+FLOWN = str(Path(__file__).parents[1] / "data" / "flown_cat.csv")
 CAT = ("cat", "cat_righting", "--momentum", "0", "0")
 # What commands write: words before the name of the file; the last one differs between the two versions of it.
 COMMANDS = {
@@ -44,6 +45,9 @@ COMMANDS = {
     "reach.svg": ("reach", ("diver", "cat_two_halves"), "--out"),
     "reach.pdf": ("reach", ("diver", "cat_two_halves"), "--out"),
     "reach.png": ("reach", ("diver", "cat_two_halves"), "--out"),
+    "audit.svg": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
+    "audit.pdf": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
+    "audit.png": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
     "conjugate.svg": ("conjugate", "1", "2", ("3", "4"), "--out"),
     "conjugate.pdf": ("conjugate", "1", "2", ("3", "4"), "--out"),
     "conjugate.png": ("conjugate", "1", "2", ("3", "4"), "--out"),

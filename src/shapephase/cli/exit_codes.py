@@ -29,6 +29,7 @@ class ExitCode(enum.IntEnum):
     NOT_FOUND = 7
     STUDY = 8
     CLUSTER = 9
+    WRONG = 10
     STOPPED = 130
     """By Ctrl-C: 128 and the number of the signal, as shells have it."""
     BROKEN_PIPE = 141
@@ -46,6 +47,7 @@ MEANINGS = {
     ExitCode.NOT_FOUND: "a search that found nothing; the best try is written",
     ExitCode.STUDY: "a study's file, or the store of another study",
     ExitCode.CLUSTER: "a cluster that cannot be reached, or not any more; what is stored is kept",
+    ExitCode.WRONG: "an audit that found a trajectory wrong; what explains it is written",
     ExitCode.STOPPED: "stopped by Ctrl-C; of plan, the best so far is written",
     ExitCode.BROKEN_PIPE: "what reads the output wants no more of it",
 }

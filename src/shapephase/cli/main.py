@@ -19,6 +19,7 @@ from .. import __version__
 from ..errors import OutputFileError, ShapePhaseError
 from ..integrator.fast.switch import begin_command
 from ..provenance import command_line, provenance
+from .audit import audit_command
 from .check import check_command
 from .ctrl_c import forget, was_pressed
 from .doctor import doctor_command
@@ -59,6 +60,7 @@ app.command(conjugate_command, name="conjugate")
 app.command(reach_command, name="reach")
 app.command(rigid_command, name="rigid")
 app.command(check_command, name="check")
+app.command(audit_command, name="audit")
 app.command(orbits_command, name="orbits")
 app.command(sweep_app)
 app.command(robots_command, name="robots")

@@ -136,15 +136,15 @@ def joint_motion(
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
     said = vars(recording) | {
-        "names": _names(recording.names),
+        "names": column_names(recording.names),
         "rest": _rest(recording.rest),
-        "flight": _flight(recording.flight),
+        "flight": flight_words(recording.flight),
     }
     recorded = read_recorded_motion(motion, body, **said)
     return recorded.path, recorded
 
 
-def _names(words: tuple[str, ...]) -> dict[str, str | None]:
+def column_names(words: tuple[str, ...]) -> dict[str, str | None]:
     """The mapping of `--names`: pairs, and files of pairs. Raises ShapeError for a column that stands twice."""
     found: dict[str, str | None] = {}
     for word in words:
@@ -156,7 +156,7 @@ def _names(words: tuple[str, ...]) -> dict[str, str | None]:
     return found
 
 
-def _flight(words: tuple[str, ...]) -> str | tuple[float, float] | None:
+def flight_words(words: tuple[str, ...]) -> str | tuple[float, float] | None:
     """What `--flight` says: a word or two times. Raises ShapeError."""
     if len(words) < 2:
         return words[0] if words else None

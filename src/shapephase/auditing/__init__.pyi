@@ -1,0 +1,32 @@
+from ._airborne import AirbornePart
+from ._consistency import RateAgreement
+from ._integration_step import StepOrder
+from ._noise import TrajectoryNoise
+from ._smooth_part import SmoothPart, smooth_part
+from .audit_result import Audit, RunAudit
+from .figures import audit_figure, write_audit_figure
+from .flight_recorder import FlightRecorder, assert_right_in_flight
+from .floating_trajectory import FloatingTrajectory
+from .hypothesis import FittedValue, Hypothesis
+from .reading import read_trajectory
+from .trajectory_audit import audit
+
+__all__ = [
+    "AirbornePart",
+    "Audit",
+    "FittedValue",
+    "FlightRecorder",
+    "FloatingTrajectory",
+    "Hypothesis",
+    "RateAgreement",
+    "RunAudit",
+    "SmoothPart",
+    "StepOrder",
+    "TrajectoryNoise",
+    "assert_right_in_flight",
+    "audit",
+    "audit_figure",
+    "read_trajectory",
+    "smooth_part",
+    "write_audit_figure",
+]

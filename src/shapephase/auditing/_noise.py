@@ -1,0 +1,104 @@
+"""How much noise the samples of a trajectory have: what is left of them after ever higher differences.
+
+White noise keeps its level from one order of differences to the next, and what is smooth loses digits with each; the
+least level that any order leaves is that of the noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import comb
+from scipy.stats import chi2
+
+from ..arrays import Array
+from ..display import short_repr
+from .floating_trajectory import FloatingTrajectory
+
+_LOWEST = 3
+"""Order of differences: the motion itself is in those below."""
+_HIGHEST = 12
+"""Order of differences, the samples allowing."""
+_ROUNDING = 8.0
+"""Units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrajectoryNoise:
+    """Standard deviations of the samples, each about each axis or of each joint alike.
+
+    Attributes
+    ----------
+    attitude : of the base [rad]
+    position : of its origin [m]
+    joints : [rad or m], one for each
+    rate : of the base's angular velocity [rad/s]
+    velocity : of its origin's [m/s]
+    joint_rates : [rad/s or m/s], one for each
+
+    Examples
+    --------
+    >>> sp.auditing.TrajectoryNoise(attitude=0.002, joints=(0.001,)).position
+    0.0
+    """
+
+    attitude: float = 0.0
+    position: float = 0.0
+    joints: tuple[float, ...] = ()
+    rate: float = 0.0
+    velocity: float = 0.0
+    joint_rates: tuple[float, ...] = ()
+
+    __repr__ = short_repr
+
+
+def estimated_noise(trajectory: FloatingTrajectory) -> TrajectoryNoise:
+    """The noise of each kind of samples."""
+    return TrajectoryNoise(
+        # Half the angle is in the quaternion, across it: three of its four numbers.
+        attitude=2.0 * _of_vector(_continuous(trajectory.quaternion)),
+        position=_of_vector(trajectory.position),
+        joints=_of_each(trajectory.shapes),
+        rate=_of_vector(trajectory.rate),
+        velocity=_of_vector(trajectory.velocity),
+        joint_rates=_of_each(trajectory.joint_rates),
+    )
+
+
+def _of_vector(samples: Array | None) -> float:
+    return 0.0 if samples is None else float(white_noise(samples[:, None], 3)[0])
+
+
+def _of_each(samples: Array | None) -> tuple[float, ...]:
+    return () if samples is None else tuple(white_noise(samples[:, :, None], 1).tolist())
+
+
+def white_noise(samples: Array, freedom: int) -> Array:
+    """Of c vectors (N, c, k) in whose directions the noise is alike: its standard deviation along each, (c,).
+
+    freedom : in how many directions there is noise
+    """
+    largest = np.abs(samples).max(axis=(0, 2), initial=0.0)
+    least = np.full(samples.shape[1], np.inf)
+    differences = samples
+    for order in range(1, min(_HIGHEST, len(samples) // 2) + 1):
+        differences = np.diff(differences, axis=0)
+        if order >= _LOWEST:
+            # The median: a blow or a break is in few of them.
+            squares = np.median((differences**2).sum(axis=2), axis=0) / comb(2 * order, order)
+            least = np.minimum(least, np.sqrt(squares / _median_square(freedom)))
+    return np.maximum(least, _ROUNDING * float(np.finfo(np.float64).eps) * largest)
+
+
+@lru_cache(maxsize=8)
+def _median_square(freedom: int) -> float:
+    """Of a vector with so many numbers of variance one."""
+    return float(chi2.median(freedom))
+
+
+def _continuous(quaternions: Array) -> Array:
+    """The same attitudes without changes of sign."""
+    flips = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    return quaternions * np.concatenate([[1.0], np.cumprod(flips)])[:, None]

@@ -1,0 +1,84 @@
+"""The slow part of residuals: what polynomials of low order take of them, and whether noise alone explains it.
+
+Causes of a drift act over many samples, and noise does not. The first polynomials that are orthogonal on the samples
+hold nearly all of the first and little of the second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+from scipy.stats import chi2
+
+from ..arrays import Array
+from ..display import short_repr
+
+_HIGHEST = 12
+"""Order of the polynomials, the samples allowing."""
+_SAMPLES_EACH = 3
+"""Samples that a polynomial needs."""
+_UNSURE = 1.5
+"""Of a variance: the noise of samples is itself estimated."""
+_CHANCE = 1e-6
+"""Probability with which noise alone is taken for something else, for one residual."""
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothPart:
+    """What the first polynomials take of residuals.
+
+    Attributes
+    ----------
+    values : (N, k) that they sum up to
+    ratio : its square in units of what noise alone brings, over the limit: above 1, noise does not explain it
+    noise : what noise alone brings to the values, rms
+
+    Examples
+    --------
+    >>> rest = np.zeros((40, 3))
+    >>> found = sp.auditing.smooth_part(np.linspace(0.0, 1.0, 40), rest, np.tile(np.eye(3), (40, 1, 1)), 1)
+    >>> print(found.ratio)
+    0.0
+    """
+
+    values: Array
+    ratio: float
+    noise: float
+
+    __repr__ = short_repr
+
+
+def polynomials(times: Array, highest: int) -> Array:
+    """(N, highest + 1) orthonormal on the samples."""
+    span = times[-1] - times[0]
+    return np.linalg.qr(legvander(2.0 * (times - times[0]) / span - 1.0, highest))[0]
+
+
+def smooth_part(
+    times: Array, residuals: Array, covariances: Array, free: int, carried: tuple[Array, Array] | None = None
+) -> SmoothPart:
+    """The smooth part of residuals (N, k) whose noise has covariances (N, k, k).
+
+    Parameters
+    ----------
+    free : how many of the lowest polynomials a body that nothing acts on may have
+    carried : instead of the covariances: what each of m unit noises of a sample adds to its residual, (N, k, m), and
+        to all that come after it, (N, k, m)
+    """
+    highest = int(min(_HIGHEST, max(free, len(times) // _SAMPLES_EACH)))
+    basis = polynomials(times, highest)[:, free:]
+    parts = basis.T @ residuals
+    # Of noise that is independent from sample to sample.
+    if carried is None:
+        spread = np.einsum("np,nq,nij->piqj", basis, basis, covariances)
+    else:
+        after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
+        of_each = np.einsum("np,nim->npim", basis, carried[0]) + np.einsum("np,nim->npim", after, carried[1])
+        spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
+    count = parts.size
+    matrix = spread.reshape(count, count)
+    square = float(parts.ravel() @ np.linalg.solve(matrix, parts.ravel()))
+    limit = _UNSURE * float(chi2.isf(_CHANCE, count))
+    return SmoothPart(basis @ parts, square / limit, float(np.sqrt(np.trace(matrix) / len(times))))

@@ -1,0 +1,307 @@
+"""The hypotheses that the numbers mean something else: other frames, orders, units or times than they were read in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import UnivariateSpline
+
+from ..arrays import Array
+from ..body.body import Body
+from ..warning_filters import quiet
+from ._consistency import rate_differences
+from ._noise import TrajectoryNoise
+from ._observation import observed
+from ._residuals import residuals
+from .floating_trajectory import FloatingTrajectory
+from .hypothesis import FittedValue, Hypothesis
+
+_STEPS = 8
+"""Of Gauss and Newton, for a time."""
+_ENOUGH = 1e-7
+"""Relative change of a fitted number below which it is kept."""
+_LONGEST = 0.1
+"""Of the trajectory: the longest shift in time that is tried; samples at the ends are lost by it."""
+_OTHER_FRAME = {"world": "base", "base": "world"}
+
+_SLACK = 1e-12
+"""Of the trajectory: rounding of a time."""
+_AS_GOOD_AS_EXACT = 1e-7
+"""Of the range of a joint or rate: noise below which the samples are taken as they are."""
+
+Change = Callable[[FloatingTrajectory], FloatingTrajectory]
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """Another way to read a trajectory."""
+
+    name: str
+    kind: str
+    change: Change
+    needs_rates: bool = False
+
+
+@dataclass(frozen=True)
+class _Gradual:
+    """Another way to read it by a number that says how much."""
+
+    name: str
+    kind: str
+    change: Callable[[FloatingTrajectory, _Curves, float], FloatingTrajectory]
+    label: str
+    unit: str
+    needs_rates: bool = False
+
+
+def other_readings(
+    body: Body,
+    runs: Sequence[FloatingTrajectory],
+    noise: TrajectoryNoise | None,
+    levels: Sequence[TrajectoryNoise],
+) -> list[tuple[Hypothesis, float]]:
+    """All of them, each applied to all runs, with the part of its square that is of the agreement of the rates.
+
+    noise : as stated; None: what the samples show, read in that way
+    levels : of each run as it is
+    """
+    given = all(run.joint_rates is not None for run in runs)
+    found = []
+    for reading in _readings(body, runs[0]):
+        if reading.needs_rates and not given:
+            continue
+        left = np.sum([_left(body, reading.change(run), noise) for run in runs], axis=0)
+        square, of_rates, freedom = left.tolist()
+        hypothesis = Hypothesis(
+            name=reading.name,
+            kind=reading.kind,
+            square=square,
+            left_over=float(np.sqrt(square / freedom)),
+            parameters=0,
+        )
+        found.append((hypothesis, of_rates))
+    curves = [_Curves(run, level) for run, level in zip(runs, levels, strict=True)]
+    return found + [
+        _gradual(body, reading, runs, curves, levels) for reading in _GRADUAL if given or not reading.needs_rates
+    ]
+
+
+def read_otherwise(body: Body, run: FloatingTrajectory) -> Iterator[FloatingTrajectory]:
+    """The trajectory in every other frame, order and unit that a place of the centre of mass depends on."""
+    for reading in _readings(body, run):
+        if not reading.needs_rates:
+            yield reading.change(run)
+
+
+def _readings(body: Body, run: FloatingTrajectory) -> Iterator[_Reading]:
+    order, frame, units = "quaternion", "frame", "units"
+    yield _Reading("quaternion written x y z w, read with w first", order, lambda t: _rolled(t, 1))
+    yield _Reading("quaternion written w x y z, read with w last", order, lambda t: _rolled(t, -1))
+    yield _Reading("quaternion of the world in base axes", order, lambda t: _inverse(t))
+    rate, velocity = _OTHER_FRAME[run.rate_axes], _OTHER_FRAME[run.velocity_axes]
+    yield _Reading(f"angular velocity in {rate} axes", frame, lambda t: replace(t, rate_axes=rate), needs_rates=True)
+    if run.velocity is not None:
+        yield _Reading(
+            f"linear velocity in {velocity} axes",
+            frame,
+            lambda t: replace(t, velocity_axes=velocity),
+            needs_rates=True,
+        )
+        yield _Reading(
+            f"angular velocity in {rate} axes, linear in {velocity}",
+            frame,
+            lambda t: replace(t, rate_axes=rate, velocity_axes=velocity),
+            needs_rates=True,
+        )
+    turning = np.array([unit == "rad" for unit in body.joint_units], dtype=bool)
+    if turning.any():
+        yield _Reading("joint angles in degrees", units, lambda t: _scaled(t, turning, angles=True))
+        for rates, base, name in (
+            (True, False, "joint rates in degrees per second"),
+            (False, True, "angular velocity of the base in degrees per second"),
+            (True, True, "all angular rates in degrees per second"),
+        ):
+            yield _Reading(name, units, lambda t, r=rates, b=base: _scaled(t, turning, r, b), needs_rates=True)
+        yield _Reading(
+            "joint angles and rates in degrees",
+            units,
+            lambda t: _scaled(t, turning, True, False, angles=True),
+            needs_rates=True,
+        )
+        yield _Reading(
+            "all angles and rates in degrees",
+            units,
+            lambda t: _scaled(t, turning, True, True, angles=True),
+            needs_rates=True,
+        )
+
+
+def _rolled(run: FloatingTrajectory, places: int) -> FloatingTrajectory:
+    return replace(run, quaternion=np.roll(run.quaternion, places, axis=1))
+
+
+def _inverse(run: FloatingTrajectory) -> FloatingTrajectory:
+    return replace(run, quaternion=run.quaternion * [-1.0, -1.0, -1.0, 1.0])
+
+
+def _scaled(
+    run: FloatingTrajectory, turning: Array, rates: bool = False, base: bool = False, *, angles: bool = False
+) -> FloatingTrajectory:
+    factor = np.where(turning, np.pi / 180.0, 1.0)
+    return replace(
+        run,
+        shapes=run.shapes * factor if angles else run.shapes,
+        joint_rates=run.joint_rates * factor if rates and run.joint_rates is not None else run.joint_rates,
+        rate=np.radians(run.rate) if base and run.rate is not None else run.rate,
+    )
+
+
+def _inside(run: FloatingTrajectory, lost: float) -> FloatingTrajectory:
+    """Samples at which what is late or early by so much is known."""
+    times = run.times
+    slack = _SLACK * float(times[-1] - times[0])
+    first = times[0] + max(-lost, 0.0) - slack
+    last = times[-1] - max(lost, 0.0) + slack
+    kept = np.flatnonzero((times >= first) & (times <= last))
+    return run.part(int(kept[0]), int(kept[-1]) + 1)
+
+
+class _Curves:
+    """Curves near the samples of a run, no nearer than their noise.
+
+    What a change of reading adds is taken from these: taken from the samples themselves, it would smooth their noise
+    and seem to explain it.
+    """
+
+    def __init__(self, run: FloatingTrajectory, level: TrajectoryNoise) -> None:
+        self._times = run.times
+        self.shapes = [_curve(run.times, *each) for each in zip(run.shapes.T, level.joints, strict=True)]
+        self.rates: list[Any] = []
+        self.base: dict[str, list[Any]] = {}
+        if run.joint_rates is not None:
+            pairs = zip(run.joint_rates.T, level.joint_rates, strict=True)
+            self.rates = [_curve(run.times, *each) for each in pairs]
+        for name, noise in (("rate", level.rate), ("velocity", level.velocity)):
+            values = getattr(run, name)
+            if values is not None:
+                self.base[name] = [_curve(run.times, column, noise) for column in values.T]
+
+    def moved(self, curves: Sequence[Any], times: Array, late: float) -> Array:
+        """What a shift in time adds: (N, k)."""
+        later = np.clip(times + late, self._times[0], self._times[-1])
+        return np.stack([curve(later) - curve(times) for curve in curves], axis=1)
+
+
+def _curve(times: Array, values: Array, noise: float) -> Any:
+    """Through the samples where they are as good as exact, else as near to them as their noise."""
+    exact = noise <= _AS_GOOD_AS_EXACT * float(np.ptp(values))
+    # Nearer than it says that it comes is near enough.
+    with quiet(category=UserWarning):
+        return UnivariateSpline(times, values, k=5, s=0.0 if exact else len(times) * noise**2)
+
+
+def _shifted_joints(run: FloatingTrajectory, curves: _Curves, late: float) -> FloatingTrajectory:
+    """Joints that were recorded late are taken from later samples."""
+    shapes = run.shapes + curves.moved(curves.shapes, run.times, late)
+    if run.joint_rates is None:
+        return replace(run, shapes=shapes)
+    return replace(run, shapes=shapes, joint_rates=run.joint_rates + curves.moved(curves.rates, run.times, late))
+
+
+def _shifted_rates(run: FloatingTrajectory, curves: _Curves, late: float) -> FloatingTrajectory:
+    assert run.joint_rates is not None
+    found = {name: getattr(run, name) + curves.moved(those, run.times, late) for name, those in curves.base.items()}
+    return replace(run, joint_rates=run.joint_rates + curves.moved(curves.rates, run.times, late), **found)
+
+
+def _sharpened_joints(run: FloatingTrajectory, curves: _Curves, width: float) -> FloatingTrajectory:
+    """A filter adds half its width, squared, times the second derivative; it is taken off again."""
+    half = 0.5 * width
+    shapes = run.shapes - half * np.stack([curve(run.times, 2) for curve in curves.shapes], axis=1)
+    if run.joint_rates is None:
+        return replace(run, shapes=shapes)
+    bent = np.stack([curve(run.times, 2) for curve in curves.rates], axis=1)
+    return replace(run, shapes=shapes, joint_rates=run.joint_rates - half * bent)
+
+
+def _left(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise | None) -> Array:
+    """Squares of all residuals, those of them that are of the agreement of the rates, and how many are independent."""
+    fit = residuals(observed(body, run, noise))
+    rates = rate_differences(run, fit.seen.noise)
+    if rates is None:
+        return np.array([fit.square, 0.0, fit.freedom])
+    square = float((rates.whitened**2).sum())
+    return np.array([fit.square + square, square, fit.freedom + rates.whitened.size])
+
+
+_GRADUAL = (
+    _Gradual("joints shifted in time", "time", _shifted_joints, "late by", "s"),
+    _Gradual("rates shifted in time", "time", _shifted_rates, "late by", "s", needs_rates=True),
+    _Gradual("joints filtered", "filter", _sharpened_joints, "square of the width", "s^2"),
+)
+
+
+def _gradual(
+    body: Body,
+    reading: _Gradual,
+    runs: Sequence[FloatingTrajectory],
+    curves: Sequence[_Curves],
+    levels: Sequence[TrajectoryNoise],
+) -> tuple[Hypothesis, float]:
+    """A number fitted by Gauss and Newton; samples that a shift loses count like those that are left."""
+    usual = float(np.median(np.diff(runs[0].times)))
+    span = float(runs[0].times[-1] - runs[0].times[0])
+    longest = _LONGEST * span if reading.unit == "s" else (_LONGEST * span) ** 2
+    # A filter has no negative width.
+    least = -longest if reading.unit == "s" else 0.0
+    nudge = 0.02 * usual if reading.unit == "s" else 0.1 * usual**2
+
+    def left(value: float, *lost: float) -> Array:
+        found = np.zeros(3)
+        for run, near, level in zip(runs, curves, levels, strict=True):
+            changed = reading.change(run, near, value)
+            for each in lost if reading.unit == "s" else ():
+                changed = _inside(changed, each)
+            found += _left(body, changed, level) * (len(run.times) / len(changed.times))
+        return found
+
+    # While the shift is looked for, the same samples count.
+    ends = (longest, -longest)
+    value, best = 0.0, left(0.0, *ends)
+    step, bend = nudge, 0.0
+    for _ in range(_STEPS):
+        ahead, behind = left(value + step, *ends)[0], left(value - step, *ends)[0]
+        slope, bend = (ahead - behind) / (2.0 * step), (ahead - 2.0 * best[0] + behind) / step**2
+        if not bend > 0.0:
+            break
+        change = float(np.clip(-slope / bend, -0.5 * longest, 0.5 * longest))
+        trial = float(np.clip(value + change, least, longest))
+        new = left(trial, *ends)
+        for _ in range(_STEPS):
+            if new[0] <= best[0]:
+                break
+            trial = 0.5 * (trial + value)
+            new = left(trial, *ends)
+        if new[0] > best[0]:
+            break
+        done = abs(trial - value) < _ENOUGH * abs(trial) + 1e-12 * usual
+        value, best = trial, new
+        step = max(min(nudge, 0.1 * abs(change)), 1e-4 * nudge)
+        if done:
+            break
+    found, without = left(value, value), left(0.0)
+    best = found if found[0] < without[0] else without
+    value = value if found[0] < without[0] else 0.0
+    bar = float(np.sqrt(2.0 / bend)) if bend > 0.0 else np.inf
+    hypothesis = Hypothesis(
+        name=reading.name,
+        kind=reading.kind,
+        square=float(best[0]),
+        left_over=float(np.sqrt(best[0] / best[2])),
+        parameters=1,
+        values={reading.label: FittedValue(value=value, bar=bar, unit=reading.unit)},
+    )
+    return hypothesis, float(best[1])

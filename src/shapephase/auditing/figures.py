@@ -1,0 +1,133 @@
+"""The figure of an audit: how momentum and attitude drift, and what each hypothesis leaves over."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arguments import check_file_name, check_object
+from ..errors import MissingExtraError, unknown_name
+from ..files import write_whole
+from ..plotting.plot_style import BLACK, COLUMN, GREY, SERIES, SKY, SMALL, axes_image
+from .audit_result import Audit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST_SHOWN = 8
+"""Hypotheses."""
+_ENDINGS = (".svg", ".pdf", ".png")
+_LEAST_SHARE = 1e-6
+"""Of what is to be explained: where the bars begin."""
+_A_ROW = 3
+"""Names of a legend beside each other."""
+_LONGEST = 34
+"""Letters of a name."""
+
+
+def audit_figure(found: Audit) -> Figure:
+    """Drift of the momentum, error of the attitude, and what the hypotheses leave over, below each other.
+
+    Raises
+    ------
+    MissingExtraError
+        Without Matplotlib.
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 51)
+    >>> still = sp.FloatingTrajectory(
+    ...     times=times, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (51, 1)), shapes=np.zeros((51, 3)))
+    >>> figure = sp.auditing.audit_figure(sp.audit(cat, still))
+    >>> [ax.get_ylabel() for ax in figure.axes]
+    ['momentum drift', 'attitude error [deg]']
+    """
+    check_object(found, "Audit", "found")
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingExtraError("figures need Matplotlib: pip install 'shapephase[plot]'") from error
+    rows = 3 if found.hypotheses else 2
+    figure = Figure(figsize=(1.5 * COLUMN, 1.6 * rows), layout="constrained")
+    axes = np.ravel(figure.subplots(rows, 1)).tolist()
+    _drift(axes[0], found)
+    _attitude(axes[1], found)
+    if found.hypotheses:
+        _causes(axes[2], found)
+    for ax in axes:
+        ax.tick_params(which="both", labelsize=SMALL)
+        ax.xaxis.label.set_fontsize(SMALL)
+        ax.yaxis.label.set_fontsize(SMALL)
+        ax.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def write_audit_figure(found: Audit, file: str | os.PathLike[str]) -> None:
+    """The figure of `audit_figure` as a file, by its ending .svg, .pdf or .png.
+
+    Raises
+    ------
+    UnknownNameError
+        For another ending.
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 51)
+    >>> still = sp.FloatingTrajectory(
+    ...     times=times, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (51, 1)), shapes=np.zeros((51, 3)))
+    >>> sp.auditing.write_audit_figure(sp.audit(cat, still), "audit.svg")
+    """
+    check_file_name(file, "file")
+    where = Path(file)
+    if where.suffix.lower() not in _ENDINGS:
+        raise unknown_name(f"ending of the figure {where}:", where.suffix, _ENDINGS)
+    image = axes_image(audit_figure(found).axes[0], where.suffix.lower()[1:])
+    write_whole(where, lambda stream: stream.write(image))
+
+
+def _drift(ax: Axes, found: Audit) -> None:
+    """Each run's momentum less that at its start, relative to what turns and moves the body."""
+    for run, style in zip(found.runs, _styles(len(found.runs)), strict=True):
+        scale = run.momentum_scale if run.momentum_scale > 0.0 else 1.0
+        drift = np.linalg.norm(run.momentum - run.momentum.mean(axis=0), axis=1) / scale
+        ax.plot(run.times, drift, label=_named(run.name, run.step, len(found.runs)), **style)
+    ax.axhline(found.tolerance, color=GREY, linewidth=0.8, linestyle=":")
+    ax.set_ylabel("momentum drift")
+    ax.set_yscale("log")
+    if len(found.runs) > 1:
+        ax.legend(fontsize=SMALL - 1, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=_A_ROW)
+
+
+def _attitude(ax: Axes, found: Audit) -> None:
+    for run, style in zip(found.runs, _styles(len(found.runs)), strict=True):
+        if run.attitude_error is not None:
+            ax.plot(run.times, np.degrees(run.attitude_error), **style)
+    ax.set_ylim(bottom=0.0)
+    ax.set_ylabel("attitude error [deg]")
+    ax.set_xlabel("time [s]")
+
+
+def _causes(ax: Axes, found: Audit) -> None:
+    """Bars of what is left over, relative to what is to be explained; those that are named are dark."""
+    shown = found.hypotheses[:_MOST_SHOWN]
+    named = {one.name for one in found.cause}
+    rows = np.arange(len(shown))[::-1]
+    shares = np.array([max(one.share, 2.0 * _LEAST_SHARE) for one in shown])
+    colours = [BLACK if one.name in named else SKY for one in shown]
+    ax.barh(rows, shares, left=0.0, color=colours, height=0.7)
+    ax.set_xscale("log")
+    ax.set_xlim(_LEAST_SHARE, 1.5)
+    ax.set_yticks(rows, [one.name if len(one.name) <= _LONGEST else one.name[:_LONGEST] + "…" for one in shown])
+    ax.set_xlabel("left over, as a part of what is wrong")
+
+
+def _named(name: str, step: float, runs: int) -> str:
+    return f"{name}, {1e3 * step:.4g} ms" if runs > 1 else name
+
+
+def _styles(count: int) -> list[dict[str, Any]]:
+    return [dict(SERIES[k % len(SERIES)]) for k in range(count)]

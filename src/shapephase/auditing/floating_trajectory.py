@@ -1,0 +1,256 @@
+"""A trajectory of a body that floats, as a simulator or a recorder has it: base, joints, and their rates if given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arguments import check_choice, check_object, positive_argument
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..display import short_repr
+from ..errors import ShapeError, TrajectoryError, unknown_name
+
+FRAMES = ("world", "base")
+_POSE = 7
+"""Numbers of a place and a quaternion."""
+_TWIST = 6
+"""Numbers of two velocities."""
+_FEWEST = 12
+"""Samples: fewer say nothing of noise."""
+_OFF_UNIT = 0.1
+"""What is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FloatingTrajectory:
+    """Base and joints of a floating body at N times.
+
+    Attributes
+    ----------
+    times : (N,) ascending [s]
+    quaternion : (N, 4) x y z w of the base, base axes to the world's
+    shapes : (N, n) joints in the body's order [rad or m]
+    position : (N, 3) of the base's origin, world axes [m], or None
+    rate : (N, 3) angular velocity of the base [rad/s], or None
+    velocity : (N, 3) of the base's origin [m/s], or None
+    joint_rates : (N, n) [rad/s or m/s], or None
+    rate_axes, velocity_axes : "world" or "base": in which axes these two are
+    step : of the integrator that made it [s]; None: that between samples
+    name : for people
+
+    Examples
+    --------
+    >>> times = np.linspace(0.0, 1.0, 21)
+    >>> qpos = np.column_stack([np.zeros((21, 3)), np.ones(21), np.zeros((21, 6))])
+    >>> rest = sp.FloatingTrajectory.from_mujoco(sp.load_body("cat_two_halves"), times, qpos)
+    >>> rest.quaternion[0].tolist()
+    [0.0, 0.0, 0.0, 1.0]
+    """
+
+    times: Array
+    quaternion: Array
+    shapes: Array
+    position: Array | None = None
+    rate: Array | None = None
+    velocity: Array | None = None
+    joint_rates: Array | None = None
+    rate_axes: str = "base"
+    velocity_axes: str = "world"
+    step: float | None = None
+    name: str = "trajectory"
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Check the arrays against each other. Raises ShapeError, TrajectoryError, UnknownNameError."""
+        where, put = self.name, object.__setattr__
+        times = finite_array(self.times, f"{where}: times", (None,), unit="s")
+        if len(times) < _FEWEST:
+            raise TrajectoryError(f"{where}: {len(times)} samples; an audit needs {_FEWEST} or more")
+        if np.any(np.diff(times) <= 0.0):
+            late = int(np.argmax(np.diff(times) <= 0.0)) + 1
+            raise TrajectoryError(
+                f"{where}: sample {late}: time {times[late]:.9g} s does not come after the one before"
+            )
+        put(self, "times", times)
+        shapes = finite_array(self.shapes, f"{where}: shapes", (len(times), None))
+        trailing = {"quaternion": 4, "position": 3, "rate": 3, "velocity": 3, "joint_rates": shapes.shape[1]}
+        put(self, "shapes", shapes)
+        for name, count in trailing.items():
+            value = getattr(self, name)
+            if value is not None:
+                put(self, name, finite_array(value, f"{where}: {name}", (len(times), count)))
+        check_choice(self.rate_axes, "rate_axes", FRAMES)
+        check_choice(self.velocity_axes, "velocity_axes", FRAMES)
+        if self.step is not None:
+            positive_argument(self.step, "step")
+        if (self.rate is None) != (self.joint_rates is None):
+            raise ShapeError(f"{where}: the rates of the base and of the joints come together, and one is missing")
+        lengths = np.linalg.norm(self.quaternion, axis=1)
+        worst = int(np.argmax(np.abs(lengths - 1.0)))
+        if abs(lengths[worst] - 1.0) > _OFF_UNIT:
+            raise TrajectoryError(f"{where}: sample {worst}: a quaternion of length {lengths[worst]:.6g}, not 1")
+        put(self, "quaternion", self.quaternion / lengths[:, None])
+
+    @staticmethod
+    def from_mujoco(
+        body: Body,
+        times: ArrayLike,
+        qpos: ArrayLike,
+        qvel: ArrayLike | None = None,
+        *,
+        joint_names: Sequence[str] | None = None,
+        step: float | None = None,
+        name: str = "trajectory",
+    ) -> FloatingTrajectory:
+        """Of MuJoCo's arrays, free joint first: the linear velocity is in world axes, the angular one in base axes.
+
+        Parameters
+        ----------
+        times : (N,) [s]
+        qpos : (N, 7 + n) place, quaternion w x y z, joints
+        qvel : (N, 6 + n), or None
+        joint_names : in the order of these arrays; None: in the body's order
+        step : of the integrator [s]; None: that between samples
+
+        Raises
+        ------
+        ShapeError, UnknownNameError, TrajectoryError
+            For arrays that do not fit each other or the body.
+
+        Examples
+        --------
+        >>> qpos = np.column_stack([np.zeros((21, 3)), np.ones(21), np.zeros((21, 6))])
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> sp.FloatingTrajectory.from_mujoco(cat, np.linspace(0.0, 1.0, 21), qpos).shapes.shape
+        (21, 3)
+        """
+        places, rates = _arrays(body, qpos, qvel, joint_names, ("qpos", "qvel"))
+        given = _rates(rates, "base", "world")
+        quaternion = np.roll(places[:, 3:_POSE], -1, axis=1)
+        return FloatingTrajectory(
+            times=np.asarray(times, dtype=float),
+            position=places[:, :3],
+            quaternion=quaternion,
+            shapes=places[:, _POSE:],
+            step=step,
+            name=name,
+            **given,
+        )
+
+    @staticmethod
+    def from_pinocchio(
+        body: Body,
+        times: ArrayLike,
+        q: ArrayLike,
+        v: ArrayLike | None = None,
+        *,
+        joint_names: Sequence[str] | None = None,
+        step: float | None = None,
+        name: str = "trajectory",
+    ) -> FloatingTrajectory:
+        """Of Pinocchio's arrays, as Crocoddyl stores them: both velocities of the base are in base axes.
+
+        Parameters
+        ----------
+        times : (N,) [s]
+        q : (N, 7 + n) place, quaternion x y z w, joints, each by one number
+        v : (N, 6 + n), or None
+        joint_names : in the order of these arrays; None: in the body's order
+        step : of the integrator [s]; None: that between samples
+
+        Raises
+        ------
+        ShapeError, UnknownNameError, TrajectoryError
+            For arrays that do not fit each other or the body.
+
+        Examples
+        --------
+        >>> q = np.column_stack([np.zeros((21, 6)), np.ones(21), np.zeros((21, 3))])
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> sp.FloatingTrajectory.from_pinocchio(cat, np.linspace(0.0, 1.0, 21), q).quaternion[0].tolist()
+        [0.0, 0.0, 0.0, 1.0]
+        """
+        places, rates = _arrays(body, q, v, joint_names, ("q", "v"))
+        given = _rates(rates, "base", "base")
+        return FloatingTrajectory(
+            times=np.asarray(times, dtype=float),
+            position=places[:, :3],
+            quaternion=places[:, 3:_POSE],
+            shapes=places[:, _POSE:],
+            step=step,
+            name=name,
+            **given,
+        )
+
+    @property
+    def attitude(self) -> Array:
+        """(N, 3, 3) base axes to the world's."""
+        return so3.matrix_from_quat(self.quaternion)
+
+    @property
+    def base_rate(self) -> Array | None:
+        """(N, 3) angular velocity of the base, base axes [rad/s]."""
+        if self.rate is None or self.rate_axes == "base":
+            return self.rate
+        return so3.apply(so3.transpose(self.attitude), self.rate)
+
+    @property
+    def world_velocity(self) -> Array | None:
+        """(N, 3) of the base's origin, world axes [m/s]."""
+        if self.velocity is None or self.velocity_axes == "world":
+            return self.velocity
+        return so3.apply(self.attitude, self.velocity)
+
+    @property
+    def integrator_step(self) -> float:
+        """As given, else the usual one between samples [s]."""
+        return float(np.median(np.diff(self.times))) if self.step is None else self.step
+
+    def part(self, first: int, past: int) -> FloatingTrajectory:
+        """Samples from `first` up to `past`, which is left out."""
+        return self._cut(slice(first, past))
+
+    def every(self, count: int) -> FloatingTrajectory:
+        """The first sample, and one of every so many after it."""
+        return self._cut(slice(None, None, count))
+
+    def _cut(self, samples: slice) -> FloatingTrajectory:
+        names = ("times", "quaternion", "shapes", "position", "rate", "velocity", "joint_rates")
+        return replace(self, **{name: None if (had := getattr(self, name)) is None else had[samples] for name in names})
+
+
+def _arrays(
+    body: Body, places: ArrayLike, rates: ArrayLike | None, names: Sequence[str] | None, labels: tuple[str, str]
+) -> tuple[Array, Array | None]:
+    """Both arrays with their joints in the body's order."""
+    check_object(body, "Body", "body")
+    order = list(body.joint_names if names is None else names)
+    for joint in body.joint_names:
+        if joint not in order:
+            raise unknown_name("joint among joint_names", joint, order)
+    columns = [order.index(joint) for joint in body.joint_names]
+    full = finite_array(places, labels[0], (None, _POSE + len(order)))
+    found = np.hstack([full[:, :_POSE], full[:, _POSE:][:, columns]])
+    if rates is None:
+        return found, None
+    turned = finite_array(rates, labels[1], (len(full), _TWIST + len(order)))
+    return found, np.hstack([turned[:, :_TWIST], turned[:, _TWIST:][:, columns]])
+
+
+def _rates(rates: Array | None, rate_axes: str, velocity_axes: str) -> dict[str, Any]:
+    if rates is None:
+        return {}
+    return {
+        "velocity": rates[:, :3],
+        "rate": rates[:, 3:_TWIST],
+        "joint_rates": rates[:, _TWIST:],
+        "rate_axes": rate_axes,
+        "velocity_axes": velocity_axes,
+    }

@@ -1,0 +1,89 @@
+"""A cause that may explain what is wrong with a trajectory, with what was fitted for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..display import short_repr
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedValue:
+    """A number that was fitted.
+
+    Attributes
+    ----------
+    value, bar : the number and its standard deviation by the noise
+    unit : "" for a ratio
+
+    Examples
+    --------
+    >>> sp.auditing.FittedValue(value=0.031, bar=0.002).unit
+    ''
+    """
+
+    value: float
+    bar: float
+    unit: str = ""
+
+    __repr__ = short_repr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hypothesis:
+    """A cause, fitted.
+
+    Attributes
+    ----------
+    name : for people, as "mass of head"
+    kind : "inertia", "torque", "force", "time", "filter", "frame", "quaternion", "units" or "step"
+    square : what is left over, squared and summed in units of the noise
+    left_over : the same as the rms of a residual, in units of the noise
+    share : of the rms without any hypothesis
+    parameters : how many numbers were fitted for it
+    values : what they are
+    remark : what else is to be said
+
+    Examples
+    --------
+    >>> sp.auditing.Hypothesis(name="mass of head", kind="inertia", square=300.0, left_over=1.0, parameters=1).values
+    {}
+    """
+
+    name: str
+    kind: str
+    square: float
+    left_over: float
+    parameters: int
+    share: float = 1.0
+    values: Mapping[str, FittedValue] = field(default_factory=dict)
+    remark: str = ""
+
+    __repr__ = short_repr
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The same as JSON can hold it."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "left_over": self.left_over,
+            "share": self.share,
+            "square": self.square,
+            "parameters": self.parameters,
+            "values": {name: {"value": v.value, "bar": v.bar, "unit": v.unit} for name, v in self.values.items()},
+            "remark": self.remark,
+        }
+
+    @property
+    def text(self) -> str:
+        """The fitted numbers in a line."""
+        return ", ".join(f"{name} {_shown(found)}" for name, found in self.values.items())
+
+
+def _shown(found: FittedValue) -> str:
+    if found.unit == "%":
+        return f"{found.value:+.3g} %"
+    return f"{found.value:.6g} {found.unit}".rstrip()

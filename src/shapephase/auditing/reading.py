@@ -1,0 +1,201 @@
+"""Trajectories with their base from files: MuJoCo's, Pinocchio's and biorbd's arrays, and recordings of any kind."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import so3
+from ..arguments import check_file_name, check_object, positive_argument
+from ..arrays import Array, finite_array
+from ..body.body import Body
+from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError
+from ..files import npz_arrays
+from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
+from ..shape_space.files.formats.text_tables import read_delimited
+from ..shape_space.files.read import read_recorded_motion
+from .floating_trajectory import FloatingTrajectory
+
+_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot)[_\[ ]?(\d+)\]?")
+"""Labels of a table such as qpos_0, qpos[0] and qpos0."""
+_ROOT = 6
+"""Coordinates of biorbd's root: three places, three angles."""
+_TEXTS = (".csv", ".tsv", ".txt")
+
+
+def read_trajectory(
+    file: str | os.PathLike[str],
+    body: Body,
+    *,
+    step: float | None = None,
+    names: Mapping[str, str | None] | str | os.PathLike[str] | None = None,
+    degrees: bool | None = None,
+    timestep: float | None = None,
+    topic: str | None = None,
+    rest_missing: bool = False,
+    ignore_extra: bool = False,
+    base_order: str | None = None,
+    base_axes: Any = None,
+) -> FloatingTrajectory:
+    """A trajectory with its base.
+
+    By the arrays of an NPZ file, or the columns of a table with the same names and numbers (`qpos_0`, `qpos[1]`):
+
+    - `qpos` and, if there, `qvel`: MuJoCo's, joints in the order of `joint_names` where that is given, else the body's;
+    - `q` and, if there, `v`: Pinocchio's, each joint by one number;
+    - `Q` and, if there, `Qdot`: biorbd's, (6 + n, N) or (N, 6 + n), the root first.
+
+    Times are the array or column `time`, or follow from `timestep`, an array of one number or the argument. All other
+    files are read as `read_recorded_motion` does, whose arguments the rest are: joints, attitude and place of the base.
+
+    Parameters
+    ----------
+    step : of the integrator that made it [s]; None: that between samples, or the file's array `timestep`
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    TrajectoryError, ShapeError, UnknownNameError
+        For faults of the file, and for one that does not say where the base is.
+
+    Examples
+    --------
+    >>> qpos = np.column_stack([np.zeros((21, 3)), np.ones(21), np.zeros((21, 6))])
+    >>> np.savez("rest.npz", time=np.linspace(0.0, 1.0, 21), qpos=qpos)
+    >>> sp.read_trajectory("rest.npz", sp.load_body("cat_two_halves")).shapes.shape
+    (21, 3)
+    """
+    check_object(body, "Body", "body")
+    check_file_name(file, "file")
+    where = Path(file)
+    suffix = where.suffix.lower()
+    if step is not None:
+        step = positive_argument(step, "step")
+    arrays = _arrays(where, suffix) if suffix in (".npz", *_TEXTS) else {}
+    kind = next((kind for kind in ("qpos", "q", "Q") if kind in arrays), None)
+    if kind is not None:
+        return _of_arrays(where, arrays, kind, body, step, timestep)
+    recorded = read_recorded_motion(
+        file,
+        body,
+        names=names,
+        degrees=degrees,
+        timestep=timestep,
+        topic=topic,
+        rest_missing=rest_missing,
+        ignore_extra=ignore_extra,
+        base_order=base_order,
+        base_axes=base_axes,
+    )
+    if recorded.base_attitude is None:
+        raise TrajectoryError(
+            f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
+            "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
+        )
+    return FloatingTrajectory(
+        times=recorded.times,
+        quaternion=so3.quat_from_matrix(recorded.base_attitude),
+        shapes=recorded.path.shape(recorded.times),
+        position=recorded.base_position,
+        step=step,
+        name=where.name,
+    )
+
+
+def _arrays(where: Path, suffix: str) -> dict[str, Any]:
+    """Of an NPZ file; of a table those whose columns are numbered, and the time."""
+    if not where.exists():
+        raise InputFileNotFoundError(f"{where}: there is no such file")
+    data = file_bytes(where)
+    if suffix == ".npz":
+        try:
+            return npz_arrays(data, 4 * MOST_BYTES)
+        except ValueError as error:
+            raise TrajectoryError(f"{where}: {error}") from None
+    return _of_table(read_delimited(where, data))
+
+
+def _of_table(table: Table) -> dict[str, Any]:
+    found: dict[str, dict[int, Array]] = {}
+    for label, values in table.columns.items():
+        match = _NUMBERED.fullmatch(label.strip())
+        if match:
+            table.check_column(label)
+            found.setdefault(match[1], {})[int(match[2])] = values
+    arrays: dict[str, Any] = {}
+    for name, columns in found.items():
+        if sorted(columns) != list(range(len(columns))):
+            raise TrajectoryError(
+                f"{table.where}: columns {name} are numbered {sorted(columns)}; 0, 1, 2, ... is needed"
+            )
+        arrays[name] = np.stack([columns[k] for k in range(len(columns))], axis=1)
+    times = next((label for label in table.columns if label.strip() in ("time", "t", "time [s]")), None)
+    if arrays and times is not None:
+        table.check_column(times)
+        arrays["time"] = table.columns[times]
+    return arrays
+
+
+def _of_arrays(
+    where: Path, arrays: Mapping[str, Any], kind: str, body: Body, step: float | None, timestep: float | None
+) -> FloatingTrajectory:
+    rates = {"qpos": "qvel", "q": "v", "Q": "Qdot"}[kind]
+    names = [str(name) for name in np.ravel(arrays["joint_names"])] if "joint_names" in arrays else None
+    stored = arrays.get("timestep")
+    try:
+        places = finite_array(arrays[kind], f"{where}: {kind}", (None, None))
+        moving = None if rates not in arrays else finite_array(arrays[rates], f"{where}: {rates}", (None, None))
+        if kind == "Q" and places.shape[0] == _ROOT + body.n_shape and places.shape[1] != places.shape[0]:
+            places, moving = places.T, None if moving is None else moving.T
+        times = _times(where, arrays, len(places), timestep)
+        if step is None and stored is not None and np.size(stored) == 1:
+            step = positive_argument(float(np.ravel(stored)[0]), "timestep")
+        if kind == "Q":
+            return replace(_of_biorbd(body, times, places, moving), step=step, name=where.name)
+        make = FloatingTrajectory.from_mujoco if kind == "qpos" else FloatingTrajectory.from_pinocchio
+        return make(body, times, places, moving, joint_names=names, step=step, name=where.name)
+    except ShapeError as error:
+        raise TrajectoryError(f"{where}: {error}".replace(f"{where}: {where}", f"{where}")) from None
+
+
+def _times(where: Path, arrays: Mapping[str, Any], count: int, timestep: float | None) -> Array:
+    if "time" in arrays:
+        return finite_array(arrays["time"], f"{where}: time", (count,), unit="s")
+    between = timestep if timestep is not None else arrays.get("timestep")
+    if between is None or np.size(between) != 1:
+        raise TrajectoryError(f"{where}: no times: an array 'time', or one number 'timestep' is needed (--timestep)")
+    spacing = positive_argument(float(np.ravel(between)[0]), "timestep")
+    return np.arange(count, dtype=np.float64) * spacing
+
+
+def _of_biorbd(body: Body, times: Array, places: Array, rates: Array | None) -> FloatingTrajectory:
+    """Of biorbd's generalised coordinates: three places, three angles in the order of the body's file, the joints."""
+    if places.shape[1] != _ROOT + body.n_shape:
+        raise TrajectoryError(
+            f"Q has {places.shape[1]} coordinates; three places, three angles and {body.n_shape} joints are needed"
+        )
+    axes = "xyz" if body.base_angles is None else body.base_angles[1]
+    turned = np.broadcast_to(np.eye(3), (len(places), 3, 3))
+    rate = np.zeros((len(places), 3))
+    for k, axis in enumerate(axes):
+        unit = np.eye(3)["xyz".index(axis)]
+        turn = so3.exp(places[:, 3 + k, None] * unit)
+        turned = turned @ turn
+        if rates is not None:
+            # What was there before is seen from axes that have turned on.
+            rate = so3.apply(so3.transpose(turn), rate) + rates[:, 3 + k, None] * unit
+    given = {} if rates is None else {"rate": rate, "velocity": rates[:, :3], "joint_rates": rates[:, _ROOT:]}
+    return FloatingTrajectory(
+        times=times,
+        position=places[:, :3],
+        quaternion=so3.quat_from_matrix(turned),
+        shapes=places[:, _ROOT:],
+        **given,
+    )

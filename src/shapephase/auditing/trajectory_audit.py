@@ -1,0 +1,306 @@
+"""Is a trajectory right in flight? Momentum, fall, attitude and rates against the laws of a free body, and why not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .. import so3
+from ..arguments import check_object, positive_argument
+from ..arrays import Array
+from ..body.body import Body
+from ..deformation.deformation import articulated
+from ..error_bars.recorded_momentum import momentum_from_recording
+from ..errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
+from ..letters import what_came
+from ..reconstruction.reconstruction import reconstruct
+from ..shape_space.shape_path import ShapePath
+from ..warning_filters import quiet
+from ._airborne import AirbornePart, airborne_part
+from ._consistency import rate_agreement
+from ._integration_step import StepOrder, as_semi_implicit_euler, step_hypothesis, step_order
+from ._noise import TrajectoryNoise
+from ._observation import Observation, observed
+from ._outside_pushes import outside_pushes
+from ._ranking import Candidate, Ranking, ranking
+from ._residuals import Residuals, residuals
+from ._smooth_part import smooth_part
+from ._transformations import other_readings, read_otherwise
+from ._wrong_inertias import wrong_inertias
+from .audit_result import Audit, RunAudit
+from .floating_trajectory import FloatingTrajectory
+from .hypothesis import Hypothesis
+
+_QUIET = 1e-6
+"""[rad] Noise of the attitude below which the first sample is the start of the exact reconstruction."""
+_AS_EULER = 0.2
+"""Of the drift of one run: less is left by what semi-implicit Euler does, where it agrees with that."""
+_ONE_AXIS = 1e-3
+"""Of the base's rates: less is across their main axis where the base turns about one axis alone."""
+_MOST_SAMPLES = 500
+"""Of each run, by which hypotheses are told apart."""
+_NEARLY_ALL = 0.9
+"""Of the samples: with so many in the air nobody asks whether there would be more, were they read otherwise."""
+_JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
+
+
+def audit(
+    body: Body,
+    trajectories: FloatingTrajectory | Sequence[FloatingTrajectory],
+    *,
+    tolerance: float = 1e-3,
+    flight: str | Sequence[float] = "auto",
+    noise: TrajectoryNoise | None = None,
+) -> Audit:
+    """Look whether trajectories obey the laws of a free body, and what explains it if they do not.
+
+    In the air the angular momentum about the centre of mass is constant, the centre of mass goes along a parabola, and
+    the rates are those of the configurations. A trajectory is right where all three hold within its own noise or
+    within the tolerance. Where they do not, each hypothesis is fitted and ranked by what it leaves over: the
+    integrator's step and order (from several runs), a link's mass, centre or inertia, a torque or a force from
+    outside, a shift in time or a filter of the joints, frames of velocities, the order of quaternions, degrees.
+    Hypotheses that the noise cannot separate are named together.
+
+    Parameters
+    ----------
+    body : as it should be
+    trajectories : one, or several runs of the same body, with different steps to find the order of an integrator
+    tolerance : of momentum and rates relative to those that turn and move the body, of the fall to its extent;
+        without unit
+    flight : "auto", where the centre of mass falls; "all"; or its first and last time [s]
+    noise : of the samples; None: what they show
+
+    Raises
+    ------
+    ShapeError
+        For arguments of the wrong kind.
+    TrajectoryError
+        If a trajectory has no flight that is long enough.
+
+    Examples
+    --------
+    >>> top, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 101)
+    >>> path = sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(top, path), [0.0, 0.001, 0.02])
+    >>> trajectory = sp.FloatingTrajectory(
+    ...     times=times, quaternion=sp.so3.quat_from_matrix(motion.attitude(times)), shapes=path.shape(times))
+    >>> sp.audit(top, trajectory).right
+    True
+    """
+    check_object(body, "Body", "body")
+    runs = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
+    if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
+        raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
+    within = positive_argument(tolerance, "tolerance", "a ratio")
+    parts = [_airborne(body, run, flight) for run in runs]
+    flown = [run.part(part.first, part.past) for run, part in zip(runs, parts, strict=True)]
+    seen = [observed(body, run, noise) for run in flown]
+    fits = [residuals(one) for one in seen]
+    looked = [_run_audit(body, run, one, part, within) for run, one, part in zip(flown, seen, parts, strict=True)]
+    order = step_order(seen, [one.momentum_noise for one in looked])
+    notes = _notes(seen, looked, order)
+    if all(one.right for one in looked):
+        return Audit(
+            body=body.name, runs=tuple(looked), tolerance=within, hypotheses=(), cause=(), step_order=order, notes=notes
+        )
+    found = _ranked(body, flown, fits, looked, order, noise)
+    return Audit(
+        body=body.name,
+        runs=tuple(looked),
+        tolerance=within,
+        hypotheses=found.ranked,
+        cause=found.tie,
+        step_order=order,
+        notes=notes,
+    )
+
+
+def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]) -> AirbornePart:
+    """The part in the air; a trajectory that falls only if it is read otherwise is looked at as it falls then."""
+    found, fault = None, None
+    try:
+        found = airborne_part(body, run, flight)
+    except TrajectoryError as error:
+        fault = error
+    if found is not None and found.past - found.first >= _NEARLY_ALL * len(run.times):
+        return found
+    for other in read_otherwise(body, run):
+        try:
+            part = airborne_part(body, other, flight)
+        except TrajectoryError:
+            continue
+        if found is None or part.past - part.first > found.past - found.first:
+            found = replace(part, how=f"{part.how}, if it is read otherwise")
+    if found is None:
+        assert fault is not None
+        raise fault
+    return found
+
+
+def _run_audit(
+    body: Body, run: FloatingTrajectory, seen: Observation, part: AirbornePart, tolerance: float
+) -> RunAudit:
+    scale = seen.scale
+    momentum = seen.seen(seen.momentum)
+    free = 1 if seen.given_rates else 2
+    smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise)
+    values, level = smooth.values, smooth.noise
+    if not seen.given_rates:
+        values = np.gradient(values, seen.times, axis=0)
+        level /= seen.times[-1] - seen.times[0]
+    drift = float(np.linalg.norm(values, axis=1).max())
+    fall = None
+    if seen.centre is not None and seen.centre_noise is not None:
+        fall = smooth_part(seen.times, seen.centre, seen.centre_noise, 3)
+    agreement = rate_agreement(run, seen.noise)
+    off = None if fall is None else float(np.linalg.norm(fall.values, axis=1).max())
+    error = _attitude_error(body, seen)
+    right = _holds(smooth.ratio, drift / scale if scale > 0.0 else 0.0, tolerance)
+    right = right and (fall is None or off is None or _holds(fall.ratio, off / seen.extent, tolerance))
+    if agreement is not None:
+        # Half a step apart, as semi-implicit integrators leave them, is no fault.
+        late = abs(agreement.late) <= run.integrator_step
+        belongs = _holds(agreement.ratio, agreement.mismatch, tolerance)
+        right = right and (belongs or (late and agreement.mismatch_less_late <= tolerance))
+    return RunAudit(
+        name=run.name,
+        airborne=part,
+        first_time=float(run.times[0]),
+        last_time=float(run.times[-1]),
+        given_rates=seen.given_rates,
+        step=run.integrator_step,
+        noise=seen.noise,
+        times=seen.times,
+        momentum=seen.momentum,
+        momentum_scale=scale,
+        momentum_drift=drift,
+        momentum_noise=level / scale if scale > 0.0 else 0.0,
+        momentum_ratio=smooth.ratio,
+        fall_off=off,
+        fall_ratio=None if fall is None else fall.ratio,
+        extent=seen.extent,
+        agreement=agreement,
+        attitude_error=error,
+        right=right,
+    )
+
+
+def _holds(ratio: float, value: float, tolerance: float) -> bool:
+    return ratio <= 1.0 or value <= tolerance
+
+
+def _attitude_error(body: Body, seen: Observation) -> Array | None:
+    """How far the attitude is from the exact reconstruction of the same joint motion: (N,) [rad]."""
+    try:
+        with quiet(category=TrajectoryWarning):
+            return _from_exact(body, seen)
+    except ShapePhaseError:
+        # What is wrong may be so wrong that no motion follows.
+        return None
+
+
+def _from_exact(body: Body, seen: Observation) -> Array:
+    times = seen.times - seen.times[0]
+    path = ShapePath.spline(times, seen.trajectory.shapes, periodic=False, joint_names=body.joint_names)
+    moving = articulated(body, path)
+    if seen.noise.attitude >= _QUIET:
+        fitted = momentum_from_recording(moving, times, seen.attitude)
+        return np.linalg.norm(fitted.residuals, axis=1)
+    motion = reconstruct(moving, seen.momentum[0], seen.attitude[0])
+    exact = motion.attitude(np.minimum(times, motion.duration))
+    return so3.angle(so3.transpose(exact) @ seen.attitude)
+
+
+def _ranked(
+    body: Body,
+    runs: Sequence[FloatingTrajectory],
+    fits: Sequence[Residuals],
+    looked: Sequence[RunAudit],
+    order: StepOrder | None,
+    noise: TrajectoryNoise | None,
+) -> Ranking:
+    seen = [fit.seen for fit in fits]
+    stepped = _step(body, seen, order)
+    runs = [_thinned(run) for run in runs]
+    fits = [residuals(observed(body, run, one.noise)) for run, one in zip(runs, looked, strict=True)]
+    agreements = [rate_agreement(run, one.noise) for run, one in zip(runs, looked, strict=True)]
+    of_rates = sum(one.square for one in agreements if one is not None)
+    more = sum(one.residuals.size for one in agreements if one is not None)
+    freedom = sum(fit.freedom for fit in fits)
+    square = sum(fit.square for fit in fits)
+    candidates = [
+        Candidate(hypothesis=_with(found, of_rates, freedom + more), of_rates=of_rates)
+        for found in (*wrong_inertias(body, fits), *outside_pushes(fits))
+    ]
+    readings = other_readings(body, runs, noise, [fit.seen.noise for fit in fits])
+    candidates += [Candidate(hypothesis=found, of_rates=rates) for found, rates in readings]
+    if stepped is not None:
+        # What is late in the rates by a part of the step comes from it, too.
+        rest = sum(
+            one.square * (one.mismatch_less_late / max(one.mismatch, 1e-300)) ** 2
+            for one in agreements
+            if one is not None
+        )
+        made = replace(stepped, square=stepped.square * square)
+        candidates.append(Candidate(hypothesis=_with(made, rest, freedom + more), of_rates=rest))
+    found = ranking(candidates, square + of_rates, freedom + more)
+    whole = square + of_rates
+    return Ranking(
+        ranked=tuple(_shared(one, whole) for one in found.ranked), tie=tuple(_shared(one, whole) for one in found.tie)
+    )
+
+
+def _shared(found: Hypothesis, whole: float) -> Hypothesis:
+    return replace(found, share=float(np.sqrt(found.square / whole)) if whole > 0.0 else 0.0)
+
+
+def _thinned(run: FloatingTrajectory) -> FloatingTrajectory:
+    """As many samples as hypotheses are told apart by, evenly taken."""
+    every = -(-len(run.times) // _MOST_SAMPLES)
+    return run if every == 1 else replace(run.every(every), step=run.integrator_step)
+
+
+def _step(body: Body, seen: Sequence[Observation], order: StepOrder | None) -> Hypothesis | None:
+    """The integrator's step as a cause; its square is relative to all there is to explain."""
+    if order is not None:
+        return step_hypothesis(order)
+    if len(seen) > 1:
+        return None
+    share = as_semi_implicit_euler(body, seen[0])
+    if share is None or share > _AS_EULER:
+        return None
+    return Hypothesis(
+        name="integration step",
+        kind="step",
+        square=share**2,
+        left_over=share,
+        parameters=0,
+        remark="consistent with semi-implicit Euler; a run with half the step tells",
+    )
+
+
+def _with(found: Hypothesis, of_rates: float, freedom: int) -> Hypothesis:
+    """The same with what it leaves of the agreement of the rates."""
+    square = max(found.square, 0.0) + of_rates
+    return replace(found, square=square, left_over=float(np.sqrt(square / freedom)))
+
+
+def _notes(seen: Sequence[Observation], looked: Sequence[RunAudit], order: StepOrder | None) -> tuple[str, ...]:
+    found = [_JOINT_TORQUES]
+    if not all(one.given_rates for one in seen):
+        found.append("Rates are not given: neither their frames nor whether they belong to the attitudes can be told.")
+    for one in seen:
+        rates = so3.apply(one.attitude, one.rate)
+        strengths = np.linalg.svd(rates, compute_uv=False)
+        if strengths[1] <= _ONE_AXIS * strengths[0]:
+            found.append(
+                f"{one.trajectory.name}: the base turns about one axis alone, so that the frame of its angular "
+                "velocity cannot be told."
+            )
+    if any(one.fall_ratio is None for one in looked):
+        found.append("Places are not given: nothing is known of the fall, nor of a force from outside.")
+    if order is None and len(seen) == 1:
+        found.append("One run says at most that a drift is consistent with an integration step; runs with others tell.")
+    return tuple(found)

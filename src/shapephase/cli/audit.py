@@ -1,0 +1,171 @@
+"""`shapephase audit`: whether trajectories of a simulator or a recorder are right in flight, and if not, why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from .options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, PrintOptions
+from .outcome import Outcome, check_writable
+from .progress import steps
+from .terminal import say_written
+
+_ENDINGS = (".svg", ".pdf", ".png")
+
+Trajectories = Annotated[
+    str,
+    Parameter(
+        help="Its trajectories with the base: NPZ or CSV with MuJoCo's qpos and qvel, Pinocchio's q and v or biorbd's "
+        "Q and Qdot, or a recording with the attitude of the base; several are runs with different steps. For example "
+        "`run.npz`."
+    ),
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class TrajectoryOptions:
+    """How a trajectory is read; each is an argument of `read_trajectory`."""
+
+    step: Annotated[
+        tuple[float, ...],
+        Parameter(
+            show_default=False,
+            negative_iterable="",
+            consume_multiple=True,
+            help="Step of the integrator of each trajectory, in s; without it that between its samples. For example "
+            "`--step 0.001 0.002`.",
+        ),
+    ] = ()
+    timestep: Annotated[
+        float | None,
+        Parameter(
+            show_default=False,
+            help="Time between samples, in s, for files without times; for example `--timestep 0.01`.",
+        ),
+    ] = None
+    names: Annotated[
+        tuple[str, ...],
+        Parameter(
+            show_default=False,
+            negative_iterable="",
+            consume_multiple=True,
+            help="Which column of a recording is which joint: COLUMN=JOINT, COLUMN= to leave it out, or a file of such "
+            "lines; for example `--names LKnee=left_knee`.",
+        ),
+    ] = ()
+    degrees: Annotated[
+        bool | None,
+        Parameter(
+            negative="--radians",
+            show_default=False,
+            help="Turning joints of a recording are in degrees, or in radians; without it, as the file says. For "
+            "example `--degrees`.",
+        ),
+    ] = None
+    rest_missing: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            show_default=False,
+            help="Joints without a column rest at zero, or at their limit next to it; for example `--rest-missing`.",
+        ),
+    ] = False
+    ignore_extra: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            show_default=False,
+            help="Columns that are no joints of the body are left out; for example `--ignore-extra`.",
+        ),
+    ] = False
+    base_order: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="The axes of the base's recorded angles in the order in which they turn, without unit; without it zxy "
+            "for OpenSim's, zyx for roll, pitch and yaw. For example `--base-order yxz`.",
+        ),
+    ] = None
+    base_axes: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Where the x, y and z axis of the body's base point to in the axes whose attitude was recorded, "
+            "without unit; without it x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`.",
+        ),
+    ] = None
+
+
+AS_IT_IS = TrajectoryOptions()
+
+
+def audit_command(
+    body: BodyArgument,
+    /,
+    *trajectories: Trajectories,
+    floating: BodyOptions = AS_WRITTEN,
+    tolerance: float = 1e-3,
+    flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
+    reading: TrajectoryOptions = AS_IT_IS,
+    figure: Path | None = None,
+    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+) -> Outcome:
+    """Audit trajectories in flight: momentum, fall, attitude and rates, and what explains it if they are wrong.
+
+    The exit code is 0 where all are right within their noise or the tolerance, else 10.
+
+    Parameters
+    ----------
+    tolerance
+        Of momentum and rates relative to those that turn and move the body, and of the fall relative to its extent,
+        without unit; for example `--tolerance 1e-6`.
+    flight
+        What is in the air: auto (where the centre of mass falls), all, or its first and last time, in s; for example
+        `--flight all` or `--flight 0.4 1.2`.
+    figure
+        Write drift, error of the attitude and what the hypotheses leave over to this figure, .svg, .pdf or .png;
+        without it none is written. For example `--figure audit.pdf`.
+    """
+    from ..auditing.figures import write_audit_figure
+    from ..auditing.reading import read_trajectory
+    from ..auditing.trajectory_audit import audit
+    from ..errors import ShapeError
+    from .exit_codes import ExitCode
+    from .motion import body_argument, column_names, flight_words
+
+    aside = check_writable(figure, "--figure", *_ENDINGS)
+    if not trajectories:
+        raise ShapeError("audit: one trajectory or more is needed after the body")
+    if len(reading.step) not in (0, 1, len(trajectories)):
+        raise ShapeError(f"--step: one for each of {len(trajectories)} trajectories is needed, got {len(reading.step)}")
+    loaded = body_argument(body, floating)
+    given = reading.step or (None,)
+    each = given if len(given) == len(trajectories) else given * len(trajectories)
+    with steps(2) as work:
+        work.begin("reading")
+        runs = [
+            read_trajectory(
+                file,
+                loaded,
+                step=step,
+                names=column_names(reading.names),
+                degrees=reading.degrees,
+                timestep=reading.timestep,
+                rest_missing=reading.rest_missing,
+                ignore_extra=reading.ignore_extra,
+                base_order=reading.base_order,
+                base_axes=reading.base_axes,
+            )
+            for file, step in zip(trajectories, each, strict=True)
+        ]
+        work.begin("auditing")
+        found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto")
+        if figure is not None:
+            write_audit_figure(found, figure)
+            say_written(figure)
+    code = ExitCode.DONE if found.right else ExitCode.WRONG
+    return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})
