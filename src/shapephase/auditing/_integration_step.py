@@ -66,7 +66,7 @@ def step_order(runs: Sequence[Observation], least: Sequence[float]) -> StepOrder
     least : of each run, what a drift has to exceed, rms relative to the momenta
     """
     ordered = sorted(zip(runs, least, strict=True), key=lambda pair: pair[0].trajectory.integrator_step)
-    known = [(run, _drift(run)) for run, limit in ordered if _rms(_drift(run)) / run.scale > _ABOVE * limit]
+    known = [(run, _drift(run)) for run, limit in ordered if _rms(_drift(run)) > _ABOVE * limit * run.scale]
     steps = [run.trajectory.integrator_step for run, _ in known]
     if len(known) < 2 or any(longer < _APART * shorter for shorter, longer in pairwise(steps)):
         return None

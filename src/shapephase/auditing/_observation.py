@@ -80,10 +80,15 @@ class Observation:
         return float(np.sqrt((turning**2 + self.internal**2).sum(axis=1).mean()))
 
     @property
+    def finest(self) -> float:
+        """What rounding of a momentum is relative to: the same, or of a body at rest a turn by one in all the time."""
+        span = float(self.times[-1] - self.times[0])
+        return self.scale + float(np.trace(self.inertia, axis1=1, axis2=2).mean()) / span
+
+    @property
     def extent(self) -> float:
         """A length of the body [m]."""
-        mean = np.trace(self.inertia, axis1=1, axis2=2).mean()
-        return float(np.sqrt(0.5 * mean / self.mass))
+        return _extent(self.inertia, self.mass)
 
     def seen(self, momentum: Array) -> Array:
         """A momentum in time (N, ..., 3 at axis 1 kept), as it is looked at: itself, or its sum over the time."""
@@ -93,6 +98,11 @@ class Observation:
         steps = steps.reshape(-1, *([1] * (momentum.ndim - 1)))
         summed = np.cumsum(0.5 * steps * (momentum[1:] + momentum[:-1]), axis=0)
         return np.concatenate([np.zeros_like(momentum[:1]), summed])
+
+
+def _extent(inertia: Array, mass: float) -> float:
+    """Radius of gyration, in the mean [m]."""
+    return float(np.sqrt(0.5 * np.trace(inertia, axis1=1, axis2=2).mean() / mass))
 
 
 def with_rates(trajectory: FloatingTrajectory) -> FloatingTrajectory:
@@ -122,7 +132,8 @@ def observed(body: Body, trajectory: FloatingTrajectory, noise: TrajectoryNoise 
     assert joint_rates is not None
     inertia, internal = body.sample(moving.shapes, joint_rates)
     from_base = so3.apply(inertia, rate) + internal
-    centre, centre_noise = _centre(body, moving, attitude, level)
+    extent = _extent(inertia, body.mass)
+    centre, centre_noise = _centre(body, moving, attitude, level, extent)
     seen = Observation(
         mass=body.mass,
         trajectory=moving,
@@ -154,10 +165,10 @@ def _momentum_noise(body: Body, seen: Observation, from_base: Array) -> Array:
             np.swapaxes(answers, 1, 2) * np.array(level.joints),
             body.momentum_matrix(moving.shapes) * np.array(level.joint_rates),
         ]
-        least = _ROUNDING * seen.scale
+        least = _ROUNDING * seen.finest
         turned = seen.attitude @ np.concatenate(factors, axis=2)
     else:
-        least = _ROUNDING * seen.scale * float(moving.times[-1] - moving.times[0])
+        least = _ROUNDING * seen.finest * float(moving.times[-1] - moving.times[0])
         turned = seen.carried_noise[0]
     return turned @ np.swapaxes(turned, 1, 2) + least**2 * np.eye(3)
 
@@ -182,7 +193,7 @@ def _carried_noise(body: Body, seen: Observation) -> tuple[Array, Array]:
 
 
 def _centre(
-    body: Body, moving: FloatingTrajectory, attitude: Array, level: TrajectoryNoise
+    body: Body, moving: FloatingTrajectory, attitude: Array, level: TrajectoryNoise, extent: float
 ) -> tuple[Array | None, Array | None]:
     """Of mass, and the covariance of each sample."""
     if moving.position is None:
@@ -196,5 +207,5 @@ def _centre(
     answers = np.swapaxes(moved, 1, 2)[nearest]
     factors = attitude @ np.concatenate([level.attitude * so3.hat(own), answers * np.array(level.joints)], axis=2)
     centre = moving.position + so3.apply(attitude, own)
-    least = _ROUNDING * float(np.abs(centre).max() + np.abs(own).max())
+    least = _ROUNDING * float(np.abs(centre).max() + np.abs(own).max() + extent)
     return centre, factors @ np.swapaxes(factors, 1, 2) + (level.position**2 + least**2) * np.eye(3)

@@ -66,6 +66,13 @@ def smooth_part(
     free : how many of the lowest polynomials a body that nothing acts on may have
     carried : instead of the covariances: what each of m unit noises of a sample adds to its residual, (N, k, m), and
         to all that come after it, (N, k, m)
+
+    Examples
+    --------
+    >>> times, noise = np.linspace(0.0, 1.0, 40), np.tile(1e-4 * np.eye(1), (40, 1, 1))
+    >>> drift = sp.auditing.smooth_part(times, times[:, None] ** 2, noise, 1)
+    >>> drift.ratio > 1.0  # more than noise of 0.01
+    True
     """
     highest = int(min(_HIGHEST, max(free, len(times) // _SAMPLES_EACH)))
     basis = polynomials(times, highest)[:, free:]

@@ -106,7 +106,8 @@ def assert_right_in_flight(
     >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 51)
     >>> still = sp.FloatingTrajectory(
     ...     times=times, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (51, 1)), shapes=np.zeros((51, 3)))
-    >>> sp.auditing.assert_right_in_flight(cat, still)
+    >>> print(sp.auditing.assert_right_in_flight(cat, still))
+    None
     """
     found = audit(body, trajectories, tolerance=tolerance, flight=flight)
     if not found.right:
