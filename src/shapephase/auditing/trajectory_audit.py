@@ -75,7 +75,7 @@ def audit(
     Raises
     ------
     ShapeError
-        For arguments of the wrong kind.
+        For arguments of the wrong kind, and bodies with ball joints.
     TrajectoryError
         If a trajectory has no flight that is long enough.
 
@@ -90,6 +90,8 @@ def audit(
     True
     """
     check_object(body, "Body", "body")
+    if body.ball_joints:
+        raise ShapeError(f"audits take joints of one axis; {body.name} has ball joints: {', '.join(body.ball_joints)}")
     runs = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
     if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
         raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
