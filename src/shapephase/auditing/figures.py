@@ -79,7 +79,8 @@ def write_audit_figure(found: Audit, file: str | os.PathLike[str]) -> None:
     >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 51)
     >>> still = sp.FloatingTrajectory(
     ...     times=times, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (51, 1)), shapes=np.zeros((51, 3)))
-    >>> sp.auditing.write_audit_figure(sp.audit(cat, still), "audit.svg")
+    >>> print(sp.auditing.write_audit_figure(sp.audit(cat, still), "audit.svg"))
+    None
     """
     check_file_name(file, "file")
     where = Path(file)
