@@ -33,7 +33,7 @@ KINDS = {
 }
 """Which files, and how many different ones load at least."""
 REASONS = (
-    *("is massless|has mass", "no segment has mass", "turns by a quaternion", "biorbd reads 'x' alone"),
+    *("is massless|has mass", "no segment has mass", "biorbd reads 'x' alone"),
     *("biorbd does not accept it: (All|axesNames|The 'recalculate')", "of any cut it is from 2 to pi times"),
 )
 """Of the files that do not load."""
