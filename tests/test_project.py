@@ -101,7 +101,7 @@ def test_the_readme_s_recording_is_split_as_it_says(tmp_path, monkeypatch, capsy
     assert printed.startswith(estimates.sub("", table))
 
 
-@pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.full) for k in (1, 2, 3))])
+@pytest.mark.parametrize("number", [0, *(pytest.param(k, marks=pytest.mark.full) for k in (1, 2, 3, 4))])
 def test_the_readme_s_bodies_of_other_formats_are_checked_and_split(number, monkeypatch, capsys):
     """Each by one command, where its extra is installed, without a warning."""
     monkeypatch.chdir(ROOT)

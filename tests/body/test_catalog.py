@@ -199,19 +199,6 @@ def test_a_file_too_large_to_be_a_urdf_is_not_read(tmp_path):
         sp.load_body(path)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        GOOD.replace('value="1.0"', 'value="${arm_mass}"'),
-        GOOD.replace('value="1.0"', 'value="$(arg m)"'),
-        '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="m"/>' + BASE + "</robot>",
-    ],
-)
-def test_xacro_must_be_run_first(text, load_urdf):
-    with pytest.raises(ModelFileError, match="run `xacro"):
-        load_urdf(text)
-
-
 def test_a_finished_xacro_with_its_namespace_left_is_a_urdf(load_urdf):
     text = GOOD.replace('name="small"', 'name="small" xmlns:xacro="http://www.ros.org/wiki/xacro"')
     assert load_urdf(text).mass == 4.0

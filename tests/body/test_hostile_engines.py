@@ -30,7 +30,11 @@ TWO = (
 TRUNK = ROOT.replace("pelvis_offset", "trunk_offset").replace("/bodyset/pelvis", "/bodyset/trunk")
 ARM = joint("PinJoint", "elbow", "trunk", "arm", [coordinate("bend")])
 SOUND = model(TWO, [TRUNK, ARM])
-GOOD = {"mjcf": GOOD_MJCF, "biomod": ACROBAT, "opensim": SOUND, "yeadon": measured()}
+MACROS = (
+    '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="m" value="2"/><link name="l">'
+    '<inertial><mass value="${m}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>'
+)
+GOOD = {"mjcf": GOOD_MJCF, "biomod": ACROBAT, "opensim": SOUND, "yeadon": measured(), "xacro": MACROS}
 """A file of each format."""
 ENDS = {
     "import os; os.abort()": "crashed on it, signal 6",
@@ -135,10 +139,30 @@ YEADON = {
     "a list of itself": ("measurementconversionfactor: &a [*a]\n", "a number above zero is needed"),
     "a length beyond the stars": (measured(Ls1L="1.0e+300"), r"no real body|finite|has a mass|does not accept|beyond"),
 }
-QUICK = ("a list of itself", "two megabytes", "a call", "a comment without end", "a centre that is no number")
+CALL = '<xacro:macro name="f"><xacro:f/></xacro:macro><xacro:f/>'
+XACRO = {
+    "an include of itself": (MACROS.replace("<link", '<xacro:include filename="body.xacro"/><link'), "recursion"),
+    "a macro of itself": (MACROS.replace("<link", CALL + "<link"), "recursion"),
+    "a text of gigabytes": (MACROS.replace("${m}", "${'1' * 10**10}"), "more than 1024 MiB|does not accept it"),
+    "a number of hours": (MACROS.replace("${m}", "${9**9**9**9}"), "took more than 5 s"),
+    "a division by zero": (MACROS.replace("${m}", "${m / 0}"), "does not accept it: .*division by zero"),
+    "a name that is not there": (MACROS.replace("${m}", "${n}"), "does not accept it: .*'n'"),
+    "an argument that is not given": (MACROS.replace("${m}", "$(arg n)"), "does not accept it: .*n"),
+    "a package that is not there": (MACROS.replace("${m}", "$(find nowhere)"), "does not accept it: .*nowhere"),
+    "a file that is opened": (MACROS.replace("${m}", "${open('/etc/passwd').read()}"), "does not accept it: "),
+    "a way around the builtins": (MACROS.replace("${m}", "${().__class__.__base__}"), "does not accept it: "),
+}
+QUICK = (
+    "a list of itself",
+    "two megabytes",
+    "a call",
+    "a comment without end",
+    "a centre that is no number",
+    "a macro of itself",
+)
 FILES = [
     pytest.param(kind, *case, id=f"{kind}: {name}", marks=() if name in QUICK else pytest.mark.full)
-    for kind, cases in (("osim", OSIM), ("bioMod", BIOMOD), ("txt", YEADON))
+    for kind, cases in (("osim", OSIM), ("bioMod", BIOMOD), ("txt", YEADON), ("xacro", XACRO))
     for name, case in cases.items()
 ]
 

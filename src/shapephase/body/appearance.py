@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import math
+import os
 import warnings
 from base64 import b64decode
 from collections.abc import Callable, Iterator
@@ -23,9 +24,9 @@ from ..inertia_tensor import principal_axes, second_moment
 from ._drawing_limits import within_limits
 from .body import Body, MovingPart
 from .catalog import example_folder
-from .engines.engine_tree import engine_shapes
+from .engines.engine_tree import engine_shapes, expanded
 from .engines.formats import MJCF, format_of
-from .formats.urdf import rpy_matrix
+from .formats.urdf import macro_of, rpy_matrix
 from .formats.xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
 
 Colour = tuple[float, float, float, float]
@@ -132,7 +133,7 @@ def visuals(body: Body) -> tuple[Visual, ...]:
 
 def drawn_shapes(body: Body) -> tuple[list[Visual], list[str]]:
     """What a body's file has to show, and what in it cannot be shown."""
-    looks = _Looks(body.file.parent if body.file else Path())
+    looks = _Looks(body.file.parent if body.file else Path(), body.packages)
     root = _unchanged(body, looks.doubts)
     if root is not None:
         _read_mjcf(body, looks) if root.tag == "mujoco" else _read_urdf(root, looks)
@@ -175,6 +176,7 @@ class _Looks:
     """What is found on the way through a file that lies in `folder`."""
 
     folder: Path
+    packages: tuple[str, ...] = ()
     found: list[Visual] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
     meshes: dict[Path, list[_Piece]] = field(default_factory=dict)
@@ -203,7 +205,14 @@ def _unchanged(body: Body, doubts: list[str]) -> Node | None:
         doubts.append(f"{body.file} has changed since {body.name} was loaded from it; load it again to see it")
         return None
     # What engines own is drawn as boxes: a file of measurements has no shapes, and meshes of bioMod are not read.
-    return xml_tree(content, str(body.file)) if format_of(content) in (None, MJCF) else None
+    root = xml_tree(content, str(body.file)) if format_of(content) in (None, MJCF) else None
+    if root is None or root.tag != "robot" or macro_of(root) is None:
+        return root
+    try:
+        return expanded(body.file, body.packages)
+    except (MissingExtraError, ModelFileError) as error:
+        doubts.append(str(error))
+        return None
 
 
 def _part_box(part: MovingPart) -> Visual:
@@ -289,7 +298,7 @@ def _rgba(node: Node, owner: str) -> Colour:
 def _mesh_shapes(node: Node, empty: Visual, colour: Colour | None, owner: str, looks: _Looks) -> list[Visual]:
     """A mesh, in pieces of one colour each."""
     name = node.get("filename") or ""
-    path = next((p for p in _mesh_places(name, looks.folder) if _is_file(p)), None)
+    path = next((p for p in _mesh_places(name, looks) if _is_file(p)), None)
     if path is None:
         raise node.fault(owner, f"the mesh {quoted(name)!r} is not found")
     if path.suffix.lower() not in _MESHES:
@@ -313,10 +322,17 @@ def _mesh_shapes(node: Node, empty: Visual, colour: Colour | None, owner: str, l
     ]
 
 
-def _mesh_places(name: str, folder: Path) -> Iterator[Path]:
-    """Where a mesh may be: in a package that lies around the URDF or in example-robot-data, or beside the URDF."""
+def _mesh_places(name: str, looks: _Looks) -> Iterator[Path]:
+    """Where a mesh may be: in a package where these are looked for, that lies around the URDF or in example-robot-data,
+    or beside the URDF.
+    """
+    folder = looks.folder
     scheme, _, rest = name.partition("://") if "://" in name else ("", "", name)
-    around = [folder, *folder.parents]
+    around = [
+        *(Path(place) for one in looks.packages for place in (one, os.path.dirname(one))),
+        folder,
+        *folder.parents,
+    ]
     if scheme == "file":
         yield Path(unquote(rest))
     elif scheme:

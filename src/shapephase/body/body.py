@@ -53,6 +53,7 @@ class Body:
     ----------
     name : str
     sha256, file : of the file it was loaded from, and where that was; None without a file
+    packages : folders in which the packages that the file names were looked for
     joint_names : tuple of the independent joints, in the order of the shape vector; of a ball joint "shoulder" its
         four numbers "shoulder.x", "shoulder.y", "shoulder.z" and "shoulder.w"
     n_shape : number of their coordinates
@@ -86,6 +87,7 @@ class Body:
         self.name = name
         self.sha256: str | None = None
         self.file: Path | None = None
+        self.packages: tuple[str, ...] = ()
         self.base_angles: tuple[tuple[str, ...], str] | None = None
         self.base_slides: tuple[str, ...] | None = None
         self.mass = float(pin.computeTotalMass(model))

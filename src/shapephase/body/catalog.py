@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import subprocess
 import sys
@@ -28,12 +29,14 @@ from ._cross_check import check_against_file
 from ._link_tree import inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
-from .engines.engine_tree import check_against_engine, engine_tree
-from .engines.formats import FORMATS, MJCF, format_of
-from .formats.urdf import urdf_tree
+from .engines.engine_tree import check_against_engine, engine_tree, expanded
+from .engines.formats import FORMATS, MJCF, XACRO, format_of
+from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 
 _EXAMPLE = "example:"
+_OF_URDF = ("packages",)
+"""Options of a URDF."""
 _CHILD_SECONDS = 20
 """Time that a child process has for the imports and the file [s]; it only ends what would never end."""
 _CHILD_MEMORY = 640 * 2**20
@@ -49,6 +52,7 @@ def load_body(
     isolate: bool = False,
     root: str | None = None,
     root_body: str | None = None,
+    packages: Sequence[str | os.PathLike[str]] = (),
 ) -> Body:
     """Load a free-floating body.
 
@@ -57,10 +61,10 @@ def load_body(
 
     Parameters
     ----------
-    source : a path to a URDF, an MJCF file (`shapephase[mjcf]`), an OpenSim model (`shapephase[opensim]`), a bioMod
-        model (`shapephase[biomod]`), or a file of measurements for Yeadon's human (`shapephase[yeadon]`); a name from
-        `robot_names()` such as "cat"; "example:human", a body of the installed example-robot-data; or a
-        `pinocchio.Model` whose root joint is a free-flyer
+    source : a path to a URDF, a xacro file (`shapephase[xacro]`), an MJCF file (`shapephase[mjcf]`), an OpenSim model
+        (`shapephase[opensim]`), a bioMod model (`shapephase[biomod]`), or a file of measurements for Yeadon's human
+        (`shapephase[yeadon]`); a name from `robot_names()` such as "cat"; "example:human", a body of the installed
+        example-robot-data; or a `pinocchio.Model` whose root joint is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted
@@ -68,6 +72,8 @@ def load_body(
         they are an error
     root_body : the body that floats, with all that hangs on it, of an MJCF, an OpenSim or a bioMod file; needed where
         the file has several trees
+    packages : folders in which the packages that a URDF or a xacro file names, `package://NAME`, `$(find NAME)`, are
+        looked for, before those around the file
 
     Raises
     ------
@@ -76,7 +82,7 @@ def load_body(
     ModelFileError, UnphysicalInertiaError
         If the file cannot be used, or a link cannot exist; the message begins with file and line.
     ShapeError
-        If `root` or `root_body` is given for a file that has no such choice.
+        If `root`, `root_body` or `packages` is given for a file that has no such choice.
     MissingExtraError
         For "example:..." without example-robot-data, and for a format whose engine is not installed.
 
@@ -95,32 +101,38 @@ def load_body(
     """
     check_flag(isolate, "isolate")
     check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
-    given = loading_options(root, root_body)
+    given = loading_options(root, root_body, packages)
     if isinstance(source, str | os.PathLike):
         path, installed = _path_of(os.fspath(source))
         content = read_file(path)
         # An engine reads in a process of its own anyway.
         if isolate and not installed and format_of(content) is None:
-            _try_in_child(content, str(path), on_unphysical)
+            _try_in_child(content, str(path), on_unphysical, given)
         try:
             body, doubts = _from_file(content, path, on_unphysical, given)
         except MemoryError:
             raise ModelFileError(f"{path}:1: there is not enough memory to load it") from None
     else:
-        _check_unused(given, "a pinocchio.Model")
+        _check_unused(given, "a pinocchio.Model", ())
         body, doubts = _from_model(source, on_unphysical)
     for category, message in doubts:
         warnings.warn(message, category, stacklevel=2)
     return body
 
 
-def loading_options(root: str | None, root_body: str | None) -> dict[str, Any]:
+def loading_options(
+    root: str | None, root_body: str | None, packages: Sequence[str | os.PathLike[str]] = ()
+) -> dict[str, Any]:
     """Of these arguments of `load_body` those that are given. Raises UnknownNameError, WrongObjectError."""
     if root is not None:
         check_choice(root, "value of root", ("free",))
     if not isinstance(root_body, str | None):
         raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
-    return {name: value for name, value in (("root", root), ("root_body", root_body)) if value is not None}
+    if isinstance(packages, str | bytes) or not all(isinstance(folder, str | os.PathLike) for folder in packages):
+        raise WrongObjectError(f"packages: folders in a list are needed, got {what_came(packages)}")
+    folders = [os.fspath(folder) for folder in packages] or None
+    found = {"root": root, "root_body": root_body, "packages": folders}
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
@@ -212,11 +224,11 @@ def _path_of(source: str | bytes) -> tuple[Path, bool]:
     return Path(text), False
 
 
-def _try_in_child(content: bytes, where: str, on_unphysical: str) -> None:
+def _try_in_child(content: bytes, where: str, on_unphysical: str, given: dict[str, Any]) -> None:
     """Load in a child process, with limits; what kills the child is named here, what it refuses the parent refuses."""
     source = "from shapephase.body import catalog; catalog.load_from_input()"
     try:
-        child = run_alone(source, (where, on_unphysical), content, _CHILD_SECONDS)
+        child = run_alone(source, (where, on_unphysical, json.dumps(given)), content, _CHILD_SECONDS)
     except subprocess.TimeoutExpired:
         raise ModelFileError(f"{where}:1: loading it took more than {_CHILD_SECONDS} s and was stopped") from None
     if child.returncode < 0:
@@ -230,10 +242,10 @@ def _try_in_child(content: bytes, where: str, on_unphysical: str) -> None:
 
 def load_from_input() -> None:
     """What a child process does: limits itself, then loads the file that comes through standard input."""
-    where, on_unphysical = sys.argv[1:3]
+    where, on_unphysical, given = sys.argv[1:4]
     limit_this_process(_CHILD_MEMORY)
     try:
-        _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical, {})
+        _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical, json.loads(given))
     except MemoryError:
         sys.exit(_NO_MEMORY)
     except ShapePhaseError:
@@ -242,7 +254,7 @@ def load_from_input() -> None:
 
 
 def _from_file(
-    content: bytes, path: Path, on_unphysical: str, given: dict[str, str]
+    content: bytes, path: Path, on_unphysical: str, given: dict[str, Any]
 ) -> tuple[Body, list[tuple[type[Warning], str]]]:
     where, poses = str(path), []
     owned = format_of(content)
@@ -250,7 +262,11 @@ def _from_file(
     root = xml_tree(content, where) if owned in (None, MJCF) else None
     if root is not None and root.tag == "mujoco":
         owned = MJCF
-    _check_unused(given, where, owned)
+    if root is not None and root.tag == "robot" and macro_of(root) is not None:
+        owned = XACRO
+    _check_unused(given, where, _OF_URDF if owned is None else FORMATS[owned].options)
+    if owned == XACRO:
+        root = expanded(path, given.get("packages", ()))
     if root is None or owned == MJCF:
         tree, poses = engine_tree(path, owned or MJCF, given)
     else:
@@ -259,6 +275,7 @@ def _from_file(
     body = Body(model_of(tree, where), path.stem, tree.couplings)
     body.base_angles, body.base_slides = tree.base_angles, tree.base_slides
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
+    body.packages = tuple(map(os.path.abspath, given.get("packages", ())))
     check_against_file(body, tree, where)
     check_against_engine(body, tree, poses, where)
     doubts += massless_warning(tree)
@@ -268,9 +285,11 @@ def _from_file(
     return body, found
 
 
-def _check_unused(given: dict[str, str], where: str, owned: str | None = None) -> None:
+def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -> None:
     for name in given:
-        if owned is None or name not in FORMATS[owned].options:
+        if name == "packages" and name not in options:
+            raise ShapeError(f"packages is for URDF and xacro files; {quoted(where)} names none")
+        if name not in options:
             files = "MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
             raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")
 

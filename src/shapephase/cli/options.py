@@ -18,7 +18,8 @@ def _spaced(value: Sequence[float]) -> str:
 BodyArgument = Annotated[
     str,
     Parameter(
-        help="The body: a URDF, MJCF or bioMod file, measurements for Yeadon's human, a name from `shapephase robots`, "
+        help="The body: a URDF, xacro, MJCF, OpenSim or bioMod file, measurements for Yeadon's human, a name "
+        "from `shapephase robots`, "
         "or example:NAME of example-robot-data; for example `cat`."
     ),
 ]
@@ -119,6 +120,16 @@ class BodyOptions:
             "needed where the file has several. For example `--root-body torso`.",
         ),
     ] = None
+    packages: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative_iterable="",
+            consume_multiple=True,
+            show_default=False,
+            help="Of a URDF or xacro file: folders in which the packages that it names are looked for, without unit, "
+            "before those around the file. For example `--packages ~/ros/src`.",
+        ),
+    ] = ()
 
 
 @Parameter(name="*")

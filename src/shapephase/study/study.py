@@ -78,7 +78,7 @@ class Study:
     chunk : cases that are computed and stored together
     momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w
     time_limit : of one case [s]; None: none
-    root, root_body : what floats of the bodies' MJCF files, as for `load_body`
+    root, root_body, packages : what floats of the bodies' files, and where their packages are, as for `load_body`
 
     Raises
     ------
@@ -110,6 +110,7 @@ class Study:
     time_limit: float | None = field(default=None, kw_only=True)
     root: str | None = field(default=None, kw_only=True)
     root_body: str | None = field(default=None, kw_only=True)
+    packages: Sequence[str | os.PathLike[str]] = field(default=(), kw_only=True)
 
     __repr__ = short_repr
 
@@ -167,7 +168,7 @@ class Study:
     @property
     def loading(self) -> dict[str, Any]:
         """Arguments of `load_body` for its bodies."""
-        return loading_options(self.root, self.root_body)
+        return loading_options(self.root, self.root_body, self.packages)
 
     @property
     def grid_shape(self) -> tuple[int, ...]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,9 @@ from .._link_tree import Joint, Link, LinkTree, from_the_root
 from ..body import Body
 from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction
-from .formats import FORMATS
-from .reading import BODY, MEMORY, MISSING, NO_MEMORY, REFUSED, SHAPES
+from ..formats.xml_text import Node, xml_tree
+from .formats import FORMATS, XACRO
+from .reading import BODY, MEMORY, MISSING, NO_MEMORY, REFUSED, SHAPES, TEXT
 
 _SECONDS = 60
 """[s] for the imports and the file; it only ends what would never end."""
@@ -39,12 +41,21 @@ def engine_tree(path: Path, name: str, options: Mapping[str, str]) -> tuple[Link
     return _tree_of(_answer(path, name, BODY, json.dumps(dict(options))), str(path))
 
 
+def expanded(path: Path, packages: Sequence[str]) -> Node:
+    """The root element of the URDF that a xacro file stands for; its lines are those of that.
+
+    Raises what `engine_tree` raises.
+    """
+    options = json.dumps({"packages": [os.path.abspath(folder) for folder in packages]})
+    return xml_tree(_answer(path, XACRO, TEXT, options).encode(), f"{path} (expanded)")
+
+
 def engine_shapes(path: Path, name: str) -> dict[str, Any]:
     """What can be drawn of such a file, as its reader says it. Raises what `engine_tree` raises."""
     return _answer(path, name, SHAPES)
 
 
-def _answer(path: Path, name: str, *words: str) -> dict[str, Any]:
+def _answer(path: Path, name: str, *words: str) -> Any:
     known, where = FORMATS[name], str(path)
     source = "from shapephase.body.engines.reading import read_in_this_process as read; read()"
     try:

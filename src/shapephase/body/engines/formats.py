@@ -12,6 +12,10 @@ MJCF = "mjcf"
 """The one of these formats that is XML throughout, and drawn."""
 
 
+XACRO = "xacro"
+"""The one whose engine makes a URDF of it."""
+
+
 class Format(NamedTuple):
     """A format that an engine owns."""
 
@@ -27,6 +31,7 @@ FORMATS = {
     MJCF: Format("an MJCF model", "mujoco", "mjcf", ".mujoco_reading", ".mujoco_drawing", ("root", "root_body")),
     "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading", options=("root_body",)),
     "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading", options=("root_body",)),
+    XACRO: Format("a xacro file", "xacrodoc", "xacro", ".xacro_reading", options=("packages",)),
     "yeadon": Format("measurements for Yeadon's model", "yeadon", "yeadon", ".yeadon_reading"),
 }
 """By our name."""

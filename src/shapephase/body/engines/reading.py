@@ -16,6 +16,8 @@ from .formats import FORMATS, Format
 
 BODY = "body"
 """What is asked of a file: its links and joints."""
+TEXT = "text"
+"""The same: the URDF that it stands for."""
 SHAPES = "shapes"
 """The same: what can be drawn."""
 MISSING = 4
@@ -31,7 +33,7 @@ MEMORY = 1024 * 2**20
 def read_in_this_process() -> None:
     """Read the file of the first argument in the format of the second, and end the process.
 
-    The third is `BODY`, and then come options as JSON, or it is `SHAPES`.
+    The third is `BODY` or `TEXT`, and then come options as JSON, or it is `SHAPES`.
     """
     path, name, what, *options = sys.argv[1:]
     known = FORMATS[name]
@@ -52,10 +54,13 @@ def read_in_this_process() -> None:
 
 def _answered(path: str, known: Format, what: str, options: list[str], answer: TextIO) -> int:
     """Write what the reader says; the exit code."""
-    reader = import_module(known.module if what == BODY else known.drawing, __package__)
+    reader = import_module(known.drawing if what == SHAPES else known.module, __package__)
     limit_this_process(MEMORY)
     try:
-        said = reader.chain_of(path, **json.loads(*options)).spoken() if what == BODY else reader.shapes_of(path)
+        if what == BODY:
+            said = reader.chain_of(path, **json.loads(*options)).spoken()
+        else:
+            said = reader.text_of(path, **json.loads(*options)) if what == TEXT else reader.shapes_of(path)
     except MemoryError:
         return NO_MEMORY
     except UnusableModelError as error:

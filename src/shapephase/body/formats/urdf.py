@@ -80,7 +80,8 @@ def urdf_tree(root: Node) -> LinkTree:
         tag = root.tag.rpartition("}")[2]
         said = _FORMATS.get(tag, "neither a URDF nor an MJCF model")
         raise root.fault(f"<{quoted(tag)}>", f"expected <robot>: this is {said}")
-    _check_xacro(root)
+    if (left := macro_of(root)) is not None:
+        raise left.fault(f"<{quoted(left.tag.rpartition('}')[2])}>", "a macro or an expression that xacro has left")
     no_misspelt_children(root, _ROBOT_PARTS, "<robot>")
     name = name_of(root) if root.get("name") else "robot"
     reading = _Reading()
@@ -111,17 +112,15 @@ def rpy_matrix(rpy: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def _check_xacro(root: Node) -> None:
-    """Macros or expressions that are left; an unused xacro namespace on <robot> is harmless."""
+def macro_of(root: Node) -> Node | None:
+    """The first macro or expression of xacro; an unused xacro namespace on <robot> is harmless."""
     for top in root.children:
         read = top.tag in _ROBOT_PARTS
         for node in top.walk():
             left = "wiki/xacro}" in node.tag or "xacro:" in node.tag
             if left or (read and any("${" in value or "$(" in value for value in node.attributes.values())):
-                tag = quoted(node.tag.rpartition("}")[2])
-                raise node.fault(
-                    f"<{tag}>", f"an unprocessed xacro file; run `xacro {root.file} > robot.urdf` and load that"
-                )
+                return node
+    return None
 
 
 def _named(root: Node, kind: str) -> dict[str, Node]:
