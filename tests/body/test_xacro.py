@@ -67,6 +67,7 @@ def test_packages_are_for_urdf_and_xacro(tmp_path):
     (tmp_path / "a.xml").write_text(GOOD_MJCF)
     with pytest.raises(ShapeError, match="packages is for URDF and xacro files"):
         sp.load_body(tmp_path / "a.xml", packages=[tmp_path])
-    with pytest.raises(WrongObjectError, match="packages: folders in a list are needed"):
-        sp.load_body("cat", packages="here")
+    for wrong in ("here", 3, [3], None):
+        with pytest.raises(WrongObjectError, match="packages: folders in a list are needed"):
+            sp.load_body("cat", packages=wrong)
     assert sp.load_body("cat", packages=[tmp_path]).packages == (str(tmp_path),)

@@ -128,7 +128,8 @@ def loading_options(
         check_choice(root, "value of root", ("free",))
     if not isinstance(root_body, str | None):
         raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
-    if isinstance(packages, str | bytes) or not all(isinstance(folder, str | os.PathLike) for folder in packages):
+    several = isinstance(packages, Sequence) and not isinstance(packages, str | bytes)
+    if not several or not all(isinstance(folder, str | os.PathLike) for folder in packages):
         raise WrongObjectError(f"packages: folders in a list are needed, got {what_came(packages)}")
     folders = [os.fspath(folder) for folder in packages] or None
     found = {"root": root, "root_body": root_body, "packages": folders}
