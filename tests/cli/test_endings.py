@@ -292,7 +292,7 @@ motion.flight = running
 sys.argv[1:] = {list(CAT)!r}
 run()
 """
-    (tmp_path / "pressed.py").write_text(source)
+    (tmp_path / "pressed").with_suffix(".py").write_text(source)
     command = [sys.executable, "-m", "pressed"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (ExitCode.STOPPED, "", "shapephase: stopped\n")
