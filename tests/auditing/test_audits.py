@@ -52,7 +52,8 @@ def test_faults_are_named_in_nineteen_of_twenty(fault: str):
     bad = []
     for seed in range(20):
         case = planted(fault, THREE[seed % 3], seed)
-        found = sp.audit(case.body, case.trajectory, tolerance=TIGHT)
+        # A gust as strong as these may be taken for the ground; they are in the air all the time.
+        found = sp.audit(case.body, case.trajectory, tolerance=TIGHT, flight="all")
         missed = faults_of_finding(case, found, 5 if fault == "mass" else 1)
         bad += [(THREE[seed % 3], seed, missed)] if missed else []
     print(f"{fault}: {20 - len(bad)} of 20", bad)
