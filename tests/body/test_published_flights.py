@@ -32,13 +32,13 @@ def momenta(name, folder):
     bare.write_text("\n".join(line for line in lines if "meshfile" not in line), encoding="utf-8")
     model = biorbd.Model(str(bare))
     with np.load(FLIGHTS / f"{name}.npz") as kept:
-        pairs = list(zip(kept["q"], kept["qdot"], strict=True))
+        pairs = list(zip(kept["Q"], kept["Qdot"], strict=True))
     return np.array([model.angularMomentum(q, v).to_array() for q, v in pairs])
 
 
 def recorded(name, body, folder, every=1):
     with np.load(FLIGHTS / f"{name}.npz") as kept:
-        rows = np.column_stack([kept["time"], kept["q"]])[::every]
+        rows = np.column_stack([kept["time"], kept["Q"]])[::every]
     names = ["time", *(f"Pelvis_{one}" for one in BASE), *body.joint_names]
     np.savetxt(folder / "flight.csv", rows, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
     return sp.read_recorded_motion(folder / "flight.csv", body, degrees=False, flight="auto")
@@ -68,7 +68,7 @@ def test_a_published_somersault_is_reconstructed(name, acrobat, tmp_path):
     np.testing.assert_allclose(fitted.momentum, by_biorbd.mean(axis=0), rtol=0, atol=drift + 5e-4)
     with np.load(FLIGHTS / f"{name}.npz") as kept:
         step = kept["time"][1]
-        jumps = np.abs(np.diff(kept["qdot"][:, 6:], 2, axis=0)).max() / step
+        jumps = np.abs(np.diff(kept["Qdot"][:, 6:], 2, axis=0)).max() / step
     assert fitted.angles.max() < jumps * step**2 / 32
 
 
