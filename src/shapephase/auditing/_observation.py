@@ -21,6 +21,8 @@ from .floating_trajectory import FloatingTrajectory
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
 """Of a momentum and a place: what their own sums leave."""
+_AT_REST = 1e-6
+"""[rad] In all the time: a body that turns by less is at rest."""
 _NUDGE = 1e-6
 """[rad or m] By which a joint is moved to see how the centre of mass goes with it: for the noise alone."""
 _ENOUGH = 32
@@ -81,9 +83,9 @@ class Observation:
 
     @property
     def finest(self) -> float:
-        """What rounding of a momentum is relative to: the same, or of a body at rest a turn by one in all the time."""
-        span = float(self.times[-1] - self.times[0])
-        return self.scale + float(np.trace(self.inertia, axis1=1, axis2=2).mean()) / span
+        """What rounding of a momentum is relative to: the same, but of a body at rest a very slow turn."""
+        slow = _AT_REST / float(self.times[-1] - self.times[0])
+        return self.scale + slow * float(np.trace(self.inertia, axis1=1, axis2=2).mean())
 
     @property
     def extent(self) -> float:
