@@ -48,7 +48,7 @@ class Tree:
                     "axis": axis / np.linalg.norm(axis),
                     "mimic": None
                     if mimic is None
-                    else (mimic.get("joint"), mimic.get("multiplier"), mimic.get("offset")),
+                    else (mimic.get("joint"), float(mimic.get("multiplier", "1")), float(mimic.get("offset", "0"))),
                 }
             )
             children.add(element.find("child").get("link"))
@@ -87,7 +87,7 @@ class Tree:
                 local, offset = j["origin"]
                 here, at = turn @ local, place + turn @ offset
                 speed = speed + np.cross(spin, at - place)
-                x, v = (0.0, 0.0) if j["kind"] == "fixed" else (shape[j["name"]], rate[j["name"]])
+                x, v = self.coordinate(j, shape, rate)
                 axis = here @ j["axis"]
                 if j["kind"] == "prismatic":
                     state[j["child"]] = (here, at + x * axis, spin, speed + v * axis + np.cross(spin, x * axis))
@@ -96,6 +96,16 @@ class Tree:
                     turned = here @ (np.eye(3) + np.sin(x) * k + (1.0 - np.cos(x)) * k @ k)
                     state[j["child"]] = (turned, at, spin + v * axis, speed)
         return state
+
+    @staticmethod
+    def coordinate(j, shape, rate):
+        """Of a joint, and its rate."""
+        if j["kind"] == "fixed":
+            return 0.0, 0.0
+        if j["mimic"] is None:
+            return shape[j["name"]], rate[j["name"]]
+        leader, multiplier, offset = j["mimic"]
+        return multiplier * shape[leader] + offset, multiplier * rate[leader]
 
     def masses(self):
         return np.array([m for m, _, _ in self.links.values()])
@@ -160,7 +170,7 @@ def test_no_mass_is_lost_and_every_joint_is_there(case):
     """U1: a model built without the free-flyer loses the root link; its mass counts here."""
     body, tree = case
     assert body.mass == pytest.approx(tree.masses().sum(), rel=1e-14)
-    assert set(body.joint_names) == {j["name"] for j in tree.joints if j["kind"] != "fixed"}
+    assert set(body.joint_names) == {j["name"] for j in tree.joints if j["kind"] != "fixed" and j["mimic"] is None}
     assert body.n_shape == len(body.joint_names)
     assert set(body.link_names) == set(tree.links)
     assert tree.links[tree.root][0] > 0.0
@@ -219,8 +229,9 @@ def test_pinocchio_with_the_base_at_the_identity_and_at_rest(case, rng):
     data = model.createData()
     shape, rate = random_shapes(body, rng, 1)[0], rng.normal(size=body.n_shape)
     q, v = pin.neutral(model), np.zeros(model.nv)
-    for name, x, speed in zip(body.joint_names, shape, rate, strict=True):
-        here = model.joints[model.getJointId(name)]
+    for j in (j for j in tree.joints if j["kind"] != "fixed"):
+        x, speed = tree.coordinate(j, named(body, shape), named(body, rate))
+        here = model.joints[model.getJointId(j["name"])]
         q[here.idx_q : here.idx_q + here.nq] = [x] if here.nq == 1 else [np.cos(x), np.sin(x)]
         v[here.idx_v] = speed
     pin.ccrba(model, data, q, v)
@@ -640,7 +651,7 @@ def test_limits_belong_to_the_joints_of_the_same_name(case):
     root = ElementTree.fromstring(tree.path.read_text())
     assert body.joint_limits.shape == (body.n_shape, 2)
     for element in root.findall("joint"):
-        if element.get("type") in ("revolute", "prismatic"):
+        if element.get("type") in ("revolute", "prismatic") and element.find("mimic") is None:
             limit = element.find("limit")
             want = [float(limit.get("lower")), float(limit.get("upper"))]
             np.testing.assert_array_equal(body.joint_limits[body.joint_index(element.get("name"))], want)

@@ -341,7 +341,7 @@ def test_small_disturbances_tilt_little_where_the_spin_is_stable_l7():
     tensor = np.diag([1.0, 2.0, 3.0])
     for axis, stable in ((0, True), (1, False), (2, True)):
         steady = np.eye(3)[axis]
-        tilts = [spin_in_space(tensor, steady, [*steady, s, 2.0 * s, -s]).tilt for s in (1e-3, 1e-6)]
+        tilts = [spin_in_space(tensor, steady, steady + s * np.array([1.0, 2.0, -1.0])).tilt for s in (1e-3, 1e-6)]
         assert (tilts[0] < 5e-3 and tilts[1] < 5e-6) if stable else min(tilts) > 3.0
     # Two equal moments: the momentum wanders along the circle of equilibria, however little it left it.
     wandering = spin_in_space(np.diag([1.0, 1.0, 2.0]), [1.0, 0.0, 0.0], [1.0, 0.0, 1e-6])

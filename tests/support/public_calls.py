@@ -125,6 +125,7 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
             for name, motion in MOTIONS.items()
         },
         "load_body": lambda: sp.load_body("cat_two_halves").locked_inertia(shape),
+        "audit": lambda: audited(motion, body, path),
         "saved": lambda: saved(motion),
         "recorded": lambda: recorded(path, body),
         "robot_names": lambda: sp.robot_names(),
@@ -149,6 +150,16 @@ def flown(name: str, path: sp.ShapePath) -> sp.PhaseSplit:
 def swung(body: sp.Body) -> sp.ShapePath:
     """A path of all joints but the first."""
     return sp.ShapePath.waypoints([0.0, 1.0], np.outer([0.0, 0.1], np.ones(body.n_shape - 1)))
+
+
+def audited(motion: sp.Motion, body: sp.Body, path: sp.ShapePath) -> tuple[bool, np.ndarray]:
+    """Whether a motion is right in flight, and its momentum by its samples."""
+    times = np.linspace(0.0, motion.duration, 41)
+    run = sp.FloatingTrajectory(
+        times=times, quaternion=sp.so3.quat_from_matrix(motion.attitude(times)), shapes=path.shape(times)
+    )
+    found = sp.audit(body, run)
+    return found.right, found.runs[0].momentum
 
 
 def saved(motion: sp.Motion) -> sp.Motion:
