@@ -41,7 +41,7 @@ class RunAudit:
     fall_ratio : its square over what noise explains, or None
     extent : radius of gyration of the body [m]
     agreement : of given rates with the configurations, or None
-    attitude_error : (N,) angle to the exact reconstruction [rad]; None where there is none
+    attitude_error : (N,) angle to the nearest exact reconstruction that was found [rad]; None where there is none
     right : whether momentum, fall and rates hold within noise or tolerance
 
     Examples
@@ -220,7 +220,7 @@ def _run_lines(run: RunAudit) -> list[str]:
         )
     if run.attitude_error is not None:
         largest = float(np.degrees(run.attitude_error.max()))
-        found.append(f"  attitude           up to {largest:.3g} degrees from the exact reconstruction")
+        found.append(f"  attitude           up to {largest:.3g} degrees from the nearest exact reconstruction")
     return found
 
 

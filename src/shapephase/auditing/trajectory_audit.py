@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +35,11 @@ from .floating_trajectory import FloatingTrajectory
 from .hypothesis import Hypothesis
 
 _QUIET = 1e-6
-"""[rad] Noise of the attitude below which the first sample is the start of the exact reconstruction."""
+"""[rad] Noise of the attitude below which the first sample is tried as the start of the exact reconstruction."""
+_NEAR = 1e-4
+"""[rad] From there on another start may be nearer: motions near the middle axis make much of the last digit."""
+_STEADY = 0.01
+"""Of what turns the body: a momentum that changes by more is no flight's, which need not be looked for."""
 _AS_EULER = 0.2
 """Of the drift of one run: less is left by what semi-implicit Euler does, where it agrees with that."""
 _ONE_AXIS = 1e-3
@@ -194,7 +199,7 @@ def _holds(ratio: float, value: float, tolerance: float) -> bool:
 
 
 def _attitude_error(body: Body, seen: Observation) -> Array | None:
-    """How far the attitude is from the exact reconstruction of the same joint motion: (N,) [rad]."""
+    """How far the attitude is from the nearest reconstruction found of the same joint motion: (N,) [rad]."""
     try:
         with quiet(category=TrajectoryWarning):
             return _from_exact(body, seen)
@@ -208,11 +213,16 @@ def _from_exact(body: Body, seen: Observation) -> Array:
     path = ShapePath.spline(times, seen.trajectory.shapes, periodic=False, joint_names=body.joint_names)
     moving = articulated(body, path)
     if seen.noise.attitude >= _QUIET:
-        fitted = momentum_from_recording(moving, times, seen.attitude)
-        return np.linalg.norm(fitted.residuals, axis=1)
+        return momentum_from_recording(moving, times, seen.attitude).angles
     motion = reconstruct(moving, seen.momentum[0], seen.attitude[0])
     exact = motion.attitude(np.minimum(times, motion.duration))
-    return so3.angle(so3.transpose(exact) @ seen.attitude)
+    off = so3.angle(so3.transpose(exact) @ seen.attitude)
+    wanders = np.ptp(seen.momentum, axis=0).max() > _STEADY * seen.scale
+    if off.max() > _NEAR and not wanders:
+        # Where no flight is near all the same, it stays as far as it is.
+        with suppress(ShapePhaseError):
+            off = min(off, momentum_from_recording(moving, times, seen.attitude).angles, key=np.max)
+    return off
 
 
 def _ranked(
