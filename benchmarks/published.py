@@ -361,21 +361,28 @@ def _holonomies() -> list[Entry]:
 
 
 def table(found: list[tuple[Entry, float]]) -> str:
-    """The results as the page has them, a table for each topic."""
+    """The results as the page has them: under a heading for each topic a table for each of its inputs and sources."""
     lines: list[str] = []
-    topic = ""
+    topic = group = None
     for entry, number in found:
         if entry.topic != topic:
-            topic = entry.topic
+            lines += [*([""] if lines else []), f"## {entry.topic}"]
+        if (entry.topic, entry.inputs, entry.source) != group:
             lines += [
-                *([""] if lines else []),
-                f"## {topic}",
                 "",
-                "| what | from | published | computed | difference | source |",
-                "|---|---|---|---|---|---|",
+                said_of(entry),
+                "",
+                "| what | published | computed | difference |",
+                "|---|---|---|---|",
             ]
         lines.append(_row(entry, number))
+        topic, group = entry.topic, (entry.topic, entry.inputs, entry.source)
     return "\n".join(lines) + "\n"
+
+
+def said_of(entry: Entry) -> str:
+    """Where a number is from, and what it is computed from."""
+    return f"{{cite:t}}`{entry.source}`, from {entry.inputs}:"
 
 
 def _row(entry: Entry, number: float) -> str:
@@ -383,7 +390,7 @@ def _row(entry: Entry, number: float) -> str:
     printed = entry.published + (f" ± {entry.within}" if entry.within else "…" if entry.truncated else "")
     difference = f"{number - float(entry.published):z.{entry.digits + 1}f}" if entry.digits else "0"
     unit = f" {entry.unit}" if entry.unit else ""
-    cells = (entry.what, entry.inputs, printed + unit, shown + unit, difference, f"{{cite:t}}`{entry.source}`")
+    cells = (entry.what, printed + unit, shown + unit, difference)
     return f"| {' | '.join(cells)} |"
 
 
