@@ -518,7 +518,7 @@ ODD_FILES = {
     "NPY, nested header": ("m.npy", npy_header("(" * 5000), E, ["no array that can be read"]),
     "NPY, empty": ("m.npy", b"", E, ["no array that can be read"]),
     "markers": ("m.trc", "PathFileType\t4\n", E, [".trc files are not read", "inverse kinematics"]),
-    "a skeleton": ("m.bvh", "HIERARCHY\n", E, [".bvh files are not read", "joint angles"]),
+    "a skeleton": ("m.bvh", "HIERARCHY\n", E, ["a BVH file moves the skeleton of its own", "table of joint angles"]),
     "an older workbook": ("m.xls", b"\xd0\xcf\x11\xe0", E, ["save it as .xlsx"]),
     **{
         f"{kind}, {how}": (f"m.{ending}", content, E, [name])

@@ -100,6 +100,7 @@ class LinkTree:
     base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
         it, as "zxy"; None where the file names none
     base_slides : names of three coordinates that move the root link along x, y and z; None where the file names none
+    length_unit : of a motion of the same file [m]; None where the format has a unit of its own
     """
 
     name: str
@@ -111,6 +112,7 @@ class LinkTree:
     text: str | None = None
     base_angles: tuple[tuple[str, ...], str] | None = None
     base_slides: tuple[str, ...] | None = None
+    length_unit: float | None = None
 
 
 def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:

@@ -73,6 +73,7 @@ class Body:
     couplings : by the name of each joint that follows others, how it does
     base_angles : names and axes of the angles by which its file turns the base; None where it names none
     base_slides : names of what its file moves the base along x, y and z by; None where it names none
+    length_unit : of the lengths in its file [m]; None where its format has a unit of its own
 
     Examples
     --------
@@ -90,6 +91,7 @@ class Body:
         self.packages: tuple[str, ...] = ()
         self.base_angles: tuple[tuple[str, ...], str] | None = None
         self.base_slides: tuple[str, ...] | None = None
+        self.length_unit: float | None = None
         self.mass = float(pin.computeTotalMass(model))
         self.couplings: Mapping[str, Coupling] = dict(couplings or {})
         self._joints = JointMap(model, pin.neutral(model), self.couplings)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..arguments import check_choice, check_flag
+from ..arguments import check_choice, check_flag, positive_argument
 from ..child_process import limit_this_process, run_alone
 from ..errors import (
     IgnoredElementWarning,
@@ -30,13 +30,16 @@ from ._link_tree import inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded
-from .engines.formats import FORMATS, MJCF, XACRO, format_of
+from .engines.formats import BVH, FORMATS, MJCF, XACRO, format_of
+from .formats.bvh import bvh_tree
 from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 
 _EXAMPLE = "example:"
 _OF_URDF = ("packages",)
 """Options of a URDF."""
+_OF_BVH = ("length_unit", "person_mass")
+"""Options of a BVH file."""
 _CHILD_SECONDS = 20
 """Time that a child process has for the imports and the file [s]; it only ends what would never end."""
 _CHILD_MEMORY = 640 * 2**20
@@ -53,6 +56,8 @@ def load_body(
     root: str | None = None,
     root_body: str | None = None,
     packages: Sequence[str | os.PathLike[str]] = (),
+    length_unit: float | None = None,
+    person_mass: float | None = None,
 ) -> Body:
     """Load a free-floating body.
 
@@ -62,9 +67,10 @@ def load_body(
     Parameters
     ----------
     source : a path to a URDF, a xacro file (`shapephase[xacro]`), an MJCF file (`shapephase[mjcf]`), an OpenSim model
-        (`shapephase[opensim]`), a bioMod model (`shapephase[biomod]`), or a file of measurements for Yeadon's human
-        (`shapephase[yeadon]`); a name from `robot_names()` such as "cat"; "example:human", a body of the installed
-        example-robot-data; or a `pinocchio.Model` whose root joint is a free-flyer
+        (`shapephase[opensim]`), a bioMod model (`shapephase[biomod]`), a file of measurements for Yeadon's human
+        (`shapephase[yeadon]`), or a BVH file, whose skeleton becomes a human; a name from `robot_names()` such as
+        "cat"; "example:human", a body of the installed example-robot-data; or a `pinocchio.Model` whose root joint is
+        a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted
@@ -74,6 +80,8 @@ def load_body(
         the file has several trees
     packages : folders in which the packages that a URDF or a xacro file names, `package://NAME`, `$(find NAME)`, are
         looked for, before those around the file
+    length_unit : of a BVH file, which says none: the metres of a unit, 0.01 for centimetres
+    person_mass : of the human whose skeleton a BVH file has [kg]; None: 70 kg, with a warning
 
     Raises
     ------
@@ -82,7 +90,9 @@ def load_body(
     ModelFileError, UnphysicalInertiaError
         If the file cannot be used, or a link cannot exist; the message begins with file and line.
     ShapeError
-        If `root`, `root_body` or `packages` is given for a file that has no such choice.
+        If `root` or one of those after it is given for a file that has no such choice.
+    TrajectoryError
+        If `length_unit` or `person_mass` is not above 0.
     MissingExtraError
         For "example:..." without example-robot-data, and for a format whose engine is not installed.
 
@@ -101,12 +111,12 @@ def load_body(
     """
     check_flag(isolate, "isolate")
     check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
-    given = loading_options(root, root_body, packages)
+    given = loading_options(root, root_body, packages, length_unit, person_mass)
     if isinstance(source, str | os.PathLike):
         path, installed = _path_of(os.fspath(source))
         content = read_file(path)
         # An engine reads in a process of its own anyway.
-        if isolate and not installed and format_of(content) is None:
+        if isolate and not installed and format_of(content) in (None, BVH):
             _try_in_child(content, str(path), on_unphysical, given)
         try:
             body, doubts = _from_file(content, path, on_unphysical, given)
@@ -121,9 +131,13 @@ def load_body(
 
 
 def loading_options(
-    root: str | None, root_body: str | None, packages: Sequence[str | os.PathLike[str]] = ()
+    root: str | None,
+    root_body: str | None,
+    packages: Sequence[str | os.PathLike[str]] = (),
+    length_unit: float | None = None,
+    person_mass: float | None = None,
 ) -> dict[str, Any]:
-    """Of these arguments of `load_body` those that are given. Raises UnknownNameError, WrongObjectError."""
+    """Of these arguments of `load_body` those that are given. Raises ShapePhaseError."""
     if root is not None:
         check_choice(root, "value of root", ("free",))
     if not isinstance(root_body, str | None):
@@ -132,7 +146,17 @@ def loading_options(
     if not several or not all(isinstance(folder, str | os.PathLike) for folder in packages):
         raise WrongObjectError(f"packages: folders in a list are needed, got {what_came(packages)}")
     folders = [os.fspath(folder) for folder in packages] or None
-    found = {"root": root, "root_body": root_body, "packages": folders}
+    if length_unit is not None:
+        length_unit = positive_argument(length_unit, "length_unit", "a number of metres")
+    if person_mass is not None:
+        person_mass = positive_argument(person_mass, "person_mass", "a mass in kg")
+    found = {
+        "root": root,
+        "root_body": root_body,
+        "packages": folders,
+        "length_unit": length_unit,
+        "person_mass": person_mass,
+    }
     return {name: value for name, value in found.items() if value is not None}
 
 
@@ -265,16 +289,19 @@ def _from_file(
         owned = MJCF
     if root is not None and root.tag == "robot" and macro_of(root) is not None:
         owned = XACRO
-    _check_unused(given, where, _OF_URDF if owned is None else FORMATS[owned].options)
+    own = {None: _OF_URDF, BVH: _OF_BVH}
+    _check_unused(given, where, own[owned] if owned in own else FORMATS[owned].options)
     if owned == XACRO:
         root = expanded(path, given.get("packages", ()))
-    if root is None or owned == MJCF:
+    if owned == BVH:
+        tree = bvh_tree(content, path.stem, where, **given)
+    elif root is None or owned == MJCF:
         tree, poses = engine_tree(path, owned or MJCF, given)
     else:
         tree = urdf_tree(root)
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.couplings)
-    body.base_angles, body.base_slides = tree.base_angles, tree.base_slides
+    body.base_angles, body.base_slides, body.length_unit = tree.base_angles, tree.base_slides, tree.length_unit
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     body.packages = tuple(map(os.path.abspath, given.get("packages", ())))
     check_against_file(body, tree, where)
@@ -290,6 +317,8 @@ def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -
     for name in given:
         if name == "packages" and name not in options:
             raise ShapeError(f"packages is for URDF and xacro files; {quoted(where)} names none")
+        if name in _OF_BVH and name not in options:
+            raise ShapeError(f"{name} is for BVH files; {quoted(where)} has units and masses of its own")
         if name not in options:
             files = "MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
             raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")

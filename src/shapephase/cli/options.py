@@ -130,6 +130,21 @@ class BodyOptions:
             "before those around the file. For example `--packages ~/ros/src`.",
         ),
     ] = ()
+    length_unit: Annotated[
+        float | None,
+        Parameter(
+            show_default=False,
+            help="Of a BVH file, which says none: the length of a unit, in m; for example `--length-unit 0.01` for "
+            "centimetres.",
+        ),
+    ] = None
+    person_mass: Annotated[
+        float | None,
+        Parameter(
+            show_default=False,
+            help="Of the human whose skeleton a BVH file has, in kg; without it 70. For example `--person-mass 62`.",
+        ),
+    ] = None
 
 
 @Parameter(name="*")

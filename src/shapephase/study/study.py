@@ -79,6 +79,7 @@ class Study:
     momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w
     time_limit : of one case [s]; None: none
     root, root_body, packages : what floats of the bodies' files, and where their packages are, as for `load_body`
+    length_unit, person_mass : of the bodies' BVH files, as for `load_body` [m, kg]
 
     Raises
     ------
@@ -111,6 +112,8 @@ class Study:
     root: str | None = field(default=None, kw_only=True)
     root_body: str | None = field(default=None, kw_only=True)
     packages: Sequence[str | os.PathLike[str]] = field(default=(), kw_only=True)
+    length_unit: float | None = field(default=None, kw_only=True)
+    person_mass: float | None = field(default=None, kw_only=True)
 
     __repr__ = short_repr
 
@@ -168,7 +171,7 @@ class Study:
     @property
     def loading(self) -> dict[str, Any]:
         """Arguments of `load_body` for its bodies."""
-        return loading_options(self.root, self.root_body, self.packages)
+        return loading_options(self.root, self.root_body, self.packages, self.length_unit, self.person_mass)
 
     @property
     def grid_shape(self) -> tuple[int, ...]:

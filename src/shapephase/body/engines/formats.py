@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from ..formats.bvh_text import is_bvh
+
 _HEAD = 65536
 """[bytes] of a file that are looked at to tell its format."""
 
@@ -14,6 +16,10 @@ MJCF = "mjcf"
 
 XACRO = "xacro"
 """The one whose engine makes a URDF of it."""
+
+
+BVH = "bvh"
+"""The one that no engine owns: it is read here, and is no XML."""
 
 
 class Format(NamedTuple):
@@ -41,6 +47,8 @@ _BEFORE_XML = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*
 
 def format_of(content: bytes) -> str | None:
     """The name of the format, by content; None for a URDF and everything else."""
+    if is_bvh(content):
+        return BVH
     head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
     if re.match(rb"<mujoco[\s/>]", _after(_BEFORE_XML, head)):
         return MJCF

@@ -14,6 +14,7 @@ from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ._recording import MOST_BYTES, Table, digest, file_bytes
+from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.frames import is_frame, read_frame
 from .formats.hdf5 import read_hdf5
@@ -45,6 +46,7 @@ _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
     ".hdf5": read_hdf5,
 }
 _ARRAYS = (".npz", ".npy")
+_WITH_BODY: dict[str, Callable[[Path, bytes, Body], Table]] = {".bvh": read_bvh}
 _BAGS = (".bag", ".mcap", ".db3")
 _YAML = (".yaml", ".yml")
 # What comes near, and how it becomes a motion of joints.
@@ -53,7 +55,6 @@ _OTHERS = {
     ".xls": "Excel's older files are not read; save it as .xlsx or .csv",
     ".ods": "save it as .xlsx or .csv",
     ".numbers": "save it as .xlsx or .csv",
-    ".bvh": "convert it to a table of joint angles first; BVH has rotations of a skeleton of its own",
 }
 
 
@@ -103,8 +104,8 @@ def read_input(source: Any, body: Body, topic: str | None, timestep: float | Non
         return Input(read_bag(where, topic), str(source), digest(where)), None
     if suffix in _OTHERS:
         raise TrajectoryError(f"{where}: {suffix} files are not read: {_OTHERS[suffix]}")
-    if suffix not in (*_TEXTS, *_WITH_PARTS, *_ARRAYS):
-        kinds = (".csv", ".npz", *_TEXTS, *_WITH_PARTS, *_ARRAYS, *_BAGS)
+    if suffix not in (*_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS):
+        kinds = (".csv", ".npz", *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS, *_BAGS)
         raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
     _check_exists(where)
     if topic is not None and suffix not in _WITH_PARTS:
@@ -115,6 +116,8 @@ def read_input(source: Any, body: Body, topic: str | None, timestep: float | Non
     sha256 = hashlib.sha256(data).hexdigest()
     if suffix in _ARRAYS:
         return Input(read_arrays(where, data, body.joint_names, timestep), str(source), sha256), None
+    if suffix in _WITH_BODY:
+        return Input(_WITH_BODY[suffix](where, data, body), str(source), sha256), timestep
     table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
     return Input(table, str(source), sha256), timestep
 

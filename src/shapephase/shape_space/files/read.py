@@ -117,6 +117,7 @@ def read_recorded_motion(
       coupled ones that are no joints of the body are left out.
     - `.mat`, `.h5`: vectors `time` and one for each joint, or a matrix `shapes` beside `joint_names`; on top or in a
       structure.
+    - `.bvh`: the bones' angles, for the body that `load_body` makes of such a file.
     - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on; no markers.
     - `.npz`: `time` (N,), `shapes` (N, n), `joint_names` (n,); the base as `base_quat_xyzw` (N, 4), `base_position`
       (N, 3).

@@ -1,0 +1,335 @@
+"""BVH: a skeleton at zero angles and the angles of its bones, frame by frame, as a strict reader finds them.
+
+The format has no unit of length. Its angles are in degrees, of hinges in one point, each turned by those before it.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Array
+
+_START = b"HIERARCHY"
+_PLACES = ("Xposition", "Yposition", "Zposition")
+_TURNS = ("Xrotation", "Yrotation", "Zrotation")
+_MOST_BONES = 1000
+"""A skeleton with all fingers has seventy."""
+_MOST_DEPTH = 100
+"""Bones from the root; one with all fingers has twelve."""
+_MOST_NAME = 200
+"""Characters: with a channel behind it, a name is still one of a joint."""
+_MOST_NUMBERS = 50_000_000
+"""Of all frames: memory, 400 MB."""
+_MOST_OFFSET = 1e6
+"""Units; the square is far from what overflows."""
+_SHOWN = 40
+"""Characters of a file in a message."""
+_STAYS = 1e-4
+"""Share of a bone's length by which its place may differ from the offset: files have six digits."""
+
+
+class BvhFaultError(Exception):
+    """What is wrong with a file, and in which line."""
+
+    def __init__(self, message: str, line: int) -> None:
+        super().__init__(message)
+        self.line = line
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Bone:
+    """A joint of the skeleton and what it moves.
+
+    Attributes
+    ----------
+    name, line : its name and where that stands
+    parent : number of the bone it hangs on; None for the root
+    offset : (3,) from the parent's joint, all angles zero [units of the file]
+    channels : words of its channels, in the file's order
+    column : of its first channel, among those of a frame
+    tip : (3,) of its end site from its joint [units], or None
+    """
+
+    name: str
+    line: int
+    parent: int | None
+    offset: Array
+    channels: tuple[str, ...]
+    column: int
+    tip: Array | None
+
+    @property
+    def turns(self) -> tuple[str, ...]:
+        """The channels that turn it, in their order."""
+        return tuple(word for word in self.channels if word in _TURNS)
+
+    def columns(self, words: Sequence[str]) -> list[int]:
+        """Where channels of these words stand in a frame."""
+        return [self.column + self.channels.index(word) for word in words]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Skeleton:
+    """All bones, parents before children in the file's order, and their motion.
+
+    Attributes
+    ----------
+    frames : (N, c) of all channels [degrees or units]
+    lines : where the frames stand
+    step : between frames [s]
+    """
+
+    bones: tuple[Bone, ...]
+    frames: Array
+    lines: Sequence[int]
+    step: float
+
+    @property
+    def places(self) -> Array:
+        """Of all joints at zero angles, from the root's: (k, 3) [units]."""
+        found = np.zeros((len(self.bones), 3))
+        for number, bone in enumerate(self.bones):
+            if bone.parent is not None:
+                found[number] = found[bone.parent] + bone.offset
+        return found
+
+    def below(self, number: int) -> list[int]:
+        """The bones that hang on one."""
+        return [other for other, bone in enumerate(self.bones) if bone.parent == number]
+
+    def above(self, number: int) -> list[int]:
+        """A bone and those it hangs on, up to the root."""
+        found, at = [], number
+        while at is not None:
+            found.append(at)
+            at = self.bones[at].parent
+        return found
+
+
+def is_bvh(content: bytes) -> bool:
+    """Whether bytes begin as a BVH file does."""
+    return content[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()[: len(_START)].upper() == _START
+
+
+def axis_of(channel: str) -> str:
+    """The letter of the axis of a channel: "Zrotation" -> "z"."""
+    return channel[0].lower()
+
+
+def bvh_skeleton(content: bytes) -> Skeleton:
+    """Read a file.
+
+    Raises
+    ------
+    BvhFaultError
+        For whatever is no BVH, has other numbers than it says, or moves bones along their parents.
+    """
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # Names of bones in older files; every byte is a letter.
+        text = content.decode("latin-1")
+    lines = _Lines(text)
+    if lines.next("HIERARCHY") != ["HIERARCHY"]:
+        raise lines.fault("HIERARCHY is needed")
+    bones = _Hierarchy(lines).read()
+    if lines.next("MOTION") != ["MOTION"]:
+        raise lines.fault("MOTION is needed behind the skeleton: one ROOT, as many closing braces as opening ones")
+    count = lines.after("Frames:")
+    if not (count.isascii() and count.isdigit() and len(count) < 10):
+        raise lines.fault(f"Frames: {count[:_SHOWN]!r} is no number of frames")
+    step = _numbers([lines.after("Frame Time:")], lines)[0]
+    if not 1e-9 <= step <= 1e9:
+        raise lines.fault(f"Frame Time: {step:g} s between frames; a time above 0 is needed")
+    width = sum(len(bone.channels) for bone in bones)
+    frames, at = _frames(lines, int(count), width)
+    skeleton = Skeleton(bones=bones, frames=frames, lines=at, step=step)
+    _check_places(skeleton)
+    return skeleton
+
+
+class _Lines:
+    """Lines that are not blank, one after the other."""
+
+    def __init__(self, text: str) -> None:
+        self.number = 0
+        self._rest = self._numbered(text)
+
+    def _numbered(self, text: str) -> Iterator[str]:
+        for self.number, line in enumerate(text.splitlines(), start=1):
+            if line.strip():
+                yield line.strip()
+
+    def text(self) -> str | None:
+        return next(self._rest, None)
+
+    def next(self, what: str) -> list[str]:
+        """The words of the next line. Raises BvhFaultError at the end of the file."""
+        line = self.text()
+        if line is None:
+            raise self.fault(f"the file ends where {what} is needed")
+        return line.split()
+
+    def after(self, label: str) -> str:
+        """What follows a label in the next line."""
+        words = " ".join(self.next(label))
+        if not words.lower().startswith(label.lower()):
+            raise self.fault(f"{label} is needed, got {words[:_SHOWN]!r}")
+        return words[len(label) :].strip()
+
+    def fault(self, message: str) -> BvhFaultError:
+        return BvhFaultError(message, max(self.number, 1))
+
+
+class _Hierarchy:
+    """The skeleton on the way through its lines."""
+
+    def __init__(self, lines: _Lines) -> None:
+        self.lines = lines
+        self.bones: list[Bone] = []
+        self.names: set[str] = set()
+        self.width = 0
+
+    def read(self) -> tuple[Bone, ...]:
+        """All bones of one root."""
+        words = self.lines.next("ROOT")
+        if words[0] != "ROOT":
+            raise self.lines.fault(f"ROOT is needed, got {' '.join(words)[:_SHOWN]!r}")
+        open_bones: list[int] = [self._bone(words, None)]
+        while open_bones:
+            words = self.lines.next("}")
+            if words == ["}"]:
+                open_bones.pop()
+            elif words[0] == "JOINT":
+                if len(open_bones) >= _MOST_DEPTH:
+                    raise self.lines.fault(f"bones are nested more than {_MOST_DEPTH} deep, as in no skeleton")
+                open_bones.append(self._bone(words, open_bones[-1]))
+            elif [word.lower() for word in words[:2]] == ["end", "site"]:
+                self._end_site(words, open_bones[-1])
+            else:
+                raise self.lines.fault(f"JOINT, End Site or }} is needed, got {' '.join(words)[:_SHOWN]!r}")
+        return tuple(self.bones)
+
+    def _bone(self, words: list[str], parent: int | None) -> int:
+        line = self.lines.number
+        brace = words[-1] == "{" and len(words) > 1
+        name = " ".join(words[1:-1] if brace else words[1:])
+        if not name or len(name) > _MOST_NAME or not name.isprintable():
+            raise self.lines.fault(
+                f"{words[0]} {name[:_SHOWN]!r}: a name of up to {_MOST_NAME} letters that can be printed is needed"
+            )
+        if name in self.names:
+            raise self.lines.fault(f"two bones are named {name!r}; give each a name of its own")
+        if len(self.bones) >= _MOST_BONES:
+            raise self.lines.fault(f"more than {_MOST_BONES} bones, as in no skeleton")
+        self._open(name, brace)
+        offset, channels = self._offset(name), self._channels(name)
+        if parent is None and len(channels) - len(set(_PLACES) & set(channels)) != len(_TURNS):
+            raise self.lines.fault(f"root {name!r}: three rotations are needed, got {' '.join(channels) or 'none'}")
+        if parent is None and 0 < len(set(_PLACES) & set(channels)) < len(_PLACES):
+            raise self.lines.fault(f"root {name!r}: three positions or none are needed, got {' '.join(channels)}")
+        self.names.add(name)
+        bone = Bone(name=name, line=line, parent=parent, offset=offset, channels=channels, column=self.width, tip=None)
+        self.bones.append(bone)
+        self.width += len(channels)
+        return len(self.bones) - 1
+
+    def _end_site(self, words: list[str], number: int) -> None:
+        name = f"the end of {self.bones[number].name}"
+        self._open(name, words[-1] == "{")
+        tip = self._offset(name)
+        if self.lines.next("}") != ["}"]:
+            raise self.lines.fault(f"{name}: }} is needed behind its OFFSET")
+        self.bones[number] = replace(self.bones[number], tip=tip)
+
+    def _open(self, name: str, there: bool) -> None:
+        if not there and self.lines.next("{") != ["{"]:
+            raise self.lines.fault(f"{name}: {{ is needed")
+
+    def _offset(self, name: str) -> Array:
+        words = self.lines.next("OFFSET")
+        if words[0] != "OFFSET" or len(words) != 4:
+            raise self.lines.fault(f"{name}: OFFSET and three numbers are needed, got {' '.join(words)[:_SHOWN]!r}")
+        offset = np.array(_numbers(words[1:], self.lines))
+        if np.abs(offset).max() > _MOST_OFFSET:
+            raise self.lines.fault(f"{name}: an offset above {_MOST_OFFSET:g} units, as in no skeleton")
+        return offset
+
+    def _channels(self, name: str) -> tuple[str, ...]:
+        words = self.lines.next("CHANNELS")
+        if words[0] != "CHANNELS" or len(words) < 2:
+            raise self.lines.fault(f"{name}: CHANNELS and their number are needed, got {' '.join(words)[:_SHOWN]!r}")
+        known = {word.lower(): word for word in (*_PLACES, *_TURNS)}
+        channels = [known.get(word.lower(), "") for word in words[2:]]
+        for word, channel in zip(words[2:], channels, strict=True):
+            if not channel:
+                raise self.lines.fault(
+                    f"{name}: the channel {word[:_SHOWN]!r} is unknown; these are: {', '.join(known.values())}"
+                )
+        if words[1] != str(len(channels)):
+            raise self.lines.fault(f"{name}: CHANNELS {words[1][:_SHOWN]} are said, and {len(channels)} follow")
+        if len(set(channels)) < len(channels):
+            raise self.lines.fault(f"{name}: a channel stands twice; three different axes can be read")
+        return tuple(channels)
+
+
+def _numbers(words: Sequence[str], lines: _Lines) -> list[float]:
+    for word in words:
+        try:
+            # Python's own reading also takes 1_000 and digits of other scripts.
+            value = float(word) if word.isascii() and "_" not in word else math.nan
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise lines.fault(f"{word[:_SHOWN]!r} is no finite number")
+    return [float(word) for word in words]
+
+
+def _quick_numbers(line: str, words: list[str]) -> list[float] | None:
+    """A whole frame at once; None where each number has to be looked at."""
+    if not line.isascii() or "_" in line:
+        return None
+    try:
+        values = list(map(float, words))
+    except ValueError:
+        return None
+    return values if math.isfinite(sum(map(abs, values))) else None
+
+
+def _frames(lines: _Lines, count: int, width: int) -> tuple[Array, list[int]]:
+    if count * width > _MOST_NUMBERS:
+        raise lines.fault(f"Frames: {count} frames of {width} channels are more than {_MOST_NUMBERS} numbers")
+    values, at = array("d"), []
+    while (line := lines.text()) is not None:
+        words = line.split()
+        if len(words) != width:
+            raise lines.fault(f"{len(words)} numbers in a frame, and the skeleton has {width} channels")
+        if len(at) == count:
+            raise lines.fault(f"Frames: {count} are said, and more follow")
+        values.extend(_quick_numbers(line, words) or _numbers(words, lines))
+        at.append(lines.number)
+    if len(at) < count:
+        raise lines.fault(f"Frames: {count} are said, and {len(at)} follow; the file is cut off")
+    return np.frombuffer(values, dtype=np.float64).reshape(-1, width) if at else np.empty((0, width)), at
+
+
+def _check_places(skeleton: Skeleton) -> None:
+    """Raise BvhFaultError where a bone below the root moves along: its length would change."""
+    for bone in skeleton.bones[1:]:
+        words = [word for word in bone.channels if word in _PLACES]
+        if not words or not len(skeleton.frames):
+            continue
+        apart = skeleton.frames[:, bone.columns(words)] - bone.offset[["XYZ".index(word[0]) for word in words]]
+        off = np.abs(apart).max(axis=1)
+        worst = int(np.argmax(off))
+        if off[worst] > _STAYS * max(1.0, float(np.abs(bone.offset).max())):
+            raise BvhFaultError(
+                f"bone {bone.name!r} is {off[worst]:.3g} units from its OFFSET: bones of changing length are no rigid "
+                "links; export rotations alone, or positions of the root only",
+                skeleton.lines[worst],
+            )

@@ -1,0 +1,250 @@
+"""Segments of a human on a skeleton: which bones carry them, and their masses, centres and inertias.
+
+Masses, centres of mass and radii of gyration are those of men by P. de Leva, J. Biomechanics 29 (1996) 1223-1230,
+table 4. Limbs are as long as their bones; trunk and head take their length from the distance of hips and shoulders.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from .bvh_text import BvhFaultError, Skeleton
+
+
+class _Row(NamedTuple):
+    """One line of the table."""
+
+    part: float  # of the mass of the body
+    centre: float  # from the first end point, in parts of the length
+    radii: tuple[float, float, float]  # of gyration about front-back, left-right, long axes, in parts of the length
+    length: float  # of the men who were measured [m]
+
+
+_TABLE = {
+    "head": _Row(0.0694, 0.5002, (0.303, 0.315, 0.261), 0.2429),
+    "upper_trunk": _Row(0.1596, 0.5066, (0.505, 0.320, 0.465), 0.2421),
+    "middle_trunk": _Row(0.1633, 0.4502, (0.482, 0.383, 0.468), 0.2155),
+    "lower_trunk": _Row(0.1117, 0.6115, (0.615, 0.551, 0.587), 0.1457),
+    "upper_arm": _Row(0.0271, 0.5772, (0.285, 0.269, 0.158), 0.2817),
+    "forearm": _Row(0.0162, 0.4574, (0.276, 0.265, 0.121), 0.2689),
+    "hand": _Row(0.0061, 0.7900, (0.628, 0.513, 0.401), 0.0862),
+    "thigh": _Row(0.1416, 0.4095, (0.329, 0.329, 0.149), 0.4222),
+    "shank": _Row(0.0433, 0.4395, (0.251, 0.246, 0.102), 0.4403),
+    "foot": _Row(0.0137, 0.4415, (0.257, 0.245, 0.124), 0.2581),
+}
+_TRUNK = ("upper_trunk", "middle_trunk", "lower_trunk")
+_SHOULDERS = 0.8556
+"""Of the trunk's length, where the shoulders are above the hips: robots/astronaut.urdf, after Drillis and Contini."""
+_HEEL = 0.05 / 0.2581
+"""Of the foot's length, by which the heel is behind the ankle (HeiMan)."""
+_ALONG = 0.7
+"""Cosine of the angle to the long axis above which the front-back axis of the body is none of a segment."""
+_NAMES = {
+    "thigh": ("upleg", "upperleg", "thigh", "hip"),
+    "shank": ("leg", "lowerleg", "lowleg", "calf", "shin", "knee"),
+    "foot": ("ankle", "foot"),
+    "upper_arm": ("upperarm", "uparm", "arm", "shoulder"),
+    "forearm": ("forearm", "lowerarm", "lowarm", "elbow"),
+    "hand": ("wrist", "hand"),
+}
+"""Of the bones that carry a segment, without their side; the first that there is counts."""
+_SIDES = {"left": ("left", "l"), "right": ("right", "r")}
+_CALLED = {
+    "thigh": "UpLeg",
+    "shank": "Leg",
+    "foot": "Foot",
+    "upper_arm": "Arm",
+    "forearm": "ForeArm",
+    "hand": "Hand",
+}
+"""Behind their side, the names that most files have."""
+_MAY_LACK = {"hand": "forearm"}
+"""Segments that the bone above carries where they have none of their own."""
+
+
+class Segment(NamedTuple):
+    """What a bone carries: mass [kg], centre from the bone's joint (3,) [m], inertia about it (3, 3) [kg m^2]."""
+
+    bone: int
+    mass: float
+    centre: Array
+    inertia: Array
+
+
+def segments_of(skeleton: Skeleton, mass: float, metre: float) -> list[Segment]:
+    """All sixteen of them, in axes of the skeleton at zero angles.
+
+    mass : of the person [kg]
+    metre : length of a unit of the file [m]
+
+    Raises
+    ------
+    BvhFaultError
+        If a bone is not found by its name, or has no length.
+    """
+    return _Person(skeleton, mass, metre).segments()
+
+
+def height_of(skeleton: Skeleton) -> float:
+    """The largest extent of a skeleton along one of its axes at zero angles [units]."""
+    ends = [
+        place + bone.tip for place, bone in zip(skeleton.places, skeleton.bones, strict=True) if bone.tip is not None
+    ]
+    return float(np.ptp(np.array([*skeleton.places, *ends]), axis=0).max())
+
+
+class _Person:
+    """A skeleton whose bones have been found."""
+
+    def __init__(self, skeleton: Skeleton, mass: float, metre: float) -> None:
+        self.skeleton, self.mass, self.metre = skeleton, mass, metre
+        self.places = metre * skeleton.places
+        self.plain = [_plain(bone.name) for bone in skeleton.bones]
+        self.bones = {(side, part): self._limb(side, part) for side in _SIDES for part in _NAMES}
+        thighs, arms = (self._middle(part) for part in ("thigh", "upper_arm"))
+        self.up = self._direction(arms - thighs, "the hips and the shoulders are in one place")
+        across = self.places[self.bones["left", "thigh"]] - self.places[self.bones["right", "thigh"]]
+        self.left = self._direction(across - (across @ self.up) * self.up, "the hips are in one place")
+        self.front = np.cross(self.left, self.up)
+        self.hips, self.trunk = thighs, float(np.linalg.norm(arms - thighs)) / _SHOULDERS
+
+    def segments(self) -> list[Segment]:
+        found = self._torso()
+        for side in _SIDES:
+            upper, forearm, thigh, shank, foot = (
+                self.bones[side, part] for part in ("upper_arm", "forearm", "thigh", "shank", "foot")
+            )
+            found.append(self._between("upper_arm", upper, self.places[forearm]))
+            wrist = self._wrist(side)
+            found.append(self._between("forearm", forearm, wrist))
+            found.append(self._hand(side, wrist))
+            found.append(self._between("thigh", thigh, self.places[shank]))
+            found.append(self._between("shank", shank, self.places[foot]))
+            found.append(self._foot(foot, float(np.linalg.norm(self.places[foot] - self.places[shank]))))
+        return found
+
+    def _torso(self) -> list[Segment]:
+        """Pelvis, middle and chest along the line from the hips, and the head on its end."""
+        pelvis = self._common([self.bones[side, "thigh"] for side in _SIDES])
+        chest = self._common([self.bones[side, "upper_arm"] for side in _SIDES])
+        above = self.skeleton.above(pelvis)
+        way = [pelvis, *(bone for bone in self.skeleton.above(chest)[::-1] if bone not in above)]
+        whole = sum(_TABLE[part].length for part in _TRUNK)
+        found, top = [], self.trunk
+        for part in _TRUNK:
+            row = _TABLE[part]
+            length = self.trunk * row.length / whole
+            height = top - row.centre * length
+            top -= length
+            carrier = {"upper_trunk": way[-1], "lower_trunk": pelvis}.get(part, self._reaching(way, height))
+            found.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
+        row, length = _TABLE["head"], self.trunk * _TABLE["head"].length / whole
+        centre = self.hips + (self.trunk + (1.0 - row.centre) * length) * self.up
+        return [*found, self._segment("head", self._head(), centre, self.up, length)]
+
+    def _reaching(self, way: list[int], height: float) -> int:
+        """The last bone of the trunk whose joint is not above a height over the hips."""
+        lower = [bone for bone in way if (self.places[bone] - self.hips) @ self.up <= height]
+        return lower[-1] if lower else way[0]
+
+    def _between(self, part: str, bone: int, end: Array) -> Segment:
+        along = end - self.places[bone]
+        length = float(np.linalg.norm(along))
+        direction = self._direction(along, f"bone {self.skeleton.bones[bone].name!r} has no length", bone)
+        centre = self.places[bone] + _TABLE[part].centre * along
+        return self._segment(part, bone, centre, direction, length)
+
+    def _wrist(self, side: str) -> Array:
+        """Where the forearm ends."""
+        forearm, hand = self.bones[side, "forearm"], self.bones[side, "hand"]
+        return self.places[hand] if hand != forearm else self.places[forearm] + self._towards(forearm)
+
+    def _hand(self, side: str, wrist: Array) -> Segment:
+        """From the wrist on, as long as hands are beside forearms."""
+        forearm, hand = self.bones[side, "forearm"], self.bones[side, "hand"]
+        along = wrist - self.places[forearm]
+        ahead = self._towards(hand) if hand != forearm else along
+        direction = self._direction(ahead if ahead.any() else along, "the forearm has no length", forearm)
+        length = float(np.linalg.norm(along)) * _TABLE["hand"].length / _TABLE["forearm"].length
+        return self._segment("hand", hand, wrist + _TABLE["hand"].centre * length * direction, direction, length)
+
+    def _foot(self, foot: int, shank: float) -> Segment:
+        """From heel to toes, as long as feet are beside shanks."""
+        ahead = self._towards(foot)
+        direction = self._direction(ahead if ahead.any() else self.front, "it points nowhere", foot)
+        length = shank * _TABLE["foot"].length / _TABLE["shank"].length
+        centre = self.places[foot] + (_TABLE["foot"].centre - _HEEL) * length * direction
+        return self._segment("foot", foot, centre, direction, length)
+
+    def _segment(self, part: str, bone: int, centre: Array, along: Array, length: float) -> Segment:
+        row = _TABLE[part]
+        reference = self.front if abs(self.front @ along) < _ALONG else self.up
+        sagittal = reference - (reference @ along) * along
+        sagittal /= np.linalg.norm(sagittal)
+        axes = np.stack([sagittal, np.cross(along, sagittal), along])
+        mass = row.part * self.mass
+        moments = mass * (np.array(row.radii) * length) ** 2
+        inertia = axes.T @ (moments[:, None] * axes)
+        return Segment(bone, mass, centre - self.places[bone], 0.5 * (inertia + inertia.T))
+
+    def _towards(self, bone: int) -> Array:
+        """From a bone's joint to the next one that is elsewhere, or to the end of the bone: (3,) [m]; or zeros."""
+        waiting = [bone]
+        while waiting:
+            at = waiting.pop(0)
+            if at != bone and np.any(self.places[at] != self.places[bone]):
+                return self.places[at] - self.places[bone]
+            tip = self.skeleton.bones[at].tip
+            if tip is not None and tip.any():
+                return self.metre * tip
+            waiting += self.skeleton.below(at)
+        return np.zeros(3)
+
+    def _limb(self, side: str, part: str) -> int:
+        for word in _NAMES[part]:
+            sided = {pattern for mark in _SIDES[side] for pattern in (f"{mark}{word}", f"{word}{mark}")}
+            for number, name in enumerate(self.plain):
+                if name in sided:
+                    return number
+        if part in _MAY_LACK:
+            return self._limb(side, _MAY_LACK[part])
+        raise self._unknown(f"{side} {part.replace('_', ' ')}", f"{side.title()}{_CALLED[part]}")
+
+    def _head(self) -> int:
+        for word in ("head", "neck"):
+            if word in self.plain:
+                return self.plain.index(word)
+        raise self._unknown("head", "Head")
+
+    def _unknown(self, what: str, name: str) -> BvhFaultError:
+        there = ", ".join(bone.name for bone in self.skeleton.bones[:40])
+        return BvhFaultError(
+            f"no bone is known as the {what} of a human; call it {name} in the file. There are: {there}",
+            self.skeleton.bones[0].line,
+        )
+
+    def _common(self, bones: list[int]) -> int:
+        """The nearest bone that all of these hang on."""
+        first, second = (self.skeleton.above(bone)[1:] for bone in bones)
+        shared = [bone for bone in first if bone in second]
+        if not shared:
+            raise BvhFaultError("left and right limbs hang on no common bone", self.skeleton.bones[0].line)
+        return shared[0]
+
+    def _middle(self, part: str) -> Array:
+        return 0.5 * (self.places[self.bones["left", part]] + self.places[self.bones["right", part]])
+
+    def _direction(self, vector: Array, why: str, bone: int = 0) -> Array:
+        length = np.linalg.norm(vector)
+        if not length > 0.0:
+            raise BvhFaultError(why, self.skeleton.bones[bone].line)
+        return vector / length
+
+
+def _plain(name: str) -> str:
+    """Letters of a name in lower case, without what stands before a colon: "mixamorig:LeftArm" -> "leftarm"."""
+    return re.sub(r"^mixamorig\d*|[^a-z]", "", name.rpartition(":")[2].lower())

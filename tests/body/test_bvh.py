@@ -1,0 +1,360 @@
+"""BVH files: a human from a skeleton, and the motion of the same file."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.errors import IgnoredElementWarning, ModelFileError, ShapeError, TrajectoryError
+from support import bvh_files
+from support.bvh_files import UNIT, ZYX, bvh_text, columns, posed, skeleton_text, write
+
+KILOGRAMS = 70.0
+MASSLESS = ("ToeBase", "FingerBase")
+STEP = 1.0 / 120.0
+MOMENTUM = np.array([-45.0, 2.0, 1.0])
+"""[kg m^2/s] Backwards over the left and right axis, with some twist."""
+DIGITS = 1e-6
+"""[degrees, units] To which a file with six decimals is written, half of it."""
+
+
+def load(path, **options: Any):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IgnoredElementWarning)
+        return sp.load_body(path, **{"length_unit": UNIT, "person_mass": KILOGRAMS, **options})
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory):
+    return load(write(tmp_path_factory.mktemp("bvh") / "person.bvh", bvh_text(np.zeros((0, len(columns()))), STEP)))
+
+
+def random_rows(count, turns=ZYX):
+    return np.random.default_rng(3).uniform(-80.0, 80.0, (count, len(columns(turns))))
+
+
+@pytest.mark.parametrize("turns", [ZYX, ("Xrotation", "Zrotation", "Yrotation")], ids=["zyx", "xzy"])
+def test_bones_are_where_the_format_puts_them(turns, tmp_path):
+    """Poses of all bones of random frames, by the products of rotations that define the format."""
+    rows = random_rows(3, turns)
+    body = load(write(tmp_path / "turns.bvh", bvh_text(rows, STEP, turns)))
+    recorded = sp.read_recorded_motion(tmp_path / "turns.bvh", body)
+    assert body.n_shape == 3 * (len(bvh_files.bones()) - 5)
+    for frame, row in enumerate(rows):
+        expected = posed(row, turns)
+        shape = recorded.path.shape(recorded.times[frame])
+        assert recorded.base_attitude is not None
+        assert recorded.base_position is not None
+        np.testing.assert_allclose(recorded.base_attitude[frame], expected["Hips"][:3, :3], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(recorded.base_position[frame], UNIT * row[:3], rtol=1e-15)
+        for name, pose in expected.items():
+            if name.endswith(MASSLESS):
+                continue
+            seen = np.linalg.inv(expected["Hips"]) @ pose
+            seen[:3, 3] *= UNIT
+            np.testing.assert_allclose(body.link_pose(shape, name), seen, rtol=0, atol=1e-13)
+
+
+def test_the_segments_are_those_of_the_astronaut(tmp_path):
+    """A skeleton with the joints of astronaut.urdf, made of the same table, has his masses, centres and inertias."""
+    astronaut = sp.load_body("astronaut")
+    shape = astronaut.shape()
+    names = {"LowerBack": "middle_trunk", "Chest": "upper_trunk", "Head": "head"}
+    above = {"LowerBack": "Hips", "Chest": "LowerBack", "Head": "Chest"}
+    for side in ("Left", "Right"):
+        limbs = [("UpLeg", "thigh"), ("Leg", "shank"), ("Foot", "foot")]
+        arms = [("Arm", "upper_arm"), ("ForeArm", "forearm"), ("Hand", "hand")]
+        for first, chain in (("Hips", limbs), ("Chest", arms)):
+            last = first
+            for bone, link in chain:
+                names[side + bone], above[side + bone], last = f"{side.lower()}_{link}", last, side + bone
+    names["Hips"] = "lower_trunk"
+    place = {bone: astronaut.link_pose(shape, link)[:3, 3] for bone, link in names.items()}
+
+    def lines(bone):
+        offset = place[bone] - place.get(above.get(bone, ""), place[bone])
+        toes = "0.2 0 0" if bone.endswith("Foot") else "0 0 -0.1"
+        ends = [] if bone in above.values() else ["End Site", "{", f"OFFSET {toes}", "}"]
+        below = [line for other, parent in above.items() if parent == bone for line in lines(other)]
+        return [
+            f"{'JOINT' if bone in above else 'ROOT'} {bone}",
+            "{",
+            "OFFSET " + " ".join(map(repr, offset.tolist())),
+            f"CHANNELS 3 {' '.join(ZYX)}",
+            *below,
+            *ends,
+            "}",
+        ]
+
+    text = "\n".join(["HIERARCHY", *lines("Hips"), "MOTION", "Frames: 0", "Frame Time: 0.01"])
+    found = load(write(tmp_path / "astronaut.bvh", text), length_unit=1.0, person_mass=82.2)
+    parts = {part.links[0]: part for part in found.moving_parts}
+    expected = {part.links[0]: part for part in astronaut.moving_parts}
+    for bone, link in names.items():
+        one, other = parts[bone], expected[link]
+        assert one.mass == pytest.approx(other.mass, abs=1e-9)
+        # Places have four decimals, and inertias five; a foot's centre is set lower there.
+        apart = np.abs(one.centre - other.centre)
+        assert np.all(apart[: 2 if link.endswith("foot") else 3] < 3e-4), bone
+        np.testing.assert_allclose(one.inertia, other.inertia, rtol=2e-3, atol=1e-5, err_msg=bone)
+
+
+def flip(body):
+    """Times, the path of a tuck, and a backward somersault along it."""
+    times = STEP * np.arange(97)
+    tuck = np.sin(np.pi * times / times[-1]) ** 2
+    sway = np.sin(2.0 * np.pi * times / times[-1])
+    target = body.shape({
+        **{f"{side}UpLeg_Xrotation": -2.0 for side in ("Left", "Right")},
+        **{f"{side}Leg_Xrotation": 2.2 for side in ("Left", "Right")},
+        **{f"{side}Arm_Yrotation": sign * 1.2 for side, sign in (("Left", -1.0), ("Right", 1.0))},
+        "Spine_Xrotation": 0.5,
+        "Neck_Xrotation": 0.4,
+    })  # fmt: skip
+    lean = body.shape({"LowerBack_Zrotation": 0.2, "LeftArm_Zrotation": 0.9, "RightForeArm_Yrotation": 0.6})
+    shapes = tuck[:, None] * target + sway[:, None] * lean
+    path = sp.ShapePath.spline(times, shapes, periodic=False, joint_names=body.joint_names)
+    return times, path, sp.reconstruct(sp.articulated(body, path), MOMENTUM, tolerance=1e-10)
+
+
+def rows_of(times, path, motion):
+    """What a recorder writes of it: places in units, angles in degrees."""
+    named = dict(zip(path.joint_names, np.degrees(path.shape(times)).T, strict=True))
+    fall = {"start": [0.0, 1.0, 0.0], "velocity": [0.0, 3.5, -0.8], "gravity": [0.0, -9.81, 0.0]}
+    places = motion.base_position(times, **fall) / UNIT
+    turned = motion.attitude(times)
+    second = np.arcsin(-turned[:, 2, 0])
+    first, third = np.arctan2(turned[:, 1, 0], turned[:, 0, 0]), np.arctan2(turned[:, 2, 1], turned[:, 2, 2])
+    named |= {f"Hips_{axis}position": places[:, k] for k, axis in enumerate("XYZ")}
+    named |= dict(zip([f"Hips_{turn}" for turn in ZYX], np.degrees([first, second, third]), strict=True))
+    return np.stack([named.get(name, np.zeros(len(times))) for name in columns()], axis=1)
+
+
+@pytest.fixture(scope="module")
+def somersault(body):
+    times, path, motion = flip(body)
+    return times, path, motion, rows_of(times, path, motion)
+
+
+def fitted(body, recorded):
+    return sp.momentum_from_recording(sp.articulated(body, recorded.path), recorded.times, recorded.base_attitude)
+
+
+def test_a_somersault_comes_back(body, somersault, tmp_path):
+    """Written, read, fitted and split: momentum and phases are those of the motion that was written.
+
+    Angles are off by half of the last decimal; so is the base, along which the momentum is fitted.
+    """
+    _, path, motion, rows = somersault
+    file = write(tmp_path / "jump.bvh", bvh_text(np.round(rows, 6), STEP))
+    recorded = sp.read_recorded_motion(file, load(file), flight="all", close=False)
+    assert recorded.format == "BVH"
+    # The file's decimals, and a spline that lets errors grow by no more than three halves.
+    off = np.radians(DIGITS)
+    assert np.abs(recorded.path.shape(path.sample_times) - path.shape(path.sample_times)).max() < off
+    found = fitted(body, recorded)
+    assert np.linalg.norm(found.momentum - MOMENTUM) < 100.0 * off * np.linalg.norm(MOMENTUM)
+    before, after = sp.split(motion), sp.split(found.motion)
+    assert after.total_rotation == pytest.approx(before.total_rotation, abs=1e3 * off)
+    assert after.dynamic_phase == pytest.approx(before.dynamic_phase, abs=1e3 * off)
+
+
+def test_the_flight_is_found_between_two_stances(body, somersault, tmp_path):
+    """Frames at rest before and after, as on the ground: the fall along y is cut out, and the same momentum fits."""
+    rows = somersault[-1]
+    stance = 40
+    take = np.concatenate([np.repeat(rows[:1], stance, axis=0), rows, np.repeat(rows[-1:], stance, axis=0)])
+    file = write(tmp_path / "take.bvh", bvh_text(np.round(take, 6), STEP))
+    recorded = sp.read_recorded_motion(file, body, flight="auto", close=False)
+    assert recorded.flight is not None
+    assert recorded.flight.fall is not None
+    assert recorded.flight.fall.up == "+y"
+    first, last = (stance * STEP, (stance + len(rows) - 1) * STEP)
+    assert first - STEP < recorded.flight.first_time < first + 0.1
+    assert last - 0.1 < recorded.flight.last_time < last + STEP
+    # Splines of a part of the samples are others near its ends.
+    np.testing.assert_allclose(fitted(body, recorded).momentum, MOMENTUM, rtol=0, atol=1e-4 * 45.0)
+
+
+def test_angles_that_files_wrap_go_on(body, tmp_path):
+    rows = np.zeros((7, len(columns())))
+    turn = columns().index("LeftArm_Xrotation")
+    rows[:, turn] = [150.0, 165.0, 179.0, -167.0, -152.0, -139.0, -128.0]
+    recorded = sp.read_recorded_motion(write(tmp_path / "wrap.bvh", bvh_text(rows, STEP)), body)
+    found = recorded.path.shape(recorded.times)[:, body.joint_index("LeftArm_Xrotation")]
+    np.testing.assert_allclose(np.degrees(found), rows[:, turn] % 360.0, rtol=1e-15)
+
+
+def test_what_a_file_does_not_say_is_asked_or_told(tmp_path):
+    file = write(tmp_path / "a.bvh", bvh_text(np.zeros((2, len(columns()))), STEP))
+    with pytest.raises(ModelFileError, match=r"a.bvh:2: .*no unit of length: give length_unit .*0.056444"):
+        sp.load_body(file)
+    with pytest.warns(IgnoredElementWarning, match=r"taken to have 70 kg.*do not move: LeftToeBase, .*RightFingerBase"):
+        found = sp.load_body(file, length_unit=UNIT)
+    assert found.mass == pytest.approx(70.0, rel=1e-14)
+    assert found.length_unit == UNIT
+    heavier: Any = found.with_inertias(masses={"Head": 5.0})
+    assert heavier.length_unit == UNIT
+    with pytest.raises(ShapeError, match="length_unit is for BVH files"):
+        sp.load_body("cat", length_unit=0.01)
+    with pytest.raises(ShapeError, match="person_mass is for BVH files"):
+        sp.load_body("cat", person_mass=70.0)
+    with pytest.raises(TrajectoryError, match=r"length_unit: a number of metres above 0"):
+        sp.load_body(file, length_unit=-1.0)
+    with pytest.raises(ShapeError, match="root_body"):
+        load(file, root_body="Hips")
+
+
+def test_the_content_tells_the_format_and_other_bodies_have_no_such_motion(tmp_path):
+    text = bvh_text(np.zeros((2, len(columns()))), STEP)
+    assert load(write(tmp_path / "skeleton.dat", "\ufeff\n" + text), isolate=True).n_shape == 63
+    with pytest.raises(TrajectoryError, match=r"skeleton of its own, and cat is not from such a file"):
+        sp.read_shape_path(write(tmp_path / "m.bvh", text), sp.load_body("cat"))
+
+
+def test_another_order_of_channels_is_no_motion_of_this_body(body, tmp_path):
+    other = bvh_text(np.zeros((2, len(columns()))), STEP, ("Xrotation", "Yrotation", "Zrotation"))
+    with pytest.raises(TrajectoryError, match=r"line 2: bone 'Hips' turns in the order Hips_Xrotation.*load the body"):
+        sp.read_shape_path(write(tmp_path / "m.bvh", other), body)
+
+
+@pytest.mark.parametrize(
+    "renamed",
+    [
+        {
+            "LeftUpLeg": "L_Hip", "LeftLeg": "L_Knee", "LeftFoot": "L_Ankle", "LeftToeBase": "L_Foot",
+            "LeftShoulder": "L_Collar", "LeftArm": "L_Shoulder", "LeftForeArm": "L_Elbow", "LeftHand": "L_Wrist",
+        },
+        {
+            "LeftUpLeg": "thigh_l", "LeftLeg": "calf_l", "LeftFoot": "foot_l", "LeftToeBase": "ball_l",
+            "LeftShoulder": "clavicle_l", "LeftArm": "upperarm_l", "LeftForeArm": "lowerarm_l", "LeftHand": "hand_l",
+        },
+        {"LeftArm": "mixamorig:LeftArm", "Head": "mixamorig:Head", "LeftLeg": "mixamorig:LeftLeg"},
+    ],
+    ids=["joints of learned models", "sides behind", "a prefix"],
+)  # fmt: skip
+def test_names_of_other_skeletons(renamed, body, tmp_path):
+    """Each part carries the same under any of its names."""
+    text = bvh_text(np.zeros((0, len(columns()))), STEP)
+    mirrored = {
+        old.replace("Left", "Right"): new.replace("L_", "R_").replace("_l", "_r").replace("Left", "Right")
+        for old, new in renamed.items()
+    }
+    for old, new in {**renamed, **mirrored}.items():
+        text = re.sub(rf"JOINT {old}\n", f"JOINT {new}\n", text)
+    other = load(write(tmp_path / "other.bvh", text))
+    np.testing.assert_array_equal(other.locked_inertia(other.shape()), body.locked_inertia(body.shape()))
+
+
+def edited(old, new, count=1):
+    text = bvh_text(np.zeros((3, len(columns()))), STEP)
+    assert old in text
+    return text.replace(old, new, count)
+
+
+FRAME = " ".join(["0.0"] * len(columns()))
+FAULTS = {
+    "cut off": (lambda: skeleton_text()[:900].rpartition("\n")[0], "the file ends where"),
+    "no motion": (skeleton_text, "the file ends where MOTION is needed"),
+    "a brace is missing": (lambda: edited("\n}\nMOTION", "\nMOTION"), "JOINT, End Site or } is needed, got 'MOTION'"),
+    "a brace too many": (lambda: edited("MOTION", "}\nMOTION"), "MOTION is needed behind the skeleton"),
+    "no opening brace": (lambda: edited("JOINT Spine\n\t\t{", "JOINT Spine"), "Spine: { is needed"),
+    "an unknown channel": (lambda: edited("Zrotation", "Wrotation"), "the channel 'Wrotation' is unknown"),
+    "a wrong count": (lambda: edited("CHANNELS 3", "CHANNELS 4"), "CHANNELS 4 are said, and 3 follow"),
+    "a channel twice": (lambda: edited("CHANNELS 3 Zrotation", "CHANNELS 3 Xrotation"), "stands twice"),
+    "root without turns": (
+        lambda: edited(
+            "CHANNELS 6 Xposition Yposition Zposition Zrotation", "CHANNELS 5 Xposition Yposition Zposition"
+        ),
+        "three rotations are needed",
+    ),
+    "root on a plane": (lambda: edited("CHANNELS 6 Xposition", "CHANNELS 5"), "three positions or none"),
+    "no number": (lambda: edited("OFFSET 0.0 2.9", "OFFSET 0.0 2,9"), "'2,9' is no finite number"),
+    "two numbers": (lambda: edited("OFFSET 0.0 2.9 -0.2", "OFFSET 0.0 2.9"), "OFFSET and three numbers"),
+    "far away": (lambda: edited("OFFSET 0.0 2.9", "OFFSET 0.0 1e200"), "an offset above"),
+    "two of a name": (lambda: edited("JOINT Spine1", "JOINT Spine"), "two bones are named 'Spine'"),
+    "no name": (lambda: edited("JOINT Spine1", "JOINT"), "a name of up to"),
+    "a second root": (lambda: edited("JOINT Spine\n", "ROOT Spine\n"), "JOINT, End Site or } is needed, got 'ROOT"),
+    "endless nesting": (
+        lambda: (
+            "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
+            + "".join(f"JOINT b{k}\n{{\nOFFSET 0 0 0\nCHANNELS 0\n" for k in range(5000))
+        ),
+        "nested more than 100 deep",
+    ),
+    "endless bones": (
+        lambda: (
+            "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
+            + "".join(f"JOINT b{k}\n{{\nOFFSET 0 0 0\nCHANNELS 0\n}}\n" for k in range(5000))
+        ),
+        "more than 1000 bones",
+    ),
+    "not a number": (lambda: edited(FRAME, FRAME[:-3] + "nan"), "'nan' is no finite number"),
+    "a grouped number": (lambda: edited(FRAME, FRAME[:-3] + "1_0"), "'1_0' is no finite number"),
+    "a short frame": (lambda: edited(FRAME, FRAME[:-4]), "80 numbers in a frame, and the skeleton has 81 channels"),
+    "frames too few": (lambda: edited("Frames: 3", "Frames: 4"), "4 are said, and 3 follow; the file is cut off"),
+    "frames too many": (lambda: edited("Frames: 3", "Frames: 2"), "2 are said, and more follow"),
+    "frames without end": (lambda: edited("Frames: 3", "Frames: 999999999"), "more than 50000000 numbers"),
+    "no count": (lambda: edited("Frames: 3", "Frames: three"), "'three' is no number of frames"),
+    "no time": (lambda: edited(f"Frame Time: {STEP!r}", "Frame Time: 0"), "a time above 0 is needed"),
+    "not text": (lambda: edited("JOINT Spine1", "JOINT Sp\0ine"), "that can be printed"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_damaged_files_are_refused_with_their_line(name, body, tmp_path):
+    """As a body and as a motion."""
+    made, said = FAULTS[name]
+    file = write(tmp_path / "odd.bvh", made())
+    with pytest.raises(ModelFileError, match=rf"odd\.bvh:\d+: .*{re.escape(said)}"):
+        load(file)
+    with pytest.raises(TrajectoryError, match=rf"odd\.bvh: line \d+: .*{re.escape(said)}"):
+        sp.read_shape_path(file, body)
+
+
+HUMAN_FAULTS = {
+    "no knee": (
+        ("JOINT LeftLeg", "JOINT Kneecap"),
+        "no bone is known as the left shank of a human; call it LeftLeg in the",
+    ),
+    "no head": (("JOINT Head", "JOINT Top"), None),
+    "a bone without length": (("OFFSET 0.4 -8.3 0.0", "OFFSET 0 0 0"), "bone 'LeftUpLeg' has no length"),
+}
+
+
+@pytest.mark.parametrize("name", HUMAN_FAULTS)
+def test_skeletons_of_no_human(name, body, tmp_path):
+    """Without a head, its mass is on the neck."""
+    change, said = HUMAN_FAULTS[name]
+    file = write(tmp_path / "odd.bvh", edited(*change))
+    if said is None:
+        assert load(file).mass == pytest.approx(body.mass, rel=1e-14)
+        return
+    with pytest.raises(ModelFileError, match=rf"odd\.bvh:\d+: {said}"):
+        load(file)
+
+
+@pytest.mark.parametrize(
+    ("shift", "said"), [(0.0, None), (0.5, r"line \d+: bone 'Spine' is 0.5 units from its OFFSET")]
+)
+def test_places_of_bones_are_their_offsets_or_an_error(shift, said, body, tmp_path):
+    """Some programs write six channels for every bone."""
+    text = re.sub(
+        r"(JOINT Spine\n\s+\{\n\s+OFFSET .*\n\s+)CHANNELS 3 (.*)", r"\1CHANNELS 6 Xposition Yposition Zposition \2",
+        skeleton_text(),
+    )  # fmt: skip
+    column = columns().index("Spine_Zrotation")
+    rows = np.insert(random_rows(3), [column] * 3, [0.0, 2.9, -0.2 + shift], axis=1)
+    frames = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+    file = write(tmp_path / "six.bvh", f"{text}MOTION\nFrames: 3\nFrame Time: 0.01\n{frames}\n")
+    if said is None:
+        plain = sp.read_shape_path(write(tmp_path / "three.bvh", bvh_text(random_rows(3), 0.01)), body)
+        np.testing.assert_array_equal(sp.read_shape_path(file, load(file)).shape(0.01), plain.shape(0.01))
+        return
+    with pytest.raises(TrajectoryError, match=said):
+        sp.read_shape_path(file, body)

@@ -1,0 +1,120 @@
+"""BVH files written for tests: a skeleton with the names and the order of channels of a public library, and motions.
+
+The numbers are our own, of a person of 1.74 m in units of 0.05 m. Written and posed here without the library.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+UNIT = 0.05
+"""[m]"""
+ZYX = ("Zrotation", "Yrotation", "Xrotation")
+_LIMBS = {
+    "Left": (1.0, "LeftToeBase", "LeftFingerBase"),
+    "Right": (-1.0, "RightToeBase", "RightFingerBase"),
+}
+AXES = dict(zip("XYZ", np.eye(3), strict=True))
+
+
+def bones() -> list[tuple[str, str | None, tuple[float, float, float], tuple[float, float, float] | None]]:
+    """Name, parent, offset and end of each bone, in the order of a file: y up, z forward, x left."""
+    found: list[tuple[str, str | None, tuple[float, float, float], tuple[float, float, float] | None]] = [
+        ("Hips", None, (0.0, 0.0, 0.0), None)
+    ]
+    for side, (sign, toes, _) in _LIMBS.items():
+        short = side[0]
+        found += [
+            (f"{short}HipJoint", "Hips", (0.0, 0.0, 0.0), None),
+            (f"{side}UpLeg", f"{short}HipJoint", (1.7 * sign, -1.8, 0.1), None),
+            (f"{side}Leg", f"{side}UpLeg", (0.4 * sign, -8.3, 0.0), None),
+            (f"{side}Foot", f"{side}Leg", (0.3 * sign, -8.4, -0.2), None),
+            (toes, f"{side}Foot", (0.1 * sign, -0.9, 2.6), (0.0, 0.0, 1.2)),
+        ]
+    found += [
+        ("LowerBack", "Hips", (0.0, 0.0, 0.0), None),
+        ("Spine", "LowerBack", (0.0, 2.9, -0.2), None),
+        ("Spine1", "Spine", (0.0, 3.1, -0.1), None),
+        ("Neck", "Spine1", (0.0, 3.4, 0.2), None),
+        ("Head", "Neck", (0.0, 2.0, 0.3), (0.0, 2.6, 0.1)),
+    ]
+    for side, (sign, _, fingers) in _LIMBS.items():
+        found += [
+            (f"{side}Shoulder", "Spine1", (0.0, 2.4, 0.0), None),
+            (f"{side}Arm", f"{side}Shoulder", (3.4 * sign, 0.3, -0.1), None),
+            (f"{side}ForeArm", f"{side}Arm", (5.6 * sign, 0.0, 0.0), None),
+            (f"{side}Hand", f"{side}ForeArm", (5.3 * sign, 0.0, 0.1), None),
+            (fingers, f"{side}Hand", (1.6 * sign, 0.0, 0.0), (1.5 * sign, 0.0, 0.0)),
+        ]
+    return found
+
+
+def skeleton_text(turns: tuple[str, ...] = ZYX) -> str:
+    """The part above MOTION."""
+    lines: list[str] = ["HIERARCHY"]
+    listed = bones()
+
+    def write(name: str, depth: int) -> None:
+        pad = "\t" * depth
+        _, parent, offset, tip = next(bone for bone in listed if bone[0] == name)
+        places = "Xposition Yposition Zposition " if parent is None else ""
+        count = len(turns) + 3 * (parent is None)
+        lines.extend([
+            f"{pad}{'JOINT' if parent else 'ROOT'} {name}",
+            f"{pad}{{",
+            f"{pad}\tOFFSET {' '.join(map(repr, offset))}",
+            f"{pad}\tCHANNELS {count} {places}{' '.join(turns)}",
+        ])  # fmt: skip
+        for other, above, *_ in listed:
+            if above == name:
+                write(other, depth + 1)
+        if tip is not None:
+            lines.extend(
+                [f"{pad}\tEnd Site", f"{pad}\t{{", f"{pad}\t\tOFFSET {' '.join(map(repr, tip))}", f"{pad}\t}}"]
+            )
+        lines.append(f"{pad}}}")
+
+    write("Hips", 0)
+    return "\n".join(lines) + "\n"
+
+
+def columns(turns: tuple[str, ...] = ZYX) -> list[str]:
+    """Names of all channels."""
+    places = [f"Hips_{axis}position" for axis in "XYZ"]
+    return places + [f"{name}_{turn}" for name, *_ in bones() for turn in turns]
+
+
+def bvh_text(rows: np.ndarray, step: float, turns: tuple[str, ...] = ZYX) -> str:
+    """A whole file of frames (N, c) [units and degrees]."""
+    frames = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+    return f"{skeleton_text(turns)}MOTION\nFrames: {len(rows)}\nFrame Time: {step!r}\n{frames}\n"
+
+
+def posed(row: np.ndarray, turns: tuple[str, ...] = ZYX) -> dict[str, np.ndarray]:
+    """Pose of each bone in the recorder's axes, by the definition of the format: (4, 4), in units."""
+    values = dict(zip(columns(turns), row.tolist(), strict=True))
+    found: dict[str, np.ndarray] = {}
+    for name, parent, offset, _ in bones():
+        pose = np.eye(4)
+        pose[:3, 3] = offset if parent else [values[f"Hips_{axis}position"] for axis in "XYZ"]
+        for turn in turns:
+            pose[:3, :3] = pose[:3, :3] @ rotation(turn[0], np.radians(values[f"{name}_{turn}"]))
+        found[name] = found[parent] @ pose if parent else pose
+    return found
+
+
+def rotation(axis: str, angle: float) -> np.ndarray:
+    """About one axis: (3, 3)."""
+    first, second = {"X": (1, 2), "Y": (2, 0), "Z": (0, 1)}[axis]
+    turned = np.eye(3)
+    turned[[first, second], [first, second]] = np.cos(angle)
+    turned[first, second], turned[second, first] = -np.sin(angle), np.sin(angle)
+    return turned
+
+
+def write(path: Path, text: str) -> Path:
+    """The file, written."""
+    path.write_text(text, encoding="utf-8")
+    return path
