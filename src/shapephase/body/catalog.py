@@ -289,8 +289,8 @@ def _from_file(
         owned = MJCF
     if root is not None and root.tag == "robot" and macro_of(root) is not None:
         owned = XACRO
-    own = {None: _OF_URDF, BVH: _OF_BVH}
-    _check_unused(given, where, own[owned] if owned in own else FORMATS[owned].options)
+    options = {BVH: _OF_BVH, **{name: known.options for name, known in FORMATS.items()}}
+    _check_unused(given, where, options.get(owned or "", _OF_URDF))
     if owned == XACRO:
         root = expanded(path, given.get("packages", ()))
     if owned == BVH:
