@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ....arguments import check_object
 from ....body.body import Body
 from ....body.formats.bvh import column_names
 from ....body.formats.bvh_text import BvhFaultError, Skeleton, bvh_skeleton
@@ -27,6 +28,7 @@ def read_bvh(where: Path, data: bytes, body: Body) -> Table:
         For faults, with the line; for a body that is not from a BVH file; where bones turn in another order than
         those of the body.
     """
+    check_object(body, "Body", "body")
     metre = body.length_unit
     if metre is None:
         raise TrajectoryError(
