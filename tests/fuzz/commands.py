@@ -12,8 +12,11 @@ from .engine_bodies import biomod, yeadon
 from .pieces import BODY, ODD_NAMES, Trial, odd_one, rarely
 from .studies import GOOD_MOTION, store_files, store_trial, study_file
 from .text_motions import delimited, number_text, opensim
+from .trajectories import file_of
+from .xacro_files import xacro
 
 _ODD_VALUES = (*ODD_WORDS, "-", "x", "a=b", "[", "1,2,3", "@", "%s", "\n")
+_SAMPLES = (".csv", ".csv", ".parquet", ".nc", ".mat", ".h5", ".CSV", "", ".xyz")
 _SMALL_SEARCH = ("--pieces", "12", "--iterations", "30", "--duration", "10")
 """What a plan takes of the processor grows with the first two; in so many seconds the rates of the body suffice."""
 
@@ -59,6 +62,7 @@ _RECORDING: Mapping[str, Callable[[Random], list[str]]] = {
     "--flight": lambda c: c.choice((["auto"], ["all"], [_number(c, "0"), _number(c, "1")], ["x"], ["1"])),
 }
 _ROOT: Mapping[str, Callable[[Random], list[str]]] = {
+    "--packages": lambda c: c.choice((["packages"], ["none"], ["body.urdf"], [], [""], ["packages", "."], ["\x01"])),
     "--root": lambda c: [c.choice(("free", "fixed", ""))],
     "--root-body": lambda c: [c.choice(("base", "body0", "none", ""))],
 }
@@ -106,8 +110,21 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
         "--out": lambda c: _file(c, "out.npz"),
         "--html": lambda c: _file(c, "report.html"),
         "--phases": lambda _: [],
-        "--samples": lambda _: [],
+        "--samples": lambda c: _file(c, "samples" + c.choice(_SAMPLES)),
         "--up": lambda c: [c.choice(_UP)],
+    },
+    "audit": {
+        "--flight": _RECORDING["--flight"],
+        "--tolerance": lambda c: [_number(c, "1e-3")],
+        "--step": lambda c: [_number(c, "0.001") for _ in range(1 + c.randrange(2))],
+        "--timestep": lambda c: [_number(c, "0.04")],
+        "--names": _RECORDING["--names"],
+        "--degrees": lambda _: [],
+        "--rest-missing": lambda _: [],
+        "--ignore-extra": lambda _: [],
+        "--base-order": _RECORDING["--base-order"],
+        "--base-axes": _RECORDING["--base-axes"],
+        "--figure": lambda c: _file(c, "audit.svg"),
     },
     "torques": _RECORDING | _FLIGHT | _TOLERANCE | {"--out": lambda c: _file(c, "out.csv")},
     "plot": _RECORDING | _FLIGHT | _GAUGE | {"--out": lambda c: _file(c, "out.png")},
@@ -187,7 +204,12 @@ _COMMANDS: Mapping[str, Mapping[str, Callable[[Random], list[str]]]] = {
 """Command -> option -> its values; `compile` takes nothing in, and longer than an input may."""
 
 
-_MADE: Mapping[str, Callable[[Random], Trial]] = {"body.xml": mjcf, "body.bioMod": biomod, "body.txt": yeadon}
+_MADE: Mapping[str, Callable[[Random], Trial]] = {
+    "body.xml": mjcf,
+    "body.bioMod": biomod,
+    "body.txt": yeadon,
+    "body.xacro": xacro,
+}
 """Bodies that are no URDF."""
 _STORES = ("no.zarr", "", ".", "folder", "study.toml", "motion.csv", "x" * 300, "no/such/out.zarr", "\x01.zarr")
 
@@ -219,6 +241,7 @@ def command(chance: Random, only: str | None = None) -> Trial:
     names = tuple(_COMMANDS) if only is None else (only,)
     weights = {"check": 12, "split": 6, "conjugate": 4}
     name = chance.choice([name for name in names for _ in range(weights.get(name, 1))])
+    exports, name = name == "split --samples", name.partition(" --")[0]
     files: dict[str, bytes] = {}
     # A plan for the 23 joints of the cat takes longer to write down than any input may.
     known = ("cat_two_halves",) if name == "plan" else ("cat", "diver")
@@ -229,7 +252,9 @@ def command(chance: Random, only: str | None = None) -> Trial:
         8,
     )
     made = _MADE.get(body, urdf)(chance)
-    files[made.main] = BODY.encode() if made.main == "body.urdf" and not rarely(chance, 4) else made.files[made.main]
+    files |= made.files
+    if body == "body.urdf" and not rarely(chance, 4):
+        files = {"body.urdf": BODY.encode()}
     motion = odd_one(
         chance, "motion.csv", ("circle", "cat_righting", "-", "none", "no.csv", "", ".csv", "body.urdf", "a.bvh"), 10
     )
@@ -254,6 +279,13 @@ def command(chance: Random, only: str | None = None) -> Trial:
         "doctor": [],
         "": [],
     }.get(name, [body, motion])
+    if exports:
+        words += ["--samples", "samples" + chance.choice(_SAMPLES)]
+    if name == "audit":
+        words = [body]
+        for _ in range(odd_one(chance, 1, (0, 2, 2), 5)):
+            run, data = file_of(chance)
+            files[run], words = data, [*words, odd_one(chance, run, ("no.npz", "", "motion.csv", "body.urdf"), 20)]
     if "sweep" in name:
         files, words = _sweep(chance, name)
     if name == "explore":

@@ -76,8 +76,17 @@ def biomod_faults(file: Path, body: Any) -> Iterator[str]:
         if traits.get("parent") and name in body.link_names
         for kind, word in (("Trans", "translations"), ("Rot", "rotations"))
         for axis in "".join(traits.get(word, ()))
+        if axis != "q"
     ]
-    below = [name for name in moving if not any(name.startswith(f"{body.link_names[0]}_{kind}") for kind in ("T", "R"))]
+    moving += [
+        f"{name}_Quat.{part}"
+        for name, traits in segments.items()
+        if traits.get("parent") and name in body.link_names and traits.get("rotations") == ["q"]
+        for part in "xyzw"
+    ]
+    below = [
+        name for name in moving if not any(name.startswith(f"{body.link_names[0]}_{kind}") for kind in ("T", "R", "Q"))
+    ]
     if sorted(below) != sorted(body.joint_names):
         yield f"joints {body.joint_names}, and the segments have {below}"
 

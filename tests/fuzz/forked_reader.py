@@ -12,6 +12,7 @@ from importlib import import_module
 
 _IMPORTED_LATE = (
     *("yaml", "h5py", "pyarrow.parquet", "openpyxl", "scipy.io", "rosbags.rosbag1", "rosbags.rosbag2", "biorbd"),
+    *("xacrodoc", "shapephase.body.engines.xacro_reading", "shapephase.auditing.trajectory_audit"),
     *("yeadon", "ezc3d", "casadi", "matplotlib.pyplot", "jinja2", "pandas", "xarray", "zarr"),
     *(f"shapephase.shape_space.files.formats.{name}" for name in ("c3d", "column_tables", "hdf5", "matlab")),
     *(f"shapephase.shape_space.files.formats.{name}" for name in ("ros_motion_files", "spreadsheets")),

@@ -21,8 +21,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fuzz.forked_reader import fork_readers
 from fuzz.pieces import BODY, Trial
+from fuzz.plain_readers import READERS
 from support.asked_process import Answers, AskedProcess, requests
 
 SECONDS = 10
@@ -37,7 +40,7 @@ _TRIES = 40
 """Inputs of one child: a fork costs as much as twenty small files."""
 _PATIENCE = 300
 """A child that has not ended after so long hangs [s of the clock]; it has used next to no processor time."""
-_CODES = (0, 2, 3, 4, 5, 6, 7, 8, 9)
+_CODES = (0, 2, 3, 4, 5, 6, 7, 8, 9, 10)
 """Exit codes that a command may have here: neither 1, a fault of the program, nor those of signals."""
 _LONGEST_MESSAGE = 6000
 """Characters of an error: names of a body's joints are listed, and up to 200 columns of a file."""
@@ -258,14 +261,34 @@ def _body(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _motion(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    import shapephase as sp
     from fuzz.rules import motion_faults
     from shapephase.shape_space.files.read import read_recorded_motion
 
-    body = _small_body()
+    own = Path(request["folder"]) / "body.urdf"
+    body = sp.load_body(own) if own.exists() else _small_body()
     recorded, _, told = _outcome(request, lambda where: read_recorded_motion(where, body, **request["options"]))
     yield told
     if recorded is not None:
         yield _checked(motion_faults(Path(request["folder"]) / request["main"], body, recorded, request["options"]))
+
+
+def _trajectory(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    import shapephase as sp
+    from fuzz.trajectories import OF_AUDIT
+    from fuzz.trajectory_rules import audit_faults, trajectory_faults
+
+    body, options = _small_body(), dict(request["options"])
+    asked = {name: options.pop(name) for name in OF_AUDIT if name in options}
+    run, _, told = _outcome(request, lambda where: sp.read_trajectory(where, body, **options))
+    yield told
+    if run is None:
+        return
+    yield _checked(trajectory_faults(Path(request["folder"]) / request["main"], body, run))
+    found, _, told = _outcome(request, lambda _: sp.audit(body, run, **asked), names_file=False)
+    yield told
+    if found is not None:
+        yield _checked(audit_faults(found))
 
 
 def _names(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -332,11 +355,15 @@ def _command_faults(request: dict[str, Any], outcome: str, place: Path) -> Itera
     if code not in map(str, _CODES) or "Traceback" in said + printed:
         yield f"{outcome}: {said[-3000:]}"
         return
+    for file in place.glob("samples.*"):
+        reader = READERS.get(file.suffix)
+        if reader is not None and not all(np.isfinite(column).all() for column in reader(file.read_bytes()).values()):
+            yield f"{file.name} has what is no number"
     lines = [line for line in said.splitlines() if not line.startswith(("shapephase: warning: ", "wrote "))]
     loud = {"-v", "--verbose"} & {*request["arguments"]}
     alone = len(lines) == (code != "0") and all(line.startswith("shapephase: ") for line in lines)
-    # A search that found nothing tells its best try, and why in a warning.
-    if not (loud or alone or code == "7"):
+    # A search that found nothing tells its best try, and why in a warning; an audit that found a fault its table.
+    if not (loud or alone or code in ("7", "10")):
         yield f"{outcome} with {len(lines)} lines: {said[-1000:]}"
     if "--json" not in request["arguments"] or (code == "0" and not printed.startswith("{")):
         return
@@ -345,7 +372,7 @@ def _command_faults(request: dict[str, Any], outcome: str, place: Path) -> Itera
     except ValueError as fault:
         yield f"{outcome}, and no JSON ({fault}): {printed[:1000]}"
         return
-    if code not in ("0", "7") and data.get("error", {}).get("exit_code") != int(code):
+    if code not in ("0", "7", "10") and data.get("error", {}).get("exit_code") != int(code):
         yield f"{outcome}, and JSON says {data}"
 
 
@@ -392,6 +419,7 @@ def _escape(request: dict[str, Any]) -> Iterator[dict[str, Any]]:
 _TRIALS = {
     "body": _body,
     "motion": _motion,
+    "trajectory": _trajectory,
     "names": _names,
     "record": _record,
     "study": _study,

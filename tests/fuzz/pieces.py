@@ -95,7 +95,8 @@ class Trial:
 
     Attributes
     ----------
-    kind : what is done with it: "body", "motion", "names", "record", "study", "store" or "command"
+    kind : what is done with it: "body", "motion", "trajectory", "names", "record", "study", "store" or
+        "command"
     source : its format or command, under which it is counted
     files : name -> content, written to a folder of its own
     main : the name of the file that is read

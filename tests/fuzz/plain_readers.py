@@ -313,5 +313,5 @@ def plain_columns(file: Path, joint_names: Sequence[str]) -> Columns | None:
     except NotKnown:
         return None
     # MuJoCo's qpos has no names: its columns are in the body's order.
-    own = dict(zip(IN_BODY_ORDER, joint_names, strict=True))
+    own = dict(zip(IN_BODY_ORDER, joint_names, strict=False))
     return {own.get(name, name): values for name, values in found.items()}

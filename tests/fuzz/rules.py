@@ -10,13 +10,14 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .engine_rules import biomod_faults, yeadon_faults
 from .plain_readers import NotPlain, plain_columns, strict_number
 
 FARTHEST = 1e6
 """The largest coordinate of a joint [rad or m]."""
-_UNITS = {"rad": 1.0, "deg": np.pi / 180.0, "mrad": 1e-3, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_UNITS = {"rad": 1.0, "deg": np.pi / 180.0, "mrad": 1e-3, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "1": 1.0}
 _IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
 _CHANGING = {"trim", "resample", "smooth", "close", "names"}
 """Options with which a path is not that of the file's own samples."""
@@ -24,6 +25,8 @@ _TRIANGLE = 1e-3
 """Part by which moments in files may break the triangle inequality by rounding."""
 _SAME = 1e-9
 """Of two ways to one number, relative to the largest: sums of a few dozen products of rounded factors."""
+_OFF_UNIT = 0.1
+"""Of the length of a quaternion."""
 _ROUNDING = 1e-11
 """Of a moment, relative to the largest of the whole body: ten times what the library allows for."""
 _SWING = 1e-8
@@ -71,7 +74,11 @@ def _column_faults(
 ) -> Iterator[str]:
     record, times = recorded.record, recorded.times
     read = record["columns"]
+    usual = "deg" if options.get("degrees") else "rad"
+    yield from _ball_faults(columns, body, read, shapes, usual)
     for joint, label in read.items():
+        if joint.rpartition(".")[0] in body.ball_joints:
+            continue
         if label not in columns:
             yield f"joint {joint} is read from {label!r}, which a plain reader does not find in {list(columns)}"
             continue
@@ -84,7 +91,8 @@ def _column_faults(
             yield f"joint {joint} is read in {record['units'][joint]} from {label!r}"
     if set(read) | set(record["at_rest"]) != set(body.joint_names):
         yield f"joints {list(read)} and {list(record['at_rest'])}"
-    others = [name for name in columns if name not in {*read.values(), *record["left_out"]}]
+    used = {part for label in read.values() for part in (label, *label.split(", "))}
+    others = [name for name in columns if name not in {*used, *record["left_out"]}]
     clock = [name for name in others if not re.match(r"(base_)?q[xyzw]$|base_[xyz]_m$|omega_[xyz]_rad_s$", name)]
     if "timestep" in options or clock == []:
         return
@@ -97,6 +105,34 @@ def _column_faults(
     slack = 4.0 * np.finfo(float).eps * np.abs(raw).max() / _IN_A_SECOND[record["time_unit"]] + 1e-9 * times[-1]
     if expected.shape != times.shape or not np.allclose(expected, times, rtol=0.0, atol=slack):
         yield f"times {times} where the file says {expected}"
+
+
+def _ball_faults(
+    columns: Mapping[str, Sequence[float]], body: Any, read: Mapping[str, str], shapes: Any, usual: str
+) -> Iterator[str]:
+    """The quaternions of ball joints are those of the columns, of either sign, or of angles in their order."""
+    for ball in body.ball_joints:
+        parts = [f"{ball}.{part}" for part in "xyzw"]
+        found = shapes[:, [body.joint_names.index(part) for part in parts]]
+        labels = [read[part] for part in parts if part in read]
+        if not np.allclose(np.linalg.norm(found, axis=1), 1.0, rtol=0.0, atol=_OFF_UNIT):
+            yield f"ball joint {ball}: {found}"
+        if len(labels) < len(parts):
+            continue
+        if ", " in labels[0]:
+            turns = labels[0].split(", ")
+            angles = np.array([columns[label] for label in turns]).T
+            scales = [_UNITS["deg" if "deg" in label else "mrad" if "mrad" in label else usual] for label in turns]
+            order = "".join(label[label.index(f"{ball}.r") + len(ball) + 2] for label in turns).upper()
+            expected = Rotation.from_euler(order, angles * scales).as_quat()
+        else:
+            expected = np.array([columns[label] for label in labels]).T
+        if expected.shape != found.shape:
+            yield f"ball joint {ball}: {found} where the file says {expected}"
+            continue
+        expected *= np.where(np.sum(expected * found, axis=1) < 0.0, -1.0, 1.0)[:, None]
+        if not np.allclose(expected, found, rtol=_SAME, atol=_SWING):
+            yield f"ball joint {ball}: {found} where the file says {expected}"
 
 
 def body_faults(file: Path, body: Any, warned: Sequence[str], options: Mapping[str, Any]) -> Iterator[str]:
@@ -122,8 +158,8 @@ def body_faults(file: Path, body: Any, warned: Sequence[str], options: Mapping[s
         yield f"a body with moments {moments} and no warning"
     if not all(lower <= upper for lower, upper in body.joint_limits):
         yield f"limits {body.joint_limits}"
-    if file.suffix == ".urdf":
-        yield from _urdf_faults(file, body, warned, allowed)
+    if file.suffix in (".urdf", ".xacro"):
+        yield from _urdf_faults(_expanded(file, options), body, warned, allowed)
     elif file.suffix == ".bioMod":
         yield from biomod_faults(file, body)
     elif file.suffix == ".txt":
@@ -132,8 +168,22 @@ def body_faults(file: Path, body: Any, warned: Sequence[str], options: Mapping[s
         yield from _mjcf_faults(file, body)
 
 
-def _urdf_faults(file: Path, body: Any, warned: Sequence[str], allowed: bool) -> Iterator[str]:
-    root = ElementTree.fromstring(file.read_bytes())
+def _expanded(file: Path, options: Mapping[str, Any]) -> bytes | str:
+    """The text of a URDF, of a xacro file that which xacrodoc makes of it."""
+    data = file.read_bytes()
+    if not re.search(rb"xacro:|[$][{(]", data):
+        return data
+    import xacrodoc
+
+    folders = [Path(folder).absolute() for folder in options.get("packages", ())]
+    found = {part.name: part for folder in folders for part in (folder, *folder.iterdir()) if part.is_dir()}
+    xacrodoc.packages.look_in([str(folder) for folder in folders])
+    xacrodoc.packages.update_package_cache(found)
+    return xacrodoc.XacroDoc.from_file(str(file), resolve_packages=False).dom.toxml()
+
+
+def _urdf_faults(text: bytes | str, body: Any, warned: Sequence[str], allowed: bool) -> Iterator[str]:
+    root = ElementTree.fromstring(text)
     if root.tag != "robot":
         yield f"<{root.tag}>"
     moving, total, names = 0, 0.0, [link.get("name") for link in root.findall("link")]
@@ -150,12 +200,12 @@ def _urdf_faults(file: Path, body: Any, warned: Sequence[str], allowed: bool) ->
     mimics = 0
     for joint in root.findall("joint"):
         kind = joint.get("type")
-        if kind not in ("revolute", "continuous", "prismatic", "fixed"):
+        if kind not in ("revolute", "continuous", "prismatic", "spherical", "fixed"):
             yield f"a joint {kind!r}"
-        moving += kind != "fixed"
+        moving += {"fixed": 0, "spherical": 4}.get(str(kind), 1)
         mimics += kind != "fixed" and joint.find("mimic") is not None
         axis = joint.find("axis")
-        if kind != "fixed" and axis is not None and not any(_numbers(axis.get("xyz", "1 0 0"))):
+        if kind not in ("fixed", "spherical") and axis is not None and not any(_numbers(axis.get("xyz", "1 0 0"))):
             yield "an axis of no length"
     if moving - mimics != body.n_shape:
         yield f"{moving} moving joints, {mimics} of which follow, and {body.n_shape} coordinates"

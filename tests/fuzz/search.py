@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from random import Random
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
-from . import array_motions, bodies, commands, engine_bodies, studies, text_motions
+from . import (
+    array_motions,
+    ball_joints,
+    bodies,
+    commands,
+    engine_bodies,
+    studies,
+    text_motions,
+    trajectories,
+    xacro_files,
+)
 from .limited_process import LimitedProcess
 from .pieces import Trial
 
@@ -32,9 +43,15 @@ GRAMMARS: Mapping[str, Callable[[Random], Trial]] = {
     "mjcf": bodies.mjcf,
     "biomod": engine_bodies.biomod,
     "yeadon": engine_bodies.yeadon,
+    "xacro": xacro_files.xacro,
+    "balls": ball_joints.bodies,
+    "ball columns": ball_joints.columns,
+    "trajectory": trajectories.trajectory,
     "study": studies.study_file,
     "store": studies.store_trial,
     "command": commands.command,
+    "audit": partial(commands.command, only="audit"),
+    "samples": partial(commands.command, only="split --samples"),
 }
 SHARES: Mapping[str, int] = {
     "delimited": 16,
@@ -53,9 +70,15 @@ SHARES: Mapping[str, int] = {
     "mjcf": 7,
     "biomod": 3,
     "yeadon": 3,
+    "xacro": 4,
+    "balls": 6,
+    "ball columns": 8,
+    "trajectory": 6,
     "study": 8,
     "store": 5,
     "command": 8,
+    "audit": 3,
+    "samples": 3,
 }
 """How often each grammar is used, of a hundred or so."""
 

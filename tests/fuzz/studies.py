@@ -33,6 +33,9 @@ _ENTRIES = {
     "body": ('"cat"', '"nobody"', '"no.urdf"', '"motion.csv"'),
     "motion": ('"none.csv"', '"math:sin"', '"no:where"', '"circle"', '"body.urdf"', '":"'),
     "parameters": ("{alpha = 0.1}", "{gamma = 1.0}", '{beta = "x"}', "{beta = true}", "{beta = nan}"),
+    "root": ('"free"', '"fixed"', '""'),
+    "root_body": ('"base"', '"none"', "1"),
+    "packages": ('["packages"]', '["none"]', '["."]', '"packages"', "[1]", '["body.urdf"]', '[""]'),
     "unknown": ("1",),
 }
 _UNITS = ('"deg"', '"rad"', '"m"', '"mm"', '"kg m^2/s"', '"furlong"', '""', "1")
@@ -101,6 +104,7 @@ def study_file(chance: Random) -> Trial:
         lines.pop(chance.randrange(len(lines)))
     data = sometimes_damaged(chance, ("\n".join(lines) + "\n").encode(errors="replace"), 12)
     files = {"study.toml": data, "body.urdf": BODY.encode(), "motion.csv": GOOD_MOTION.encode()}
+    files["packages/note.txt"] = b""
     return Trial(kind="study", source="study", files=files, main="study.toml")
 
 

@@ -16,7 +16,7 @@ _SAME = 1e-12
 _STATUSES = range(5)
 _KNOWN = (
     *("body", "motion", "rigid", "over", "functions", "outputs", "draws", "seed", "chunk", "momentum", "attitude"),
-    *("tolerance", "gauge", "parameters", "time_limit"),
+    *("tolerance", "gauge", "parameters", "time_limit", "root", "root_body", "packages"),
 )
 _NAMES = ("body", "motion", "gauge")
 
@@ -27,6 +27,9 @@ def study_faults(file: Path, study: Any) -> Iterator[str]:
     unknown = set(said) - set(_KNOWN)
     if unknown:
         yield f"entries {unknown}"
+    for name in ("root", "root_body", "packages"):
+        if name in said and ("rigid" in said or not said[name]) and said[name] != []:
+            yield f"{name} = {said[name]!r}"
     over = said.get("over", {})
     plain = ("momentum", "attitude", "tolerance", "time_limit", "seed", "draws", "chunk")
     numbers = {name: said[name] for name in plain if name in said}

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import pytest
 
-from fuzz.finds import CASES
+from fuzz import finds, trajectory_finds
 from fuzz.limited_process import LimitedProcess
 from fuzz.pieces import Trial
 from fuzz.search import GRAMMARS, SHARES, Tally, searched
 
+CASES = {**finds.CASES, **trajectory_finds.CASES}
 QUICK = {
     "delimited": 6,
     "opensim": 3,
@@ -23,6 +24,9 @@ QUICK = {
     "excel": 3,
     "urdf": 5,
     "mjcf": 3,
+    "balls": 3,
+    "ball columns": 4,
+    "trajectory": 3,
     "study": 5,
 }
 FULL = 20

@@ -243,3 +243,13 @@ def test_what_floats_of_an_mjcf_is_said_in_the_file_or_to_the_command(write, tmp
 def test_a_rigid_body_has_no_root():
     with pytest.raises(StudyError, match="root_body: a rigid body is not read from a file"):
         room.Study(room.RigidBody(np.eye(3), 1.0), root_body="torso")
+
+
+def test_folders_of_packages_stand_beside_the_study(write, tmp_path, monkeypatch):
+    (tmp_path / "ours").mkdir()
+    write(
+        'body = "cat_two_halves"\nmotion = "kane_scher"\nparameters = {alpha = 0, beta = 0.5}\n'
+        'packages = ["ours", "nowhere"]\n'
+    )
+    monkeypatch.chdir(tmp_path / "ours")
+    assert room.read_study(tmp_path / "study.toml").packages == [str(tmp_path / "ours"), "nowhere"]

@@ -12,6 +12,9 @@ import numpy as np
 from ..arrays import Array
 from ._observation import Observation
 
+_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
+"""Of the largest variance: what sums of a dozen products leave of a smaller one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
@@ -76,7 +79,9 @@ def residuals(seen: Observation) -> Residuals:
 
 def _inverse_factor(covariances: Array) -> Array:
     """W with W C W^T = 1: (N, 3, 3)."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances)), dtype=np.float64)
+    # Noise of one joint alone has one direction, and rounding what is across.
+    floor = _ROUNDING * np.trace(covariances, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances + floor)), dtype=np.float64)
 
 
 def _whitened(factor: Array, change: Array) -> Array:

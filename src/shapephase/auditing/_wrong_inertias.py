@@ -21,6 +21,8 @@ _STEPS = 6
 """Of Gauss and Newton; each gains about two digits."""
 _CANDIDATES = 12
 """Hypotheses that leave the least are fitted to the end, the others to first order."""
+_MOST_LOST = 0.9
+"""Of a link's mass: to first order a link that is much too heavy would have none."""
 _AXES = "xyz"
 _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -55,8 +57,14 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     columns = of_all @ changes.T
     strength = (columns**2).sum(axis=0)
     seen_at_all = strength > 0.0
-    guesses = np.where(seen_at_all, -(vector @ columns) / np.where(seen_at_all, strength, 1.0), 0.0)
+    along = vector @ columns
+    guesses = np.where(seen_at_all, -along / np.where(seen_at_all, strength, 1.0), 0.0)
     squares = vector @ vector - guesses**2 * strength
+    # To first order a link may weigh less than nothing.
+    least = np.array([-_MOST_LOST * body.chain.masses[way.frame] / way.mass if way.mass else -np.inf for way in ways])
+    too_light = guesses < least
+    guesses = np.maximum(guesses, least)
+    squares[too_light] = (vector @ vector + 2.0 * guesses * along + guesses**2 * strength)[too_light]
     order = np.argsort(squares, kind="stable")
     found = []
     for rank, place in enumerate(order.tolist()):

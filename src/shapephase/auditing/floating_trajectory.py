@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_choice, check_object, positive_argument
-from ..arrays import Array, finite_array
+from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
@@ -23,6 +23,8 @@ _TWIST = 6
 """Numbers of two velocities."""
 _FEWEST = 12
 """Samples: fewer say nothing of noise."""
+_LARGEST = 1e12
+"""Of places, rates and times: no recorder has a clock or a place beyond it."""
 _OFF_UNIT = 0.1
 """What is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong."""
 
@@ -86,6 +88,8 @@ class FloatingTrajectory:
             value = getattr(self, name)
             if value is not None:
                 put(self, name, finite_array(value, f"{where}: {name}", (len(times), count)))
+        for name in ("times", *trailing, "shapes"):
+            _check_size(getattr(self, name), f"{where}: {name}", FARTHEST if name == "shapes" else _LARGEST)
         check_choice(self.rate_axes, "rate_axes", FRAMES)
         check_choice(self.velocity_axes, "velocity_axes", FRAMES)
         if self.step is not None:
@@ -226,6 +230,13 @@ class FloatingTrajectory:
         return replace(self, **{name: None if (had := getattr(self, name)) is None else had[samples] for name in names})
 
 
+def _check_size(values: Array | None, what: str, most: float) -> None:
+    """Raise TrajectoryError for numbers whose squares are none, or that have no digits left."""
+    if values is not None and np.abs(values).max(initial=0.0) > most:
+        sample = int(np.argmax(np.abs(values).reshape(len(values), -1).max(axis=1)))
+        raise TrajectoryError(f"{what}: sample {sample} has {np.abs(values[sample]).max():.6g}; up to {most:g} is read")
+
+
 def _arrays(
     body: Body, places: ArrayLike, rates: ArrayLike | None, names: Sequence[str] | None, labels: tuple[str, str]
 ) -> tuple[Array, Array | None]:
@@ -233,6 +244,8 @@ def _arrays(
     check_object(body, "Body", "body")
     order = list(body.joint_names if names is None else names)
     for joint in body.joint_names:
+        if order.count(joint) > 1:
+            raise ShapeError(f"joint_names: {joint!r} stands {order.count(joint)} times")
         if joint not in order:
             raise unknown_name("joint among joint_names", joint, order)
     columns = [order.index(joint) for joint in body.joint_names]

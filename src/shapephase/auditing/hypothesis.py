@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..display import short_repr
+from ..plain_data import plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,7 +16,7 @@ class FittedValue:
 
     Attributes
     ----------
-    value, bar : the number and its standard deviation by the noise
+    value, bar : the number and its standard deviation by the noise, infinite where the samples do not bound it
     unit : "" for a ratio
 
     Examples
@@ -73,7 +74,7 @@ class Hypothesis:
             "share": self.share,
             "square": self.square,
             "parameters": self.parameters,
-            "values": {name: {"value": v.value, "bar": v.bar, "unit": v.unit} for name, v in self.values.items()},
+            "values": {name: plain(found) for name, found in self.values.items()},
             "remark": self.remark,
         }
 

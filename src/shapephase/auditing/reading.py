@@ -15,14 +15,14 @@ from .. import so3
 from ..arguments import check_file_name, check_object, positive_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError
+from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError, UnknownNameError
 from ..files import npz_arrays
 from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
 from ..shape_space.files.formats.text_tables import read_delimited
 from ..shape_space.files.read import read_recorded_motion
 from .floating_trajectory import FloatingTrajectory
 
-_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot)[_\[ ]?(\d+)\]?")
+_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot)[_\[ ]?([0-9]{1,6})\]?")
 """Labels of a table such as qpos_0, qpos[0] and qpos0."""
 _ROOT = 6
 """Coordinates of biorbd's root: three places, three angles."""
@@ -81,7 +81,10 @@ def read_trajectory(
     arrays = _arrays(where, suffix) if suffix in (".npz", *_TEXTS) else {}
     kind = next((kind for kind in ("qpos", "q", "Q") if kind in arrays), None)
     if kind is not None:
-        return _of_arrays(where, arrays, kind, body, step, timestep)
+        try:
+            return _of_arrays(where, arrays, kind, body, step, timestep)
+        except (ShapeError, TrajectoryError, UnknownNameError) as error:
+            raise _of_file(where, error) from None
     recorded = read_recorded_motion(
         file,
         body,
@@ -99,14 +102,25 @@ def read_trajectory(
             f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
             "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
         )
-    return FloatingTrajectory(
-        times=recorded.times,
-        quaternion=so3.quat_from_matrix(recorded.base_attitude),
-        shapes=recorded.path.shape(recorded.times),
-        position=recorded.base_position,
-        step=step,
-        name=where.name,
-    )
+    try:
+        return FloatingTrajectory(
+            times=recorded.times,
+            quaternion=so3.quat_from_matrix(recorded.base_attitude),
+            shapes=recorded.path.shape(recorded.times),
+            position=recorded.base_position,
+            step=step,
+            name=where.name,
+        )
+    except (ShapeError, TrajectoryError) as error:
+        raise _of_file(where, error) from None
+
+
+def _of_file(where: Path, error: Exception) -> TrajectoryError | UnknownNameError:
+    """A fault with the file's name before it."""
+    said = str(error)
+    if not said.startswith(f"{where}: "):
+        said = f"{where}: {said.removeprefix(f'{where.name}: ')}"
+    return UnknownNameError(said) if isinstance(error, UnknownNameError) else TrajectoryError(said)
 
 
 def _arrays(where: Path, suffix: str) -> dict[str, Any]:
@@ -128,7 +142,10 @@ def _of_table(table: Table) -> dict[str, Any]:
         match = _NUMBERED.fullmatch(label.strip())
         if match:
             table.check_column(label)
-            found.setdefault(match[1], {})[int(match[2])] = values
+            columns = found.setdefault(match[1], {})
+            if int(match[2]) in columns:
+                raise TrajectoryError(f"{table.where}: two columns are number {int(match[2])} of {match[1]}; keep one")
+            columns[int(match[2])] = values
     arrays: dict[str, Any] = {}
     for name, columns in found.items():
         if sorted(columns) != list(range(len(columns))):
@@ -136,10 +153,12 @@ def _of_table(table: Table) -> dict[str, Any]:
                 f"{table.where}: columns {name} are numbered {sorted(columns)}; 0, 1, 2, ... is needed"
             )
         arrays[name] = np.stack([columns[k] for k in range(len(columns))], axis=1)
-    times = next((label for label in table.columns if label.strip() in ("time", "t", "time [s]")), None)
-    if arrays and times is not None:
-        table.check_column(times)
-        arrays["time"] = table.columns[times]
+    times = [label for label in table.columns if label.strip() in ("time", "t", "time [s]")]
+    if arrays and len(times) > 1:
+        raise TrajectoryError(f"{table.where}: columns {' and '.join(map(repr, times))} are both times; keep one")
+    if arrays and times:
+        table.check_column(times[0])
+        arrays["time"] = table.columns[times[0]]
     return arrays
 
 
@@ -149,38 +168,37 @@ def _of_arrays(
     rates = {"qpos": "qvel", "q": "v", "Q": "Qdot"}[kind]
     names = [str(name) for name in np.ravel(arrays["joint_names"])] if "joint_names" in arrays else None
     stored = arrays.get("timestep")
-    try:
-        places = finite_array(arrays[kind], f"{where}: {kind}", (None, None))
-        moving = None if rates not in arrays else finite_array(arrays[rates], f"{where}: {rates}", (None, None))
-        if kind == "Q" and places.shape[0] == _ROOT + body.n_shape and places.shape[1] != places.shape[0]:
-            places, moving = places.T, None if moving is None else moving.T
-        times = _times(where, arrays, len(places), timestep)
-        if step is None and stored is not None and np.size(stored) == 1:
-            step = positive_argument(float(np.ravel(stored)[0]), "timestep")
-        if kind == "Q":
-            return replace(_of_biorbd(body, times, places, moving), step=step, name=where.name)
-        make = FloatingTrajectory.from_mujoco if kind == "qpos" else FloatingTrajectory.from_pinocchio
-        return make(body, times, places, moving, joint_names=names, step=step, name=where.name)
-    except ShapeError as error:
-        raise TrajectoryError(f"{where}: {error}".replace(f"{where}: {where}", f"{where}")) from None
+    places = finite_array(arrays[kind], kind, (None, None))
+    moving = None if rates not in arrays else finite_array(arrays[rates], rates, (None, None))
+    if kind == "Q" and places.shape[0] == _ROOT + body.n_shape and places.shape[1] != places.shape[0]:
+        places, moving = places.T, None if moving is None else moving.T
+    times = _times(arrays, len(places), timestep)
+    if step is None and stored is not None and np.size(stored) == 1:
+        step = positive_argument(np.ravel(stored)[0].item(), "timestep")
+    if kind == "Q":
+        return replace(_of_biorbd(body, times, places, moving, where.name), step=step)
+    make = FloatingTrajectory.from_mujoco if kind == "qpos" else FloatingTrajectory.from_pinocchio
+    return make(body, times, places, moving, joint_names=names, step=step, name=where.name)
 
 
-def _times(where: Path, arrays: Mapping[str, Any], count: int, timestep: float | None) -> Array:
+def _times(arrays: Mapping[str, Any], count: int, timestep: float | None) -> Array:
     if "time" in arrays:
-        return finite_array(arrays["time"], f"{where}: time", (count,), unit="s")
+        return finite_array(arrays["time"], "time", (count,), unit="s")
     between = timestep if timestep is not None else arrays.get("timestep")
     if between is None or np.size(between) != 1:
-        raise TrajectoryError(f"{where}: no times: an array 'time', or one number 'timestep' is needed (--timestep)")
-    spacing = positive_argument(float(np.ravel(between)[0]), "timestep")
+        raise TrajectoryError("no times: an array 'time', or one number 'timestep' is needed (--timestep)")
+    spacing = positive_argument(np.ravel(between)[0].item(), "timestep")
     return np.arange(count, dtype=np.float64) * spacing
 
 
-def _of_biorbd(body: Body, times: Array, places: Array, rates: Array | None) -> FloatingTrajectory:
+def _of_biorbd(body: Body, times: Array, places: Array, rates: Array | None, name: str) -> FloatingTrajectory:
     """Of biorbd's generalised coordinates: three places, three angles in the order of the body's file, the joints."""
     if places.shape[1] != _ROOT + body.n_shape:
         raise TrajectoryError(
             f"Q has {places.shape[1]} coordinates; three places, three angles and {body.n_shape} joints are needed"
         )
+    if rates is not None and rates.shape != places.shape:
+        raise ShapeError(f"Qdot: expected shape {places.shape} as that of Q, got {rates.shape}")
     axes = "xyz" if body.base_angles is None else body.base_angles[1]
     turned = np.broadcast_to(np.eye(3), (len(places), 3, 3))
     rate = np.zeros((len(places), 3))
@@ -197,5 +215,6 @@ def _of_biorbd(body: Body, times: Array, places: Array, rates: Array | None) -> 
         position=places[:, :3],
         quaternion=so3.quat_from_matrix(turned),
         shapes=places[:, _ROOT:],
+        name=name,
         **given,
     )

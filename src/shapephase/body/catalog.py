@@ -143,7 +143,7 @@ def loading_options(
     if not isinstance(root_body, str | None):
         raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
     several = isinstance(packages, Sequence) and not isinstance(packages, str | bytes)
-    if not several or not all(isinstance(folder, str | os.PathLike) for folder in packages):
+    if not several or not all(isinstance(folder, str | os.PathLike) and os.fspath(folder) for folder in packages):
         raise WrongObjectError(f"packages: folders in a list are needed, got {what_came(packages)}")
     folders = [os.fspath(folder) for folder in packages] or None
     if length_unit is not None:

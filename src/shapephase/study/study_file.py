@@ -39,6 +39,8 @@ _FACTORS = {
 _BASE = {"deg": "rad", "mm": "m", "ms": "s"}
 # A file that is longer is no study.
 _MOST_BYTES = 50_000_000
+_LONGEST_NAME = 300
+"""Characters of what is varied: an error shows it."""
 
 
 def read_study(path: str | os.PathLike[str]) -> Study:
@@ -89,6 +91,8 @@ def _made(said: Mapping[str, Any], folder: Path) -> Study:
     _check_names("entry", said, _ENTRIES)
     _check_truths(said, "")
     given: dict[str, Any] = {name: said[name] for name in _PLAIN if name in said}
+    if isinstance(given.get("packages"), list):
+        given["packages"] = [_folder(one, folder) for one in given["packages"]]
     if ("body" in said or "body" in said.get("over", {})) == ("rigid" in said):
         raise StudyError("one of body and rigid is needed")
     over = {name: _axis(name, one, folder) for name, one in _table(said, "over").items()}
@@ -108,6 +112,8 @@ def _made(said: Mapping[str, Any], folder: Path) -> Study:
 
 
 def _axis(name: str, said: Any, folder: Path) -> Any:
+    if len(name) > _LONGEST_NAME:
+        raise StudyError(f"over: a name of {len(name)} characters, {name[:20]!r}...; {_LONGEST_NAME} are enough")
     where = f"over.{name}"
     if not isinstance(said, Mapping):
         raise StudyError(f"{where}: a table is needed, with values, with from, to and count, or with a distribution")
@@ -176,6 +182,11 @@ def _file(name: Any, folder: Path, where: str) -> str:
         raise StudyError(f"{where}: a name or a file is needed, got {name!r}")
     beside = folder / name
     return str(beside) if beside.is_file() else name
+
+
+def _folder(name: Any, folder: Path) -> Any:
+    """A folder beside the study's file, if there is one, or the name as it is."""
+    return str(folder / name) if isinstance(name, str) and name and (folder / name).is_dir() else name
 
 
 def _table(said: Mapping[str, Any], name: str) -> Mapping[str, Any]:
