@@ -35,6 +35,8 @@ _ENTRIES = {
     "parameters": ("{alpha = 0.1}", "{gamma = 1.0}", '{beta = "x"}', "{beta = true}", "{beta = nan}"),
     "root": ('"free"', '"fixed"', '""'),
     "root_body": ('"base"', '"none"', "1"),
+    "length_unit": ("0.01",),
+    "person_mass": ("62",),
     "packages": ('["packages"]', '["none"]', '["."]', '"packages"', "[1]", '["body.urdf"]', '[""]'),
     "unknown": ("1",),
 }

@@ -16,7 +16,8 @@ _SAME = 1e-12
 _STATUSES = range(5)
 _KNOWN = (
     *("body", "motion", "rigid", "over", "functions", "outputs", "draws", "seed", "chunk", "momentum", "attitude"),
-    *("tolerance", "gauge", "parameters", "time_limit", "root", "root_body", "packages"),
+    *("tolerance", "gauge", "parameters", "time_limit", "root", "root_body", "packages", "length_unit"),
+    "person_mass",
 )
 _NAMES = ("body", "motion", "gauge")
 
