@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -46,6 +48,22 @@ def test_the_command_line_waits_for_large_work(monkeypatch, momenta, samples, en
     monkeypatch.setenv("SHAPEPHASE_FAST", "1")
     assert switch.is_on()
     assert switch.may_compile()
+
+
+@pytest.mark.usefixtures("fast", "heard_ctrl_c")
+def test_ctrl_c_leaves_no_numba_half_imported(monkeypatch):
+    asked = []
+
+    def imported(name, package):
+        asked.append(name)
+        signal.raise_signal(signal.SIGINT)
+        return import_module(name, package)
+
+    monkeypatch.setattr(engine, "import_module", imported)
+    with pytest.raises(KeyboardInterrupt):
+        engine._import_kernels()
+    assert {f".kernels.{name}_kernel" for name in ("tree", "march", "panel")} < set(asked)
+    assert asked[-1] == ".kernels.jit"
 
 
 def _cat_righting():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import signal
 import sys
 import threading
 import time
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
 from . import curves, gradients, marches, nodes, panels, tree, variants
@@ -117,8 +119,27 @@ def _load() -> bool:
 
 
 def _import_kernels() -> None:
-    for module in set(_KERNELS.values()):
-        import_module(module, __package__)
+    with _ctrl_c_waits():
+        for module in set(_KERNELS.values()):
+            import_module(module, __package__)
+        import_module(".kernels.jit", __package__).import_late_parts()
+
+
+@contextmanager
+def _ctrl_c_waits() -> Iterator[None]:
+    """Ctrl-C comes at the end: Numba half imported would be of no use until the process ends."""
+    before: Any = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    presses: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: presses.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if presses:
+            signal.raise_signal(signal.SIGINT)
 
 
 @lru_cache(maxsize=1)

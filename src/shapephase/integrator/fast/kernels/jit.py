@@ -12,6 +12,7 @@ from typing import Any
 
 from numba import njit
 from numba.core import config
+from numba.core.registry import cpu_target
 
 from ..cache_folder import kernel_folder
 from .kept_code import KeptFunction
@@ -43,3 +44,9 @@ def kernel(function: Any) -> Any:
             return njit(**_OPTIONS)(function)
         finally:
             _config.CACHE_DIR = before
+
+
+def import_late_parts() -> None:
+    """Import what Numba leaves for the first call of a compiled function."""
+    context: Any = cpu_target.target_context
+    context.refresh()
