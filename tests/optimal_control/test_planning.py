@@ -586,6 +586,7 @@ def test_what_the_callback_raises_comes_through(error):
 
 @pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])
 @pytest.mark.usefixtures("heard_ctrl_c")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_ctrl_c_is_not_taken_for_a_failed_search(seconds):
     body = sp.load_body("cat_two_halves")
     before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))

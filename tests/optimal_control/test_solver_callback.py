@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import signal
 import time
+import weakref
 
 import casadi
 import numpy as np
@@ -54,6 +55,55 @@ class Interrupted:
         self.presses += 1
         if self.presses == 1:
             signal.raise_signal(signal.SIGINT)
+        raise AttributeError
+
+
+class Ending:
+    """Something in whose end Ctrl-C is pressed."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+class Asked:
+    """Something in whose use Ctrl-C is pressed."""
+
+    def __bool__(self):
+        signal.raise_signal(signal.SIGINT)
+        return False
+
+
+def forgotten_weakly():
+    """The end of a key of a weak dictionary, in whose own callback Ctrl-C is pressed."""
+    known = weakref.WeakKeyDictionary()
+    key = BestIterate(None)
+    known[key] = 1
+    known._iterating = Asked()
+    del key
+    known._iterating = set()
+
+
+@pytest.mark.usefixtures("heard_ctrl_c")
+@pytest.mark.parametrize("end", [Ending, forgotten_weakly])
+def test_ctrl_c_in_the_end_of_an_object_comes_a_moment_later(end):
+    def ended():
+        end()
+        time.sleep(30.0)
+
+    with pytest.raises(KeyboardInterrupt), heard_interrupts():
+        ended()
+
+
+@pytest.mark.usefixtures("heard_ctrl_c")
+def test_ctrl_c_of_which_a_library_made_another_error_is_ctrl_c():
+    def half_imported():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise AttributeError
+
+    with pytest.raises(KeyboardInterrupt), heard_interrupts():
+        half_imported()
+    with pytest.raises(AttributeError), heard_interrupts():
         raise AttributeError
 
 

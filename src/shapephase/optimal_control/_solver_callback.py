@@ -21,6 +21,8 @@ IterationCallback = Callable[[int, float, float], bool]
 _FEASIBLE = 1e-3
 # In its module `casadi.py`, what CasADi calls to see what an argument is, such as `DM_from_array`.
 _ASKS = "_from_"
+# Where Python drops what is raised when an object that others know weakly ends: functions and their files.
+_ENDS = (("remove", "weakref.py"), ("_remove", "_weakrefset.py"))
 # Until Ctrl-C is tried again [s]: many times what such a question takes.
 _LATER = 1e-3
 
@@ -89,17 +91,23 @@ def ipopt_callback(best: BestIterate, unknowns: int, low: Array, high: Array) ->
 
 @contextmanager
 def heard_interrupts() -> Iterator[None]:
-    """Ctrl-C is not lost while CasADi asks in Python what an argument is, and takes any exception for a no.
+    """Ctrl-C is not lost where exceptions are: while CasADi asks in Python what an argument is, and takes any for a no,
+    and while an object is taken apart.
 
-    There it comes a moment later; elsewhere nothing is changed.
+    There it comes a moment later. Elsewhere it comes at once, and where a library makes another error of it, such as
+    one half imported, it is Ctrl-C all the same.
     """
     before: Any = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
         return
 
+    pressed = False
+
     def handler(number: int, frame: FrameType | None) -> None:
-        if _is_asked(frame):
+        nonlocal pressed
+        pressed = True
+        if _would_be_lost(frame):
             again = threading.Timer(_LATER, os.kill, (os.getpid(), signal.SIGINT))
             again.daemon = True
             again.start()
@@ -109,15 +117,21 @@ def heard_interrupts() -> Iterator[None]:
     signal.signal(signal.SIGINT, handler)
     try:
         yield
+    except Exception as error:
+        if pressed:
+            raise KeyboardInterrupt from error
+        raise
     finally:
         signal.signal(signal.SIGINT, before)
 
 
-def _is_asked(frame: FrameType | None) -> bool:
-    """Whether Python is in a question of CasADi, or in what that calls."""
+def _would_be_lost(frame: FrameType | None) -> bool:
+    """Whether Python is in a question of CasADi, in the end of an object, or in what these call."""
     while frame is not None:
         code = frame.f_code
-        if _ASKS in code.co_name and os.path.basename(code.co_filename) == "casadi.py":
+        file = os.path.basename(code.co_filename)
+        asked = _ASKS in code.co_name and file == "casadi.py"
+        if asked or code.co_name == "__del__" or (code.co_name, file) in _ENDS:
             return True
         frame = frame.f_back
     return False
