@@ -130,8 +130,8 @@ def _would_be_lost(frame: FrameType | None) -> bool:
     while frame is not None:
         code = frame.f_code
         file = os.path.basename(code.co_filename)
-        asked = _ASKS in code.co_name and file == "casadi.py"
-        if asked or code.co_name == "__del__" or (code.co_name, file) in _ENDS:
+        question = _ASKS in code.co_name and file == "casadi.py"
+        if question or code.co_name == "__del__" or (code.co_name, file) in _ENDS:
             return True
         frame = frame.f_back
     return False
