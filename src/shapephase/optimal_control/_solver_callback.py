@@ -21,8 +21,8 @@ IterationCallback = Callable[[int, float, float], bool]
 _FEASIBLE = 1e-3
 # In its module `casadi.py`, what CasADi calls to see what an argument is, such as `DM_from_array`.
 _ASKS = "_from_"
-# Where Python drops what is raised when an object that others know weakly ends: functions and their files.
-_ENDS = (("remove", "weakref.py"), ("_remove", "_weakrefset.py"))
+# Where Python drops what is raised when an object that others know weakly ends: functions and their modules.
+_ENDS = (("remove", "weakref"), ("_remove", "_weakrefset"))
 # Until Ctrl-C is tried again [s]: many times what such a question takes.
 _LATER = 1e-3
 
@@ -129,9 +129,9 @@ def _would_be_lost(frame: FrameType | None) -> bool:
     """Whether Python is in a question of CasADi, in the end of an object, or in what these call."""
     while frame is not None:
         code = frame.f_code
-        file = os.path.basename(code.co_filename)
-        question = _ASKS in code.co_name and file == "casadi.py"
-        if question or code.co_name == "__del__" or (code.co_name, file) in _ENDS:
+        question = _ASKS in code.co_name and os.path.basename(code.co_filename) == "casadi.py"
+        ending = code.co_name == "__del__" or (code.co_name, frame.f_globals.get("__name__")) in _ENDS
+        if question or ending:
             return True
         frame = frame.f_back
     return False
