@@ -338,7 +338,10 @@ def _neighbours(curve: _Curve, pieces: _Pieces, near: float) -> tuple[Integers, 
         who, guess = _seems_along(pieces, first, second, near)
         when, on = _on_curve(curve, pieces.middle[who], (pieces.point[who], pieces.rate[who]), guess, near)
         partner[who[on]] = when[on]
-        kept = np.concatenate([kept, part[partner[part] < 0.0]])
+        # Of a piece at the end of a stretch, which is known by its middle, the other half may be new.
+        along = np.pad(partner[part] >= 0.0, 1, mode="edge")
+        along[0] = partner[start - 1] >= 0.0 if start else True
+        kept = np.concatenate([kept, part[~(along[:-2] & along[1:-1] & along[2:])]])
         new = (partner[first] < 0.0) & (partner[second] < 0.0)
         pairs.append(np.stack([first[new], second[new]], axis=1))
     return np.concatenate(pairs), partner
