@@ -34,8 +34,8 @@ _ROUNDING = 1e-14
 _HALVINGS_AT_START = 8
 # Halvings of steps whose integrals add more; each divides what they add by four thousand.
 _MOST_HALVINGS = 3
-# [rad] Longer pieces of a curve are halved: their area is taken between arc and chord.
-_LONGEST_CHORD = 0.5
+# [rad] Longer pieces of a curve are halved: their area is taken between arc and chord, which may hide whole turns.
+_LONGEST_PIECE = 0.5
 # Keeps the decay of terms defined where all are zero.
 _TINY = 1e-300
 
@@ -336,11 +336,10 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
     at_end: tuple[Array, ...] = ()
     while len(left):
         ends = np.union1d(left, right)
-        dynamic, slivers, corners, missed, in_body = _by_piece(curve, left, right, ends)
-        first, last = (np.searchsorted(ends, at) for at in (left, right))
-        start, end = corners[:, first], corners[:, last]
-        bend = np.linalg.norm(end - start, axis=-1).max(axis=0)
-        rough = np.any(missed > goal[:, None] / count, axis=0) | (bend > _LONGEST_CHORD)
+        dynamic, slivers, corners, missed, length, in_body = _by_piece(curve, left, right, ends)
+        first = np.searchsorted(ends, left)
+        start = corners[:, first]
+        rough = np.any((missed > goal[:, None] / count) | (length > _LONGEST_PIECE), axis=0)
         parts = (dynamic, slivers, missed, start, *(part[:, first] for part in in_body))
         done.append((left[~rough], *(part[:, ~rough] for part in parts)))
         count += int(rough.sum())
@@ -370,20 +369,25 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
 
 def _by_piece(
     curve: _Curve, left: Array, right: Array, ends: Array
-) -> tuple[Array, Array, Array, Array, tuple[Array, ...]]:
-    """Dynamic phase and area of pieces (B, K), directions at `ends`, errors of both, and what is in body axes there."""
+) -> tuple[Array, Array, Array, Array, Array, tuple[Array, ...]]:
+    """Of pieces (B, K) dynamic phase, area, errors of both and length, and what is in body axes at `ends`.
+
+    In this order: dynamic phase, area, directions at `ends`, errors, lengths, what is in body axes.
+    """
     nodes, weights = sphere.gauss_nodes(left, right)
     # One evaluation for both: the ends are but an eighth as many as the nodes.
     directions, rates, *in_body = curve(np.concatenate([ends, nodes.ravel()]))
     corners = directions[:, : len(ends)]
     direction, rate = (part[:, len(ends) :].reshape(-1, *nodes.shape, 3) for part in (directions, rates))
     along = np.sum(direction * rate, axis=-1)
-    start = corners[:, np.searchsorted(ends, left), None]
-    weighted = np.stack([along, sphere.area_rate(start, direction, np.cross(direction, rate))]) * weights
+    start, moving = corners[:, np.searchsorted(ends, left), None], np.cross(direction, rate)
+    length = (np.sqrt(np.einsum("...i,...i", moving, moving)) * weights).sum(axis=-1)
+    weighted = np.stack([along, sphere.area_rate(start, direction, moving)]) * weights
     early, late = (np.abs(weighted @ terms).max(axis=-1) for terms in _last_terms())
     # The rule is right to twice as many degrees as its nodes tell apart: four times two more than the last seen.
     missed = late * np.minimum(late / (early + _TINY), 1.0) ** 4
-    return *weighted.sum(axis=-1), corners, missed.max(axis=0), tuple(part[:, : len(ends)] for part in in_body)
+    in_body = [part[:, : len(ends)] for part in in_body]
+    return *weighted.sum(axis=-1), corners, missed.max(axis=0), length, tuple(in_body)
 
 
 @lru_cache(maxsize=1)
