@@ -9,14 +9,13 @@ import pytest
 from numpy.polynomial import chebyshev
 
 from shapephase.chebyshev import end_margin
-from shapephase.integrator import _step_control
 from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._step_control import StepRequirements, even_steps
-from shapephase.integrator.fast import engine
 from shapephase.integrator.interpolant import Interpolant
 from shapephase.integrator.panels.finer_panels import FinerPanels, refining_factors
 from shapephase.integrator.panels.panel_series import PanelSeries, panel_errors, sample_times, series_through
 from shapephase.integrator.resolved import Hidden
+from support.both_engines import both
 
 EPS = np.finfo(float).eps
 DEGREES = np.array([0, 5, 30, 10, 80, 10])
@@ -101,16 +100,6 @@ def random_panels(rng: np.random.Generator) -> PanelSeries:
     return sampled(rough)
 
 
-def both(monkeypatch: pytest.MonkeyPatch, run) -> list:
-    """The same by arrays and by kernels."""
-    found = []
-    for setting in ("0", "1"):
-        monkeypatch.setenv("SHAPEPHASE_FAST", setting)
-        assert engine.is_ready() == (setting == "1")
-        found.append(run())
-    return found
-
-
 @pytest.mark.usefixtures("fast")
 @pytest.mark.parametrize("seed", range(8))
 def test_kernels_and_arrays_are_one_formula(monkeypatch: pytest.MonkeyPatch, seed: int):
@@ -146,9 +135,3 @@ def test_kernels_and_arrays_are_one_formula(monkeypatch: pytest.MonkeyPatch, see
         # Errors come of the last terms, 1e-10 large and rounded as the largest is, and of powers of their quotients.
         limit = 1e-4 if name in ("table", "errors", "bare", "changed", "sizes") else 1e-9
         assert np.allclose(kernels[name], expected, rtol=limit, atol=1e-13 * np.abs(arrays["coefficients"]).max()), name
-
-
-def test_tables_have_one_value_a_place():
-    """The straight lines between the parts ascend, as more degrees in a step are less sure."""
-    assert np.all(np.diff(_step_control.SPANNED_DEGREES) > 0.0)
-    assert np.all(np.diff(_step_control.PARTS_OF_DISTANCE) > 0.0)

@@ -36,10 +36,15 @@ def growth_and_rounding(propagators: Array, quaternions: Array, least: float) ->
     """
     find = growths_and_rounding if engine.is_ready() else _growths_and_rounding
     growth, rounding = find(propagators, quaternions)
+    return growth, looked_at_closely(rounding, propagators, quaternions, least)
+
+
+def looked_at_closely(rounding: Array, propagators: Array, quaternions: Array, least: float) -> Array:
+    """Rounding by the largest growth (B,), where it is above `least` time by time; arguments as above [rad]."""
     large = (rounding > least) & np.isfinite(rounding)
     if propagators.shape[1] and large.any():
         rounding[large] = _rounding_at_worst(propagators[large], _turns(quaternions[large]))
-    return growth, rounding
+    return rounding
 
 
 def largest_growth(propagators: Array) -> Array:

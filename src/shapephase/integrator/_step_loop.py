@@ -22,14 +22,12 @@ from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
-from .step_record import StepRecord
+from .step_record import CHECKPOINTS, StepRecord
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
 BLOCK = 256
 # Momenta: up to so many, one after another in CasADi is faster than all at once on NumPy's arrays.
 FEW = 24
-# Times between which the growth of errors is compared: 28 pairs.
-CHECKPOINTS = 8
 # Momenta on arrays at once, so that the arrays of one step stay in the processor's cache.
 _ROWS_AT_ONCE = 2048
 # The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
@@ -283,7 +281,7 @@ def _by_kernel(
     with_propagators: bool,
     threads: int | None,
 ) -> StepRecord:
-    widths, loops = np.diff(interpolant.edges[: len(steps) + 1]), interpolant.loops
+    widths, loops = interpolant.widths, interpolant.loops
     marks = checkpoint_steps(loops * int(steps.sum())) if with_propagators else np.zeros(0, dtype=int)
     return march_in_threads(
         widths, interpolant.coefficients, perturbed, steps, loops, directions, magnitudes, marks=marks, threads=threads
@@ -293,7 +291,7 @@ def _by_kernel(
 def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:
     """At the ends of all steps without momentum: (loops K + 1, 4)."""
     if engine.is_ready():
-        quaternions = quaternions_at_rest(np.diff(interpolant.edges[: len(steps) + 1]), coefficients, steps)
+        quaternions = quaternions_at_rest(interpolant.widths, coefficients, steps)
         run_progress.advance(int(steps.sum()))
     else:
         quaternions = _quaternions_of_one_loop(_channels_at_stages(interpolant, coefficients, steps))

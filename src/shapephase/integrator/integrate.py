@@ -17,10 +17,23 @@ import numpy as np
 from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth
+from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
+from ._last_terms import Perturbed
 from ._step_control import StepRequirements, even_steps
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
-from .fast.estimate_constants import ORDER
+from .fast import engine
+from .fast.estimate_constants import (
+    EXPECTED_GROWTH,
+    INFORMATIVE_ERROR,
+    LITTLE_ROUNDING,
+    MANY_STEPS,
+    MOST_EXPECTED_GROWTH,
+    MOST_SAMPLING,
+    MOST_STEPPING,
+    NEGLIGIBLE,
+    REFINED,
+)
+from .fast.rounds import Round, rounds_of_one
 from .interpolant import Interpolant
 from .sampling import Sampler
 from .step_record import StepRecord
@@ -30,25 +43,10 @@ from .stepped import SteppedRotation, for_whole_batch
 _MOST_STEPS = 4_000_000
 # Rounds of refinement; most motions need one.
 _MOST_ROUNDS = 12
-# Steps of one motion from which on propagators are not integrated along: the derivative of coarser steps costs less.
-_MANY_STEPS = 4000
 # Of the tolerance, for what the samplers say of themselves at first; it is ten to a hundred times the truth.
 _SAMPLING_SHARE = 0.3
-# Of the tolerance: what the samplers say, amplified, is not worth a march of its own below.
-_NEGLIGIBLE = 0.005
-# What errors are expected to grow by for each radian turned, and at most, before it is known.
-_EXPECTED_GROWTH = 0.5
-_MOST_EXPECTED_GROWTH = 30.0
-# Of the room that rounding leaves: what stepping and sampling may take up, and what a further round aims at.
-_MOST_STEPPING = 0.5
-_MOST_SAMPLING = 0.4
-_AIM = 0.2
 # Amplification that the first plan allows for; what grows more is seen when it is there.
 _MOST_FORESEEN = 1e4
-# [rad] distance of coarser steps up to which the propagators of the steps are trusted.
-_INFORMATIVE_ERROR = 0.1
-# Of the tolerance: rounding below is not looked at closely.
-_LITTLE_ROUNDING = 0.01
 # Of the tolerance: with more rounding than this no refinement reaches it.
 _MOST_ROUNDING = 0.9
 
@@ -110,11 +108,13 @@ class Errors(NamedTuple):
     rounding: float
     amplification: float
     distance: float  # of half as many steps
+    order: float  # by which the error of steps falls
+    rounded_up: float  # how many more steps were taken than planned, since they are even
 
     @property
     def are_informative(self) -> bool:
         """Whether they show how errors grow; steps that are still far too long do not."""
-        return self.distance < _INFORMATIVE_ERROR and isfinite(self.amplification)
+        return self.distance < INFORMATIVE_ERROR and isfinite(self.amplification)
 
 
 class Attempt(NamedTuple):
@@ -122,6 +122,8 @@ class Attempt(NamedTuple):
 
     rotation: SteppedRotation
     distances: Array  # (B,) of half as many steps [rad]
+    order: float  # by which the error of steps falls
+    rounded_up: float  # how many more steps were taken than planned
 
     @property
     def _errors(self) -> list[Array]:
@@ -132,11 +134,12 @@ class Attempt(NamedTuple):
     @property
     def worst(self) -> Errors:
         """The largest of all momenta."""
-        return Errors(*(float(part.max(initial=0.0)) for part in self._errors))
+        return Errors(*(float(part.max(initial=0.0)) for part in self._errors), self.order, self.rounded_up)
 
     def errors(self, rows: Integers) -> list[Errors]:
         """Of some momenta."""
-        return [Errors(*row) for row in zip(*(part[rows].tolist() for part in self._errors), strict=True)]
+        each = zip(*(part[rows].tolist() for part in self._errors), strict=True)
+        return [Errors(*row, self.order, self.rounded_up) for row in each]
 
 
 class Integration:
@@ -162,7 +165,7 @@ class Integration:
         refinement: Refinement | None = None,
     ) -> None:
         self._sampler, self._momentum, self._tolerance = sampler, momentum, tolerance
-        self._subdivide = 1 if subdivide is None else subdivide
+        self._subdivide = subdivide
         self._magnitudes = norms(momentum)
         self._largest, self._threads = ceiling, threads
         self._refinement = refinement or Refinement.at_first(tolerance)
@@ -194,55 +197,87 @@ class Integration:
     @cached_property
     def is_long(self) -> bool:
         """Whether it takes exact error propagators, and a plan of steps for each momentum by its own."""
-        _, requirements = self._sampled()
+        self._sampler.refine(self._largest, self._refinement.sampling_target)
+        requirements = StepRequirements.from_interpolant(self._sampler.interpolant(), self._largest, self._tolerance)
         return self._is_long(requirements, requirements.loops * float(self._planned(requirements).sum()))
 
     def _is_long(self, requirements: StepRequirements, count: float) -> bool:
         """Count : of the steps planned."""
-        return self._largest > 0.0 and (requirements.very_far or count > _MANY_STEPS)
-
-    def _sampled(self) -> tuple[Interpolant, StepRequirements]:
-        """All samples so far, as dense as the refinement asks, and how finely they must be stepped."""
-        self._sampler.refine(self._largest, self._refinement.sampling_target)
-        interpolant = self._sampler.interpolant()
-        return interpolant, StepRequirements.from_interpolant(interpolant, self._largest, self._tolerance)
+        return self._largest > 0.0 and (requirements.very_far or count > MANY_STEPS)
 
     def attempt(self) -> Attempt:
         """Steps as planned, and the error estimates of the result."""
-        interpolant, requirements = self._sampled()
+        self._sampler.refine(self._largest, self._refinement.sampling_target)
+        interpolant, perturbed = self._sampler.interpolant(), self._sampler.perturbed(self._largest)
         expected = self._sampler.error(self._largest)
-        growth = self._refinement.amplified
-        if growth is None:
-            turn = requirements.whole_turn if self._largest else 0.0
-            growth = min(1.0 + _EXPECTED_GROWTH * turn, _MOST_EXPECTED_GROWTH)
-        perturbed = self._sampler.perturbed(self._largest)
-        counts = expected * growth > _NEGLIGIBLE * self._tolerance
-        changed = perturbed.coefficients if counts and perturbed.differ else None
-        steps = self._plan(interpolant, requirements)
-        record = self._take_steps(interpolant, changed, steps)
+        taken = self._rounds_of_one(interpolant, perturbed, expected) or self._round(interpolant, perturbed, expected)
+        record, growth = taken.record, taken.growth
+        sampling = growth * expected
+        if taken.counts:
+            sampling = np.fmin(sampling, record.truncation + growth * perturbed.hidden)
         stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
-        propagators = record.propagators if self._propagators is None else self._propagators
-        little = _LITTLE_ROUNDING * self._tolerance
-        amplifications, rounding = growth_and_rounding(propagators, record.quaternions, little)
-        sampling = amplifications * expected
-        if counts:
-            measured = record.truncation + amplifications * perturbed.hidden
-            sampling = np.fmin(sampling, measured)
         rotation = SteppedRotation(
             interpolant=interpolant,
             momentum=self._momentum,
-            steps=steps,
+            steps=taken.steps,
             quaternions=record.quaternions,
             directions=record.directions,
             turns=record.turns,
             dynamics=record.dynamics,
             sampling_error=sampling,
-            stepping_error=requirements.stepping_error(steps, stepping),
-            rounding_error=rounding,
-            amplification=amplifications,
+            stepping_error=taken.defects.error(stepping, interpolant.loops),
+            rounding_error=taken.rounding,
+            amplification=growth,
             perturbed=perturbed,
         )
-        return Attempt(rotation, stepping)
+        return Attempt(rotation, stepping, taken.defects.order, taken.rounded_up)
+
+    def _rounds_of_one(self, interpolant: Interpolant, perturbed: Perturbed, expected: float) -> Round | None:
+        """As `_round`, of one momentum in machine code, in as many rounds as steps alone need; None: not with that."""
+        alone = len(self._momentum) == 1 and self._subdivide is None and engine.is_ready()
+        if not alone or (self._largest == 0.0 and interpolant.loops > 1):
+            return None
+        # What is below by any growth is not looked at.
+        changed = MOST_EXPECTED_GROWTH * expected > NEGLIGIBLE * self._tolerance and perturbed.differ
+        of_last = np.array([self._refinement.finer, self._refinement.amplified or np.inf])
+        found = rounds_of_one(
+            interpolant,
+            perturbed.coefficients if changed else None,
+            _directions(self._momentum, self._magnitudes) if self._largest else None,
+            self._magnitudes,
+            ceiling=self._largest,
+            tolerance=self._tolerance,
+            expected=expected,
+            hidden=perturbed.hidden,
+            refinement=of_last,
+        )
+        if found is None:
+            return None
+        finer, amplified = of_last.tolist()
+        self._refinement = Refinement(
+            self._refinement.sampling_target, finer, amplified if isfinite(amplified) else None
+        )
+        little = LITTLE_ROUNDING * self._tolerance
+        record = found.record
+        closely = looked_at_closely(found.rounding, record.propagators, record.quaternions, little)
+        return found._replace(rounding=closely)
+
+    def _round(self, interpolant: Interpolant, perturbed: Perturbed, expected: float) -> Round:
+        """Plan the steps and take them; how errors grow, and whether those of the samples were measured."""
+        requirements = StepRequirements.from_interpolant(interpolant, self._largest, self._tolerance)
+        growth = self._refinement.amplified
+        if growth is None:
+            turn = requirements.whole_turn if self._largest else 0.0
+            growth = min(1.0 + EXPECTED_GROWTH * turn, MOST_EXPECTED_GROWTH)
+        counts = expected * growth > NEGLIGIBLE * self._tolerance
+        steps = self._plan(interpolant, requirements)
+        record = self._take_steps(interpolant, perturbed.coefficients if counts and perturbed.differ else None, steps)
+        propagators = record.propagators if self._propagators is None else self._propagators
+        little = LITTLE_ROUNDING * self._tolerance
+        amplifications, rounding = growth_and_rounding(propagators, record.quaternions, little)
+        planned = float(self._planned(requirements).sum())
+        rounded_up = float(steps.sum()) / planned
+        return Round(steps, record, counts, amplifications, rounding, requirements.defects(steps), rounded_up)
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> Integers:
         """Steps on each panel: (P,). Finds the growth of errors first where the steps themselves will not show it."""
@@ -257,7 +292,7 @@ class Integration:
             growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
-        steps = even_steps(planned, self._subdivide)
+        steps = even_steps(planned, 1 if self._subdivide is None else self._subdivide)
         if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         return steps
@@ -288,12 +323,14 @@ class Integration:
         """Finer steps and samples for the next round."""
         target, finer, growth = self._refinement
         room = max(self._tolerance - errors.rounding, 0.1 * self._tolerance)
-        if errors.stepping > _MOST_STEPPING * room:
-            finer *= min(max((errors.stepping / (_AIM * room)) ** (1.0 / ORDER), 1.1), 4.0)
+        if errors.stepping > MOST_STEPPING * room:
+            shorter = (errors.stepping / (REFINED * room)) ** (1.0 / errors.order)
+            # So much finer that steps are more, too.
+            finer *= min(max(shorter, 1.1, 1.02 * errors.rounded_up), 4.0)
         if errors.are_informative:
             growth = errors.amplification
-            if errors.sampling > _MOST_SAMPLING * room:
-                target = min(target, self._sampler.error(self._largest) * _AIM * room / errors.sampling)
+            if errors.sampling > MOST_SAMPLING * room:
+                target = min(target, self._sampler.error(self._largest) * REFINED * room / errors.sampling)
         return Refinement(target, finer, growth)
 
 

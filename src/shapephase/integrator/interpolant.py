@@ -43,6 +43,12 @@ class Interpolant:
     __post_init__ = lock_arrays
 
     @cached_property
+    def widths(self) -> Array:
+        """(P,) of the panels of one loop [s]."""
+        ends = self.edges[: len(self.coefficients) + 1]
+        return ends[1:] - ends[:-1]
+
+    @cached_property
     def series(self) -> PiecewiseChebyshev:
         """The nine channels as a function of time."""
         return PiecewiseChebyshev(self.edges, self.coefficients)

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import frexp, ldexp
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
+from .fast.rounds import STEPS_OF_FINER, STEPS_OF_OTHERS, marks_between
 from .integrate import Attempt, Integration, Refinement, norms
 from .interpolant import Interpolant
 from .sampling import Sampler, Samplers
@@ -22,9 +24,6 @@ from .stepped import SteppedRotation, for_whole_batch, of_rows
 
 # Classes of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed.
 _CLASSES = 4
-# Refinements in each factor of two: of the steps, and of what samples must reach and errors grow by.
-_STEPS_OF_FINER = 8
-_STEPS_OF_OTHERS = 2
 # From here on a growth of errors is not told from any larger one.
 _MOST_GROWTH = 1e30
 
@@ -145,7 +144,7 @@ def rotations_of_each(
     for ceiling in sorted(set(ceilings.tolist())) or (0.0,):
         rows = np.flatnonzero(ceilings == ceiling)
         first = Refinement.at_first(tolerance)
-        waiting = [_Group(rows, np.full(len(rows), np.inf), ceiling, (first,), None)]
+        waiting = [_Group(rows, np.full(max(len(rows), 1), np.inf), ceiling, (first,), None)]
         while waiting:
             found, further = _integrated(samplers, waiting.pop(), momentum, tolerance, threads)
             parts += found
@@ -175,7 +174,7 @@ def _integrated(
             return [], [group._replace(rows=rows[k : k + 1], best=group.best[k : k + 1]) for k in range(len(rows))]
         attempt = integration.attempt()
     except AccuracyNotReached as error:
-        raise _of_row(error, int(rows[0]), len(momentum)) from error
+        raise _of_row(error, rows[:1], len(momentum)) from error
     estimates = attempt.rotation.error_estimate
     failed = np.flatnonzero(~(estimates <= tolerance))
     if not len(failed):
@@ -198,12 +197,12 @@ def _further(
         try:
             integration.check_progress(errors, len(group.history), best)
         except AccuracyNotReached as error:
-            raise _of_row(error, int(group.rows[row]), count) from None
-        refinement = _rounded(integration.refined(errors))
+            raise _of_row(error, group.rows[row : row + 1], count) from None
+        refinement = _rounded(integration.refined(errors), group.history[-1])
         together.setdefault(refinement, []).append((row, min(best, errors.estimate)))
     for refinement, members in together.items():
         rows = group.rows if at_rest else group.rows[[row for row, _ in members]]
-        best = np.full(len(rows), members[0][1]) if at_rest else np.array([best for _, best in members])
+        best = np.full(max(len(rows), 1), members[0][1]) if at_rest else np.array([best for _, best in members])
         history = (*group.history, refinement)
         # Where all go on together the sampler goes with them.
         yield _Group(rows, best, group.ceiling, history, sampler if len(together) == 1 else None)
@@ -217,26 +216,31 @@ def _after(samplers: Samplers, group: _Group) -> Sampler:
     return sampler
 
 
-def _rounded(refinement: Refinement) -> Refinement:
-    """Made stricter by little, so that many are the same."""
+def _rounded(refinement: Refinement, last: Refinement) -> Refinement:
+    """What is stricter than in the last round is made stricter by little more, so that many are the same."""
     target, finer, amplified = refinement
     return Refinement(
-        sampling_target=1.0 / _up(1.0 / target, _STEPS_OF_OTHERS),
-        finer=_up(finer, _STEPS_OF_FINER),
-        amplified=None if amplified is None else _up(min(amplified, _MOST_GROWTH), _STEPS_OF_OTHERS),
+        sampling_target=target if target == last.sampling_target else 1.0 / _up(1.0 / target, STEPS_OF_OTHERS),
+        finer=_up(finer, STEPS_OF_FINER),
+        amplified=None if amplified is None else _up(min(amplified, _MOST_GROWTH), STEPS_OF_OTHERS),
     )
 
 
 def _up(number: float, steps: int) -> float:
-    return float(rounded_up(np.array([number]), steps)[0])
+    """As `rounded_up`, of one number."""
+    mantissa, exponent = frexp(number)
+    return ldexp(next(mark for mark in marks_between(steps).tolist() if mantissa <= mark), exponent)
 
 
 def rounded_up(numbers: Array, steps: int) -> Array:
     """To the next of `steps` geometric steps in each factor of two, exactly alike for equal numbers; zero is zero."""
+    if len(numbers) == 1:
+        return np.array([_up(float(numbers[0]), steps) if numbers[0] else 0.0])
     mantissa, exponent = np.frexp(numbers)
-    marks = 0.5 * 2.0 ** (np.arange(steps + 1) / steps)
+    marks = marks_between(steps)
     return np.where(numbers == 0.0, 0.0, np.ldexp(marks[np.searchsorted(marks, mantissa) % len(marks)], exponent))
 
 
-def _of_row(error: AccuracyNotReached, row: int, count: int) -> AccuracyNotReached:
-    return error if count == 1 else AccuracyNotReached(f"momentum {row} of {count}: {error}")
+def _of_row(error: AccuracyNotReached, row: Integers, count: int) -> AccuracyNotReached:
+    """`row` : the row in an array, or none."""
+    return error if count <= 1 else AccuracyNotReached(f"momentum {row[0]} of {count}: {error}")

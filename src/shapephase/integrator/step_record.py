@@ -8,6 +8,9 @@ import numpy as np
 
 from ..arrays import Array
 
+# Times between which the growth of errors is compared: 28 pairs.
+CHECKPOINTS = 8
+
 
 @dataclass(frozen=True, eq=False)
 class StepRecord:

@@ -14,10 +14,9 @@ from ._dense_output import DenseOutput
 from ._error_propagator import momentum_slope
 from ._last_terms import Perturbed
 from ._step_loop import stage_channels
+from .fast.estimate_constants import DENSE_SHARE
 from .interpolant import Interpolant
 
-# Of the error at the ends of the steps: what the polynomials between them may add.
-_DENSE_SHARE = 5e-3
 _BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
     "rounding_error", "amplification",
@@ -166,7 +165,7 @@ class SteppedRotation:
             directions=self.directions[rows],
             dynamics=self.dynamics[rows],
             magnitude=np.linalg.norm(self.momentum[rows], axis=-1),
-            goal=_DENSE_SHARE * float(self._error_at_ends.min(initial=np.inf)),
+            goal=DENSE_SHARE * float(self._error_at_ends.min(initial=np.inf)),
         )
 
     def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:
@@ -189,7 +188,7 @@ class SteppedRotation:
 
 def estimate_from_ends(error: Array) -> Array:
     """The error over the whole interval, from that at the ends of the steps: (B,) -> (B,) [rad]."""
-    return (1.0 + _DENSE_SHARE) * error
+    return (1.0 + DENSE_SHARE) * error
 
 
 def for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotation:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import curves, gradients, marches, nodes, panels, tree, variants
+from . import curves, gradients, marches, nodes, panels, rounds, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, is_wanted, may_compile
 
@@ -41,7 +41,8 @@ _KERNELS = {
     "change_ends": ".kernels.panel_kernel",
     "sizes_of_terms": ".kernels.panel_kernel",
     "plan_steps": ".kernels.panel_kernel",
-    "errors_of_steps": ".kernels.panel_kernel",
+    "defects_of_panels": ".kernels.panel_kernel",
+    "take_rounds": ".kernels.round_kernel",
 }
 """And the modules that they are in."""
 # A version of Numba that does not go with this NumPy or this Python says so in many ways.
@@ -174,3 +175,4 @@ def _warm() -> None:
     panels.warm()
     curves.warm()
     variants.warm()
+    rounds.warm()

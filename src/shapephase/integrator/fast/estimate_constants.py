@@ -50,15 +50,15 @@ FEW_TERMS = 10.0
 
 ORDER = 8.0
 """Of the formula."""
-SIGNIFICANT = 0.2
+SIGNIFICANT = 0.5
 """A term of the rate of turning, times the panel's width, is significant above this part of the tolerance."""
 DEGREES_A_RADIAN = 0.6
 """What a radian turned on a panel adds to the degrees of its series: they swing as seen from space."""
 MOST_TURN = 1e9
 """[rad] on a panel, that a plan of steps is made for."""
 
-DEGREES_A_STEP = 2.4
-"""Significant Chebyshev degrees of a panel that one step may span, so that half as many steps still see all of them."""
+DEGREES_A_STEP = 8.0
+"""Significant Chebyshev degrees of a panel that one step may span."""
 TURN_A_STEP = 2.0
 """[rad] bound of the turn in one step; it is up to twice the turn itself."""
 SHORT_TURN_A_STEP = 0.6
@@ -67,25 +67,61 @@ DISTANCE = 10.0**-8.1
 """The distance between so many steps and half as many: this times the root of the sum of the panels' squared errors,
 each the sum of its terms times the eighth power of their degree over half the steps. Three of four random motions
 need no more."""
-AIM = 40.0
+AIM = 1000.0
 """Of the tolerance: the distance that is planned for; its part that counts is far smaller, and so is the usual one."""
+
+FAR = 25.0
+"""[rad] bound of the whole turn (some fifteen radians indeed) from which errors of the propagators have added up to
+more than an estimate can bear."""
+VERY_FAR = 100.0
+"""[rad] the same of short steps; they were right to 3 % in turns of half as much, and to 30 % in the double."""
+MANY_STEPS = 4000.0
+"""Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
+NEGLIGIBLE = 0.005
+"""Of the tolerance: what the samplers say, amplified, is not worth a march of its own below."""
+EXPECTED_GROWTH = 0.5
+"""What errors are expected to grow by for each radian turned, before it is known."""
+MOST_EXPECTED_GROWTH = 30.0
+
+# ---- Another round -------------------------------------------------------------------------------------------------
+
+MOST_STEPPING = 0.5
+"""Of the room that rounding leaves: what the error of the steps may take up of a round that is not good enough."""
+MOST_SAMPLING = 0.4
+"""And that of the samples."""
+REFINED = 0.5
+"""Of that room: what a further round aims at."""
+INFORMATIVE_ERROR = 0.1
+"""[rad] distance of coarser steps up to which the propagators of the steps are trusted."""
+LITTLE_ROUNDING = 0.01
+"""Of the tolerance: rounding below is not looked at closely."""
+DENSE_SHARE = 5e-3
+"""Of the error at the ends of the steps: what the polynomials between them may add."""
 
 # ---- The error of steps, from their distance from half as many -----------------------------------------------------
 
-NOT_SMALL = 0.02
-"""Of the distance: terms above count when it is asked how many degrees a step spans."""
-SPANNED_DEGREES = (1.6, 1.9, 2.4, 3.0, 3.5, 5.0)
-"""For each the error is a part of the distance. An eighth-order formula would allow 1/255; that is the median of 1,200
-random motions, half of them with bumps and ramps that hide. It is less sure the more degrees a step spans: of 10,000
-motions one came to 1/9.6 at 2.2 degrees."""
-PARTS_OF_DISTANCE = (1.0 / 80.0, 1.0 / 32.0, 1.0 / 8.0, 1.0 / 5.0, 1.0 / 4.0, 1.0)
-"""Their logarithms are joined by straight lines."""
-CHANCE_DEGREES = (1.6, 2.4)
-"""The distance of steps that span so many degrees may be small by chance."""
-CHANCE_PARTS = (0.0, 0.005)
-"""Of the tolerance: then the error is at least this, joined by a straight line, as far as the distance allows."""
-MOST_BY_CHANCE = 0.25
-"""Of the distance: more error than that was never hidden by chance."""
+FULL_ORDER = 2.0**-8
+"""The part of the distance that the error is where steps are so short that it falls by the order of the formula."""
+DEFECT_STEPS = 64
+"""Steps of a panel, that the formula's defects are tabulated for."""
+DEFECT_DEGREES = 192
+"""And terms of its series."""
+DEGREES_OF_TURN = 0.5
+"""What a radian turned on a panel adds to the degrees of its terms, where the part is found that an error falls by."""
+EVENNESS = (0.2, 0.4)
+"""Of the panels' defects, one where all are alike: the fewer panels they come from, the likelier is a distance that is
+small by chance."""
+MOST_BY_CHANCE = (14.0, 9.0)
+"""How many times the part that defects foretell the error may be, joined by a straight line."""
+BY_CHANCE = 2.6
+"""The same where the distance is all that defects would come to if they added up; they have to cancel for more."""
+POWER_OF_CHANCE = 0.4
+"""Of how many times that is the distance."""
+LEAST_BY_CHANCE = 3.0
+LEAST_ORDER = 2.0
+"""By which errors fall at least when steps are made shorter."""
+UNRESOLVED = 0.125
+"""A term whose defect falls to no less than this part when steps are halved is not seen by them: it adds its own."""
 
 # ---- Rounding along the motion -------------------------------------------------------------------------------------
 

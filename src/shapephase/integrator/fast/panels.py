@@ -10,6 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Integers, Mask
 from ...chebyshev import unit_nodes, values_to_coefficients
+from .._quadrature_defects import Defects, defect_table
 from ._plain import plain
 
 _NOTHING_HIDDEN = np.zeros((0, 5))
@@ -109,11 +110,11 @@ def plan_of_steps(sizes: Array, loops: int, tolerance: float, turn_a_step: float
     return planned
 
 
-def errors_of_steps(rates: Array, steps: Integers, tolerance: float, distances: Array) -> Array:
-    """What `StepRequirements.stepping_error` finds: (P, n), (P,), (B,) -> (B,) [rad]."""
-    errors = np.empty(len(distances))
-    _kernel().errors_of_steps(plain(rates), steps, float(tolerance), plain(distances), errors)
-    return errors
+def defects_of_panels(rates: Array, turns: Array, steps: Integers) -> Defects:
+    """What `defects` finds."""
+    found = np.empty(4)
+    _kernel().defects_of_panels(plain(rates), plain(turns), steps, plain(defect_table()), found)
+    return Defects(*found.tolist())
 
 
 def warm() -> None:
@@ -130,7 +131,7 @@ def warm() -> None:
     series_with_changed_ends(coefficients, degree, one, 1.0)
     rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
     plan_of_steps(sizes, 1, 1.0, 1.0)
-    errors_of_steps(rates, np.array([2]), 1.0, one)
+    defects_of_panels(rates, one, np.array([2]))
 
 
 @lru_cache(maxsize=64)

@@ -9,23 +9,26 @@ import numpy as np
 from ..estimate_constants import (
     AIM,
     AT_ROUNDING,
-    CHANCE_DEGREES,
-    CHANCE_PARTS,
+    BY_CHANCE,
     CONVERGED_TAIL,
     CONVERGING,
     DECAY,
     DEGREES_A_RADIAN,
     DEGREES_A_STEP,
+    DEGREES_OF_TURN,
     DISTANCE,
     DRIFT_NORM,
     EPS,
+    EVENNESS,
     FEW_TERMS,
     FLOOR,
+    FULL_ORDER,
     HALF_DEGREE,
     HIGHEST_DEGREE,
     INVERSE,
     INVERSE_NORM,
     LAST_TERMS,
+    LEAST_BY_CHANCE,
     LEAST_DEGREE,
     LEAST_OF_FLOOR,
     MISSING_FACTOR,
@@ -33,19 +36,17 @@ from ..estimate_constants import (
     MOST_MISSING,
     MOST_RAISED,
     MOST_TURN,
-    NOT_SMALL,
     ORDER,
-    PARTS_OF_DISTANCE,
+    POWER_OF_CHANCE,
     ROUNDED_TERM,
     ROUNDING,
     SLOWEST_DECAY,
-    SPANNED_DEGREES,
     TINY,
     UNAVERAGED_PHASE,
+    UNRESOLVED,
 )
 from .jit import kernel, part
 
-_LOGARITHMS = tuple(math.log(share) for share in PARTS_OF_DISTANCE)
 _CHANNELS = 9
 _DRIFT = 6
 """The first channel of I^-1 L_o; before it come three diagonal and three other entries of I^-1."""
@@ -319,27 +320,56 @@ def plan_steps(turn, swing, degree, loops, tolerance, turn_a_step, planned):
 
 
 @part
-def _between(x, places, values):
-    """Along straight lines, beyond the ends as at the ends."""
-    if x <= places[0]:
-        return values[0]
-    for k in range(1, len(places)):
-        if x <= places[k]:
-            share = (x - places[k - 1]) / (places[k] - places[k - 1])
-            return values[k - 1] + share * (values[k] - values[k - 1])
-    return values[len(values) - 1]
+def _defect(degree, row, slower, table):
+    """Of a term, by the table's row for so many steps."""
+    degree = min(degree * slower, table.shape[1] - 1.001)
+    below = int(degree)
+    first = table[row, below]
+    return slower * slower * (first + (degree - below) * (table[row, below + 1] - first))
 
 
 @kernel
-def errors_of_steps(rates, steps, tolerance, distances, errors):
-    """As `StepRequirements.stepping_error`: (P, n), (P,), (B,) -> (B,), the last one filled."""
-    for row in range(len(distances)):
-        distance, most = distances[row], 0.0
-        least = NOT_SMALL * distance
-        for panel in range(len(steps)):
-            for k in range(rates.shape[1]):
-                if rates[panel, k] > least:
-                    most = max(most, k / steps[panel])
-        by_chance = tolerance * _between(most, CHANCE_DEGREES, CHANCE_PARTS)
-        share = math.exp(_between(most, SPANNED_DEGREES, _LOGARITHMS))
-        errors[row] = max(share * distance, min(by_chance, MOST_BY_CHANCE * distance))
+def defects_of_panels(rates, turns, steps, table, found):
+    """As `defects`, with the table of defects: the four fields of the result in their order are filled."""
+    whole = half = unresolved = squares = 0.0
+    for panel in range(len(steps)):
+        row, half_row = min(steps[panel], len(table) - 1), min(steps[panel] // 2, len(table) - 1)
+        slower, half_slower = math.sqrt(row / steps[panel]), math.sqrt(half_row / (steps[panel] // 2))
+        here = 0.0
+        for k in range(rates.shape[1]):
+            degree = k + DEGREES_OF_TURN * turns[panel]
+            one = rates[panel, k] * _defect(degree, row, slower, table)
+            other = rates[panel, k] * _defect(degree, half_row, half_slower, table)
+            whole += one
+            here += other
+            if one > UNRESOLVED * other:
+                unresolved += one
+        half += here
+        squares += here * here
+    found[0], found[1], found[2] = whole, half, unresolved
+    found[3] = half * half / (len(steps) * squares) if squares > 0.0 else 1.0
+
+
+@part
+def _between(x, places, values):
+    """Along a straight line from the first place to the second, beyond them as there."""
+    share = min(max((x - places[0]) / (places[1] - places[0]), 0.0), 1.0)
+    return values[0] + share * (values[1] - values[0])
+
+
+@part
+def remaining_by_defects(whole, half):
+    """As `Defects.remaining`."""
+    return min(max(whole / half, FULL_ORDER), 1.0) if half > 0.0 else FULL_ORDER
+
+
+@part
+def error_by_defects(found, distance, loops):
+    """As `Defects.error`."""
+    whole, half, unresolved, evenness = found[0], found[1], found[2], found[3]
+    remaining = remaining_by_defects(whole, half)
+    cancelled = loops * half / max(distance, TINY)
+    factor = min(
+        max(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE), _between(evenness, EVENNESS, MOST_BY_CHANCE)
+    )
+    return min(max(factor * remaining * distance, loops * unresolved), distance)

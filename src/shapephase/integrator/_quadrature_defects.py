@@ -1,0 +1,133 @@
+"""What the steps' formula misses of each term of a Chebyshev series: how errors fall when steps are halved.
+
+Of a motion about one axis the error of steps is the defect of a quadrature, term by term. Of any other motion the sum
+of these defects is no measure of the error itself, but from half as many steps to all of them it falls as that does.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import log2
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Array, Integers, read_only
+from ._rotation_step import tableau
+from .fast.estimate_constants import (
+    BY_CHANCE,
+    DEFECT_DEGREES,
+    DEFECT_STEPS,
+    DEGREES_OF_TURN,
+    EVENNESS,
+    FULL_ORDER,
+    LEAST_BY_CHANCE,
+    LEAST_ORDER,
+    MOST_BY_CHANCE,
+    ORDER,
+    POWER_OF_CHANCE,
+    TINY,
+    UNRESOLVED,
+)
+
+# Of sums of stages by weights up to six.
+_ROUNDING = 1e-14
+
+
+@lru_cache(maxsize=1)
+def defect_table() -> Array:
+    """Of the term T_k on a panel of width one in m steps, the largest at any end of a step: [m, k]; row 0 is zero.
+
+    (DEFECT_STEPS + 1, DEFECT_DEGREES).
+    """
+    _, weights, nodes = tableau()
+    table = np.zeros((DEFECT_STEPS + 1, DEFECT_DEGREES))
+    for steps in range(1, DEFECT_STEPS + 1):
+        stages = 2.0 * (np.arange(steps)[:, None] + nodes) / steps - 1.0
+        ends = np.linspace(-1.0, 1.0, steps + 1)
+        taken = _polynomials(stages, DEFECT_DEGREES) @ weights / steps
+        exact = 0.5 * np.diff(_integrals(ends), axis=1)
+        table[steps] = np.abs(np.cumsum(taken - exact, axis=1)).max(axis=1)
+    # Low terms are integrated exactly: what is left of them is rounding.
+    return read_only(np.where(table > _ROUNDING, table, 0.0))
+
+
+def _polynomials(x: Array, count: int) -> Array:
+    """T_0 ... T_(count-1): (...) -> (count, ...)."""
+    found = np.empty((count, *x.shape))
+    found[0], found[1] = 1.0, x
+    for k in range(2, count):
+        found[k] = 2.0 * x * found[k - 1] - found[k - 2]
+    return found
+
+
+def _integrals(x: Array) -> Array:
+    """Of T_0 ... T_(DEFECT_DEGREES-1) up to x, but for constants: (...) -> (DEFECT_DEGREES, ...)."""
+    terms = _polynomials(x, DEFECT_DEGREES + 1)
+    found = np.empty((DEFECT_DEGREES, *x.shape))
+    found[0], found[1] = x, 0.5 * x * x
+    for k in range(2, DEFECT_DEGREES):
+        found[k] = 0.5 * (terms[k + 1] / (k + 1) - terms[k - 1] / (k - 1))
+    return found
+
+
+class Defects(NamedTuple):
+    """Of all panels, each term weighed by its size.
+
+    Attributes
+    ----------
+    whole, half : of the steps and of half as many [rad]
+    unresolved : of the steps, by terms that halving them does little about [rad]
+    evenness : of the panels' part in `half`, one over their number where all comes from one panel
+    """
+
+    whole: float
+    half: float
+    unresolved: float
+    evenness: float
+
+    @property
+    def remaining(self) -> float:
+        """The part of the distance from half as many steps that the error of the steps is."""
+        return min(max(self.whole / self.half, FULL_ORDER), 1.0) if self.half > 0.0 else FULL_ORDER
+
+    @property
+    def order(self) -> float:
+        """By which power of the steps' length errors fall."""
+        return min(max(-log2(self.remaining), LEAST_ORDER), ORDER)
+
+    def error(self, distance: Array, loops: int) -> Array:
+        """Bound of the error of steps by their distance from half as many: (B,) -> (B,) [rad]."""
+        cancelled = loops * self.half / np.maximum(distance, TINY)
+        by_chance = np.maximum(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE)
+        factor = np.minimum(by_chance, np.interp(self.evenness, EVENNESS, MOST_BY_CHANCE))
+        return np.minimum(np.maximum(factor * self.remaining * distance, loops * self.unresolved), distance)
+
+
+def defects(rates: Array, turns: Array, steps: Integers) -> Defects:
+    """What the formula misses on all panels.
+
+    Parameters
+    ----------
+    rates : (P, n) the size of each term [rad]
+    turns : (P,) how far the body turns on each panel, which makes terms swing faster as seen from space [rad]
+    steps : (P,) even
+    """
+    counts = np.stack([steps, steps // 2])
+    # More steps than the table has: as in the most that it has, for the terms that swing as fast at the panel's ends.
+    fewer = np.minimum(counts, DEFECT_STEPS)
+    slower = np.sqrt(fewer / counts)[..., None]
+    degrees = np.arange(float(rates.shape[1])) + (DEGREES_OF_TURN * turns)[:, None]
+    degrees = np.minimum(degrees * slower, DEFECT_DEGREES - 1.001)
+    below, table = degrees.astype(np.int64), defect_table()
+    place = fewer[..., None] * DEFECT_DEGREES + below
+    first, second = table.take(place), table.take(place + 1)
+    whole, half = rates * (slower * slower) * (first + (degrees - below) * (second - first))
+    of_panels = half.sum(axis=1)
+    total, squares = float(of_panels.sum()), float(of_panels @ of_panels)
+    return Defects(
+        whole=float(whole.sum()),
+        half=total,
+        unresolved=float(whole[whole > UNRESOLVED * half].sum()),
+        evenness=total * total / (len(steps) * squares) if squares > 0.0 else 1.0,
+    )

@@ -1,0 +1,156 @@
+"""Rounds for one momentum in one call: plan the steps, take them three times, measure what they are off by."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..estimate_constants import (
+    DENSE_SHARE,
+    EXPECTED_GROWTH,
+    FAR,
+    INFORMATIVE_ERROR,
+    LEAST_ORDER,
+    LITTLE_ROUNDING,
+    MANY_STEPS,
+    MOST_EXPECTED_GROWTH,
+    MOST_SAMPLING,
+    MOST_STEPPING,
+    NEGLIGIBLE,
+    ORDER,
+    REFINED,
+    SHORT_TURN_A_STEP,
+    SIGNIFICANT,
+    TURN_A_STEP,
+    VERY_FAR,
+)
+from .growth_kernel import growths_and_rounding
+from .jit import kernel, part
+from .march_kernel import march_at_rest, march_momenta
+from .panel_kernel import defects_of_panels, error_by_defects, plan_steps, remaining_by_defects, sizes_of_terms
+
+_ONE_LANE = 1
+_MOST_ROUNDS = 4
+
+
+@part
+def _largest_square(a, b, skip):
+    """Of the distances of every `skip`-th quaternion of a from those of b; a quaternion and its negative are one."""
+    worst = 0.0
+    for k in range(len(b)):
+        minus = plus = 0.0
+        for i in range(4):
+            x, y = a[skip * k, i], b[k, i]
+            minus += (x - y) * (x - y)
+            plus += (x + y) * (x + y)
+        square = min(minus, plus)
+        if not square <= worst:
+            worst = square
+    return worst
+
+
+@part
+def _march_at_rest(widths, series, perturbed, steps, quaternions, stepping, truncation):
+    """As `march_momenta` for one loop without momentum."""
+    march_at_rest(widths, series, steps, quaternions[0])
+    half = np.empty((quaternions.shape[1] // 2 + 1, 4))
+    march_at_rest(widths, series, steps // 2, half)
+    stepping[0] = 2.0 * math.sqrt(_largest_square(quaternions[0], half, 2))
+    truncation[0] = 0.0
+    if len(perturbed):
+        other = np.empty((len(half), 4))
+        march_at_rest(widths, perturbed, steps // 2, other)
+        truncation[0] = 2.0 * math.sqrt(_largest_square(half, other, 1))
+
+
+@part
+def _up(number, marks):
+    """As `rounded_up`, by the marks of a factor of two."""
+    mantissa, exponent = math.frexp(number)
+    for mark in marks:
+        if mantissa <= mark:
+            return math.ldexp(mark, exponent)
+    return number
+
+
+@part
+def _too_coarse(found, loops, expected, hidden, tolerance):
+    """The error of the steps, if they alone are why the estimate is above the tolerance and finer ones help; else 0."""
+    counts, distance, truncation, growth, rounding = found[0], found[1], found[2], found[3], found[4]
+    if not (distance < INFORMATIVE_ERROR and math.isfinite(growth) and rounding <= LITTLE_ROUNDING * tolerance):
+        return 0.0
+    stepping, sampling = error_by_defects(found[5:], distance, loops), growth * expected
+    if counts > 0.0:
+        sampling = min(sampling, truncation + growth * hidden)
+    room = tolerance - rounding
+    if (1.0 + DENSE_SHARE) * (sampling + stepping + rounding) <= tolerance or sampling > MOST_SAMPLING * room:
+        return 0.0
+    return stepping / room if stepping > MOST_STEPPING * room else 0.0
+
+
+@kernel
+def take_rounds(
+    widths, series, perturbed, loops, directions, magnitudes, ceiling, tolerance, refinement, expected, hidden,
+    segments, checkpoints, table, marks_of_finer, marks_of_growth,
+):  # fmt: skip
+    """Rounds of one momentum, or at rest of one loop, as long as nothing but shorter steps is needed.
+
+    Arguments as of `march_momenta`, with one row, no rows of directions at rest, and:
+    ceiling: of the magnitudes, that steps are planned for [kg m^2/s]
+    refinement: how much finer steps are than they were planned at first, and what errors grow by, infinite where that
+        is not known yet; both are those of the last round after it
+    expected: what the samplers say of themselves [rad]
+    hidden: its part that perturbed series do not show [rad]
+    checkpoints: at how many times propagators are kept
+    table: of defects
+    marks_of_finer, marks_of_growth: that refinements are rounded up to, of a factor of two
+
+    Returns whether the motion is short enough to be done here, and if so steps, quaternions, ends, turns, dynamics,
+    propagators as of `march_momenta`, and ten numbers: whether perturbed series count, distance of half as many steps,
+    of the perturbed series, growth, rounding, the four of `defects_of_panels`, and how many more steps were taken than
+    planned.
+    """
+    panels, moving = len(widths), ceiling > 0.0
+    rates, sizes, planned = np.empty((panels, series.shape[1] // 9)), np.empty((3, panels)), np.empty(panels)
+    sizes_of_terms(series, widths, ceiling, SIGNIFICANT * tolerance, rates, sizes)
+    turn = loops * sizes[0].sum()
+    a_step = SHORT_TURN_A_STEP if moving and turn > FAR else TURN_A_STEP
+    plan_steps(sizes[0], sizes[1], sizes[2], loops, tolerance, a_step, planned)
+    seen = sizes[0] if moving else np.zeros(panels)
+    steps, found, rounds = np.empty(panels, np.int64), np.zeros(10), 0
+    while True:
+        finer, amplified = refinement[0], refinement[1]
+        is_short = loops * finer * planned.sum() <= MANY_STEPS and not (moving and turn > VERY_FAR)
+        for panel in range(panels if is_short else 0):
+            steps[panel] = 2 * int(math.ceil(0.5 * finer * planned[panel]))  # noqa: RUF046 (a float in machine code)
+        total = loops * steps.sum() if is_short else 0
+        quaternions, ends = np.empty((1, total + 1, 4)), np.empty((1, total + 1 if moving else 0, 3))
+        turns, dynamics = np.zeros((1, total)), np.zeros((1, total))
+        propagators = np.empty((1, checkpoints if moving else 0, 9))
+        if not is_short:
+            return False, steps, quaternions, ends, turns, dynamics, propagators, found
+        growth = amplified
+        if math.isinf(amplified):
+            growth = min(1.0 + EXPECTED_GROWTH * (turn if moving else 0.0), MOST_EXPECTED_GROWTH)
+        found[0] = 1.0 if expected * growth > NEGLIGIBLE * tolerance else 0.0
+        other = perturbed if found[0] > 0.0 else perturbed[:0]
+        if moving:
+            marks = np.arange(checkpoints) * total // (checkpoints - 1)
+            march_momenta(
+                widths, series, other, steps, loops, directions, magnitudes, marks, _ONE_LANE, segments,
+                quaternions, ends, turns, dynamics, propagators, found[1:2], found[2:3],
+            )  # fmt: skip
+        else:
+            _march_at_rest(widths, series, other, steps, quaternions, found[1:2], found[2:3])
+        growths_and_rounding(propagators, quaternions, found[3:4], found[4:5])
+        defects_of_panels(rates, seen, steps, table, found[5:9])
+        found[9] = steps.sum() / (finer * planned.sum())
+        rounds += 1
+        excess = _too_coarse(found, loops, expected, hidden, tolerance)
+        if rounds == _MOST_ROUNDS or excess == 0.0:
+            return True, steps, quaternions, ends, turns, dynamics, propagators, found
+        order = min(max(-math.log2(remaining_by_defects(found[5], found[6])), LEAST_ORDER), ORDER)
+        finer *= min(max((excess / REFINED) ** (1.0 / order), 1.1, 1.02 * found[9]), 4.0)
+        refinement[0] = _up(finer, marks_of_finer)
+        refinement[1] = _up(found[3], marks_of_growth)

@@ -1,0 +1,96 @@
+"""What the steps' formula misses of a term, against mpmath, and what errors made of it are worth."""
+
+from __future__ import annotations
+
+import mpmath
+import numpy as np
+import pytest
+from scipy.integrate import DOP853
+
+from shapephase.integrator._quadrature_defects import Defects, defect_table, defects
+from shapephase.integrator._step_control import StepRequirements
+from shapephase.integrator.fast.estimate_constants import DEFECT_STEPS, FULL_ORDER
+from shapephase.integrator.interpolant import Interpolant
+from support.both_engines import both
+
+
+def largest_defect(steps: int, degree: int) -> float:
+    """Of T_k on a panel of width one, in 30 digits."""
+    with mpmath.workdps(30):
+        total = worst = mpmath.mpf(0)
+        for step in range(steps):
+            left, width = mpmath.mpf(2 * step) / steps - 1, mpmath.mpf(2) / steps
+            taken = sum(
+                mpmath.mpf(b) * mpmath.chebyt(degree, left + mpmath.mpf(c) * width)
+                for b, c in zip(DOP853.B.tolist(), DOP853.C.tolist())
+                if b
+            )
+            exact = mpmath.quad(lambda x: mpmath.chebyt(degree, x), [left, left + width])
+            total += taken / steps - exact / 2
+            worst = max(worst, abs(total))
+    return float(worst)
+
+
+@pytest.mark.parametrize(("steps", "degree"), [(1, 8), (2, 9), (3, 40), (4, 16), (7, 23), (16, 31)])
+def test_the_table_has_the_largest_defect_at_an_end_of_a_step(steps: int, degree: int):
+    """Sums of stages by weights up to six are rounded to some 1e-15."""
+    assert defect_table()[steps, degree] == pytest.approx(largest_defect(steps, degree), rel=1e-9, abs=5e-15)
+
+
+def test_the_formula_takes_seven_degrees_exactly():
+    assert not defect_table()[1:, :8].any()
+    assert defect_table()[1:9, 8].all()
+
+
+def test_halving_divides_the_defect_of_long_terms_by_two_to_the_eighth():
+    table = defect_table()
+    for steps in (2, 4, 8):
+        assert table[2 * steps, 8] == pytest.approx(FULL_ORDER * table[steps, 8], rel=1e-3)
+
+
+def test_kernels_find_what_arrays_find(monkeypatch: pytest.MonkeyPatch):
+    """Panels of more steps than the table has are among them."""
+    rng = np.random.default_rng(3)
+    coefficients = rng.normal(size=(6, 40, 9)) * 10.0 ** -np.linspace(0.0, 12.0, 40)[:, None]
+    interpolant = Interpolant(np.cumsum([0.0, *rng.uniform(0.1, 1.0, 6)]), coefficients, 3, 0)
+    steps, distances = np.array([2, 4, 6, 18, 4 * DEFECT_STEPS, 2 * DEFECT_STEPS]), 10.0 ** np.arange(-14.0, 0.0)
+
+    def run() -> tuple[Defects, np.ndarray]:
+        requirements = StepRequirements.from_interpolant(interpolant, 2.0, 1e-9)
+        return requirements.defects(steps), requirements.stepping_error(steps, distances)
+
+    (arrays, slow), (kernels, fast) = both(monkeypatch, run)
+    np.testing.assert_allclose(kernels, arrays, rtol=1e-12)
+    np.testing.assert_allclose(fast, slow, rtol=1e-12)
+
+
+def test_evenness_is_the_share_of_panels_that_err():
+    """Of four panels one alone swings; then all alike."""
+    rates = np.zeros((4, 20))
+    rates[0, 12] = 1.0
+    one = defects(rates, np.zeros(4), np.full(4, 4))
+    every = defects(np.tile(rates[:1], (4, 1)), np.zeros(4), np.full(4, 4))
+    assert one.evenness == pytest.approx(0.25)
+    assert every.evenness == pytest.approx(1.0)
+    assert every.half == pytest.approx(4.0 * one.half)
+    distance = np.array([1e-3 * one.half])
+    assert one.error(distance, 1) > every.error(distance, 1)
+
+
+def test_an_error_is_no_larger_than_its_distance_and_no_smaller_than_the_order_allows():
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        found = defects(10.0 ** rng.uniform(-12.0, 0.0, (3, 30)), rng.uniform(0.0, 5.0, 3), 2 * rng.integers(1, 40, 3))
+        distance = 10.0 ** rng.uniform(-14.0, -1.0, 5)
+        errors = found.error(distance, 1)
+        assert np.all(errors <= distance)
+        assert np.all(errors >= 3.0 * FULL_ORDER * distance * (1.0 - 1e-12))
+
+
+def test_terms_that_no_step_sees_count_whole():
+    """A term of degree 60 in two steps is missed by one as by two."""
+    rates = np.zeros((1, 61))
+    rates[0, 60] = 1e-9
+    found = defects(rates, np.zeros(1), np.array([2]))
+    assert found.unresolved == found.whole > 0.1e-9
+    assert found.error(np.array([1e-3]), 1) >= found.whole
