@@ -614,12 +614,14 @@ def test_a_polished_plan_whose_windings_have_gone_elsewhere_is_not_kept(offset: 
         windings=np.array([angle, 0.0]),
         duration=1.0,
         rate_limit=np.ones(1),
+        acceleration_limit=np.ones(1),
+        jerk_limit=np.ones(1),
+        efforts_limited=False,
         counted_windings=lambda attitudes: np.array(
             [np.unwrap(np.arctan2(-attitudes[:, 1, 2], attitudes[:, 2, 2]))[-1], 0.0]
         ),
     )
-    basis = SimpleNamespace(pieces=4, rate_control=np.zeros((1, 1)))
-    polished = SimpleNamespace(
-        path=SimpleNamespace(duration=1.0), motion=SimpleNamespace(attitude=attitude), control=np.zeros((1, 1))
-    )
+    basis = SimpleNamespace(pieces=4, derivative_control=lambda _: np.zeros((1, 1)))
+    motion = SimpleNamespace(attitude=attitude, duration=1.0)
+    polished = SimpleNamespace(path=SimpleNamespace(duration=1.0), motion=motion, control=np.zeros((1, 1)))
     assert _within_limits(cast(Any, task), cast(Any, basis), cast(Any, polished)) is kept

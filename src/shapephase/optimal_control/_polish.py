@@ -13,6 +13,7 @@ from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
+from ._plan_limits import derivative_limits, shortest_duration
 from ._spline_basis import SplineBasis
 from .task import Reorientation
 
@@ -174,62 +175,71 @@ def _corrected(
     held = _Held.at_limits(task, basis, control, duration)
     moved = control
     for _ in range(_ROUNDS):
-        every, all_right = np.concatenate([rows, held.rows(basis)]), np.concatenate([right, held.changes])
+        every, all_right = np.concatenate([rows, held.rows]), np.concatenate([right, held.changes])
         change = np.zeros(control.size)
         change[free] = root @ np.linalg.lstsq(every[:, free] @ root, all_right, rcond=_RANK)[0]
         moved = np.clip(control + change.reshape(control.shape), task.lower, task.upper)
-        further = held.and_those_beyond(task, basis, control, moved, duration)
+        further = held.and_those_beyond(task, control, moved)
         if further is held:
             break
         held = further
     if task.cost == "time":
-        duration = float(np.max(np.abs(basis.rate_control @ moved) / task.rate_limit))
+        shortest = shortest_duration(task, basis, moved)
+        # Efforts have limits of their own, which the solver's duration keeps.
+        duration = max(shortest, duration) if task.efforts_limited else shortest
     return moved, duration
 
 
 @dataclass(frozen=True, eq=False)
 class _Held:
-    """Control points of rates that a correction does not choose.
+    """Control points of rates, accelerations and jerks that a correction does not choose.
 
     Attributes
     ----------
+    bounding : (j, k) all of them by place, from control points of the path
+    limits : (j, m)
     chosen : (j, m) which
-    targets : (j, m) what they become, times the duration, less what they are
+    targets : (j, m) what they become less what they are
     """
 
+    bounding: Array
+    limits: Array
     chosen: Mask
     targets: Array
 
     @classmethod
     def at_limits(cls, task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Held:
         """Those at their limits, which stay; for a path of least time, which is stretched instead, none."""
-        rates = basis.rate_control @ control / duration
-        chosen = np.abs(rates) > task.rate_limit * (1.0 - _ACTIVE)
-        return cls(chosen & (task.cost != "time"), np.zeros_like(rates))
+        each = [basis.derivative_control(order) for order in (1, 2, 3)]
+        bounds = derivative_limits(task, duration).values()
+        limits = np.concatenate([np.tile(limit, (len(rows), 1)) for rows, limit in zip(each, bounds, strict=True)])
+        bounding = np.concatenate(each)
+        now = bounding @ control
+        chosen = np.abs(now) > limits * (1.0 - _ACTIVE)
+        return cls(bounding, limits, chosen & (task.cost != "time"), np.zeros_like(now))
 
-    def and_those_beyond(
-        self, task: Reorientation, basis: SplineBasis, control: Array, moved: Array, duration: float
-    ) -> _Held:
+    def and_those_beyond(self, task: Reorientation, control: Array, moved: Array) -> _Held:
         """Those too that a correction would take beyond their limits, which become their limits; itself if none."""
-        after, limits = basis.rate_control @ moved, task.rate_limit * duration
-        beyond = (np.abs(after) > limits) & ~self.chosen
+        after = self.bounding @ moved
+        beyond = (np.abs(after) > self.limits) & ~self.chosen
         if task.cost == "time" or not beyond.any():
             return self
-        targets = np.where(beyond, np.copysign(limits, after) - basis.rate_control @ control, self.targets)
-        return _Held(self.chosen | beyond, targets)
+        targets = np.where(beyond, np.copysign(self.limits, after) - self.bounding @ control, self.targets)
+        return _Held(self.bounding, self.limits, self.chosen | beyond, targets)
 
     @property
     def changes(self) -> Array:
         """Of each: (h,)."""
         return self.targets[self.chosen]
 
-    def rows(self, basis: SplineBasis) -> Array:
+    @property
+    def rows(self) -> Array:
         """From the control points of the path: (h, k m)."""
         where = np.argwhere(self.chosen)
-        rows = np.zeros((len(where), basis.dimension, self.chosen.shape[1]))
+        rows = np.zeros((len(where), self.bounding.shape[1], self.chosen.shape[1]))
         for row, (point, coordinate) in enumerate(where):
-            rows[row, :, coordinate] = basis.rate_control[point]
-        return rows.reshape(len(where), basis.dimension * self.chosen.shape[1])
+            rows[row, :, coordinate] = self.bounding[point]
+        return rows.reshape(len(where), self.bounding.shape[1] * self.chosen.shape[1])
 
 
 def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:

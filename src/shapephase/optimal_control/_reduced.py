@@ -14,6 +14,7 @@ from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
+from ._plan_limits import derivative_limits
 from ._polish import end_conditions, end_derivative, movable_points
 from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
@@ -45,6 +46,7 @@ _LEAST_COST = 1e-300
 _SMALL_TURN = 1e-4
 # The least turn to divide by [rad].
 _LEAST_TURN = 1e-12
+_NOT_HERE = ("time", "effort")
 _STOPPED = "stopped on request"
 _CONVERGED = "conditions of optimality met"
 
@@ -66,12 +68,16 @@ class ReducedProgram:
     Raises
     ------
     UnknownNameError
-        For the cost "time".
+        For the costs "time" and "effort", and limits of efforts.
     """
 
     def __init__(self, task: Reorientation, basis: SplineBasis) -> None:
-        if task.cost == "time":
-            raise unknown_name("cost for method 'reduced'", task.cost, [cost for cost in COSTS if cost != "time"])
+        if task.cost in _NOT_HERE:
+            raise unknown_name(
+                "cost for method 'reduced'", task.cost, [cost for cost in COSTS if cost not in _NOT_HERE]
+            )
+        if task.efforts_limited:
+            raise unknown_name("method with limits of efforts", "reduced", ["collocation"])
         self._task, self._basis = task, basis
         inside, weights, _ = gauss_tableau(_STAGES)
         places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
@@ -163,7 +169,7 @@ class _ScaledProblem:
     Attributes
     ----------
     cost_scale : cost of the guess
-    limits_rates : whether any rate is limited
+    limits_rates : whether any rate is limited, or acceleration, or jerk
     """
 
     def __init__(
@@ -177,7 +183,8 @@ class _ScaledProblem:
         self._low, self._high = (
             np.broadcast_to(limit, guess.shape)[self._free] / self._unit for limit in (task.lower, task.upper)
         )
-        self.limits_rates = bool(np.isfinite(task.rate_limit).any())
+        bounds = derivative_limits(task, duration)
+        self.limits_rates = any(bool(np.isfinite(limit).any()) for limit in bounds.values())
         self._constraints: list[dict[str, Any]] = [
             {"type": "eq", "fun": lambda x: self.end(x)[0], "jac": lambda x: self.end(x)[1]}
         ]
@@ -187,7 +194,7 @@ class _ScaledProblem:
             fixed = np.asarray(every @ np.where(self._free, 0.0, guess).ravel(), dtype=np.float64)
             self._constraints.append(_linear_equations(self._end_conditions, fixed))
         if self.limits_rates:
-            self._constraints.append(_within_rates(task, basis, guess, self._free, self._unit, duration))
+            self._constraints.append(_within_rates(basis, list(bounds.values()), guess, self._free, self._unit))
         # SciPy evaluates the constraint and its derivative separately at the same x: the last result is kept.
         self._known: dict[bytes, tuple[Array, Array]] = {}
 
@@ -261,13 +268,14 @@ def _linear_equations(rows: Array, fixed: Array) -> dict[str, Any]:
     return {"type": "eq", "fun": lambda x: rows @ x + fixed, "jac": lambda _: rows}
 
 
-def _within_rates(
-    task: Reorientation, basis: SplineBasis, guess: Array, free: Mask, unit: Array, duration: float
-) -> dict[str, Any]:
-    """The rate limits as inequalities that are linear in the scaled unknowns."""
-    limited = np.flatnonzero(np.isfinite(task.rate_limit))
-    every = np.kron(basis.rate_control, np.eye(task.dimension)[limited])
-    largest = np.tile(task.rate_limit[limited] * duration, basis.dimension - 1)
+def _within_rates(basis: SplineBasis, bounds: list[Array], guess: Array, free: Mask, unit: Array) -> dict[str, Any]:
+    """Limits of derivatives by place, (m,) each, as inequalities that are linear in the scaled unknowns."""
+    every, largest = [], []
+    for order, limit in enumerate(bounds, start=1):
+        limited = np.flatnonzero(np.isfinite(limit))
+        every.append(np.kron(basis.derivative_control(order), np.eye(len(limit))[limited]))
+        largest.append(np.tile(limit[limited], basis.dimension - order))
+    every, largest = np.concatenate(every), np.concatenate(largest)
     rows = every[:, free.ravel()] * unit
     fixed = every @ np.where(free, 0.0, guess).ravel()
     both, room = np.concatenate([-rows, rows]), np.concatenate([largest - fixed, largest + fixed])

@@ -53,8 +53,16 @@ class SplineBasis:
     @cached_property
     def rate_control(self) -> Array:
         """From control points to those of the derivative by place: (k - 1, k)."""
-        spread = self.knots[_DEGREE + 1 : -1] - self.knots[1 : -_DEGREE - 1]
-        return _DEGREE / spread[:, None] * np.diff(np.eye(self.dimension), axis=0)
+        return self.derivative_control(1)
+
+    def derivative_control(self, order: int) -> Array:
+        """From control points to those of a derivative by place, the first to the third: (k - order, k)."""
+        found = np.eye(self.dimension)
+        for past in range(order):
+            degree = _DEGREE - past
+            spread = self.knots[_DEGREE + 1 : -1 - past] - self.knots[1 + past : -_DEGREE - 1]
+            found = degree / spread[:, None] * np.diff(found, axis=0)
+        return found
 
     @cached_property
     def rate_reaches(self) -> Mask:

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
 from ._gauss import gauss_tableau
+from ._limit_rows import DerivativeRows, EffortTerms
 from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
+from ._unknowns import scipy_sparse, seen_at, sparse_matrix
 from .nodes.node_functions import node_functions
 from .task import Reorientation
 
-# Gauss nodes of a piece: order six. On 12 pieces plans of the cat are off by some 1e-4 rad, which the Newton
-# corrections remove.
-_STAGES = 3
+STAGES = 3
+"""Gauss nodes of a piece: order six.
+
+On 12 pieces plans of the cat are off by some 1e-4 rad, which the Newton corrections remove."""
 # Dual residual, scaled, above which IPOPT's success is reported as degenerate: it converges to 1e-8, so this is no
 # rounding.
 _DEGENERATE = 1e-3
@@ -97,34 +100,50 @@ class CollocationProgram:
         import casadi
 
         self._task, self._basis = task, basis
-        inside, weights, integrals = gauss_tableau(_STAGES)
+        inside, weights, integrals = gauss_tableau(STAGES)
         self.places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
         count, step, width = len(self.places), 1.0 / basis.pieces, 2 * task.dimension + 5
         duration_place = task.dimension * basis.dimension
         unknown = casadi.MX.sym("unknown", duration_place + 1 + 4 * (count + basis.pieces + 1))
-        seen = self._seen()
+        seen = seen_at(task, basis, self.places, 1, unknown.shape[0])
         at_node = casadi.reshape(seen @ unknown, width, count)
         node = node_functions(task)
         turning, density = node.values.map(count)(at_node)
-        shares = casadi.DM(step * np.tile(weights, basis.pieces))
+        panels = step * np.tile(weights, basis.pieces)
+        shares = casadi.DM(panels)
         # All rows but those of the goal are linear in the unknowns, apart from the turning.
         linear, from_turning, low, high = self._linear_rows(step, weights, integrals)
         final = _final_conditions(task, unknown[-4:])
-        rows = casadi.vertcat(linear @ unknown - from_turning @ casadi.vec(turning), final)
+        further: list[DerivativeRows | EffortTerms] = [DerivativeRows(task, basis, unknown)]
+        if task.efforts_limited or task.cost == "effort":
+            further.append(EffortTerms(task, basis, self.places, panels, unknown))
+        groups = [linear @ unknown - from_turning @ casadi.vec(turning), final, *(part.values for part in further)]
+        rows = casadi.vertcat(*groups)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
-        jacobian = casadi.vertcat(linear - from_turning @ (slopes @ seen), casadi.jacobian(final, unknown))
+        jacobian = casadi.vertcat(
+            linear - from_turning @ (slopes @ seen),
+            casadi.jacobian(final, unknown),
+            *(part.jacobian for part in further),
+        )
         multipliers, cost_factor = casadi.MX.sym("multipliers", rows.shape[0]), casadi.MX.sym("cost_factor")
-        turning_multipliers = casadi.reshape(-from_turning.T @ multipliers[: linear.shape[0]], 4, count)
+        of_linear, of_final, *of_further = casadi.vertsplit(
+            multipliers, np.cumsum([0, *(group.shape[0] for group in groups)]).tolist()
+        )
+        turning_multipliers = casadi.reshape(-from_turning.T @ of_linear, 4, count)
         density_factor = 0.0 if task.cost == "time" else cost_factor
         blocks = node.hessian.map(count)(at_node, turning_multipliers, density_factor * shares.T)
         hessian = seen.T @ (casadi.diagcat(*casadi.horzsplit(blocks, width)) @ seen)
+        for part, its_multipliers in zip(further, of_further, strict=True):
+            hessian = hessian + part.hessian(its_multipliers, cost_factor)
         # What of the Lagrangian is no sum over nodes, left to CasADi's own differentiation.
-        others = casadi.dot(final, multipliers[linear.shape[0] :])
+        others = casadi.dot(final, of_final)
         if task.cost == "time":
             cost = unknown[duration_place]
         elif task.cost == "acceleration":
             cost = self._acceleration_cost(unknown)
             others = others + cost_factor * cost
+        elif task.cost == "effort":
+            cost = cast("EffortTerms", further[-1]).cost
         else:
             cost = casadi.dot(density.T, shares)
         hessian = hessian + casadi.hessian(others, unknown)[0]
@@ -137,35 +156,17 @@ class CollocationProgram:
         }
         # The third row of a pointed axis is a cosine, which only has to be positive.
         final_high = np.zeros(3) if task.target is not None else np.array([0.0, 0.0, np.inf])
-        self._low, self._high = np.append(low, np.zeros(3)), np.append(high, final_high)
-
-    def _seen(self) -> Any:
-        """W: the values at the nodes as linear functions of the unknowns."""
-        sparse = _scipy_sparse()
-        m, count = self._task.dimension, len(self.places)
-        shapes = sparse.kron(self._basis.matrix(self.places), sparse.eye(m))
-        rates = sparse.kron(self._basis.matrix(self.places, 1), sparse.eye(m))
-        durations = np.ones((count, 1))
-        attitudes = sparse.eye(4 * count)
-        whole = sparse.block_diag([sparse.vstack([shapes, rates]), durations, attitudes]).tocsr()
-        order = np.concatenate(
-            [
-                np.arange(2 * m * count).reshape(2, count, m).transpose(1, 0, 2).reshape(count, 2 * m),
-                2 * m * count + count + np.arange(4 * count).reshape(count, 4),
-                2 * m * count + np.arange(count)[:, None],
-            ],
-            axis=1,
-        )
-        rest = sparse.csr_matrix((whole.shape[0], 4 * (self._basis.pieces + 1)))
-        return _sparse(sparse.hstack([whole, rest]).tocsr()[order.ravel()])
+        room = np.ones(rows.shape[0] - len(low) - 3)
+        self._low = np.concatenate([low, np.zeros(3), -room])
+        self._high = np.concatenate([high, final_high, room])
 
     def _linear_rows(self, step: float, weights: Array, integrals: Array) -> tuple[Any, Any, Array, Array]:
         """Collocation and rate limits: the linear part of the rows, how the turning enters, lower and upper bounds."""
-        sparse = _scipy_sparse()
+        sparse = scipy_sparse()
         task, basis = self._task, self._basis
         pieces, count = basis.pieces, len(self.places)
         before, after = sparse.eye(pieces, pieces + 1), sparse.eye(pieces, pieces + 1, k=1)
-        from_start = sparse.kron(before, np.ones((_STAGES, 1)))
+        from_start = sparse.kron(before, np.ones((STAGES, 1)))
         no_control = sparse.csr_matrix((4 * (count + pieces), task.dimension * basis.dimension + 1))
         quaternions = sparse.kron(
             sparse.block_array([[sparse.eye(count), -from_start], [None, after - before]]), sparse.eye(4)
@@ -199,14 +200,14 @@ class CollocationProgram:
         unbounded = np.full(rates.shape[0], np.inf)
         met = np.zeros(conditions.shape[0])
         low, high = np.concatenate([equal, -unbounded, zero, met]), np.concatenate([equal, zero, unbounded, met])
-        return _sparse(linear), _sparse(turning), low, high
+        return sparse_matrix(linear), sparse_matrix(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
         """The integral of half the squared second derivative: exact by two nodes of a piece or more."""
         import casadi
 
         task, basis = self._task, self._basis
-        _, weights, _ = gauss_tableau(_STAGES)
+        _, weights, _ = gauss_tableau(STAGES)
         bend = basis.matrix(self.places, 2)
         gram = bend.T @ (np.tile(weights, basis.pieces)[:, None] / basis.pieces * bend)
         control = casadi.reshape(unknown[: task.dimension * basis.dimension], task.dimension, basis.dimension)
@@ -222,21 +223,26 @@ class CollocationProgram:
         iterations: int,
         tolerance: float = _TOLERANCE,
         settles: bool = False,
+        room: Array | None = None,
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
         """A local optimum from a guess: control points (k, m), T, and the attitude at places (N,) -> (N, 4).
 
-        With `settles` it may end before, where the cost changes no more.
+        With `settles` it may end before, where the cost changes no more. `room` is how much of their limits efforts may
+        take up at the nodes and the ends of pieces, (places, l); None: all of it.
         """
         guess = np.concatenate(
             [control.ravel(), [duration], quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
         )
         best = BestIterate(iteration_callback)
+        rows_low, rows_high = self._low.copy(), self._high.copy()
+        if room is not None:
+            rows_low[-room.size :], rows_high[-room.size :] = -room.ravel(), room.ravel()
         # A local name keeps it alive: CasADi does not.
-        callback = ipopt_callback(best, len(guess), self._low, self._high)
+        callback = ipopt_callback(best, len(guess), rows_low, rows_high)
         solver = self._ipopt(callback, 1.0 / self._cost_scale(control, duration), iterations, tolerance, settles)
         low, high = self._bounds()
-        found = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=self._low, ubg=self._high)
+        found = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)
         return self._solution(np.array(found["x"]).ravel(), float(found["f"]), solver.stats(), best)
 
     def _ipopt(self, callback: Any, cost_factor: float, iterations: int, tolerance: float, settles: bool) -> Any:
@@ -339,17 +345,3 @@ def _final_conditions(task: Reorientation, last: Any) -> Any:
     seen = casadi.DM(axis)
     turned = seen + 2.0 * scalar * casadi.cross(vector, seen) + 2.0 * casadi.cross(vector, casadi.cross(vector, seen))
     return casadi.DM(np.vstack([task.constrained_directions(), direction])) @ turned
-
-
-def _scipy_sparse() -> Any:
-    """SciPy's sparse matrices: imported late, and without the types that they lack."""
-    from scipy import sparse
-
-    return sparse
-
-
-def _sparse(matrix: Any) -> Any:
-    """A constant sparse matrix of CasADi."""
-    import casadi
-
-    return casadi.DM(_scipy_sparse().csc_matrix(matrix))

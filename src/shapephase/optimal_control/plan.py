@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from ..arrays import Array
 from ..body.body import Body
@@ -11,7 +12,7 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._card import plan_card
 
-COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "time": "s"}
+COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "effort": "s", "time": "s"}
 """Of each cost; metres stand for radians where joints slide."""
 
 AGREEMENT = 1e-3
@@ -93,7 +94,7 @@ class Plan:
     path : of all its joints; a C2 spline with not-a-knot ends, also where it closes: a file of its samples is read back
         unchanged with `read_shape_path(..., close=False)`
     motion : its reconstruction, to 1e-10 rad: independent of how the plan was found
-    cost_name : "kinetic", "rate", "acceleration" or "time"
+    cost_name : "kinetic", "rate", "acceleration", "effort" or "time"
     rates_at_ends : of the joints, "zero", "periodic" or "free"
     cost : of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
@@ -109,7 +110,10 @@ class Plan:
     hamiltonian_spread : by how much Pontryagin's Hamiltonian varies, relative to its mean: along an optimal path of the
         costs "kinetic" and "rate" without momentum it is constant where no rate is at its limit. Means of the pieces of
         the spline, without three at both ends, where the joints start and stop; None for other costs, with momentum,
-        and where all pieces are at a rate limit
+        and where all pieces are at a rate limit, or accelerations, jerks or efforts have limits
+    limit_shares : what `path` takes up of each kind of limit that it has, at most, 1 being all of it: of "position",
+        half the range, from its middle; of "rate", by the spline's control points, which bound it; of "acceleration"
+        and "jerk"; of "effort", at 4,001 even times or more
 
     Examples
     --------
@@ -137,6 +141,7 @@ class Plan:
     starts: tuple[Start, ...]
     second_order: bool | None = None
     hamiltonian_spread: float | None = None
+    limit_shares: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def agreeing_starts(self) -> int:

@@ -17,6 +17,13 @@ from ..letters import what_came
 
 METHODS = ("collocation", "reduced")
 RATES_AT_ENDS = ("zero", "periodic", "free")
+LIMIT_UNITS = {
+    "rate_limits": ("rad/s or m/s", True),
+    "acceleration_limits": ("rad/s^2 or m/s^2", False),
+    "jerk_limits": ("rad/s^3 or m/s^3", False),
+    "effort_limits": ("N m or N", True),
+}
+"""Of what `Limits` bounds, and whether a body's file may state it."""
 
 # Pieces of the spline: with fewer, not-a-knot ends leave too few control points for a loop.
 _LEAST_PIECES = 6
@@ -108,11 +115,17 @@ class Limits:
     joint_limits : whether the joints stay within the body's own limits
     rate_limits : the largest rate of every joint, or one for each, (n,) [rad/s or m/s]; "body": those that the body's
         file states, joints of which it states none being as fast as they like; None: no limit
+    acceleration_limits, jerk_limits : the same of the first and second derivative of the rate, without "body"
+        [rad/s^2 or m/s^2], [rad/s^3 or m/s^3]; with limits of the jerk joints that start from rest start without
+        acceleration, too
+    effort_limits : the same of the torque or force of every motor, of joints that are held, too [N m or N]; "body":
+        those that the body's file states, which are none for joints of which it states none. Where the cost is "effort"
+        these are also what efforts are measured by; None: no limit, and measured by the file's
 
     Raises
     ------
     ShapeError, UnknownNameError
-        For rates that are not finite, not above 0, or neither a number nor a vector.
+        For limits that are not finite, not above 0, or neither a number nor a vector.
 
     Examples
     --------
@@ -122,28 +135,34 @@ class Limits:
 
     joint_limits: bool = True
     rate_limits: ArrayLike | str | None = "body"
+    acceleration_limits: ArrayLike | None = None
+    jerk_limits: ArrayLike | None = None
+    effort_limits: ArrayLike | str | None = None
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        """Check what is given and keep it as a read-only array."""
+        """Check what is given and keep it as read-only arrays."""
         if not isinstance(self.joint_limits, bool | np.bool_):
             raise ShapeError(f"joint_limits: True or False is needed, got {what_came(self.joint_limits)}")
-        if self.rate_limits is None:
+        for name, (unit, stated) in LIMIT_UNITS.items():
+            self._check(name, unit, ("body",) if stated else ())
+
+    def _check(self, name: str, unit: str, words: tuple[str, ...]) -> None:
+        """Limits of one kind, which may be some words instead of numbers."""
+        given = getattr(self, name)
+        if given is None:
             return
-        if isinstance(self.rate_limits, str):
-            if self.rate_limits != "body":
-                raise unknown_name(
-                    "value of rate_limits", self.rate_limits, ("body", "a number, or one for each joint")
-                )
+        if isinstance(given, str):
+            if given not in words:
+                raise unknown_name(f"value of {name}", given, (*words, "a number, or one for each joint"))
             return
-        rates = finite_array(self.rate_limits, "rate_limits", unit="rad/s or m/s")
-        if rates.ndim > 1 or np.any(rates <= 0.0):
+        limits = finite_array(given, name, unit=unit)
+        if limits.ndim > 1 or np.any(limits <= 0.0):
             raise ShapeError(
-                "rate_limits: one number above 0, or one for each of the joints, is needed, got "
-                f"{what_came(self.rate_limits)}"
+                f"{name}: one number above 0, or one for each of the joints, is needed, got {what_came(given)}"
             )
-        object.__setattr__(self, "rate_limits", _read_only(rates))
+        object.__setattr__(self, name, _read_only(limits))
 
 
 @dataclass(frozen=True)
@@ -154,9 +173,9 @@ class Search:
     ----------
     method : "collocation", the attitude by Gauss collocation, the whole a sparse program with exact second derivatives
         for IPOPT; or "reduced", the path's coefficients alone, with the exact derivative of the integrator's attitude
-        (not for the cost "time"). On equal splines both come to the same costs within 1.5 %, of the cat in 14 and 11 s;
-        the first leaves a KKT residual of 1e-9, the second of some 1e-6, and for the astronaut it may need more than
-        300 iterations: so the first is the default
+        (not for the costs "time" and "effort", nor with limits of efforts). On equal splines both come to the same
+        costs within 1.5 %, of the cat in 14 and 11 s; the first leaves a KKT residual of 1e-9, the second of some 1e-6,
+        and for the astronaut it may need more than 300 iterations: so the first is the default
     starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. Where none leads
         to a plan of a body with up to eight free joints, two further guesses are tried, and then a motion of many
         strokes

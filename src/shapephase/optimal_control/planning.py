@@ -5,7 +5,6 @@ from __future__ import annotations
 import pickle
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -19,15 +18,17 @@ from numpy.typing import ArrayLike
 from ..arguments import check_executor, check_object
 from ..arrays import Array
 from ..body.body import Body
-from ..errors import PlanNotFound, ShapePhaseError, UnstatedLimitWarning
+from ..dynamics.torques import joint_torques
+from ..errors import PlanNotFound, ShapePhaseError
 from ._certificates import hamiltonian_spread
 from ._path_cost import path_cost
+from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, position_share, tightened, warn_of_unstated
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
 from ._solver_callback import IterationCallback, heard_interrupts
 from ._spline_basis import SplineBasis
-from .collocation import GOOD_STATUS, CollocationProgram
-from .guesses.loops import PLACES, Guess, guess_of, guesses
+from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
+from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
 from .guesses.strokes import guess_of_strokes
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search
@@ -46,8 +47,8 @@ _PIECES = 40
 _PIECES_OF_MANY = 20
 # How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
 _HALVINGS = 2
-# Rates and durations may exceed their limits by this share, which the solver leaves.
-_LIMIT_SLACK = 1e-7
+# How often efforts are given less room where they exceed their limits between the nodes.
+_TIGHTENINGS = 6
 # Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
 _WINDING_TOLERANCE = 0.1
 # Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
@@ -56,8 +57,6 @@ _WINDING_SAMPLES = 50
 _COARSE_PIECES = 10
 # Of a rate limit: what counts as being at it, where no plan was found.
 _NEARLY = 0.9
-# Joints that a warning names.
-_MOST_NAMED = 8
 # The fewest guesses that it ranks, so that a single start is the best of several.
 _COARSE_GUESSES = 8
 # Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
@@ -101,13 +100,15 @@ def plan_reorientation(
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
         joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
         other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
-        of 1/2 |r''|^2; "time", the duration, under rate limits
+        of 1/2 |r''|^2; "effort", that of the squared torques and forces of all joints, each as a part of its limit [s];
+        "time", the duration, under rate limits
     rates_at_ends : of the joints; "zero": from rest to rest, for the cost "acceleration" without acceleration at the
         ends, too; "periodic": the same at both ends, for gaits; "free": any, as the theory of optimal loops has it: the
         body would have to be set in motion before the start, and stopped after the end
     joints : names of those that may move, the others are held at the start; None: all
     symmetric : joints that follow others: name -> (name of the leader, factor)
-    limits : of positions and rates; None: `Limits()`, those of the body's file
+    limits : of positions, rates, accelerations, jerks and efforts; None: `Limits()`, positions and rates as the body's
+        file has them
     search : method, starts, resolution; None: `Search()`
     iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
         there: with the cheapest plan of the starts that had ended, or else PlanNotFound with the best so far.
@@ -127,7 +128,7 @@ def plan_reorientation(
     Warns
     -----
     UnstatedLimitWarning
-        If the body's file states no rate limit for a joint that moves, and `limits` none either.
+        If `limits` takes those of rates or efforts from the body's file, and it states none for a joint.
 
     Notes
     -----
@@ -158,7 +159,7 @@ def plan_reorientation(
         symmetric=symmetric,
         limits=limits,
     )
-    _warn_of_unstated_rates(task, limits)
+    warn_of_unstated(task, Limits() if limits is None else limits)
     began = time.perf_counter()
     attempts: list[_Attempt] = []
     with heard_interrupts():
@@ -237,20 +238,6 @@ def _searched_elsewhere(recipe: bytes, guess: Guess) -> _Attempt:
 
 def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
     return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
-
-
-def _warn_of_unstated_rates(task: Reorientation, limits: Limits | None) -> None:
-    rates = Limits().rate_limits if limits is None else limits.rate_limits
-    moves = np.abs(task.coupling).sum(axis=1) > 0.0
-    names = [name for name, unstated in zip(task.body.joint_names, np.isinf(task.body.rate_limits) & moves) if unstated]
-    if isinstance(rates, str) and names:
-        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-        warnings.warn(
-            f"{task.body.name} states no rate limit for {', '.join(names[:_MOST_NAMED])}{more}: they may move at any "
-            "rate; give limits=Limits(rate_limits=...), or None for no limits",
-            UnstatedLimitWarning,
-            stacklevel=3,
-        )
 
 
 class _ProgressReporter:
@@ -405,21 +392,9 @@ class _LocalSearch:
     ) -> tuple[_Attempt, Array]:
         """The attempt on some basis, and the control points that the solver found."""
         task, began = self.task, time.perf_counter()
-        attitudes, settling = _guessed_attitudes(task, guess), {"settles": True} if self.settles else {}
-        solution = program.solve(
-            guess.control,
-            task.duration,
-            attitudes,
-            iterations=self.iterations,
-            iteration_callback=callback,
-            **settling,
-        )
-        try:
-            polished = polish(task, basis, solution.control, solution.duration)
-            cost = _cost(task, basis, polished)
-        except ShapePhaseError:
-            # The path cannot be reconstructed: the attempt is ranked last, and only the solver's numbers describe it.
-            polished, cost = None, np.inf
+        solution, polished, iterations = self._solved(basis, program, guess, callback)
+        # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
+        cost = np.inf if polished is None else _cost(task, basis, polished)
         reaches_goal = (
             polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
         )
@@ -430,16 +405,58 @@ class _LocalSearch:
             goal_error=task.goal_error(solution.attitude),
             kkt_residual=solution.kkt_residual,
             infeasibility=solution.infeasibility,
-            iterations=solution.iterations,
+            iterations=iterations,
             seconds=time.perf_counter() - began,
             second_order=solution.second_order,
         )
         attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
         return attempt, solution.control
 
+    def _solved(
+        self,
+        basis: SplineBasis,
+        program: CollocationProgram | ReducedProgram,
+        guess: Guess,
+        callback: IterationCallback,
+    ) -> tuple[NlpSolution, PolishedPath | None, int]:
+        """What the solver found, its path corrected, and the iterations.
+
+        Where efforts are beyond their limits between the nodes, they are given less room there, and it goes on.
+        """
+        task, room, iterations = self.task, None, 0
+        control, duration, attitudes = guess.control, task.duration, _guessed_attitudes(task, guess)
+        options: dict[str, Any] = {"iterations": self.iterations, "iteration_callback": callback}
+        options |= {"settles": True} if self.settles else {}
+        rounds = 0
+        while True:
+            solution = program.solve(control, duration, attitudes, **options)
+            iterations += solution.iterations
+            polished = _polished(task, basis, solution)
+            if not task.efforts_limited or polished is None or not solution.converged or rounds == _TIGHTENINGS:
+                return solution, polished, iterations
+            shares = effort_shares(task, basis, polished.motion)
+            again = guess_of_control(task, basis, solution.control)
+            if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
+                return solution, polished, iterations
+            room = options["room"] = tightened(room, shares, STAGES, rounds)
+            control, duration, attitudes = solution.control, solution.duration, _guessed_attitudes(task, again)
+            rounds += 1
+
+
+def _polished(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
+    """The path that the solver found, corrected to reach the goal; None where it has no motion."""
+    try:
+        return polish(task, basis, solution.control, solution.duration)
+    except ShapePhaseError:
+        return None
+
 
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
     """The cost of a corrected path, by quadrature."""
+    if task.cost == "effort":
+        places, weights = panel_nodes(basis)
+        torque = joint_torques(polished.motion, places * polished.duration).torque
+        return float(polished.duration * weights @ np.sum((torque / task.effort_measure) ** 2, axis=1))
     if task.cost == "time":
         return polished.duration
     if task.cost == "acceleration":
@@ -456,14 +473,9 @@ def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPa
         counted = task.counted_windings(polished.motion.attitude(times))
         if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
             return False
-    slack = 1.0 + _LIMIT_SLACK
-    return polished.path.duration <= task.duration * slack and _share_of_rate_limits(task, basis, polished) <= slack
-
-
-def _share_of_rate_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
-    """How much of its limit the fastest rate takes up."""
-    rates = np.abs(basis.rate_control @ polished.control) / polished.path.duration
-    return float((rates / task.rate_limit).max(initial=0.0))
+    slack = 1.0 + LIMIT_SLACK
+    shares = limit_shares(task, basis, polished.control, polished.motion)
+    return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
 
 
 def _plan(
@@ -490,6 +502,8 @@ def _plan(
         starts=tuple(attempt.report for attempt in attempts),
         second_order=best.report.second_order,
         hamiltonian_spread=hamiltonian_spread(task, best.basis, best.polished.control, best.polished.duration),
+        limit_shares=position_share(task, best.basis, best.polished.control)
+        | limit_shares(task, best.basis, best.polished.control, best.polished.motion),
     )
 
 
@@ -510,14 +524,13 @@ def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _A
         outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
     if stopped:
         return f"the search for a motion of the joints of {name} was stopped on request ({summary}); {outcome}"
-    fast = (
-        best is not None
-        and best.polished is not None
-        and _share_of_rate_limits(task, best.basis, best.polished) > _NEARLY
-    )
+    near: list[str] = []
+    if best is not None and best.polished is not None:
+        shares = limit_shares(task, best.basis, best.polished.control, best.polished.motion)
+        near = [name for name, share in shares.items() if share > _NEARLY]
     way_out = (
-        f"joints are at their rate limits: give more than {task.duration:.6g} s (cost='time' finds the least)"
-        if fast and task.cost != "time"
+        f"joints are at their {near[0]} limits: give more than {task.duration:.6g} s (cost='time' finds the least)"
+        if near and task.cost != "time"
         else "loosen the limits, or give more time, iterations or starts"
     )
     return f"no motion of the joints of {name} was found that turns it to the goal ({summary}); {outcome}; {way_out}"

@@ -18,7 +18,7 @@ from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
 from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
 
-COSTS = ("kinetic", "rate", "acceleration", "time")
+COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 
 # How far from its start a joint without limits may go [rad or m]: no plan goes 160 turns, and finite bounds keep the
 # guesses and the solver's interior point finite.
@@ -52,6 +52,9 @@ class Reorientation:
     cost : one of `COSTS`
     lower, upper : (m,) limits of the coordinates [rad or m]
     rate_limit : (m,) limits of their rates [rad/s or m/s], infinite where there are none
+    acceleration_limit, jerk_limit : (m,) the same of the second and third derivatives
+    effort_measure : (n,) what the efforts of joints are measured by [N m or N], infinite where by nothing
+    efforts_limited : whether they stay within that measure
     rates_at_ends : one of `RATES_AT_ENDS`
     coupling, offset : (n, m) and (n,), each joint from the coordinates
     """
@@ -69,6 +72,10 @@ class Reorientation:
     lower: Array
     upper: Array
     rate_limit: Array
+    acceleration_limit: Array
+    jerk_limit: Array
+    effort_measure: Array
+    efforts_limited: bool
     rates_at_ends: str
     coupling: Array
     offset: Array
@@ -87,7 +94,7 @@ class Reorientation:
         """How many control points at either end are the same: two without a rate, three without acceleration either."""
         if self.rates_at_ends != "zero":
             return 1
-        return 3 if self.cost == "acceleration" else 2
+        return 3 if self.cost == "acceleration" or np.isfinite(self.jerk_limit).any() else 2
 
     @property
     def movable(self) -> Mask:
@@ -178,7 +185,11 @@ def reorientation(
     first, last = _end_postures(body, bounds, start, end)
     if rates_at_ends == "periodic" and (last is None or not np.array_equal(first, last)):
         raise TrajectoryError("rates_at_ends='periodic' is for loops: leave end out, or give the shape of the start")
-    rates = _rate_limits(body, within.rate_limits)
+    rates, *further = (
+        _joint_limits(body, getattr(within, name), name, body.rate_limits)
+        for name in ("rate_limits", "acceleration_limits", "jerk_limits")
+    )
+    measure = _effort_measure(body, cost, within)
     if cost == "time" and not np.isfinite(rates).all():
         unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(rates)][:_MOST_NAMED])
         raise TrajectoryError(
@@ -192,13 +203,20 @@ def reorientation(
     for shape, name in ((first, "start"), (last, "end")):
         if shape is not None:
             _check_coupling(body, shape, coupling @ shape[leaders] + offset, name)
-    lower, upper, rate_limit = _coordinate_limits(coupling, factors, first[leaders], bounds, rates)
+    lower, upper = _coordinate_limits(coupling, factors, first[leaders], bounds)
+    rate_limit, *further = (_coordinate_rates(coupling, factors, limits) for limits in (rates, *further))
     chart = BallChart.of(body, first, leaders)
     start, end = first[leaders], None if last is None else last[leaders]
     if chart is not None:
         coupling, offset = chart.shapes(coupling, offset)
         start, end = chart.coordinates(start, "start"), None if end is None else chart.coordinates(end, "end")
+        if any(np.isfinite(limits).any() for limits in further):
+            raise ShapeError(
+                f"limits of accelerations and jerks: {body.ball_joints[0]} is a ball joint, which has none in its "
+                "coordinates; leave them out, or hold it, or make it three hinges in one point"
+            )
         lower, upper, rate_limit = chart.limits(lower, upper, rate_limit)
+        further = [np.full(len(rate_limit), np.inf) for _ in further]
     return Reorientation(
         body=body,
         target=_target(checked_goal, windings, winding_axes),
@@ -213,6 +231,10 @@ def reorientation(
         lower=lower,
         upper=upper,
         rate_limit=rate_limit,
+        acceleration_limit=further[0],
+        jerk_limit=further[1],
+        effort_measure=measure,
+        efforts_limited=within.effort_limits is not None,
         rates_at_ends=rates_at_ends,
         coupling=coupling,
         offset=offset,
@@ -282,19 +304,37 @@ def _check_limits(body: Body, shape: Array, bounds: Array, name: str) -> None:
         )
 
 
-def _rate_limits(body: Body, rate_limits: ArrayLike | str | None) -> Array:
+def _joint_limits(body: Body, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
     """One for each joint, infinite where there are none: (n,)."""
-    if rate_limits is None:
+    if given is None:
         return np.full(body.n_shape, np.inf)
-    if isinstance(rate_limits, str):
-        return body.rate_limits
-    rates = np.asarray(rate_limits)
-    if rates.shape not in ((), (body.n_shape,)):
+    if isinstance(given, str):
+        return stated
+    limits = np.asarray(given)
+    if limits.shape not in ((), (body.n_shape,)):
         raise ShapeError(
-            f"rate_limits: one number above 0, or one for each of the {body.n_shape} joints, is needed, "
-            f"got {len(rates)} numbers"
+            f"{name}: one number above 0, or one for each of the {body.n_shape} joints, is needed, "
+            f"got {len(limits)} numbers"
         )
-    return np.array(np.broadcast_to(rates, body.n_shape))
+    return np.array(np.broadcast_to(limits, body.n_shape))
+
+
+def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
+    """What efforts are measured by, infinite where by nothing: (n,)."""
+    measured_by = "body" if cost == "effort" and limits.effort_limits is None else limits.effort_limits
+    measure = _joint_limits(body, measured_by, "effort_limits", body.effort_limits)
+    if measured_by is not None and not body.chain.follows.is_linear:
+        raise ShapeError(
+            f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, of which plans do "
+            "not know the efforts; leave them out, and see joint_torques(plan.motion)"
+        )
+    if cost == "effort" and not np.isfinite(measure).all():
+        unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(measure)][:_MOST_NAMED])
+        raise TrajectoryError(
+            "cost='effort' needs effort_limits for every joint, which efforts are measured by, and there is none for "
+            f"{unstated}; give limits=Limits(effort_limits=...)"
+        )
+    return measure
 
 
 def joint_coupling(
@@ -343,15 +383,17 @@ def _check_coupling(body: Body, shape: Array, coupled: Array, name: str) -> None
         )
 
 
-def _coordinate_limits(
-    coupling: Array, factors: Array, start: Array, bounds: Array, rates: Array
-) -> tuple[Array, Array, Array]:
-    """Lower and upper limits and rate limits of the coordinates (m,): the tightest of all joints that follow each."""
+def _coordinate_limits(coupling: Array, factors: Array, start: Array, bounds: Array) -> tuple[Array, Array]:
+    """Lower and upper limits of the coordinates (m,): the tightest of all joints that follow each."""
     lower, upper = start - _FARTHEST, start + _FARTHEST
-    rate_limit = np.full(len(start), np.inf)
     for joint in np.flatnonzero(coupling.any(axis=1)):
         column = int(np.argmax(coupling[joint] != 0.0))
         low, high = np.sort(bounds[joint] / factors[joint])
         lower[column], upper[column] = max(lower[column], low), min(upper[column], high)
-        rate_limit[column] = min(rate_limit[column], rates[joint] / abs(factors[joint]))
-    return lower, upper, rate_limit
+    return lower, upper
+
+
+def _coordinate_rates(coupling: Array, factors: Array, limits: Array) -> Array:
+    """Limits of rates of the coordinates, or higher derivatives (m,): the tightest of all joints that follow each."""
+    seen = np.where(coupling != 0.0, (limits / np.abs(factors))[:, None], np.inf)
+    return seen.min(axis=0, initial=np.inf)

@@ -29,9 +29,14 @@ if TYPE_CHECKING:
     from ...arrays import Array
     from ...body.body import Body
     from ...optimal_control.plan import Plan, Progress
+    from ...optimal_control.plan_options import Limits
 
 # Samples of the file written: at 1 s they are 0.5 ms apart, far below the pieces of a plan.
 _SAMPLES = 2001
+# What stands for the limits that a body's file states.
+_OF_THE_FILE = "body"
+# What a part of a limit is of, where that is not plain.
+_FROM_MIDDLE = {"position": ", from the middle of the range"}
 
 
 def plan_command(
@@ -55,6 +60,9 @@ def plan_command(
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     rate_limit: float | None = None,
+    acceleration_limit: float | None = None,
+    jerk_limit: float | None = None,
+    effort: str | None = None,
     starts: int = 1,
     workers: int | None = None,
     time_limit: float | None = None,
@@ -107,13 +115,23 @@ def plan_command(
     mirror
         Joints that follow others, or with a minus move against them. For example `--mirror hip_left=-hip_right`.
     cost
-        What is made least: kinetic, rate, acceleration or time; for example `--cost rate`.
+        What is made least: kinetic, rate, acceleration, effort (the squared torques and forces of all joints, each as
+        a part of its limit) or time; for example `--cost rate`.
     rates_at_ends
         Of the joints: zero (from rest to rest), periodic (the same at both ends, for gaits) or free; for example
         `--rates-at-ends free`.
     rate_limit
         The largest rate of every joint, in rad/s or m/s; without it those that the body's file states. For example
         `--rate-limit 3`.
+    acceleration_limit
+        The largest acceleration of every joint, in rad/s^2 or m/s^2; without it any. For example
+        `--acceleration-limit 20`.
+    jerk_limit
+        The largest jerk, the rate of the acceleration, in rad/s^3 or m/s^3; without it any. From rest joints then start
+        without acceleration. For example `--jerk-limit 100`.
+    effort
+        The largest torque or force of every joint, in N m or N, or the word body for those that the body's file states;
+        without it any. For example `--effort body`.
     starts
         Searches from different guesses, of which the cheapest plan is kept; for example `--starts 4`.
     workers
@@ -134,11 +152,12 @@ def plan_command(
     import numpy as np
 
     from ...body.catalog import load_body
-    from ...optimal_control.plan_options import Limits, Search
+    from ...optimal_control.plan_options import Search
     from ...optimal_control.planning import plan_reorientation
     from ...phases.phases import split
     from ...shape_space.files.read import write_shape_path
 
+    limits = _limits(rate_limit, acceleration_limit, jerk_limit, effort)
     words = GoalWords(turn, rotate, about, point, somersaults, half_twists)
     words.check()
     _check_search(workers, time_limit)
@@ -167,7 +186,7 @@ def plan_command(
                     rates_at_ends=rates_at_ends,
                     joints=moving_joints(loaded, joints, hold),
                     symmetric=mirrored(mirror),
-                    limits=None if rate_limit is None else Limits(rate_limits=rate_limit),
+                    limits=limits,
                     search=Search(starts=starts, seed=seed, pieces=pieces, iterations=iterations),
                     iteration_callback=search.report,
                     executor=executor,
@@ -194,6 +213,33 @@ def plan_command(
     return Outcome(
         text, data | {"status": status or "found"}, code=code, aside=aside, made_from=found.motion.deformation.made_from
     )
+
+
+def _limits(
+    rate_limit: float | None, acceleration_limit: float | None, jerk_limit: float | None, effort: str | None
+) -> Limits:
+    """What the joints have to stay within. Raises ShapeError."""
+    from ...optimal_control.plan_options import Limits
+
+    return Limits(
+        rate_limits=_OF_THE_FILE if rate_limit is None else rate_limit,
+        acceleration_limits=acceleration_limit,
+        jerk_limits=jerk_limit,
+        effort_limits=None if effort is None else _effort(effort),
+    )
+
+
+def _effort(word: str) -> float | str:
+    """One number, or the body's own. Raises ShapeError."""
+    if word == _OF_THE_FILE:
+        return word
+    try:
+        return float(word)
+    except ValueError:
+        raise ShapeError(
+            f"--effort: a number of N m or N above 0 is needed, or {_OF_THE_FILE} for those of the body's file, got "
+            f"{word!r}"
+        ) from None
 
 
 def _check_search(workers: int | None, time_limit: float | None) -> None:
@@ -237,6 +283,10 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
             f"{'off the goal':24}{found.goal_error:16.2e} rad",
             f"{'cost':24}{found.cost:16.9g}   {found.cost_unit} ({found.cost_name})",
             f"{'rates at the ends':24}{found.rates_at_ends:>16}",
+            *(
+                f"{f'{name} at most':24}{share:16.4%}   of its limit{_FROM_MIDDLE.get(name, '')}"
+                for name, share in found.limit_shares.items()
+            ),
             f"{'off the minimum':24}{found.kkt_residual:16.2e}       (residual of the conditions of a minimum, scaled)",
             f"{'iterations':24}{found.iterations:16d}       (in {found.seconds:.1f} s, {_searches(len(found.starts))})",
         ]
@@ -260,6 +310,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
         "cost_name": found.cost_name,
         "cost_unit": found.cost_unit,
         "rates_at_ends": found.rates_at_ends,
+        "limit_shares": dict(found.limit_shares),
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
         "seconds": found.seconds,

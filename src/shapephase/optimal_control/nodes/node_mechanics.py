@@ -30,7 +30,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...body.joint_chain import JointChain
-from ..symbolic import constant, joint_frames, joint_screw
+from ..symbolic import joint_frames, joint_screw
+from .spatial import Inertia, Twist
 
 SIZE = 16
 """Of z."""
@@ -68,8 +69,8 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
     q, u, c = (casadi.MX.sym(name, size) for name, size in (("q", count), ("u", count), ("c", SIZE)))
     r = casadi.MX.sym("r", shape.shape[0])
     carrying, carried, screws, forces, turned, lent = rows(q, u, r, c)
-    above = casadi.DM(_carries(chain))
-    apart = casadi.DM(_carries(chain) - np.eye(count))
+    above = casadi.DM(carries(chain))
+    apart = casadi.DM(carries(chain) - np.eye(count))
     upper = above * (carrying.T @ carried)
     places = upper + (apart * upper).T
     mixed = (apart * (screws.T @ lent)) - (above * (turned.T @ forces)).T
@@ -79,7 +80,7 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
     return NodeMechanics(values=values, second=second)
 
 
-def _carries(chain: JointChain) -> Array:
+def carries(chain: JointChain) -> Array:
     """(k, k) one where the first joint carries the second, or is the same, else zero."""
     return chain.hanging[:, 1:]
 
@@ -92,13 +93,13 @@ class _Tree:
 
         frames = joint_frames(chain, place, shape)
         joints = range(len(chain.parents))
-        self._screws = [_Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
+        self._screws = [Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
         none = casadi.SX(3, 1)
-        self._twists = [_Twist(none, none)]
+        self._twists = [Twist(none, none)]
         for number, parent in enumerate(chain.parents):
             self._twists.append(self._twists[parent] + self._screws[number] * rate[number])
         bodies = [
-            _Inertia.of_link(float(mass), frame, centre, inertia)
+            Inertia.of_link(float(mass), frame, centre, inertia)
             for frame, mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True)
         ]
         momenta = [body.momentum(twist) for body, twist in zip(bodies, self._twists, strict=True)]
@@ -120,12 +121,12 @@ class _Tree:
         by_place, by_rate = [], []
         for number, screw in enumerate(self._screws):
             body, carried = self._bodies[number + 1], self._momenta[number + 1]
-            moment, inertia = body.moved(screw)
+            moved = body.moved(screw)
             swept = screw.cross(self._twists[number + 1])
             change = screw.on_force(carried) - body.momentum(swept)
-            entries = [inertia[place] for place in _INERTIA_ENTRIES]
+            entries = [moved.inertia[place] for place in _INERTIA_ENTRIES]
             by_place.append(
-                casadi.vertcat(moment, *entries, change.angular, change.linear, -2.0 * swept.power(carried))
+                casadi.vertcat(moved.moment, *entries, change.angular, change.linear, -2.0 * swept.power(carried))
             )
             force = self._forces[number]
             by_rate.append(casadi.vertcat(casadi.SX(9, 1), force.angular, force.linear, 2.0 * screw.power(carried)))
@@ -140,7 +141,7 @@ class _Tree:
         for number, (a, b) in enumerate(_INERTIA_ENTRIES):
             # Entries off the diagonal stand for both of their places.
             doubled[a, b] = doubled[b, a] = factors[3 + number] * (1.0 if a == b else 0.5)
-        eta = _Twist(factors[9:12], factors[12:15])
+        eta = Twist(factors[9:12], factors[12:15])
         columns: list[list[Any]] = [[] for _ in range(6)]
         for number, screw in enumerate(self._screws):
             body, carried, force = self._bodies[number + 1], self._momenta[number + 1], self._forces[number]
@@ -148,95 +149,15 @@ class _Tree:
             turned = lever + swept * (2.0 * of_energy)
             lent = screw.on_force(body.momentum(eta) + carried * (2.0 * of_energy)) - body.momentum(turned)
             change = body.momentum(swept) - screw.on_force(carried)
-            moment, inertia = body.moved(screw)
+            moved = body.moved(screw)
             spin = casadi.skew(screw.angular)
             weight = doubled @ spin - spin @ doubled
             along = casadi.cross(of_moment, screw.angular)
             along = along + 2.0 * (casadi.trace(doubled) * screw.linear - doubled @ screw.linear)
-            entries = [(1.0 if a == b else 2.0) * inertia[a, b] for a, b in _INERTIA_ENTRIES]
+            entries = [(1.0 if a == b else 2.0) * moved.inertia[a, b] for a, b in _INERTIA_ENTRIES]
             weights = [weight[place] for place in _INERTIA_ENTRIES]
             columns[0].append(casadi.vertcat(swept.stacked, lever.stacked, along, *weights))
-            columns[1].append(casadi.vertcat(-lent.stacked, change.stacked, moment, *entries))
+            columns[1].append(casadi.vertcat(-lent.stacked, change.stacked, moved.moment, *entries))
             for column, one in zip(columns[2:], (screw, force, turned, lent), strict=True):
                 column.append(one.stacked)
         return tuple(casadi.densify(casadi.horzcat(*column)) for column in columns)
-
-
-@dataclass(frozen=True, eq=False)
-class _Twist:
-    """Angular velocity and velocity at the base origin; or angular momentum about it and momentum."""
-
-    angular: Any
-    linear: Any
-
-    @property
-    def stacked(self) -> Any:
-        import casadi
-
-        return casadi.vertcat(self.angular, self.linear)
-
-    def __add__(self, other: _Twist) -> _Twist:
-        return _Twist(self.angular + other.angular, self.linear + other.linear)
-
-    def __sub__(self, other: _Twist) -> _Twist:
-        return _Twist(self.angular - other.angular, self.linear - other.linear)
-
-    def __mul__(self, factor: Any) -> _Twist:
-        return _Twist(self.angular * factor, self.linear * factor)
-
-    def power(self, force: _Twist) -> Any:
-        """Of a force on this twist."""
-        import casadi
-
-        return casadi.dot(self.angular, force.angular) + casadi.dot(self.linear, force.linear)
-
-    def cross(self, other: _Twist) -> _Twist:
-        """How another twist changes as it is carried along with this one."""
-        import casadi
-
-        linear = casadi.cross(self.angular, other.linear) + casadi.cross(self.linear, other.angular)
-        return _Twist(casadi.cross(self.angular, other.angular), linear)
-
-    def on_force(self, force: _Twist) -> _Twist:
-        """How a force, or a momentum, changes as it is carried along with this twist."""
-        import casadi
-
-        angular = casadi.cross(self.angular, force.angular) + casadi.cross(self.linear, force.linear)
-        return _Twist(angular, casadi.cross(self.angular, force.linear))
-
-
-@dataclass(frozen=True, eq=False)
-class _Inertia:
-    """Mass, first moment and inertia about the base origin."""
-
-    mass: float
-    moment: Any
-    inertia: Any
-
-    @classmethod
-    def of_link(cls, mass: float, frame: tuple[Any, Any], centre: Array, inertia: Array) -> _Inertia:
-        import casadi
-
-        turn, place = frame
-        seen = place + turn @ constant(centre)
-        own = turn @ constant(inertia) @ turn.T
-        return cls(mass, mass * seen, own + mass * (casadi.dot(seen, seen) * casadi.SX.eye(3) - seen @ seen.T))
-
-    def __add__(self, other: _Inertia) -> _Inertia:
-        return _Inertia(self.mass + other.mass, self.moment + other.moment, self.inertia + other.inertia)
-
-    def momentum(self, twist: _Twist) -> _Twist:
-        """Of this body moving with a twist."""
-        import casadi
-
-        linear = self.mass * twist.linear + casadi.cross(twist.angular, self.moment)
-        return _Twist(self.inertia @ twist.angular + casadi.cross(self.moment, twist.linear), linear)
-
-    def moved(self, screw: _Twist) -> tuple[Any, Any]:
-        """Derivatives of first moment and inertia along a screw."""
-        import casadi
-
-        spin, along = casadi.skew(screw.angular), self.moment @ screw.linear.T
-        turned = spin @ self.inertia
-        slid = 2.0 * casadi.dot(self.moment, screw.linear) * casadi.SX.eye(3) - along - along.T
-        return casadi.cross(screw.angular, self.moment) + self.mass * screw.linear, turned + turned.T + slid

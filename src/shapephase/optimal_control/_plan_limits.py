@@ -1,0 +1,119 @@
+"""How near a path comes to its limits, between the nodes of a program, too."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+
+from ..arrays import Array
+from ..dynamics.torques import joint_torques
+from ..errors import UnstatedLimitWarning
+from ..reconstruction.reconstruction import Motion
+from ._spline_basis import SplineBasis
+from .plan_options import Limits
+from .task import Reorientation
+
+TIMES = 4001
+"""At which efforts are compared with their limits, at least."""
+LIMIT_SLACK = 1e-7
+"""Limits may be exceeded by this share of them, which the solver leaves."""
+# A program's limits of efforts are made this much tighter than what is exceeded asks for, doubled each time.
+_MARGIN = 5e-5
+# Joints that a warning names.
+_MOST_NAMED = 8
+
+
+def derivative_shares(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> dict[str, float]:
+    """How much of their limits rates, accelerations and jerks take up at most, by their control points.
+
+    Those of the rate bound it from outside; accelerations and jerks are largest at theirs.
+    """
+    bounds = derivative_limits(task, duration)
+    found: dict[str, float] = {}
+    for order, (name, limit) in enumerate(bounds.items(), start=1):
+        if np.isfinite(limit).any():
+            found[name] = float((np.abs(basis.derivative_control(order) @ control) / limit).max(initial=0.0))
+    return found
+
+
+def derivative_limits(task: Reorientation, duration: float) -> dict[str, Array]:
+    """Of the first three derivatives by place, (m,) each."""
+    limits = {"rate": task.rate_limit, "acceleration": task.acceleration_limit, "jerk": task.jerk_limit}
+    return {name: limit * duration**order for order, (name, limit) in enumerate(limits.items(), start=1)}
+
+
+def shortest_duration(task: Reorientation, basis: SplineBasis, control: Array) -> float:
+    """In which a path keeps to its limits of rates, accelerations and jerks."""
+    shares = derivative_shares(task, basis, control, 1.0)
+    orders = {"rate": 1, "acceleration": 2, "jerk": 3}
+    return max(share ** (1.0 / orders[name]) for name, share in shares.items())
+
+
+def effort_shares(task: Reorientation, basis: SplineBasis, motion: Motion) -> Array:
+    """How much of their measure efforts take up at most, in each piece of the spline: (pieces, l).
+
+    By `joint_torques`, which has nothing of the program's own mechanics, at 4,001 even places or more.
+    """
+    looks = -(-(TIMES - 1) // basis.pieces)
+    places = np.linspace(0.0, 1.0, looks * basis.pieces + 1)
+    measured = np.isfinite(task.effort_measure)
+    torque = joint_torques(motion, np.minimum(places * motion.duration, motion.duration)).torque[:, measured]
+    shares = np.abs(torque) / task.effort_measure[measured]
+    inner = shares[:-1].reshape(basis.pieces, looks, -1).max(axis=1)
+    return np.maximum(inner, shares[looks::looks])
+
+
+def tightened(room: Array | None, shares: Array, stages: int, rounds: int) -> Array:
+    """What efforts may take up at the places of a program, where a path took up too much between them.
+
+    Parameters
+    ----------
+    room : at the nodes, `stages` a piece, and the ends of pieces (places, l); None: all of their limits
+    shares : (pieces, l) that the path took up
+    rounds : how often this has been done before
+    """
+    pieces, count = shares.shape
+    most = (1.0 - _MARGIN * 2.0**rounds) / np.maximum(shares, 1.0)
+    factor = np.where(shares > 1.0 + LIMIT_SLACK, most, 1.0)
+    ends = np.ones((pieces + 1, count))
+    ends[:-1] = factor
+    ends[1:] = np.minimum(ends[1:], factor)
+    at_places = np.concatenate([np.repeat(factor, stages, axis=0), ends])
+    return at_places if room is None else room * at_places
+
+
+def position_share(task: Reorientation, basis: SplineBasis, control: Array) -> dict[str, float]:
+    """How far the coordinates that move come from the middle of their limits to those, at most."""
+    moves = task.movable
+    middle, half = 0.5 * (task.lower + task.upper)[moves], 0.5 * (task.upper - task.lower)[moves]
+    path = basis.matrix(np.linspace(0.0, 1.0, TIMES)) @ control[:, moves]
+    return {"position": float((np.abs(path - middle) / half).max(initial=0.0))}
+
+
+def limit_shares(task: Reorientation, basis: SplineBasis, control: Array, motion: Motion) -> dict[str, float]:
+    """What a path takes up of each kind of limit that it has beside those of positions, at most: 1 is all of it."""
+    found = derivative_shares(task, basis, control, motion.duration)
+    if task.efforts_limited:
+        found["effort"] = float(effort_shares(task, basis, motion).max(initial=0.0))
+    return found
+
+
+def warn_of_unstated(task: Reorientation, limits: Limits) -> None:
+    """UnstatedLimitWarning to the caller of the caller, where limits are those of a file that states none."""
+    body, moves = task.body, np.abs(task.coupling).sum(axis=1) > 0.0
+    unstated = {
+        "rate": (limits.rate_limits, np.isinf(body.rate_limits) & moves, "they may move at any rate"),
+        # A motor that holds its joint has an effort, too.
+        "effort": (limits.effort_limits, np.isinf(body.effort_limits), "they may need any effort"),
+    }
+    for kind, (given, where, so) in unstated.items():
+        names = [body.joint_names[joint] for joint in np.flatnonzero(where)]
+        if isinstance(given, str) and names:
+            more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+            warnings.warn(
+                f"{body.name} states no {kind} limit for {', '.join(names[:_MOST_NAMED])}{more}: {so}; give "
+                f"limits=Limits({kind}_limits=...), or None for no limits",
+                UnstatedLimitWarning,
+                stacklevel=3,
+            )

@@ -1,0 +1,110 @@
+"""What the motors of a body bear at one place of a plan, and its derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ...body.body import Body
+from ..task import Reorientation
+from .inverse_dynamics import InverseDynamics, inverse_dynamics
+
+
+@dataclass(frozen=True, eq=False)
+class NodeEfforts:
+    """CasADi functions of a place's y = (r, u, w, q, T): shape, its two derivatives by place, quaternion, duration.
+
+    Shares are efforts of the joints that have a measure, as a part of it: (l,). Their load is T times the sum of their
+    squares, so that its integral over places is that over time.
+
+    Attributes
+    ----------
+    shares : y -> shares (l,)
+    load : y -> of the shares
+    slopes : y -> derivatives of the shares (l, 3 m + 5)
+    second : y, multipliers of the shares (l,), factor of the load -> second derivatives of the weighted sum
+    """
+
+    shares: Any
+    load: Any
+    slopes: Any
+    second: Any
+
+
+_built: WeakKeyDictionary[Body, InverseDynamics] = WeakKeyDictionary()
+
+
+def node_efforts(task: Reorientation) -> NodeEfforts:
+    """The functions of a task; those of its body are kept as long as that is."""
+    import casadi
+
+    m, chain = task.dimension, task.body.chain
+    if task.body not in _built:
+        _built[task.body] = inverse_dynamics(chain)
+    dynamics, measured = _built[task.body], np.flatnonzero(np.isfinite(task.effort_measure))
+    y, multipliers, factor = casadi.MX.sym("y", 3 * m + 5), casadi.MX.sym("l", len(measured)), casadi.MX.sym("f")
+    seen = _seen(task)
+    x, onward = seen.values(y), seen.slopes(y)
+    duration = y[3 * m + 4]
+    # Places are counted as shares of the duration, so that these efforts are those in time, times its square.
+    scale = casadi.DM(chain.matrix[:, measured] / task.effort_measure[measured]).T
+    bare = scale @ dynamics.efforts(x)
+    by_duration = casadi.MX(1, 3 * m + 5)
+    by_duration[3 * m + 4] = 1.0
+    shares = bare / duration**2
+    slopes = (scale @ dynamics.slopes(x) @ onward) / duration**2 - 2.0 * (shares @ by_duration) / duration
+    weights = multipliers + 2.0 * factor * duration * shares
+    gradient = scale.T @ weights / duration**2
+    curved = onward.T @ dynamics.second(x, gradient) @ onward + seen.second(y, dynamics.slopes(x).T @ gradient)
+    # Of 1 / T^2 times what depends on T itself, and of T times the squares of the shares.
+    with_duration = -2.0 * (slopes.T @ weights) / duration + factor * 2.0 * (slopes.T @ shares)
+    alone = -2.0 * casadi.dot(weights, shares) / duration**2
+    across = with_duration @ by_duration
+    curved = curved + across + across.T + alone * (by_duration.T @ by_duration)
+    curved = curved + 2.0 * factor * duration * (slopes.T @ slopes)
+    return NodeEfforts(
+        shares=casadi.Function("shares", [y], [shares]),
+        load=casadi.Function("load", [y], [duration * casadi.dot(shares, shares)]),
+        slopes=casadi.Function("share_slopes", [y], [casadi.densify(slopes)]),
+        second=casadi.Function("share_second", [y, multipliers, factor], [casadi.densify(curved)]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What inverse dynamics takes, (3 k + 3,), as functions of y.
+
+    Attributes
+    ----------
+    values : y -> x
+    slopes : y -> derivatives of x
+    second : y, factors of x -> second derivatives of the weighted sum
+    """
+
+    values: Any
+    slopes: Any
+    second: Any
+
+
+def _seen(task: Reorientation) -> _Seen:
+    import casadi
+
+    m, chain = task.dimension, task.body.chain
+    y, factors = casadi.SX.sym("y", 3 * m + 5), casadi.SX.sym("factors", 3 * len(chain.parents) + 3)
+    from_shape = casadi.DM(chain.matrix @ task.coupling)
+    place = from_shape @ y[:m] + casadi.DM(chain.matrix @ task.offset + chain.offset)
+    momentum = casadi.SX(3, 1)
+    if task.momentum.any():
+        vector, scalar, mu = y[3 * m : 3 * m + 3], y[3 * m + 3], casadi.DM(task.momentum)
+        back = mu - 2.0 * scalar * casadi.cross(vector, mu) + 2.0 * casadi.cross(vector, casadi.cross(vector, mu))
+        momentum = y[3 * m + 4] * back
+    x = casadi.vertcat(place, from_shape @ y[m : 2 * m], from_shape @ y[2 * m : 3 * m], momentum)
+    second, _ = casadi.hessian(casadi.dot(factors, x), y)
+    return _Seen(
+        values=casadi.Function("seen", [y], [casadi.densify(x)]),
+        slopes=casadi.Function("seen_slopes", [y], [casadi.jacobian(x, y)]),
+        second=casadi.Function("seen_second", [y, factors], [second]),
+    )

@@ -1,0 +1,112 @@
+"""Twists, forces and inertias of rigid bodies about the base origin, as expressions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...arrays import Array
+from ..symbolic import constant, solve_linear
+
+
+@dataclass(frozen=True, eq=False)
+class Twist:
+    """Angular velocity and velocity at the base origin; or angular momentum about it and momentum."""
+
+    angular: Any
+    linear: Any
+
+    @classmethod
+    def of_stacked(cls, six: Any) -> Twist:
+        """From angular and linear part, one after the other."""
+        return cls(six[:3], six[3:])
+
+    @property
+    def stacked(self) -> Any:
+        """Angular and linear part, one after the other."""
+        import casadi
+
+        return casadi.vertcat(self.angular, self.linear)
+
+    def __add__(self, other: Twist) -> Twist:
+        """Both at once."""
+        return Twist(self.angular + other.angular, self.linear + other.linear)
+
+    def __sub__(self, other: Twist) -> Twist:
+        """This one without the other."""
+        return Twist(self.angular - other.angular, self.linear - other.linear)
+
+    def __mul__(self, factor: Any) -> Twist:
+        """At another size."""
+        return Twist(self.angular * factor, self.linear * factor)
+
+    def power(self, force: Twist) -> Any:
+        """Of a force on this twist."""
+        import casadi
+
+        return casadi.dot(self.angular, force.angular) + casadi.dot(self.linear, force.linear)
+
+    def cross(self, other: Twist) -> Twist:
+        """How another twist changes as it is carried along with this one."""
+        import casadi
+
+        linear = casadi.cross(self.angular, other.linear) + casadi.cross(self.linear, other.angular)
+        return Twist(casadi.cross(self.angular, other.angular), linear)
+
+    def on_force(self, force: Twist) -> Twist:
+        """How a force, or a momentum, changes as it is carried along with this twist."""
+        import casadi
+
+        angular = casadi.cross(self.angular, force.angular) + casadi.cross(self.linear, force.linear)
+        return Twist(angular, casadi.cross(self.angular, force.linear))
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Mass, first moment and inertia about the base origin."""
+
+    mass: float
+    moment: Any
+    inertia: Any
+
+    @classmethod
+    def of_link(cls, mass: float, frame: tuple[Any, Any], centre: Array, inertia: Array) -> Inertia:
+        """Of what has its centre of mass, and its inertia about that, in a frame (orientation, origin)."""
+        import casadi
+
+        turn, place = frame
+        seen = place + turn @ constant(centre)
+        own = turn @ constant(inertia) @ turn.T
+        return cls(mass, mass * seen, own + mass * (casadi.dot(seen, seen) * casadi.SX.eye(3) - seen @ seen.T))
+
+    def __add__(self, other: Inertia) -> Inertia:
+        """Of both in one piece."""
+        return Inertia(self.mass + other.mass, self.moment + other.moment, self.inertia + other.inertia)
+
+    def momentum(self, twist: Twist) -> Twist:
+        """Of this body moving with a twist."""
+        import casadi
+
+        linear = self.mass * twist.linear + casadi.cross(twist.angular, self.moment)
+        return Twist(self.inertia @ twist.angular + casadi.cross(self.moment, twist.linear), linear)
+
+    def moved(self, screw: Twist) -> Inertia:
+        """Its derivative along a screw, which has no mass."""
+        import casadi
+
+        spin, along = casadi.skew(screw.angular), self.moment @ screw.linear.T
+        turned = spin @ self.inertia
+        slid = 2.0 * casadi.dot(self.moment, screw.linear) * casadi.SX.eye(3) - along - along.T
+        moment = casadi.cross(screw.angular, self.moment) + self.mass * screw.linear
+        return Inertia(0.0, moment, turned + turned.T + slid)
+
+    def twist(self, force: Twist) -> Twist:
+        """With which this body has a momentum, or, as an acceleration, answers to a force."""
+        import casadi
+
+        about_centre = (
+            self.inertia
+            + (self.moment @ self.moment.T - casadi.dot(self.moment, self.moment) * casadi.SX.eye(3)) / self.mass
+        )
+        angular = solve_linear(about_centre, force.angular - casadi.cross(self.moment, force.linear) / self.mass)
+        return Twist(angular, (force.linear - casadi.cross(angular, self.moment)) / self.mass)
