@@ -61,6 +61,8 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_bend=1"), 2, "waist_bend"),
         (("cat_two_halves", "--turn", "9 about x", "--joints", "a", "--hold", "b"), 2, "--hold"),
         (("cat_two_halves", "--turn", "9 about x", "--mirror", "waist_yaw"), 2, "--mirror"),
+        (("cat_two_halves", "--turn", "9 about x", "--effort", "strong"), 2, "--effort"),
+        (("cat_two_halves", "--turn", "9 about x", "--jerk-limit", -1), 2, "jerk_limits"),
         (("cat_two_halves", "--turn", "9 about x", "--workers", 0), 2, "--workers"),
         (("cat_two_halves", "--turn", "9 about x", "--time-limit", 0), 2, "--time-limit"),
         (("cat_two_halves", "--rotate", 90, "--out", "plan.txt"), 2, "--out"),
@@ -114,6 +116,22 @@ def test_postures_lists_and_mirrors(tmp_path, capsys):
     assert np.abs(bound[:, pitch] + bound[:, yaw]).max() < 1e-12
     assert np.ptp(bound[:, pitch]) > 0.01
     assert data["miss_rad"] < 1e-8
+
+
+def test_limits_hold_and_are_told(tmp_path, capsys):
+    """Second and third differences of the file's shapes, between which they do not change much."""
+    limits = ("--effort", "0.02", "--acceleration-limit", "6", "--jerk-limit", "60", "--cost", "effort")
+    data, _, body = planned(
+        "cat_two_halves", "--turn", "20 about x", "--duration", 2, *limits, capsys=capsys, out=tmp_path / "plan.csv"
+    )
+    times = np.linspace(0.0, 2.0, 2001)
+    shapes = sp.read_shape_path(tmp_path / "plan.csv", body).shape(times)
+    for order, name, most in ((2, "acceleration", 6.0), (3, "jerk", 60.0)):
+        share = np.abs(np.diff(shapes, order, axis=0)).max() / 1e-3**order / most
+        assert share < 1.0 + 1e-4
+        assert data["limit_shares"][name] == pytest.approx(share, abs=0.05)
+    assert 0.1 < data["limit_shares"]["effort"] < 1.0 + 1e-6
+    assert (data["cost_name"], data["cost_unit"]) == ("effort", "s")
 
 
 def test_a_time_limit_ends_the_search_with_the_best_so_far(monkeypatch, capsys):

@@ -234,7 +234,7 @@ def reorientation(
         acceleration_limit=further[0],
         jerk_limit=further[1],
         effort_measure=measure,
-        efforts_limited=within.effort_limits is not None,
+        efforts_limited=within.effort_limits is not None and bool(np.isfinite(measure).any()),
         rates_at_ends=rates_at_ends,
         coupling=coupling,
         offset=offset,
