@@ -120,13 +120,13 @@ def test_postures_lists_and_mirrors(tmp_path, capsys):
 
 def test_limits_hold_and_are_told(tmp_path, capsys):
     """Second and third differences of the file's shapes, between which they do not change much."""
-    limits = ("--effort", "0.02", "--acceleration-limit", "6", "--jerk-limit", "60", "--cost", "effort")
+    limits = ("--effort", "0.2", "--acceleration-limit", "12", "--jerk-limit", "120", "--cost", "effort")
     data, _, body = planned(
         "cat_two_halves", "--turn", "20 about x", "--duration", 2, *limits, capsys=capsys, out=tmp_path / "plan.csv"
     )
     times = np.linspace(0.0, 2.0, 2001)
     shapes = sp.read_shape_path(tmp_path / "plan.csv", body).shape(times)
-    for order, name, most in ((2, "acceleration", 6.0), (3, "jerk", 60.0)):
+    for order, name, most in ((2, "acceleration", 12.0), (3, "jerk", 120.0)):
         share = np.abs(np.diff(shapes, order, axis=0)).max() / 1e-3**order / most
         assert share < 1.0 + 1e-4
         assert data["limit_shares"][name] == pytest.approx(share, abs=0.05)

@@ -529,7 +529,8 @@ def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _A
         shares = limit_shares(task, best.basis, best.polished.control, best.polished.motion)
         near = [name for name, share in shares.items() if share > _NEARLY]
     way_out = (
-        f"joints are at their {near[0]} limits: give more than {task.duration:.6g} s (cost='time' finds the least)"
+        f"joints are at their {' and '.join(near)} limits: give more than {task.duration:.6g} s (cost='time' finds the "
+        "least)"
         if near and task.cost != "time"
         else "loosen the limits, or give more time, iterations or starts"
     )
