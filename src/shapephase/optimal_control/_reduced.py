@@ -72,12 +72,7 @@ class ReducedProgram:
     """
 
     def __init__(self, task: Reorientation, basis: SplineBasis) -> None:
-        if task.cost in _NOT_HERE:
-            raise unknown_name(
-                "cost for method 'reduced'", task.cost, [cost for cost in COSTS if cost not in _NOT_HERE]
-            )
-        if task.efforts_limited:
-            raise unknown_name("method with limits of efforts", "reduced", ["collocation"])
+        check_reducible(task)
         self._task, self._basis = task, basis
         inside, weights, _ = gauss_tableau(_STAGES)
         places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
@@ -161,6 +156,14 @@ class ReducedProgram:
         """How steeply the cost grows with each control point in the metric of the start, square root: (k, m)."""
         by_coordinate = np.maximum(np.diag(start_metric(self._task)), _LEAST_STIFFNESS)
         return np.sqrt(np.outer(self._weights @ self._slopes**2, by_coordinate))
+
+
+def check_reducible(task: Reorientation) -> None:
+    """Raise UnknownNameError for a task that is not for the method "reduced"."""
+    if task.cost in _NOT_HERE:
+        raise unknown_name("cost for method 'reduced'", task.cost, [cost for cost in COSTS if cost not in _NOT_HERE])
+    if task.efforts_limited:
+        raise unknown_name("method with limits of efforts", "reduced", ["collocation"])
 
 
 class _ScaledProblem:

@@ -24,7 +24,7 @@ from ._certificates import hamiltonian_spread
 from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, position_share, tightened, warn_of_unstated
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
-from ._reduced import ReducedProgram
+from ._reduced import ReducedProgram, check_reducible
 from ._solver_callback import IterationCallback, heard_interrupts
 from ._spline_basis import SplineBasis
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
@@ -159,6 +159,8 @@ def plan_reorientation(
         symmetric=symmetric,
         limits=limits,
     )
+    if chosen.method == "reduced":
+        check_reducible(task)
     warn_of_unstated(task, Limits() if limits is None else limits)
     began = time.perf_counter()
     attempts: list[_Attempt] = []
