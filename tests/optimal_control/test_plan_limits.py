@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 
-import mujoco
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.arrays import Array
 from shapephase.errors import PlanNotFound, ShapeError, TrajectoryError, UnknownNameError, UnstatedLimitWarning
 from shapephase.optimal_control import Goal, Limits, Plan, Search, plan_reorientation
 from support.ball_bodies import BALLS
@@ -40,7 +40,7 @@ def spun(body: sp.Body, angle: float, **options) -> Plan:
     )
 
 
-def path_derivatives(plan: Plan) -> list[np.ndarray]:
+def path_derivatives(plan: Plan) -> list[Array]:
     """Shapes, rates, accelerations and jerks at 4,001 times, by SciPy's spline through the ends of the pieces."""
     times = plan.path.breaks
     spline = CubicSpline(times, plan.path.shape(times), bc_type="not-a-knot")
@@ -48,7 +48,7 @@ def path_derivatives(plan: Plan) -> list[np.ndarray]:
     return [spline(even, order) for order in range(4)]
 
 
-def mujoco_torques(name: str, plan: Plan, momentum: np.ndarray) -> np.ndarray:
+def mujoco_torques(name: str, plan: Plan, momentum: Array) -> Array:
     """At 4,001 times, by `mj_inverse`; the base's acceleration by MuJoCo's forces, its attitude by the motion."""
     body = MujocoBody(name, plan.body.joint_names)
     shapes, rates, bends, _ = path_derivatives(plan)
@@ -61,7 +61,7 @@ def mujoco_torques(name: str, plan: Plan, momentum: np.ndarray) -> np.ndarray:
         velocity = np.linalg.solve(body.base_mass(), wanted - body.carried(rate))
         body.move(velocity[:3], velocity[3:], rate)
         body.data.qacc[:] = body.full(np.linalg.solve(body.base_mass(), -body.base_force(bend)), bend)
-        mujoco.mj_inverse(body.model, body.data)
+        body.mujoco.mj_inverse(body.model, body.data)
         assert np.abs(body.data.qfrc_inverse[:6]).max() < 1e-9
         found[row] = body.data.qfrc_inverse[body.velocity]
     return found
@@ -145,13 +145,15 @@ def test_coupled_joints_take_the_tightest_limit():
     """The follower moves half as far, against its leader."""
     body = sp.load_body("cat_two_halves")
     mirror = {"waist_roll": ("waist_pitch", -0.5)}
-    limits = Limits(acceleration_limits=[30.0, 40.0, 10.0])
+    most = np.array([30.0, 40.0, 10.0])
     target = so3.exp(np.array([0.0, 0.1, 0.0]))
-    plan = plan_reorientation(body, target, symmetric=mirror, end="free", limits=limits, search=Search(pieces=12))
+    plan = plan_reorientation(
+        body, target, symmetric=mirror, end="free", limits=Limits(acceleration_limits=most), search=Search(pieces=12)
+    )
     bends = np.abs(path_derivatives(plan)[2]).max(axis=0)
     order = [body.joint_index(name) for name in ("waist_pitch", "waist_roll")]
     assert bends[order[1]] == pytest.approx(0.5 * bends[order[0]])
-    assert np.all(bends <= limits.acceleration_limits * (1.0 + 1e-6))
+    assert np.all(bends <= most * (1.0 + 1e-6))
 
 
 def test_what_no_motor_can_do_is_told(discs):

@@ -20,12 +20,11 @@ def plan_card(self: Plan) -> Card:
     """What turns by how much at which cost, how far off the goal, and how it was found; with its joints in time."""
     converged = sum(start.converged for start in self.starts)
     rows = [
-        ("duration", numbers(self.path.duration, "s")),
+        ("duration", f"{numbers(self.path.duration, 's')}, rates at the ends: {self.rates_at_ends}"),
         ("momentum", momentum_text(self.motion.momentum)),
         ("turned", angle_text(angle(self.motion.final_attitude))),
         ("off the goal", f"{self.goal_error:.1e} rad"),
         ("cost", f"{numbers(self.cost, self.cost_unit)} ({self.cost_name})"),
-        ("rates at the ends", self.rates_at_ends),
         ("of the limits", ", ".join(f"{name} {share:.1%}" for name, share in self.limit_shares.items())),
         ("found by", f"{self.method}, {self.iterations} iterations, {self.seconds:.3g} s"),
         ("starts", f"{len(self.starts)}, {converged} of them converged, {self.agreeing_starts} to this cost"),

@@ -394,7 +394,7 @@ class _LocalSearch:
     ) -> tuple[_Attempt, Array]:
         """The attempt on some basis, and the control points that the solver found."""
         task, began = self.task, time.perf_counter()
-        solution, polished, iterations = self._solved(basis, program, guess, callback)
+        solution, polished, iterations = self._optimum(basis, program, guess, callback)
         # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
         cost = np.inf if polished is None else _cost(task, basis, polished)
         reaches_goal = (
@@ -414,7 +414,7 @@ class _LocalSearch:
         attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
         return attempt, solution.control
 
-    def _solved(
+    def _optimum(
         self,
         basis: SplineBasis,
         program: CollocationProgram | ReducedProgram,
