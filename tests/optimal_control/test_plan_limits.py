@@ -58,7 +58,7 @@ def mujoco_torques(name: str, plan: Plan, momentum: Array) -> Array:
         # Where the body is does not matter.
         body.place(np.zeros(3), attitude, shape)
         wanted = np.concatenate([np.zeros(3), attitude.T @ momentum])
-        velocity = np.linalg.solve(body.base_mass(), wanted - body.carried(rate))
+        velocity = np.asarray(np.linalg.solve(body.base_mass(), wanted - body.carried(rate)), dtype=np.float64)
         body.move(velocity[:3], velocity[3:], rate)
         body.data.qacc[:] = body.full(np.linalg.solve(body.base_mass(), -body.base_force(bend)), bend)
         body.mujoco.mj_inverse(body.model, body.data)
