@@ -11,12 +11,12 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._gauss import gauss_tableau
-from ._limit_rows import DerivativeRows, EffortTerms
 from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
-from ._unknowns import scipy_sparse, seen_at, sparse_matrix
+from .nodes.limit_rows import DerivativeRows, EffortTerms
 from .nodes.node_functions import node_functions
+from .nodes.unknowns import scipy_sparse, seen_at, sparse_matrix
 from .task import Reorientation
 
 STAGES = 3

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
-from ._spline_basis import SplineBasis
-from ._unknowns import scipy_sparse, seen_at, sparse_matrix
-from .nodes.node_efforts import node_efforts
-from .task import Reorientation
+from ...arrays import Array
+from .._spline_basis import SplineBasis
+from ..task import Reorientation
+from .node_efforts import node_efforts
+from .unknowns import scipy_sparse, seen_at, sparse_matrix
 
 
 class DerivativeRows:

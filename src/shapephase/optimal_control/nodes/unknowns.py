@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
-from ._spline_basis import SplineBasis
-from .task import Reorientation
+from ...arrays import Array
+from .._spline_basis import SplineBasis
+from ..task import Reorientation
 
 
 def seen_at(task: Reorientation, basis: SplineBasis, places: Array, order: int, unknowns: int) -> Any:
