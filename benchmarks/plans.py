@@ -167,7 +167,7 @@ def judged(name: str, turn: np.ndarray) -> dict[str, Any]:
         return row | {"miss": np.pi, "cost": np.inf, "kkt": np.inf, "beyond": np.inf}
     motion = sp.reconstruct(sp.articulated(body, plan.path), [0.0, 0.0, 0.0], tolerance=1e-10)
     miss = so3.angle(goal.T @ motion.final_attitude) + float(motion.error_estimate)
-    return row | {"miss": miss, "cost": plan.cost, "kkt": plan.kkt_residual, "beyond": _beyond(body, plan.path, limits)}
+    return row | {"miss": miss, "cost": plan.cost, "kkt": plan.kkt_residual, "beyond": beyond(body, plan.path, limits)}
 
 
 def _shortest(body: sp.Body, goal: np.ndarray, limits: Limits) -> float:
@@ -186,7 +186,7 @@ def _shortest(body: sp.Body, goal: np.ndarray, limits: Limits) -> float:
         return stretched
 
 
-def _beyond(body: sp.Body, path: sp.ShapePath, limits: Limits) -> float:
+def beyond(body: sp.Body, path: sp.ShapePath, limits: Limits) -> float:
     """By how much positions and rates exceed their limits between the nodes, as a part of their range."""
     times = np.linspace(0.0, path.duration, TIMES)
     shapes, rates = path.shape(times), np.abs(path.rate(times)) / np.asarray(limits.rate_limits)

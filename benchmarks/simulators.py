@@ -91,7 +91,7 @@ def mujoco_attitude(case: Case, rtol: float, atol: float | None = None) -> tuple
 
 def drake_attitude(case: Case, rtol: float, atol: float | None = None) -> tuple[np.ndarray, int]:
     """With the base's rows of Drake's mass matrix, taken to the centre of mass."""
-    plant, indices = _drake_plant(case.body)
+    plant, indices = drake_plant(case.body)
     context = plant.CreateDefaultContext()
     joints = _Joints(case, *indices)
     q, v = plant.GetPositions(context).copy(), np.zeros(plant.num_velocities())
@@ -189,7 +189,7 @@ def _mujoco_model(body: sp.Body) -> tuple[Any, tuple[np.ndarray, np.ndarray]]:
     import mujoco
 
     try:
-        model = mujoco.MjModel.from_xml_string(_urdf(body._model).replace("</robot>", _MUJOCO))
+        model = mujoco.MjModel.from_xml_string(plain_urdf(body._model).replace("</robot>", _MUJOCO))
     except ValueError as error:
         raise ModelRefused(f"MuJoCo does not take {body.name}: {error}") from error
     joints = [model.joint(f"joint{i}") for i in range(2, body._model.njoints)]
@@ -197,14 +197,14 @@ def _mujoco_model(body: sp.Body) -> tuple[Any, tuple[np.ndarray, np.ndarray]]:
 
 
 @cache
-def _drake_plant(body: sp.Body) -> tuple[Any, tuple[np.ndarray, np.ndarray]]:
+def drake_plant(body: sp.Body) -> tuple[Any, tuple[np.ndarray, np.ndarray]]:
     """A Drake plant with a floating base at the origin, and where its joints are in positions and velocities."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 
     plant = MultibodyPlant(time_step=0.0)
     try:
-        Parser(plant).AddModelsFromString(_urdf(body._model), "urdf")
+        Parser(plant).AddModelsFromString(plain_urdf(body._model), "urdf")
         plant.Finalize()
     except RuntimeError as error:
         raise ModelRefused(f"Drake does not take {body.name}: {error}") from error
@@ -212,11 +212,12 @@ def _drake_plant(body: sp.Body) -> tuple[Any, tuple[np.ndarray, np.ndarray]]:
     return plant, (np.array([j.position_start() for j in joints]), np.array([j.velocity_start() for j in joints]))
 
 
-def _urdf(model: pin.Model) -> str:
+def plain_urdf(model: pin.Model, hinge: str = "continuous") -> str:
     """A URDF of what moves and weighs in a Pinocchio model with a free-flyer: link1 is the base, joint2 the first.
 
     The files themselves have meshes that are not there, joints that follow others, and tiny links fixed to large ones
-    whose inertia a simulator refuses or mends; here such links are one.
+    whose inertia a simulator refuses or mends; here such links are one. A hinge is "continuous", or "revolute"
+    within 10 rad.
     """
     data, neutral, parts = model.createData(), pin.neutral(model), []
     for i in range(1, model.njoints):
@@ -230,8 +231,8 @@ def _urdf(model: pin.Model) -> str:
         if i == 1:
             continue
         slide, turn = np.split(pin.computeJointJacobian(model, data, neutral, i)[:, model.joints[i].idx_v], 2)
-        kind = "prismatic" if slide.any() else "continuous"
-        limit = '<limit lower="-10" upper="10" effort="1" velocity="1"/>' if slide.any() else ""
+        kind = "prismatic" if slide.any() else hinge
+        limit = "" if kind == "continuous" else '<limit lower="-10" upper="10" effort="1" velocity="1"/>'
         parts.append(
             f'<joint name="joint{i}" type="{kind}"><parent link="link{model.parents[i]}"/><child link="link{i}"/>'
             f'<origin xyz="{_numbers(placement.translation)}" '
