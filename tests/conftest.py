@@ -79,18 +79,18 @@ def compiled(monkeypatch):
 
 
 @pytest.fixture(scope="session")
-def _warm_engine():
-    from support.warm_engines import WarmEngine
+def _warm_engines():
+    from support.warm_engines import WarmEngines
 
-    started = WarmEngine()
+    started = WarmEngines()
     yield started
     started.stop()
 
 
 @pytest.fixture
-def warm_mujoco(_warm_engine, monkeypatch):
-    """MuJoCo without the time of its imports, for tests that load many MJCF files."""
-    monkeypatch.setattr("shapephase.body.engines.engine_tree.run_alone", _warm_engine)
+def warm_engines(_warm_engines, monkeypatch):
+    """Engines without the time of their imports, for tests that load many files."""
+    monkeypatch.setattr("shapephase.body.engines.engine_tree.run_alone", _warm_engines)
 
 
 @pytest.fixture

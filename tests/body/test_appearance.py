@@ -380,7 +380,7 @@ def test_collada_meshes_count_in_their_unit_and_keep_their_axes_and_colour(tmp_p
 
 # ---- MJCF -----------------------------------------------------------------------------------------------------------
 
-with_mujoco = pytest.mark.usefixtures("warm_mujoco")
+with_mujoco = pytest.mark.usefixtures("warm_engines")
 MJCF = """
 <mujoco model="toy">
   <compiler angle="radian" eulerseq="zyx"/>

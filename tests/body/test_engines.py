@@ -20,6 +20,8 @@ from shapephase.body.engines.reading import MISSING, NO_MEMORY
 from shapephase.errors import IgnoredElementWarning, MissingExtraError, ModelFileError
 from support.engine_files import ACROBAT, MASSLESS_ROOT, measured
 
+# That a file is read in a process of its own is left to test_published_flights.py and the README's bodies.
+pytestmark = pytest.mark.usefixtures("warm_engines")
 EPS = np.finfo(float).eps
 SIX_DIGITS = 5e-7
 """What a frame written with six digits lacks of being orthonormal, at most."""

@@ -30,7 +30,7 @@ from support.floating_mujoco import FloatingMujoco
 from support.hostile_files import GOOD_MJCF
 from support.independent import random_loop, random_vector, simulated_motion
 
-pytestmark = pytest.mark.usefixtures("warm_mujoco")
+pytestmark = pytest.mark.usefixtures("warm_engines")
 JOINT = '<joint name="j" axis="1 2 3" pos="0.1 0 0.05" range="-10 10"/>'
 INERTIAL = '<inertial pos="0 0.1 0" euler="30 40 50" mass="1" diaginertia="0.02 0.03 0.04"/>'
 

@@ -107,7 +107,7 @@ def test_limits_beyond_a_turn(load_urdf, limit, words):
     assert found == () if words is None else words in found[0]
 
 
-@pytest.mark.usefixtures("warm_mujoco")
+@pytest.mark.usefixtures("warm_engines")
 def test_limits_that_are_missing(tmp_path):
     """An MJCF may leave a slide without them."""
     inertial = "<inertial pos='0 0 0' mass='1' diaginertia='.1 .1 .1'/>"

@@ -22,7 +22,7 @@ from shapephase.errors import IgnoredElementWarning, UnphysicalInertiaWarning
 from support.floating_mujoco import FloatingMujoco, choices
 from support.independent import apart, random_loop, random_vector, simulated_motion
 
-pytestmark = [pytest.mark.full, pytest.mark.usefixtures("warm_mujoco")]
+pytestmark = [pytest.mark.full, pytest.mark.usefixtures("warm_engines")]
 PACKAGES = ("dm_control", "gymnasium", "gymnasium_robotics", "robosuite")
 EXACT = 1e-12
 

@@ -10,6 +10,7 @@ from shapephase.errors import ModelFileError, ShapeError, WrongObjectError
 from support.hostile_files import GOOD_MJCF
 
 pytest.importorskip("xacrodoc")
+pytestmark = pytest.mark.usefixtures("warm_engines")
 INERTIA = '<inertia ixx="0.3" iyy="0.2" izz="0.4" ixy="0" ixz="0.01" iyz="0"/>'
 ROBOT = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
 LINK = f'<link name="{{}}"><inertial><mass value="{{}}"/>{INERTIA}</inertial>{{}}</link>'

@@ -1,4 +1,4 @@
-"""MuJoCo imported once for many files: each is read as in a process of its own, which is forked from one that waits.
+"""Engines imported once for many files: each is read as in a process of its own, which is forked from one that waits.
 
 What reads, its limits and what comes back are those of the library; only the start of Python and the imports are saved.
 """
@@ -10,17 +10,38 @@ import subprocess
 import sys
 import tempfile
 import traceback
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from shapephase.body.engines.formats import FORMATS, MJCF
 from support.asked_process import Answers, AskedProcess, ProcessEnded, requests
 
 
-class WarmEngine(AskedProcess):
-    """In place of `run_alone` of the module that asks engines."""
+class WarmEngines:
+    """In place of `run_alone` of the module that asks engines; a process waits for each format that was asked for."""
 
     def __init__(self) -> None:
-        super().__init__(__file__, silent=True)
+        self._waiting: dict[str, WarmEngine] = {}
+
+    def __call__(
+        self, source: str, words: tuple[str, ...], data: bytes, seconds: float
+    ) -> subprocess.CompletedProcess[bytes]:
+        name = words[1]
+        if name not in self._waiting:
+            self._waiting[name] = WarmEngine(name)
+        return self._waiting[name](source, words, data, seconds)
+
+    def stop(self) -> None:
+        for engine in self._waiting.values():
+            engine.stop()
+
+
+class WarmEngine(AskedProcess):
+    """The same for one format, MJCF if none is named."""
+
+    def __init__(self, name: str = MJCF) -> None:
+        super().__init__(__file__, name, silent=True)
 
     def __call__(
         self, source: str, words: tuple[str, ...], data: bytes, seconds: float
@@ -41,10 +62,16 @@ class WarmEngine(AskedProcess):
         return subprocess.CompletedProcess(list(words), code, printed, said)
 
 
-def work() -> None:
+def work(name: str) -> None:
+    """Import the format's reader, which every file needs, and read in processes that are forked."""
     answers = Answers()
-    import shapephase.body.engines.mujoco_reading  # noqa: F401 (which every file needs)
     from shapephase.body.engines.reading import read_in_this_process
+
+    with tempfile.TemporaryDirectory() as folder:
+        # Some engines write a log into the folder that they are imported in.
+        os.chdir(folder)
+        import_module(FORMATS[name].module, "shapephase.body.engines")
+        os.chdir(os.path.sep)
 
     for request in requests():
         child = os.fork()
@@ -76,4 +103,4 @@ def _read(request: dict[str, Any], read: Any) -> int:
 
 
 if __name__ == "__main__":
-    work()
+    work(sys.argv[1])
