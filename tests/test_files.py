@@ -66,7 +66,7 @@ def open_folder():
         yield Path(made)
 
 
-@pytest.mark.parametrize("trials", [20, pytest.param(200, marks=pytest.mark.full)])
+@pytest.mark.parametrize("trials", [8, pytest.param(200, marks=pytest.mark.full)])
 def test_killed_at_random_times_a_writer_leaves_no_half_and_the_next_write_no_litter(trials: int, tmp_path: Path):
     target = tmp_path / "whole.txt"
     rng = np.random.default_rng(7)
@@ -158,7 +158,7 @@ def test_the_umask_of_the_process_is_never_touched(tmp_path: Path):
             made.unlink()
 
     def write(k: int) -> None:
-        for _ in range(100):
+        for _ in range(30):
             write_whole(tmp_path / f"written{k}", content("x"))
 
     try:
