@@ -33,7 +33,7 @@ def swing(name: str) -> sp.ShapePath:
     return sp.ShapePath.spline(times, samples, periodic=True)
 
 
-@pytest.mark.parametrize(("name", "draws"), full_but(product(["cat", "astronaut"], [60, 400]), ("cat", 60)))
+@pytest.mark.parametrize(("name", "draws"), full_but(product(["cat", "astronaut"], [30, 400]), ("cat", 30)))
 def test_a_recorded_cycle_with_noise(name: str, draws: int):
     """Each component of the holonomy's error within two bars, and its chi-square, in 95 % of the recordings."""
     body, path = sp.load_body(name), swing(name)

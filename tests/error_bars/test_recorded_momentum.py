@@ -58,7 +58,7 @@ def test_without_noise_the_momentum_is_found(momentum: np.ndarray):
     assert np.abs(found.residuals).max() < 1e-8
 
 
-@pytest.mark.parametrize("draws", [40, pytest.param(400, marks=pytest.mark.full)])
+@pytest.mark.parametrize("draws", [20, pytest.param(400, marks=pytest.mark.full)])
 def test_bars_cover_the_truth(draws: int):
     """In 95 % of the recordings, each component and the chi-square of all; 92 to 98 % of 400."""
     motion = flight()
