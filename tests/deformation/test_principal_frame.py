@@ -218,7 +218,7 @@ def test_nearly_symmetric_bodies(gap):
     assert_continuous(frames, fastest=10.0)
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(deadline=None, derandomize=True)
 @given(
     st.lists(st.floats(-1.0, 1.0), min_size=12, max_size=12),
     st.lists(st.floats(-0.4, 0.4), min_size=9, max_size=9),
