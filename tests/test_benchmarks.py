@@ -12,6 +12,7 @@ from benchmarks.estimates import judged, judged_all, read_runs, summary
 from benchmarks.extended import CONSTANT, HARMONIC, Segment, Terms, TooLong, Truth, angles_between, exact_path
 from benchmarks.page import PAGE, RESULTS, circumstances, section, with_results
 from benchmarks.peer import NoPeer, Peer
+from benchmarks.planners.rest_to_rest import Turn, hermite
 
 import shapephase as sp
 from shapephase.examples.scenarios import cat_righting
@@ -113,6 +114,32 @@ def test_a_contestant_reconstructs_in_its_own_process_what_is_reconstructed_here
             contestant("no_such_thing")
     finally:
         contestant.close()
+
+
+# ---- Plans by other programs -----------------------------------------------------------------------------------------
+
+
+def test_the_peers_paths_are_the_cubics_that_they_found():
+    """Three nodes of a cubic in time, where both interpolate exactly, against the cubic itself."""
+    body = sp.load_body("cat_two_halves")
+    turn = Turn(body, np.eye(3), 2.0, 2, 1.0)
+    cubic = np.polynomial.Polynomial([0.1, -0.2, 0.05, 0.3])
+    nodes, sizes = np.linspace(0.0, 2.0, 3), np.array([1.0, -0.5, 0.2])
+    path = turn.path(hermite(np.outer(cubic(nodes), sizes), np.outer(cubic.deriv()(nodes), sizes), turn.step))
+    times = np.linspace(0.0, 2.0, 41)
+    np.testing.assert_allclose(path.shape(times), np.outer(cubic(times), sizes), rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(path.rate(times), np.outer(cubic.deriv()(times), sizes), rtol=0.0, atol=1e-14)
+
+
+def test_the_peers_first_guess_rests_at_both_ends_and_its_rates_are_its_slopes():
+    turn = Turn(sp.load_body("cat_two_halves"), np.eye(3), 2.0, 40, 1.0)
+    places = np.linspace(0.0, 1.0, 4001)
+    shapes, rates, accelerations = turn.first_guess(places)
+    np.testing.assert_allclose(rates[[0, -1]], 0.0, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(shapes[[0, -1]], turn.body.shape()[None].repeat(2, axis=0), rtol=0.0, atol=1e-14)
+    for values, slopes in ((shapes, rates), (rates, accelerations)):
+        found = np.gradient(values, 2.0 * places, axis=0, edge_order=2)
+        np.testing.assert_allclose(found, slopes, rtol=0.0, atol=1e-5 * np.abs(slopes).max())
 
 
 # ---- The page -------------------------------------------------------------------------------------------------------
