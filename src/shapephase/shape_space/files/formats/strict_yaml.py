@@ -90,10 +90,10 @@ def yaml_documents(text: str, where: str) -> list[Any]:
                 stack.append(value)
                 keys.append(None)
     except yaml.YAMLError as error:
-        if "nesting depth" in str(getattr(error, "problem", "")):
+        mark = getattr(error, "problem_mark", None)
+        if mark is not None and "nesting depth" in str(error):
             # PyYAML has a limit of its own, and reads ahead.
-            line = error.problem_mark.line + 1
-            raise TrajectoryError(f"{where}: line {line}: nested deeper than {_MOST_DEPTH}") from None
+            raise TrajectoryError(f"{where}: line {mark.line + 1}: nested deeper than {_MOST_DEPTH}") from None
         said = " ".join(str(error).split())
         raise TrajectoryError(f"{where}: no YAML: {said:.200}") from None
     return [document for document in documents if not isinstance(document, Word) or document.text]
