@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, Integers, lock_arrays
+from ..arrays import Array, Integers, lock_arrays, read_only
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
 
@@ -46,7 +46,7 @@ class Interpolant:
     def widths(self) -> Array:
         """(P,) of the panels of one loop [s]."""
         ends = self.edges[: len(self.coefficients) + 1]
-        return ends[1:] - ends[:-1]
+        return read_only(ends[1:] - ends[:-1])
 
     @cached_property
     def series(self) -> PiecewiseChebyshev:

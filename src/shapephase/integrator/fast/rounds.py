@@ -61,7 +61,7 @@ def rounds_of_one(
     """
     series, loops = interpolant.coefficients, interpolant.loops
     found = _kernel().take_rounds(
-        interpolant.widths, plain(series).reshape(len(series), -1),
+        plain(interpolant.widths), plain(series).reshape(len(series), -1),
         _NO_SERIES if perturbed is None else plain(perturbed).reshape(len(series), -1), loops,
         _NO_SERIES if directions is None else directions, magnitudes, ceiling, tolerance,
         refinement, expected, inf if hidden is None else hidden, segments_of(1, loops), CHECKPOINTS,
