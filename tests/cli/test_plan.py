@@ -7,6 +7,7 @@ import re
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,7 +55,9 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("cat_two_halves", "--turn", "nan about x"), 2, "--turn"),
         (("cat_two_halves", "--point", "0 0", "0 0 1"), 2, "--point"),
         (("cat_two_halves", "--point", "tail 0 0 1", "0 0 1"), 2, "tail"),
-        (("cat_two_halves", "--point", "front 0 0 1", "0 0 1", "--to", "free"), 2, "--to free"),
+        (("cat_two_halves", "--turn", "9 about x", "--symmetry", "0 about x"), 2, "4 about x"),
+        (("cat_two_halves", "--turn", "9 about x", "--symmetry", "w"), 2, "--symmetry"),
+        (("cat_two_halves", "--somersaults", 1, "--symmetry", "x"), 2, "--symmetry"),
         (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw"), 2, "waist_yaw"),
         (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw=1,2"), 2, "NAME=VALUE"),
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_yaw=1rad"), 2, "--to"),
@@ -116,14 +119,46 @@ def test_postures_lists_and_mirrors(tmp_path, capsys):
     assert data["miss_rad"] < 1e-8
 
 
-def test_a_time_limit_ends_the_search_with_the_best_so_far(monkeypatch, capsys):
-    """The clock is a counter: the time is over when it is asked for the fourth time."""
-    ticks = iter(range(1000))
-    monkeypatch.setattr(cli_plan.time, "monotonic", lambda: float(next(ticks)))
+def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
+    """The time is over after the first iteration, with a file that says so and is read all the same."""
+    out = tmp_path / "plan.csv"
     with pytest.raises(SystemExit) as ended:
-        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "2.5", "--json"])
-    assert ended.value.code == 7
-    assert "stopped" in json.loads(capsys.readouterr().out)["warnings"][0]
+        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "1e-6", "--out", str(out), "--json"])
+    assert ended.value.code == 124
+    data = json.loads(capsys.readouterr().out)
+    assert data["status"] == "out of time"
+    assert "time limit" in data["warnings"][0]
+    assert out.read_text().startswith("# shapephase plan, cat_two_halves: out of time; ")
+    body = sp.load_body("cat_two_halves")
+    assert sp.read_shape_path(out, body).duration == 1.0
+
+
+def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_take(monkeypatch):
+    said = []
+    monkeypatch.setattr(cli_plan.time, "monotonic", iter([100.0, 103.0, 170.0]).__next__)
+    search = cli_plan._InterruptibleSearch(SimpleNamespace(say=said.append), 60.0)
+    for start in (2, 3):
+        assert not search.report(Progress("search", start, 4, 12, 0.125, 1e-3, 0.02))
+    shown = "search {} of 4: iteration 12, off the goal by 2.0e-02 rad, cost 0.125, {} s left"
+    assert said == [shown.format(2, 57), shown.format(3, 0)]
+
+
+def test_of_several_turns_the_cheapest_is_made(tmp_path, capsys):
+    one, _, _ = planned("cat_two_halves", "--turn", "-8 about 0,1,0", capsys=capsys, out=tmp_path / "one.csv")
+    several = ("--turn", "150 about x", "--turn", "-8 about 0,1,0")
+    assert planned("cat_two_halves", *several, capsys=capsys, out=tmp_path / "two.csv")[0]["cost"] == one["cost"]
+
+
+@pytest.mark.full
+def test_a_symmetry_on_the_command_line(tmp_path, capsys):
+    for arguments, goal in (
+        (("--turn", "170 about z", "--symmetry", "2 about z"), [0.0, 0.0, np.radians(-10.0)]),
+        (("--point", "-1 0 0", "1 0 0.2", "--symmetry", "2 about z"), [0.0, -np.arctan(0.2), 0.0]),
+    ):
+        data, _, _ = planned("cat_two_halves", *arguments, capsys=capsys, out=tmp_path / "plan.csv")
+        attitude = so3.matrix_from_quat(np.array(data["final_attitude_quat_xyzw"]))
+        wanted = so3.exp(np.array(goal))
+        assert np.abs(attitude[:, 0] - wanted[:, 0]).max() < 1e-8, arguments
 
 
 @pytest.mark.full
@@ -175,7 +210,7 @@ def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
 def test_pressed_twice_gives_it_up():
     with steps(1) as work:
         search = cli_plan._InterruptibleSearch(work, None)
-        search.report(Progress(stage="search", start=1, starts=1, iteration=0, cost=1.0, infeasibility=0.0))
+        search.report(Progress("search", 1, 1, iteration=0, cost=1.0, infeasibility=0.0, goal_error=1.0))
         search.interrupted()
         assert search.stopped
         with pytest.raises(KeyboardInterrupt):

@@ -111,6 +111,16 @@ def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, mot
     return np.einsum("nak,ns->ask", by_shape, values) + np.einsum("nak,ns->ask", by_rate, slopes)
 
 
+def goal_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, motion: Motion, control: Array) -> Array:
+    """The exact derivative of what has to reach the goal by each control point, where it is constrained: (j, k, m).
+
+    For a link that is pointed the last control point turns it against the base, too.
+    """
+    slopes = end_derivative(task, basis, path, motion)
+    slopes[:, -1] += motion.final_attitude @ task.pointed_turn(control[-1])
+    return np.tensordot(task.constrained_directions(), slopes, axes=1)
+
+
 def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> PolishedPath:
     """The nearest control points whose reconstructed motion reaches the goal, by Newton's method.
 
@@ -128,8 +138,8 @@ def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: fl
         if now.goal_error <= _CONVERGED or now.goal_error > _TOO_FAR:
             break
         directions = task.constrained_directions()
-        slopes = np.tensordot(directions, end_derivative(task, basis, now.path, now.motion), axes=1)
-        turn = directions @ task.turn_to_goal(now.motion.final_attitude)
+        slopes = goal_derivative(task, basis, now.path, now.motion, now.control)
+        turn = directions @ task.turn_to_goal(now.motion.final_attitude, now.control[-1])
         corrected = _corrected(task, basis, now.control, now.duration, slopes.reshape(len(directions), -1), turn)
         now = _reconstructed(task, basis, *corrected)
         if now.goal_error < best.goal_error:
@@ -154,7 +164,7 @@ def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, dura
         duration=duration,
         path=path,
         motion=motion,
-        goal_error=task.goal_error(motion.final_attitude),
+        goal_error=task.goal_error(motion.final_attitude, control[-1]),
     )
 
 

@@ -14,7 +14,7 @@ from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
-from ._polish import end_conditions, end_derivative, movable_points
+from ._polish import end_conditions, goal_derivative, movable_points
 from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
 from .collocation import NlpSolution
@@ -93,7 +93,7 @@ class ReducedProgram:
         """A local optimum from a guess: control points (k, m) and T. As `CollocationProgram.solve`."""
         task = self._task
         problem = _ScaledProblem(self, task, self._basis, np.clip(control, task.lower, task.upper), duration)
-        best = BestIterate(iteration_callback)
+        best = BestIterate(iteration_callback, lambda x: float(np.linalg.norm(problem.end(x)[0])))
 
         def callback(x: Array) -> None:
             residual, missing = problem.residuals(x)
@@ -130,11 +130,10 @@ class ReducedProgram:
         For a pointed axis the derivative is exact to first order in what is missing.
         """
         path, motion = self._motion(control, duration)
-        directions = self._task.constrained_directions()
-        slopes = np.tensordot(directions, end_derivative(self._task, self._basis, path, motion), axes=1)
-        turn = self._task.turn_to_goal(motion.final_attitude)
+        slopes = goal_derivative(self._task, self._basis, path, motion, control)
+        turn = self._task.turn_to_goal(motion.final_attitude, control[-1])
         if self._task.target is None:
-            return directions @ turn, -slopes
+            return self._task.constrained_directions() @ turn, -slopes
         return turn, -np.tensordot(_inverse_right_jacobian(turn), slopes, axes=1)
 
     def cost(self, control: Array, duration: float) -> tuple[float, Array]:

@@ -15,6 +15,7 @@ from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
 from .nodes.node_functions import node_functions
+from .symbolic import symbolic_body
 from .task import Reorientation
 
 # Gauss nodes of a piece: order six. On 12 pieces plans of the cat are off by some 1e-4 rad, which the Newton
@@ -109,7 +110,7 @@ class CollocationProgram:
         shares = casadi.DM(step * np.tile(weights, basis.pieces))
         # All rows but those of the goal are linear in the unknowns, apart from the turning.
         linear, from_turning, low, high = self._linear_rows(step, weights, integrals)
-        final = _final_conditions(task, unknown[-4:])
+        final = _final_conditions(task, unknown[duration_place - task.dimension : duration_place], unknown[-4:])
         rows = casadi.vertcat(linear @ unknown - from_turning @ casadi.vec(turning), final)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(linear - from_turning @ (slopes @ seen), casadi.jacobian(final, unknown))
@@ -231,7 +232,7 @@ class CollocationProgram:
         guess = np.concatenate(
             [control.ravel(), [duration], quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
         )
-        best = BestIterate(iteration_callback)
+        best = BestIterate(iteration_callback, self._goal_error)
         # A local name keeps it alive: CasADi does not.
         callback = ipopt_callback(best, len(guess), self._low, self._high)
         solver = self._ipopt(callback, 1.0 / self._cost_scale(control, duration), iterations, tolerance, settles)
@@ -301,6 +302,12 @@ class CollocationProgram:
             second_order=shifts[-1] == 0.0 if shifts else None,
         )
 
+    def _goal_error(self, values: Array) -> float:
+        """Of unknowns [rad]."""
+        points = self._task.dimension * self._basis.dimension
+        attitude = so3.matrix_from_quat(so3.normalised(values[-4:]))
+        return self._task.goal_error(attitude, values[points - self._task.dimension : points])
+
     def _cost_scale(self, control: Array, duration: float) -> float:
         """The cost of a guess, or 1 where it is zero."""
         rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1))
@@ -327,16 +334,19 @@ class CollocationProgram:
         return bounds[0], bounds[1]
 
 
-def _final_conditions(task: Reorientation, last: Any) -> Any:
-    """Three rows of the last quaternion: zero at the target; for an axis the third is the cosine, not below zero."""
+def _final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> Any:
+    """Three rows of the last coordinates and quaternion: zero at the target; of an axis the third is the cosine."""
     import casadi
 
     if task.target is not None:
         x, y, z, w = so3.quat_from_matrix(task.target)
-        return casadi.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ last
+        return casadi.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ quaternion
     axis, direction = task.pointing_axes()
-    vector, scalar = last[:3], last[3]
+    vector, scalar = quaternion[:3], quaternion[3]
     seen = casadi.DM(axis)
+    if task.link is not None:
+        shape = casadi.DM(task.coupling) @ coordinates + casadi.DM(task.offset)
+        seen = symbolic_body(task.body).link_pose(task.link)(shape)[:3, :3] @ seen
     turned = seen + 2.0 * scalar * casadi.cross(vector, seen) + 2.0 * casadi.cross(vector, casadi.cross(vector, seen))
     return casadi.DM(np.vstack([task.constrained_directions(), direction])) @ turned
 

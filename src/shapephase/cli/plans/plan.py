@@ -26,12 +26,19 @@ from .goals import GoalWords
 from .postures import mirrored, moving_joints, posture
 
 if TYPE_CHECKING:
-    from ...arrays import Array
     from ...body.body import Body
     from ...optimal_control.plan import Plan, Progress
 
 # Samples of the file written: at 1 s they are 0.5 ms apart, far below the pieces of a plan.
 _SAMPLES = 2001
+# Numbers may begin with a minus.
+_SIGNED = Parameter(allow_leading_hyphen=True, negative_iterable="", show_default=False)
+_CODES = {
+    "found": ExitCode.DONE,
+    "not found": ExitCode.NOT_FOUND,
+    "stopped": ExitCode.STOPPED,
+    "out of time": ExitCode.OUT_OF_TIME,
+}
 
 
 def plan_command(
@@ -39,10 +46,11 @@ def plan_command(
     /,
     *,
     floating: BodyOptions = AS_WRITTEN,
-    turn: str | None = None,
-    point: Annotated[tuple[str, str] | None, Parameter(negative_iterable="")] = None,
+    turn: Annotated[tuple[str, ...], _SIGNED] = (),
+    point: Annotated[tuple[str, str] | None, _SIGNED] = None,
     rotate: float | None = None,
-    about: str | None = None,
+    about: Annotated[str | None, _SIGNED] = None,
+    symmetry: Annotated[str | None, _SIGNED] = None,
     momentum: Momentum = (0.0, 0.0, 0.0),
     duration: float = 1.0,
     somersaults: float | None = None,
@@ -67,18 +75,23 @@ def plan_command(
 ) -> Outcome:
     """Find the cheapest motion of the joints that turns a body to a goal, and compute the resulting motion.
 
-    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130. If the search finds
-    nothing, its best try is printed and written, and the exit code is 7.
+    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130. So does its time
+    limit, with the exit code 124. If the search finds nothing, its best try is printed and written, and the exit code
+    is 7. The file says so in its first line.
 
     Parameters
     ----------
     turn
         The turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas
-        between them). For example `--turn "90 about y"`.
+        between them); of several the one that costs least. For example `--turn "90 about y"`.
     point
         Two vectors instead: an axis of the base, or behind its name of a link as it is at the end, and the direction
         that this has to have at the end, in inertial axes, of any length; the turn about it is free. For example
         `--point "dish 0 0 1" "0 1 0"`.
+    symmetry
+        Turns of the body, before that of the goal, after which it looks the same: how often about an axis of the base,
+        or behind a link's name in --point of this, or an axis alone, for all turns about it. For example
+        `--symmetry "4 about x"`.
     rotate
         Angle of the turn, in degrees, as with --turn. For example `--rotate 180`.
     about
@@ -139,8 +152,9 @@ def plan_command(
     from ...phases.phases import split
     from ...shape_space.files.read import write_shape_path
 
-    words = GoalWords(turn, rotate, about, point, somersaults, half_twists)
+    words = GoalWords(turn, rotate, about, point, symmetry, somersaults, half_twists)
     words.check()
+    goal = words.goal()
     _check_search(workers, time_limit)
     if not 0.0 < duration < math.inf:
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
@@ -151,8 +165,7 @@ def plan_command(
         loaded = load_body(body, isolate=True, **vars(floating))
         start = None if from_ is None else posture(loaded, from_, "--from", first=True)
         end = to if to in (None, "free") else posture(loaded, to, "--to", first=False)
-        goal = words.goal(loaded, _shape_at_end(loaded, start, end))
-        code, status = ExitCode.DONE, ""
+        status = ""
         work.begin("searching")
         with _stoppable(work, time_limit) as search, _executor(workers) as executor:
             try:
@@ -168,21 +181,22 @@ def plan_command(
                     joints=moving_joints(loaded, joints, hold),
                     symmetric=mirrored(mirror),
                     limits=None if rate_limit is None else Limits(rate_limits=rate_limit),
-                    search=Search(starts=starts, seed=seed, pieces=pieces, iterations=iterations),
+                    search=Search(
+                        starts=starts, seed=seed, pieces=pieces, iterations=iterations, time_limit=time_limit
+                    ),
                     iteration_callback=search.report,
                     executor=executor,
                 )
             except PlanNotFound as failure:
                 if failure.best is None:
                     raise
-                found, code, status = cast("Plan", failure.best), ExitCode.NOT_FOUND, str(failure)
-        if search.stopped:
-            code = ExitCode.STOPPED
+                found, status = cast("Plan", failure.best), str(failure)
         if status:
             warnings.warn(status, stacklevel=2)
         if out is not None:
             # Dense samples: a reader that joins the ends of a closed path smoothly then changes next to nothing.
-            write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
+            times = np.linspace(0.0, found.path.duration, _SAMPLES)
+            write_shape_path(found.path, out, times, comment=_comment(loaded, found))
             say_written(out)
         if html is not None:
             from ...plotting.report import write_report
@@ -192,7 +206,11 @@ def plan_command(
             say_written(html)
     text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
     return Outcome(
-        text, data | {"status": status or "found"}, code=code, aside=aside, made_from=found.motion.deformation.made_from
+        text,
+        data,
+        code=_CODES[found.status],
+        aside=aside,
+        made_from=found.motion.deformation.made_from,
     )
 
 
@@ -202,17 +220,6 @@ def _check_search(workers: int | None, time_limit: float | None) -> None:
         raise ShapeError(f"--workers: a whole number above 0 is needed, got {workers}")
     if time_limit is not None and not 0.0 < time_limit < math.inf:
         raise ShapeError(f"--time-limit: a time in s above 0 is needed, got {time_limit:g}")
-
-
-def _shape_at_end(body: Body, start: Array | None, end: Array | str | None) -> Array | None:
-    """The shape that a plan ends with; None: any."""
-    import numpy as np
-
-    if isinstance(end, str):
-        return None
-    if end is not None:
-        return end
-    return np.clip(body.shape(), *body.joint_limits.T) if start is None else start
 
 
 @contextmanager
@@ -233,6 +240,7 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
         [
             _heading(body, found.path.duration, momentum),
             "",
+            f"{'status':24}{found.status:>16}",
             rotation_line("turned", found.motion.final_attitude),
             f"{'off the goal':24}{found.goal_error:16.2e} rad",
             f"{'cost':24}{found.cost:16.9g}   {found.cost_unit} ({found.cost_name})",
@@ -252,6 +260,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
 
     return {
         "body": body.name,
+        "status": found.status,
         "duration_s": found.path.duration,
         "momentum_kg_m2_s": list(momentum),
         "final_attitude_quat_xyzw": so3.quat_from_matrix(found.motion.final_attitude).tolist(),
@@ -271,7 +280,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
 
 
 class _InterruptibleSearch:
-    """A search on the terminal, which Ctrl-C, or its time limit, ends after the iteration in progress.
+    """A search on the terminal, which Ctrl-C ends after the iteration in progress.
 
     Attributes
     ----------
@@ -287,11 +296,13 @@ class _InterruptibleSearch:
     def report(self, now: Progress) -> bool:
         """Show the progress of the search; returns whether to stop it."""
         which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
+        left = "" if self._end == math.inf else f", {max(self._end - time.monotonic(), 0.0):.0f} s left"
         self._work.say(
-            f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
+            f"{now.stage}{which}: iteration {now.iteration}, off the goal by {now.goal_error:.1e} rad, "
+            f"cost {now.cost:.6g}{left}"
         )
         self.reported = True
-        return self.stopped or time.monotonic() > self._end
+        return self.stopped
 
     def interrupted(self, *_: Any) -> None:
         """Ctrl-C: the search ends after this iteration; pressed again, at once."""
@@ -314,6 +325,13 @@ def _stoppable(work: Steps, time_limit: float | None) -> Iterator[_Interruptible
         yield search
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _comment(body: Body, found: Plan) -> str:
+    return (
+        f"shapephase plan, {body.name}: {found.status}; off the goal by {found.goal_error:.1e} rad, cost "
+        f"{found.cost:.9g} {found.cost_unit} ({found.cost_name}), KKT residual {found.kkt_residual:.1e}"
+    )
 
 
 def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:

@@ -159,7 +159,7 @@ def _straight(task: Reorientation) -> list[Array]:
         return [task.start + ramp * (task.end - task.start)] if np.any(task.end != task.start) else []
     connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.coupling
     metric = start_metric(task)
-    turning = task.constrained_directions() @ -connection
+    turning = task.constrained_directions() @ (task.pointed_turn(task.start) - connection)
     cheap = np.linalg.solve(metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric)), turning.T)
     missing = task.constrained_directions() @ task.turn_to_goal()
     direction = cheap @ np.linalg.lstsq(turning @ cheap, missing, rcond=_RANK)[0]
@@ -197,7 +197,7 @@ def guess_of_control(task: Reorientation, basis: SplineBasis, control: Array) ->
         motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
     except ShapePhaseError:
         return None
-    goal_error = task.goal_error(motion.final_attitude)
+    goal_error = task.goal_error(motion.final_attitude, control[-1])
     steps = np.diff(basis.matrix(PLACES) @ control, axis=0)
     length = np.sum((steps @ start_metric(task)) * steps)
     whole = float(np.linalg.norm(task.turn_to_goal()))
