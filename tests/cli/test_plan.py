@@ -62,6 +62,9 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw=1,2"), 2, "NAME=VALUE"),
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_yaw=1rad"), 2, "--to"),
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_bend=1"), 2, "waist_bend"),
+        (("cat_two_halves", "--turn", "9 about x", "--via", "waist_yaw=1@soon"), 2, "--via"),
+        (("cat_two_halves", "--turn", "9 about x", "--via", "there.csv"), 2, "FILE@TIME"),
+        (("cat_two_halves", "--turn", "9 about x", "--via", "waist_yaw"), 2, "--via"),
         (("cat_two_halves", "--turn", "9 about x", "--joints", "a", "--hold", "b"), 2, "--hold"),
         (("cat_two_halves", "--turn", "9 about x", "--mirror", "waist_yaw"), 2, "--mirror"),
         (("cat_two_halves", "--turn", "9 about x", "--workers", 0), 2, "--workers"),
@@ -131,6 +134,23 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
     assert out.read_text().startswith("# shapephase plan, cat_two_halves: out of time; ")
     body = sp.load_body("cat_two_halves")
     assert sp.read_shape_path(out, body).duration == 1.0
+
+
+def test_postures_on_the_way(tmp_path, capsys):
+    """One by its joints, one of the motion file of another plan at its time; each is where the file has it."""
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    _, one, body = planned("cat_two_halves", "--turn", "40 about x", capsys=capsys, out=first)
+    via = ("--via", "waist_roll=20deg", "--via", f"{first}@0.6")
+    data, other, _ = planned("cat_two_halves", "--turn", "10 about z", *via, capsys=capsys, out=second)
+    early, late = data["waypoint_times_s"]
+    assert 0.0 < early < late == 0.6
+    assert np.abs(other[60] - one[60]).max() < 1e-8
+    passed = sp.read_shape_path(second, body).shape(early)
+    assert abs(passed[body.joint_index("waist_roll")] - np.radians(20.0)) < 1e-7
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--turn", "10 about z", "--via", f"{first}@1.5"])
+    assert ended.value.code == 2
+    assert "ends at 1 s" in capsys.readouterr().err
 
 
 def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_take(monkeypatch):

@@ -10,13 +10,14 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Mask
 from ..deformation.deformation import articulated
-from ..errors import unknown_name
+from ..errors import TrajectoryError, unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._polish import end_conditions, goal_derivative, movable_points
 from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
+from ._via_rows import open_points, via_rows
 from .collocation import NlpSolution
 from .guesses.loops import start_metric
 from .symbolic import symbolic_body
@@ -65,13 +66,17 @@ class ReducedProgram:
 
     Raises
     ------
-    UnknownNameError
-        For the cost "time".
+    UnknownNameError, TrajectoryError
+        For the cost "time", for waypoints without a time.
     """
 
     def __init__(self, task: Reorientation, basis: SplineBasis) -> None:
         if task.cost == "time":
             raise unknown_name("cost for method 'reduced'", task.cost, [cost for cost in COSTS if cost != "time"])
+        if open_points(task):
+            raise TrajectoryError(
+                "method 'reduced' passes waypoints at given times; give their times, or use 'collocation'"
+            )
         self._task, self._basis = task, basis
         inside, weights, _ = gauss_tableau(_STAGES)
         places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
@@ -88,6 +93,7 @@ class ReducedProgram:
         *,
         iterations: int,
         tolerance: float = _TOLERANCE,
+        via_places: Array | None = None,  # noqa: ARG002 (all are given)
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
         """A local optimum from a guess: control points (k, m) and T. As `CollocationProgram.solve`."""
@@ -117,6 +123,7 @@ class ReducedProgram:
             kkt_residual=max(residual, missing),
             infeasibility=missing,
             iterations=count,
+            via_places=np.array([point.place for point in task.via], dtype=np.float64),
         )
 
     def _motion(self, control: Array, duration: float) -> tuple[ShapePath, Motion]:
@@ -180,10 +187,13 @@ class _ScaledProblem:
         self._constraints: list[dict[str, Any]] = [
             {"type": "eq", "fun": lambda x: self.end(x)[0], "jac": lambda x: self.end(x)[1]}
         ]
-        every = np.kron(end_conditions(task, basis), np.eye(task.dimension))
+        passed, values = via_rows(task, basis, np.array([point.place for point in task.via], dtype=np.float64))
+        conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
+        every = np.concatenate([conditions, passed.reshape(-1, guess.size)])
         self._end_conditions = every[:, self._free.ravel()] * self._unit
         if len(every):
             fixed = np.asarray(every @ np.where(self._free, 0.0, guess).ravel(), dtype=np.float64)
+            fixed[len(conditions) :] -= values
             self._constraints.append(_linear_equations(self._end_conditions, fixed))
         if self.limits_rates:
             self._constraints.append(_within_rates(task, basis, guess, self._free, self._unit, duration))

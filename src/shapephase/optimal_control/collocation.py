@@ -14,6 +14,7 @@ from ._gauss import gauss_tableau
 from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
+from ._via_rows import open_points, symbolic_via_rows
 from .nodes.node_functions import node_functions
 from .symbolic import symbolic_body
 from .task import Reorientation
@@ -60,6 +61,7 @@ class NlpSolution:
     kkt_residual : largest remaining violation of the Karush-Kuhn-Tucker conditions, scaled
     infeasibility : largest violation of a constraint
     iterations : number taken
+    via_places : (v,) where the path passes the waypoints
     second_order : whether the Hessian of the Lagrangian, projected on what the constraints leave, is positive definite
         there, by the inertia of the last factorised matrix; None where that is not known
     """
@@ -73,6 +75,7 @@ class NlpSolution:
     kkt_residual: float
     infeasibility: float
     iterations: int
+    via_places: Array
     second_order: bool | None = None
 
 
@@ -84,8 +87,9 @@ class CollocationProgram:
         dq/ds = q (T omega)/2,    T omega = T I^-1 R^T mu - A u,
 
     whose collocation keeps |q| to rounding, as it keeps all quadratic invariants; order six. Unknown are
-    x = (control points, T, q at the nodes, q at the ends of the pieces). What a node sees of them is linear,
-    y = W x with y = (r, u, q, T), so that Jacobian and Hessian are those of one node, chained on by W: exact, banded.
+    x = (control points, T, q at the nodes, q at the ends of the pieces, open places of waypoints). What a node sees of
+    them is linear, y = W x with y = (r, u, q, T), so that Jacobian and Hessian are those of one node, chained on by W:
+    exact, banded.
 
     Attributes
     ----------
@@ -102,7 +106,9 @@ class CollocationProgram:
         self.places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
         count, step, width = len(self.places), 1.0 / basis.pieces, 2 * task.dimension + 5
         duration_place = task.dimension * basis.dimension
-        unknown = casadi.MX.sym("unknown", duration_place + 1 + 4 * (count + basis.pieces + 1))
+        core = duration_place + 1 + 4 * (count + basis.pieces + 1)
+        self._open = slice(core, core + len(open_points(task)))
+        unknown = casadi.MX.sym("unknown", self._open.stop)
         seen = self._seen()
         at_node = casadi.reshape(seen @ unknown, width, count)
         node = node_functions(task)
@@ -110,7 +116,11 @@ class CollocationProgram:
         shares = casadi.DM(step * np.tile(weights, basis.pieces))
         # All rows but those of the goal are linear in the unknowns, apart from the turning.
         linear, from_turning, low, high = self._linear_rows(step, weights, integrals)
-        final = _final_conditions(task, unknown[duration_place - task.dimension : duration_place], unknown[-4:])
+        end = _final_conditions(
+            task, unknown[duration_place - task.dimension : duration_place], unknown[core - 4 : core]
+        )
+        via, via_low, via_high = symbolic_via_rows(task, basis, unknown[:duration_place], unknown[self._open])
+        final = casadi.vertcat(end, via)
         rows = casadi.vertcat(linear @ unknown - from_turning @ casadi.vec(turning), final)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(linear - from_turning @ (slopes @ seen), casadi.jacobian(final, unknown))
@@ -138,7 +148,8 @@ class CollocationProgram:
         }
         # The third row of a pointed axis is a cosine, which only has to be positive.
         final_high = np.zeros(3) if task.target is not None else np.array([0.0, 0.0, np.inf])
-        self._low, self._high = np.append(low, np.zeros(3)), np.append(high, final_high)
+        self._low = np.concatenate([low, np.zeros(3), via_low])
+        self._high = np.concatenate([high, final_high, via_high])
 
     def _seen(self) -> Any:
         """W: the values at the nodes as linear functions of the unknowns."""
@@ -157,7 +168,8 @@ class CollocationProgram:
             ],
             axis=1,
         )
-        rest = sparse.csr_matrix((whole.shape[0], 4 * (self._basis.pieces + 1)))
+        opened = self._open.stop - self._open.start
+        rest = sparse.csr_matrix((whole.shape[0], 4 * (self._basis.pieces + 1) + opened))
         return _sparse(sparse.hstack([whole, rest]).tocsr()[order.ravel()])
 
     def _linear_rows(self, step: float, weights: Array, integrals: Array) -> tuple[Any, Any, Array, Array]:
@@ -200,7 +212,8 @@ class CollocationProgram:
         unbounded = np.full(rates.shape[0], np.inf)
         met = np.zeros(conditions.shape[0])
         low, high = np.concatenate([equal, -unbounded, zero, met]), np.concatenate([equal, zero, unbounded, met])
-        return _sparse(linear), _sparse(turning), low, high
+        no_places = sparse.csr_matrix((linear.shape[0], self._open.stop - self._open.start))
+        return _sparse(sparse.hstack([linear, no_places])), _sparse(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
         """The integral of half the squared second derivative: exact by two nodes of a piece or more."""
@@ -222,16 +235,19 @@ class CollocationProgram:
         *,
         iterations: int,
         tolerance: float = _TOLERANCE,
+        via_places: Array | None = None,
         settles: bool = False,
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
         """A local optimum from a guess: control points (k, m), T, and the attitude at places (N,) -> (N, 4).
 
+        Where there are waypoints, their places too, (v,).
+
         With `settles` it may end before, where the cost changes no more.
         """
-        guess = np.concatenate(
-            [control.ravel(), [duration], quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
-        )
+        at = np.zeros(len(self._task.via)) if via_places is None else via_places
+        attitudes = [quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
+        guess = np.concatenate([control.ravel(), [duration], *attitudes, at[open_points(self._task)]])
         best = BestIterate(iteration_callback, self._goal_error)
         # A local name keeps it alive: CasADi does not.
         callback = ipopt_callback(best, len(guess), self._low, self._high)
@@ -290,13 +306,14 @@ class CollocationProgram:
         return NlpSolution(
             control=values[:points].reshape(self._basis.dimension, self._task.dimension),
             duration=float(values[points]),
-            attitude=so3.matrix_from_quat(so3.normalised(values[-4:])),
+            attitude=self._last_attitude(values),
             cost=cost,
             status=status,
             converged=status in GOOD_STATUS,
             kkt_residual=max(dual, primal),
             infeasibility=primal,
             iterations=int(stats["iter_count"]),
+            via_places=self._via_places(values),
             # IPOPT adds a multiple of the identity to the Hessian until the matrix has n positive and m negative
             # eigenvalues, n unknowns and m rows: with none, that of the projected Hessian are all positive.
             second_order=shifts[-1] == 0.0 if shifts else None,
@@ -305,12 +322,20 @@ class CollocationProgram:
     def _goal_error(self, values: Array) -> float:
         """Of unknowns [rad]."""
         points = self._task.dimension * self._basis.dimension
-        attitude = so3.matrix_from_quat(so3.normalised(values[-4:]))
-        return self._task.goal_error(attitude, values[points - self._task.dimension : points])
+        return self._task.goal_error(self._last_attitude(values), values[points - self._task.dimension : points])
+
+    def _last_attitude(self, values: Array) -> Array:
+        return so3.matrix_from_quat(so3.normalised(values[self._open.start - 4 : self._open.start]))
+
+    def _via_places(self, values: Array) -> Array:
+        """Of all waypoints, whether given or found."""
+        places = np.array([np.nan if point.place is None else point.place for point in self._task.via])
+        places[open_points(self._task)] = values[self._open]
+        return places
 
     def _cost_scale(self, control: Array, duration: float) -> float:
         """The cost of a guess, or 1 where it is zero."""
-        rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1))
+        rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1) + self._open.stop - self._open.start)
         value = float(self._cost_function(np.concatenate([control.ravel(), [duration], rest])))
         return value if value > 0.0 else 1.0
 
@@ -330,7 +355,8 @@ class CollocationProgram:
             duration = _SHORTEST * task.duration if task.cost == "time" and free < 0.0 else task.duration
             inner, ends = np.full(4 * len(self.places), free), np.full((basis.pieces + 1, 4), free)
             ends[0] = [0.0, 0.0, 0.0, 1.0]
-            bounds.append(np.concatenate([control.ravel(), [duration], inner, ends.ravel()]))
+            opened = np.full(self._open.stop - self._open.start, 0.0 if free < 0.0 else 1.0)
+            bounds.append(np.concatenate([control.ravel(), [duration], inner, ends.ravel(), opened]))
         return bounds[0], bounds[1]
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from ..arrays import Array
 from ..body.body import Body
@@ -119,6 +121,7 @@ class Plan:
     goal : what `path` was to reach; of several, the one that costs least
     status : "found"; of a `PlanNotFound.best`, "not found"; "stopped" or "out of time" where not all starts were gone
         through
+    waypoint_times : (v,) when `path` passes its waypoints [s]
 
     Examples
     --------
@@ -148,6 +151,7 @@ class Plan:
     hamiltonian_spread: float | None = None
     goal: Goal | None = None
     status: str = "found"
+    waypoint_times: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def agreeing_starts(self) -> int:

@@ -27,12 +27,14 @@ from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
 from ._solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
 from ._spline_basis import SplineBasis
+from ._via_rows import via_rows
 from .collocation import GOOD_STATUS, CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guesses
 from .guesses.strokes import guess_of_strokes
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search, goal_argument
 from .task import Reorientation, reorientation
+from .waypoints import Waypoint
 
 # Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
 _FEW_JOINTS = 4
@@ -78,6 +80,7 @@ def plan_reorientation(
     duration: float = 1.0,
     start: ArrayLike | None = None,
     end: Any = None,
+    via: Sequence[Waypoint] = (),
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
@@ -100,6 +103,8 @@ def plan_reorientation(
     duration : [s]; for cost "time" the longest allowed
     start : (n,) shape at the start [rad or m]; None: neutral, or as near as the limits permit
     end : (n,) shape at the end; None: as at the start, a closed loop; "free": any
+    via : what the path passes through on its way, in this order: a `Waypoint` is a shape, or the coordinates of some
+        joints, with a time or without
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
         joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
         other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
@@ -157,6 +162,7 @@ def plan_reorientation(
             duration=duration,
             start=start,
             end=end,
+            via=via,
             cost=cost,
             rates_at_ends=rates_at_ends,
             joints=joints,
@@ -373,6 +379,7 @@ def _starting_points(
             _guessed_attitudes(task, candidate),
             iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
             tolerance=_COARSE_TOLERANCE,
+            via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
         curve = coarse.matrix(PLACES) @ (solution.control if solution.converged else candidate.control)
@@ -448,11 +455,12 @@ class _LocalSearch:
             task.duration,
             attitudes,
             iterations=self.iterations,
+            via_places=guess.via_places,
             iteration_callback=callback,
             **settling,
         )
         try:
-            polished = polish(task, basis, solution.control, solution.duration)
+            polished = polish(task, basis, solution.control, solution.duration, solution.via_places)
             cost = _cost(task, basis, polished)
         except ShapePhaseError:
             # The path cannot be reconstructed: the attempt is ranked last, and only the solver's numbers describe it.
@@ -489,12 +497,15 @@ def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> fl
 
 
 def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:
-    """Whether duration, rates and windings are within limits; the correction itself keeps the positions there."""
+    """Whether duration, rates, windings and waypoints are as asked for; the correction keeps positions in limits."""
     if task.windings is not None:
         times = np.linspace(0.0, polished.path.duration, _WINDING_SAMPLES * basis.pieces)
         counted = task.counted_windings(polished.motion.attitude(times))
         if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
             return False
+    rows, values = via_rows(task, basis, polished.via_places)
+    if np.abs(np.einsum("jkm,km->j", rows, polished.control) - values).max(initial=0.0) > GOAL_TOLERANCE:
+        return False
     slack = 1.0 + _LIMIT_SLACK
     return polished.path.duration <= task.duration * slack and _share_of_rate_limits(task, basis, polished) <= slack
 
@@ -520,6 +531,7 @@ def _plan(
     return Plan(
         body=task.body,
         goal=goals[task],
+        waypoint_times=best.polished.via_places * best.polished.duration,
         status=stopped or ("found" if best.report.converged else "not found"),
         path=best.polished.path,
         motion=best.polished.motion,

@@ -16,7 +16,9 @@ from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
+from ._via_points import ViaPoint, via_points
 from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
+from .waypoints import Waypoint
 
 COSTS = ("kinetic", "rate", "acceleration", "time")
 
@@ -55,6 +57,7 @@ class Reorientation:
     rate_limit : (m,) limits of their rates [rad/s or m/s], infinite where there are none
     rates_at_ends : one of `RATES_AT_ENDS`
     coupling, offset : (n, m) and (n,), each joint from the coordinates
+    via : what it passes through, in its order
     """
 
     body: Body
@@ -74,6 +77,7 @@ class Reorientation:
     rates_at_ends: str
     coupling: Array
     offset: Array
+    via: tuple[ViaPoint, ...] = ()
 
     def shapes(self, coordinates: Array) -> Array:
         """The shape at coordinates: (..., m) -> (..., n)."""
@@ -163,6 +167,7 @@ def reorientation(
     duration: float = 1.0,
     start: ArrayLike | None = None,
     end: Any = None,
+    via: Sequence[Waypoint] = (),
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
@@ -212,6 +217,8 @@ def reorientation(
             _check_coupling(body, shape, coupling @ shape[leaders] + offset, name)
     lower, upper, rate_limit = _coordinate_limits(coupling, factors, first[leaders], bounds, rates)
     chart = BallChart.of(body, first, leaders)
+    length = positive_argument(duration)
+    points = via_points(body, via, None if cost == "time" else length, bounds, coupling, offset, chart)
     start, end = first[leaders], None if last is None else last[leaders]
     if chart is not None:
         coupling, offset = chart.shapes(coupling, offset)
@@ -226,7 +233,7 @@ def reorientation(
         windings=windings,
         winding_axes=winding_axes,
         momentum=mu,
-        duration=positive_argument(duration),
+        duration=length,
         start=start,
         end=end,
         cost=cost,
@@ -236,6 +243,7 @@ def reorientation(
         rates_at_ends=rates_at_ends,
         coupling=coupling,
         offset=offset,
+        via=points,
     )
 
 

@@ -23,7 +23,7 @@ from ..outcome import Outcome, check_writable
 from ..progress import Steps, steps
 from ..terminal import say_written
 from .goals import GoalWords
-from .postures import mirrored, moving_joints, posture
+from .postures import mirrored, moving_joints, posture, waypoint
 
 if TYPE_CHECKING:
     from ...body.body import Body
@@ -57,6 +57,7 @@ def plan_command(
     half_twists: float | None = None,
     from_: Annotated[str | None, Parameter(name="--from")] = None,
     to: str | None = None,
+    via: Annotated[tuple[str, ...], Parameter(negative_iterable="", show_default=False)] = (),
     joints: str | None = None,
     hold: str | None = None,
     mirror: str | None = None,
@@ -112,6 +113,10 @@ def plan_command(
     to
         Posture at the end, like --from, of a file the last row; or free; without it as at the start. For example
         `--to free`.
+    via
+        Posture on the way, which the joints pass without stopping: NAME=VALUE pairs, the other joints being as they
+        like, with a time in s behind @ or without; or that of a motion file at a time, passed then. More than once, in
+        this order. For example `--via waist_pitch=60deg@0.4`.
     joints
         Those that may move, with commas between their names; without it all. For example
         `--joints waist_pitch,waist_yaw`.
@@ -176,6 +181,7 @@ def plan_command(
                     duration=duration,
                     start=start,
                     end=end,
+                    via=[waypoint(loaded, one) for one in via],
                     cost=cost,
                     rates_at_ends=rates_at_ends,
                     joints=moving_joints(loaded, joints, hold),
@@ -236,6 +242,7 @@ def _executor(workers: int | None) -> Iterator[Executor | None]:
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
     from ...phases.split_text import rotation_line
 
+    passed = " ".join(f"{time:.6g}" for time in found.waypoint_times)
     return "\n".join(
         [
             _heading(body, found.path.duration, momentum),
@@ -245,6 +252,7 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
             f"{'off the goal':24}{found.goal_error:16.2e} rad",
             f"{'cost':24}{found.cost:16.9g}   {found.cost_unit} ({found.cost_name})",
             f"{'rates at the ends':24}{found.rates_at_ends:>16}",
+            *([f"{'waypoints passed at':24}{passed:>16} s"] if passed else []),
             f"{'off the minimum':24}{found.kkt_residual:16.2e}       (residual of the conditions of a minimum, scaled)",
             f"{'iterations':24}{found.iterations:16d}       (in {found.seconds:.1f} s, {_searches(len(found.starts))})",
         ]
@@ -269,6 +277,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
         "cost_name": found.cost_name,
         "cost_unit": found.cost_unit,
         "rates_at_ends": found.rates_at_ends,
+        "waypoint_times_s": found.waypoint_times.tolist(),
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
         "seconds": found.seconds,
