@@ -7,6 +7,8 @@ import re
 import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -190,6 +192,14 @@ def test_workers_find_what_one_process_finds(tmp_path, capsys):
     assert np.array_equal(shapes, same)
 
 
+def test_a_page_says_that_nothing_was_found(tmp_path):
+    page = tmp_path / "plan.html"
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "1e-6", "--html", str(page)])
+    assert ended.value.code == 124
+    assert "The search ended by its time limit; this is the best until then: off the goal by" in page.read_text()
+
+
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     """The signal itself, in the third iteration; the motion written reaches the goal nearly."""
     plain = cli_plan._InterruptibleSearch.report
@@ -214,6 +224,34 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     body = sp.load_body("cat_two_halves")
     again = sp.reconstruct(sp.articulated(body, sp.read_shape_path(out, body)), np.zeros(3))
     assert so3.angle(again.final_attitude.T @ so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))) < 1e-5
+
+
+def hears_of_ctrl_c(process):
+    """Whether a process has a handler for it, by the kernel's list."""
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{process}/status").read_text())
+    return bool(int(caught[1], 16) >> (signal.SIGINT - 1) & 1)
+
+
+@pytest.mark.full
+def test_ctrl_c_ends_what_searches_beside(tmp_path):
+    """As soon as they hear of it; they are gone when the command is, and the best of what they had is written."""
+    out = tmp_path / "plan.csv"
+    words = ("cat", "--turn", "60 about x", "--starts", "40", "--workers", "2", "--out", str(out))
+    with subprocess.Popen(
+        [sys.executable, "-m", "shapephase", "plan", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as command:
+        beside = Path(f"/proc/{command.pid}/task/{command.pid}/children")
+        # The first is Python's own tracker of what they share.
+        while command.poll() is None and sum(hears_of_ctrl_c(one) for one in beside.read_text().split()[1:]) < 2:
+            time.sleep(0.01)
+        workers = beside.read_text().split()[1:]
+        command.send_signal(signal.SIGINT)
+        _, said = command.communicate(timeout=300)
+    assert command.returncode == 130
+    assert "stopped on request" in said
+    assert "Traceback" not in said
+    assert out.read_text().startswith("# shapephase plan, cat: stopped; ")
+    assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
 
 
 def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):

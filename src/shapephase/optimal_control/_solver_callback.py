@@ -131,11 +131,27 @@ def heard_interrupts() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+# Whether Ctrl-C has come to a process that does nothing but search.
+_PRESSED = threading.Event()
+
+
+def keep_interrupts() -> None:
+    """From now on Ctrl-C ends the searches of this process, and nothing else."""
+    signal.signal(signal.SIGINT, _kept)
+
+
+def _kept(*_: Any) -> None:
+    _PRESSED.set()
+
+
 @contextmanager
 def stopping_interrupts() -> Iterator[Callable[[], bool]]:
     """A function that says whether Ctrl-C has come, which does nothing else; outside the main thread it never does."""
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
+        return
+    if signal.getsignal(signal.SIGINT) is _kept:
+        yield _PRESSED.is_set
         return
     pressed = False
 

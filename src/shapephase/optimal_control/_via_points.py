@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..body.body import Body
 from ..errors import ShapeError, TrajectoryError
 from ._ball_chart import BallChart
@@ -27,7 +27,7 @@ class ViaPoint:
     place : the time as a share of the duration; None: open
     """
 
-    columns: Array
+    columns: Integers
     values: Array
     place: float | None
 
@@ -80,7 +80,7 @@ def via_points(
 
 def _coordinates(
     body: Body, waypoint: Waypoint, bounds: Array, coupling: Array, offset: Array, name: str
-) -> tuple[Array, Array]:
+) -> tuple[Integers, Array]:
     """Which coordinates a waypoint tells, and what they are."""
     if isinstance(waypoint.shape, Mapping):
         told = {body.joint_index(joint): value for joint, value in waypoint.shape.items()}

@@ -83,7 +83,7 @@ def symbolic_via_rows(task: Reorientation, basis: SplineBasis, control: Any, ope
         return casadi.MX(0, 1), np.zeros(0), np.zeros(0)
     points = casadi.reshape(control, task.dimension, basis.dimension)
     free = open_points(task)
-    places = [opened[free.index(k)] if k in free else point.place for k, point in enumerate(task.via)]
+    places: list[Any] = [opened[free.index(k)] if k in free else point.place for k, point in enumerate(task.via)]
     rows = [
         points[point.columns.tolist(), :] @ _weights(basis, place)
         for point, place in zip(task.via, places, strict=True)

@@ -263,11 +263,11 @@ _KEPT = threading.local()
 
 def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> _Attempt:
     """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
-    if getattr(_KEPT, "recipe", None) != recipe:
-        task, pieces, search = pickle.loads(recipe)
-        _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
-        _KEPT.recipe = recipe
     with stopping_interrupts() as stopped:
+        if getattr(_KEPT, "recipe", None) != recipe:
+            task, pieces, search = pickle.loads(recipe)
+            _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
+            _KEPT.recipe = recipe
         return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import os
 import signal
 import threading
 import time
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -172,7 +173,11 @@ def plan_command(
         end = to if to in (None, "free") else posture(loaded, to, "--to", first=False)
         status = ""
         work.begin("searching")
-        with _stoppable(work, time_limit) as search, _executor(workers) as executor:
+        beside = workers is not None and workers > 1
+        with (
+            _stoppable(work, time_limit, beside=beside) as search,
+            _executor(workers if beside else None, search) as executor,
+        ):
             try:
                 found = plan_reorientation(
                     loaded,
@@ -207,8 +212,15 @@ def plan_command(
         if html is not None:
             from ...plotting.report import write_report
 
-            title = f"{loaded.name} turns itself"
-            write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
+            write_report(
+                found.motion,
+                split(found.motion),
+                html,
+                shape_path=found.path,
+                title=f"{loaded.name} turns itself",
+                purpose=_purpose(found),
+                begin=work.begin,
+            )
             say_written(html)
     text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
     return Outcome(
@@ -229,14 +241,40 @@ def _check_search(workers: int | None, time_limit: float | None) -> None:
 
 
 @contextmanager
-def _executor(workers: int | None) -> Iterator[Executor | None]:
+def _deaf() -> Iterator[None]:
+    """Ctrl-C is ignored, also by processes that begin meanwhile."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _executor(workers: int | None, search: _InterruptibleSearch) -> Iterator[Executor | None]:
     """Processes that search side by side; None where one is enough."""
-    if workers is None or workers == 1:
+    if workers is None:
         yield None
         return
+    from ...optimal_control._solver_callback import keep_interrupts
+
     # A process that was forked beside threads of the solver may hang.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as processes:
-        yield processes
+    spawned = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=keep_interrupts) as processes:
+        # They begin deaf to Ctrl-C, until they can take note of it.
+        with _deaf():
+            processes.submit(int)
+        search.beside = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
+        try:
+            if search.stopped:
+                search.end_beside()
+            yield processes
+        finally:
+            search.end_beside()
+            processes.shutdown(cancel_futures=True)
 
 
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
@@ -293,14 +331,16 @@ class _InterruptibleSearch:
 
     Attributes
     ----------
-    reported : whether an iteration has been reported, so that there is something to keep
+    reported : whether there will be something to keep: an iteration has been reported, or others search
     stopped : whether Ctrl-C has been pressed since
+    beside : ids of the processes that search side by side
     """
 
-    def __init__(self, work: Steps, time_limit: float | None) -> None:
+    def __init__(self, work: Steps, time_limit: float | None, *, beside: bool = False) -> None:
         self._work = work
         self._end = math.inf if time_limit is None else time.monotonic() + time_limit
-        self.reported = self.stopped = False
+        self.reported, self.stopped = beside, False
+        self.beside: list[int] = []
 
     def report(self, now: Progress) -> bool:
         """Show the progress of the search; returns whether to stop it."""
@@ -313,18 +353,25 @@ class _InterruptibleSearch:
         self.reported = True
         return self.stopped
 
+    def end_beside(self) -> None:
+        """Ctrl-C for those that search side by side."""
+        for process in self.beside:
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGINT)
+
     def interrupted(self, *_: Any) -> None:
         """Ctrl-C: the search ends after this iteration; pressed again, at once."""
         if self.stopped or not self.reported:
             raise KeyboardInterrupt
         self.stopped = True
+        self.end_beside()
         self._work.say("stopping, to keep the best so far (Ctrl-C again gives it up)")
 
 
 @contextmanager
-def _stoppable(work: Steps, time_limit: float | None) -> Iterator[_InterruptibleSearch]:
+def _stoppable(work: Steps, time_limit: float | None, *, beside: bool) -> Iterator[_InterruptibleSearch]:
     """A search that Ctrl-C stops."""
-    search = _InterruptibleSearch(work, time_limit)
+    search = _InterruptibleSearch(work, time_limit, beside=beside)
     if threading.current_thread() is not threading.main_thread():
         # Python hands Ctrl-C to the main thread alone.
         yield search
@@ -334,6 +381,22 @@ def _stoppable(work: Steps, time_limit: float | None) -> Iterator[_Interruptible
         yield search
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+_ENDINGS = {
+    "found": "This is the cheapest plan that was found",
+    "not found": "No plan was found; this is the nearest that the search came",
+    "stopped": "The search was stopped; this is the best until then",
+    "out of time": "The search ended by its time limit; this is the best until then",
+}
+
+
+def _purpose(found: Plan) -> str:
+    """Sentences for a page."""
+    return (
+        f"{_ENDINGS[found.status]}: off the goal by {found.goal_error:.1e} rad, cost {found.cost:.6g} "
+        f"{found.cost_unit} ({found.cost_name})."
+    )
 
 
 def _comment(body: Body, found: Plan) -> str:
