@@ -83,14 +83,14 @@ def _coordinates(
 ) -> tuple[Integers, Array]:
     """Which coordinates a waypoint tells, and what they are."""
     if isinstance(waypoint.shape, Mapping):
-        told = {body.joint_index(joint): value for joint, value in waypoint.shape.items()}
+        named = {body.joint_index(joint): value for joint, value in waypoint.shape.items()}
     else:
         shape = np.asarray(waypoint.shape)
         if len(shape) != body.n_shape:
             raise ShapeError(f"{name}: one coordinate for each of the {body.n_shape} joints, got {len(shape)} numbers")
-        told = dict(enumerate(shape.tolist()))
+        named = dict(enumerate(shape.tolist()))
     known: dict[int, float] = {}
-    for joint, value in told.items():
+    for joint, value in named.items():
         if not bounds[joint, 0] - _TOLERANCE <= value <= bounds[joint, 1] + _TOLERANCE:
             raise TrajectoryError(
                 f"{name}: joint {body.joint_names[joint]} at {value:.6g} is beyond its limits "

@@ -34,15 +34,15 @@ def posture(body: Body, text: str, option: str, *, first: bool) -> Array:
 
 def _coordinates(text: str, option: str) -> dict[str, float]:
     """Of joints, from NAME=VALUE pairs with commas between them."""
-    told = {}
+    named = {}
     for pair in text.split(","):
         name, found, value = pair.partition("=")
         if not found:
             raise ShapeError(
                 f"{option}: NAME=VALUE pairs with commas between them, or a file, are needed, got {text!r}"
             )
-        told[name.strip()] = _value(value.strip(), option)
-    return told
+        named[name.strip()] = _value(value.strip(), option)
+    return named
 
 
 def waypoint(body: Body, text: str) -> Waypoint:
@@ -52,18 +52,18 @@ def waypoint(body: Body, text: str) -> Waypoint:
     """
     from ...optimal_control.waypoints import Waypoint
 
-    told, timed, at = text.rpartition("@")
-    told, at = (told, at) if timed else (text, "")
+    named, timed, at = text.rpartition("@")
+    named, at = (named, at) if timed else (text, "")
     time = _time(at) if timed else None
-    if "=" in told:
-        return Waypoint(_coordinates(told, "--via"), time)
+    if "=" in named:
+        return Waypoint(_coordinates(named, "--via"), time)
     if time is None:
         raise ShapeError(f"--via: NAME=VALUE pairs, or FILE@TIME, the time in s, are needed, got {text!r}")
     from ...shape_space.files.read import read_shape_path
 
-    path = read_shape_path(Path(told), body)
+    path = read_shape_path(Path(named), body)
     if not time <= path.duration:
-        raise ShapeError(f"--via: {told} ends at {path.duration:g} s, which is before {time:g} s")
+        raise ShapeError(f"--via: {named} ends at {path.duration:g} s, which is before {time:g} s")
     return Waypoint(path.shape(time), time)
 
 
