@@ -16,7 +16,7 @@ from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, Waypoint, plan_reorientation
 from shapephase.optimal_control._gauss import gauss_tableau
-from shapephase.optimal_control._polish import end_derivative, polish
+from shapephase.optimal_control._polish import end_derivative, goal_derivative, polish
 from shapephase.optimal_control._reduced import ReducedProgram
 from shapephase.optimal_control._spline_basis import SplineBasis
 from shapephase.optimal_control.collocation import CollocationProgram
@@ -199,6 +199,27 @@ def test_the_ends_derivative_is_the_difference_of_ends(name, rng):
     ends = {k: moved(k * step)[1].final_attitude for k in (-2, -1, 1, 2)}
     first, second = (so3.log(ends[k] @ ends[-k].T) / (2 * k * step) for k in (1, 2))
     assert_allclose(np.einsum("ask,sk->a", slopes, change), (4.0 * first - second) / 3.0, atol=1e-8)
+
+
+def test_the_goals_derivative_is_the_difference_of_where_a_link_points(rng):
+    """Where it points is the goal itself, as the derivative is seen across that direction."""
+    task, basis = task_of("link"), SplineBasis(7)
+    control, change = random_control(task, basis, rng), rng.normal(size=(8, task.dimension))
+
+    def moved(size):
+        path = basis.path(task.shapes(control + size * change), task.duration, task.body.joint_names)
+        return path, sp.reconstruct(sp.articulated(task.body, path), task.momentum, tolerance=1e-13)
+
+    def pointed(size):
+        path, motion = moved(size)
+        return motion.final_attitude @ task.body.link_pose(path.shape(task.duration), "rear")[:3, :3] @ [0.0, 0.6, 0.8]
+
+    here = pointed(0.0)
+    task = replace(task, pointing=np.array([[0.0, 0.6, 0.8], here]))
+    slopes = goal_derivative(task, basis, *moved(0.0), control)
+    first, second = ((pointed(k * 1e-3) - pointed(-k * 1e-3)) / (2e-3 * k) for k in (1, 2))
+    turning = np.cross(here, (4.0 * first - second) / 3.0)
+    assert_allclose(np.einsum("ask,sk->a", slopes, change), task.constrained_directions() @ turning, atol=1e-8)
 
 
 def test_the_reduced_forms_derivative_far_from_the_goal(rng):
