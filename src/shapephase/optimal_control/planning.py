@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import threading
 import time
@@ -25,14 +26,16 @@ from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, position_share, tightened, warn_of_unstated
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram, check_reducible
-from ._solver_callback import IterationCallback, heard_interrupts
+from ._solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
 from ._spline_basis import SplineBasis
+from ._via_rows import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
 from .guesses.strokes import guess_of_strokes
 from .plan import Plan, Progress, Start
-from .plan_options import Goal, Limits, Search
+from .plan_options import Goal, Limits, Search, goal_argument
 from .task import Reorientation, reorientation
+from .waypoints import Waypoint
 
 # Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
 _FEW_JOINTS = 4
@@ -76,6 +79,7 @@ def plan_reorientation(
     duration: float = 1.0,
     start: ArrayLike | None = None,
     end: Any = None,
+    via: Sequence[Waypoint] = (),
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
@@ -92,11 +96,14 @@ def plan_reorientation(
 
     Parameters
     ----------
-    goal : (3, 3) attitude at the end; or a `Goal`: an axis to be pointed, or somersaults and twists to be counted
+    goal : (3, 3) attitude at the end, or any of several (k, 3, 3); or a `Goal`: an axis to be pointed, of the base or
+        of a link, an attitude up to a symmetry of the body, or somersaults and twists to be counted
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]; 0: none
     duration : [s]; for cost "time" the longest allowed
     start : (n,) shape at the start [rad or m]; None: neutral, or as near as the limits permit
     end : (n,) shape at the end; None: as at the start, a closed loop; "free": any
+    via : what the path passes through on its way, in this order: a `Waypoint` is a shape, or the coordinates of some
+        joints, with a time or without
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
         joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
         other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
@@ -111,8 +118,9 @@ def plan_reorientation(
         file has them
     search : method, starts, resolution; None: `Search()`
     iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
-        there: with the cheapest plan of the starts that had ended, or else PlanNotFound with the best so far.
-        Ctrl-C is raised as KeyboardInterrupt, and nothing is kept
+        there, as it does when its time is over (`Search.time_limit`): with the cheapest plan of the starts that had
+        ended, or else PlanNotFound with the best so far. Ctrl-C is raised as KeyboardInterrupt, and
+        nothing is kept
     executor : of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes search
         from several starts (`Search.starts`) side by side; `iteration_callback` then hears of a start when it has
         ended. None: one start after the other, here. Plans do not depend on it
@@ -122,8 +130,8 @@ def plan_reorientation(
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, unknown names.
     PlanNotFound
-        If no start came to a local optimum that reaches the goal, or `iteration_callback` stopped the search; it
-        carries the best attempt.
+        If no start came to a local optimum that reaches the goal, or `iteration_callback` or its time limit stopped
+        the search before; it carries the best attempt.
 
     Warns
     -----
@@ -146,56 +154,84 @@ def plan_reorientation(
     check_object(body, "Body", "body")
     check_executor(executor)
     chosen = Search() if search is None else search
-    task = reorientation(
-        body,
-        goal,
-        momentum=momentum,
-        duration=duration,
-        start=start,
-        end=end,
-        cost=cost,
-        rates_at_ends=rates_at_ends,
-        joints=joints,
-        symmetric=symmetric,
-        limits=limits,
-    )
+    goals = goal_argument(goal).members
+    tasks = [
+        reorientation(
+            body,
+            member,
+            momentum=momentum,
+            duration=duration,
+            start=start,
+            end=end,
+            via=via,
+            cost=cost,
+            rates_at_ends=rates_at_ends,
+            joints=joints,
+            symmetric=symmetric,
+            limits=limits,
+        )
+        for member in goals
+    ]
     if chosen.method == "reduced":
-        check_reducible(task)
-    warn_of_unstated(task, Limits() if limits is None else limits)
+        check_reducible(tasks[0])
+    warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
+    reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
     attempts: list[_Attempt] = []
     with heard_interrupts():
-        basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
-        reporter = _ProgressReporter(iteration_callback)
-        starting_points, spare = _starting_points(task, basis, chosen, reporter)
+        first, spare = _jobs(tasks, chosen, reporter)
         searched = _searched_here if executor is None else partial(_searched_by, executor)
-        for attempt in searched(task, basis, chosen, starting_points, reporter):
+        for attempt in searched(first, chosen, reporter):
             attempts.append(attempt)
             if reporter.stopped:
                 break
         if not reporter.stopped and not any(attempt.report.converged for attempt in attempts):
-            further = chain(
-                _searched_here(task, basis, chosen, spare, reporter), _searched_by_strokes(task, chosen, reporter)
-            )
-            for attempt in further:
+            strokes = (_searched_by_strokes(task, chosen, reporter) for task in tasks)
+            for attempt in chain(_searched_here(spare, chosen, reporter), *strokes):
                 attempts.append(attempt)
                 if reporter.stopped or attempt.report.converged:
                     break
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
-    plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
+    plan = (
+        None
+        if best is None
+        else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, chosen.method, seconds, reporter.stopped)
+    )
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(_failure_message(task, attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(_failure_message(tasks[0], attempts, best, reporter.stopped), plan)
     return plan
 
 
-def _searched_here(
-    task: Reorientation, basis: SplineBasis, search: Search, guesses: Sequence[Guess], reporter: _ProgressReporter
-) -> Iterator[_Attempt]:
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A local search that is to be done."""
+
+    task: Reorientation
+    basis: SplineBasis
+    guess: Guess
+
+
+def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter) -> tuple[list[_Job], list[_Job]]:
+    """The local searches for each of several tasks, and those to go on with if none of them leads to a plan."""
+    first: list[_Job] = []
+    spare: list[_Job] = []
+    for task in tasks:
+        if first and reporter.stopped:
+            break
+        basis = SplineBasis(int(search.pieces or _default_pieces(task)))
+        for jobs, found in zip((first, spare), _starting_points(task, basis, search, reporter), strict=True):
+            jobs.extend(_Job(task, basis, guess) for guess in found)
+    return first, spare
+
+
+def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
     """The local searches, one after the other."""
-    local = _LocalSearch.of(task, basis, search)
-    for number, guess in enumerate(guesses):
-        yield local.attempt(guess, reporter.solver_callback("search", number + 1, len(guesses)))
+    local = None
+    for number, job in enumerate(jobs):
+        if local is None or local.task is not job.task:
+            local = _LocalSearch.of(job.task, job.basis, search)
+        yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
 
 
 def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
@@ -210,32 +246,32 @@ def _searched_by_strokes(task: Reorientation, search: Search, reporter: _Progres
 
 
 def _searched_by(
-    executor: Executor,
-    task: Reorientation,
-    basis: SplineBasis,
-    search: Search,
-    guesses: Sequence[Guess],
-    reporter: _ProgressReporter,
+    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter
 ) -> Iterator[_Attempt]:
-    """The local searches by an executor, in the order of the guesses."""
-    recipe = pickle.dumps((task, basis.pieces, search))
-    for number, attempt in enumerate(executor.map(partial(_searched_elsewhere, recipe), guesses)):
+    """The local searches by an executor, in their order."""
+    recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
+    found = executor.map(
+        partial(_searched_elsewhere, reporter.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
+    )
+    for number, (job, attempt) in enumerate(zip(jobs, found, strict=True)):
         end = attempt.report
-        reporter.solver_callback("search", number + 1, len(guesses))(end.iterations, end.cost, end.infeasibility)
-        yield attempt
+        report = reporter.solver_callback("search", number + 1, len(jobs))
+        report(end.iterations, end.cost, end.infeasibility, end.goal_error)
+        yield replace(attempt, task=job.task)
 
 
 # What a thread of an executor has made of the last recipe that came: a program takes as long as some starts.
 _KEPT = threading.local()
 
 
-def _searched_elsewhere(recipe: bytes, guess: Guess) -> _Attempt:
-    """One of them, in another process or thread."""
-    if getattr(_KEPT, "recipe", None) != recipe:
-        task, pieces, search = pickle.loads(recipe)
-        _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
-        _KEPT.recipe = recipe
-    return _KEPT.local.attempt(guess, lambda *_: False)
+def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> _Attempt:
+    """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
+    with stopping_interrupts() as stopped:
+        if getattr(_KEPT, "recipe", None) != recipe:
+            task, pieces, search = pickle.loads(recipe)
+            _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
+            _KEPT.recipe = recipe
+        return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
 
 
 def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
@@ -243,24 +279,29 @@ def _program(task: Reorientation, basis: SplineBasis, method: str) -> Collocatio
 
 
 class _ProgressReporter:
-    """Passes the progress of a search on to the user's callback.
+    """Passes the progress of a search on to the user's callback, and ends it in time.
 
     Attributes
     ----------
-    stopped : whether the callback has stopped the search
+    end : when the time is over [s since 1970]: a clock that other processes have, too
+    stopped : what has stopped the search, one of `PLAN_STATUS`; empty: nothing
     """
 
-    def __init__(self, callback: Callable[[Progress], Any] | None) -> None:
+    def __init__(self, callback: Callable[[Progress], Any] | None, time_limit: float | None) -> None:
         self._callback = callback
-        self.stopped = False
+        self.end = math.inf if time_limit is None else time.time() + time_limit
+        self.stopped = ""
 
     def solver_callback(self, stage: str, start: int, starts: int) -> IterationCallback:
         """The solver's callback during one start."""
 
-        def report(iteration: int, cost: float, infeasibility: float) -> bool:
-            if self._callback is not None and not self.stopped:
-                self.stopped = bool(self._callback(Progress(stage, start, starts, iteration, cost, infeasibility)))
-            return self.stopped
+        def report(iteration: int, cost: float, infeasibility: float, goal_error: float) -> bool:
+            now = Progress(stage, start, starts, iteration, cost, infeasibility, goal_error)
+            if not self.stopped and self._callback is not None and self._callback(now):
+                self.stopped = "stopped"
+            if not self.stopped and time.time() > self.end:
+                self.stopped = "out of time"
+            return bool(self.stopped)
 
         return report
 
@@ -271,6 +312,7 @@ class _Attempt:
 
     Attributes
     ----------
+    task : whose it is
     report : what the user sees of it
     polished : its path, corrected; None where that could not be reconstructed
     cost : of the corrected path; infinite where there is none
@@ -278,6 +320,7 @@ class _Attempt:
     basis : of its spline
     """
 
+    task: Reorientation
     report: Start
     polished: PolishedPath | None
     cost: float
@@ -325,6 +368,7 @@ def _starting_points(
             _guessed_attitudes(task, candidate),
             iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
             tolerance=_COARSE_TOLERANCE,
+            via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
         curve = coarse.matrix(PLACES) @ (solution.control if solution.converged else candidate.control)
@@ -339,7 +383,7 @@ def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], A
     """Attitudes at places of [0, 1] that a solver starts from: (N,) -> (N, 4)."""
     if task.windings is not None:
         return task.uniform_winding
-    turn = task.turn_to_goal(guess.motion.final_attitude)
+    turn = task.turn_to_goal(guess.motion.final_attitude, guess.control[-1])
     return lambda places: guess.quaternions(places, turn)
 
 
@@ -404,14 +448,16 @@ class _LocalSearch:
             status=solution.status,
             converged=solution.converged and reaches_goal,
             cost=solution.cost,
-            goal_error=task.goal_error(solution.attitude),
+            goal_error=task.goal_error(solution.attitude, solution.control[-1]),
             kkt_residual=solution.kkt_residual,
             infeasibility=solution.infeasibility,
             iterations=iterations,
             seconds=time.perf_counter() - began,
             second_order=solution.second_order,
         )
-        attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
+        attempt = _Attempt(
+            task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis
+        )
         return attempt, solution.control
 
     def _optimum(
@@ -427,7 +473,11 @@ class _LocalSearch:
         """
         task, room, iterations = self.task, None, 0
         control, duration, attitudes = guess.control, task.duration, _guessed_attitudes(task, guess)
-        options: dict[str, Any] = {"iterations": self.iterations, "iteration_callback": callback}
+        options: dict[str, Any] = {
+            "iterations": self.iterations,
+            "via_places": guess.via_places,
+            "iteration_callback": callback,
+        }
         options |= {"settles": True} if self.settles else {}
         rounds = 0
         while True:
@@ -440,7 +490,8 @@ class _LocalSearch:
             again = guess_of_control(task, basis, solution.control)
             if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
                 return solution, polished, iterations
-            room = options["room"] = tightened(room, shares, STAGES, rounds)
+            room = tightened(room, shares, STAGES, rounds)
+            options |= {"room": room, "via_places": solution.via_places}
             control, duration, attitudes = solution.control, solution.duration, _guessed_attitudes(task, again)
             rounds += 1
 
@@ -448,7 +499,7 @@ class _LocalSearch:
 def _polished(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
     """The path that the solver found, corrected to reach the goal; None where it has no motion."""
     try:
-        return polish(task, basis, solution.control, solution.duration)
+        return polish(task, basis, solution.control, solution.duration, solution.via_places)
     except ShapePhaseError:
         return None
 
@@ -469,25 +520,37 @@ def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> fl
 
 
 def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:
-    """Whether duration, rates and windings are within limits; the correction itself keeps the positions there."""
+    """Whether duration, rates, windings and waypoints are as asked for; the correction keeps positions in limits."""
     if task.windings is not None:
         times = np.linspace(0.0, polished.path.duration, _WINDING_SAMPLES * basis.pieces)
         counted = task.counted_windings(polished.motion.attitude(times))
         if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
             return False
+    rows, values = via_rows(task, basis, polished.via_places)
+    if np.abs(np.einsum("jkm,km->j", rows, polished.control) - values).max(initial=0.0) > GOAL_TOLERANCE:
+        return False
     slack = 1.0 + LIMIT_SLACK
     shares = limit_shares(task, basis, polished.control, polished.motion)
     return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
 
 
 def _plan(
-    task: Reorientation, best: _Attempt, attempts: Sequence[_Attempt], method: str, seconds: float
+    goals: Mapping[Reorientation, Goal],
+    best: _Attempt,
+    attempts: Sequence[_Attempt],
+    method: str,
+    seconds: float,
+    stopped: str,
 ) -> Plan | None:
     """The plan of the best attempt; None where it has no path."""
     if best.polished is None:
         return None
+    task = best.task
     return Plan(
         body=task.body,
+        goal=goals[task],
+        waypoint_times=best.polished.via_places * best.polished.duration,
+        status=stopped or ("found" if best.report.converged else "not found"),
         path=best.polished.path,
         motion=best.polished.motion,
         cost_name=task.cost,
@@ -509,7 +572,7 @@ def _plan(
     )
 
 
-def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: bool) -> str:
+def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: str) -> str:
     """Why no plan is returned, start by start, and what the best attempt reached."""
     name = task.body.name
     summary = "; ".join(
@@ -525,10 +588,11 @@ def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _A
         length = best.polished.path.duration
         outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
     if stopped:
-        return f"the search for a motion of the joints of {name} was stopped on request ({summary}); {outcome}"
+        how = "stopped on request" if stopped == "stopped" else "ended by its time limit"
+        return f"the search for a motion of the joints of {name} was {how} ({summary}); {outcome}"
     near: list[str] = []
     if best is not None and best.polished is not None:
-        shares = limit_shares(task, best.basis, best.polished.control, best.polished.motion)
+        shares = limit_shares(best.task, best.basis, best.polished.control, best.polished.motion)
         near = [name for name, share in shares.items() if share > _NEARLY]
     way_out = (
         f"joints are at their {' and '.join(near)} limits: give more than {task.duration:.6g} s (cost='time' finds the "

@@ -13,6 +13,7 @@ from ...errors import PlanNotFound, ShapePhaseError
 from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.connection import curvature, mechanical_connection
 from .._spline_basis import SplineBasis
+from .._via_rows import bent_through, nearest_places
 from ..symbolic import symbolic_body
 from ..task import Reorientation
 
@@ -53,12 +54,14 @@ class Guess:
     motion : its reconstruction, roughly
     goal_error : angle between its attitude at the end and the goal [rad]
     price : its cost in the metric of the start, more where it turns only part of the way; guesses are ranked by it
+    via_places : (v,) where it passes the waypoints, about
     """
 
     control: Array
     motion: Motion
     goal_error: float
     price: float
+    via_places: Array
 
     def quaternions(self, places: Array, turn: Array) -> Array:
         """Attitudes at places of [0, 1], the missing `turn` added steadily: (N,) -> (N, 4), continuous."""
@@ -156,10 +159,11 @@ def _straight(task: Reorientation) -> list[Array]:
     """The way that turns the body best to first order, for a free end; else straight to another end."""
     ramp = PLACES[:, None]
     if task.end is not None:
-        return [task.start + ramp * (task.end - task.start)] if np.any(task.end != task.start) else []
+        moves = np.any(task.end != task.start) or task.via
+        return [task.start + ramp * (task.end - task.start)] if moves else []
     connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.coupling
     metric = start_metric(task)
-    turning = task.constrained_directions() @ -connection
+    turning = task.constrained_directions() @ (task.pointed_turn(task.start) - connection)
     cheap = np.linalg.solve(metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric)), turning.T)
     missing = task.constrained_directions() @ task.turn_to_goal()
     direction = cheap @ np.linalg.lstsq(turning @ cheap, missing, rcond=_RANK)[0]
@@ -181,10 +185,14 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
     """A curve (101, m) over `PLACES`, taken within the limits and from start to end; None where it has no motion."""
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
-    return guess_of_control(task, basis, basis.fitted(np.clip(curve, task.lower, task.upper), PLACES))
+    at = nearest_places(task, curve, PLACES)
+    curve = bent_through(task, curve, PLACES, at)
+    return guess_of_control(task, basis, basis.fitted(np.clip(curve, task.lower, task.upper), PLACES), at)
 
 
-def guess_of_control(task: Reorientation, basis: SplineBasis, control: Array) -> Guess | None:
+def guess_of_control(
+    task: Reorientation, basis: SplineBasis, control: Array, via_places: Array | None = None
+) -> Guess | None:
     """The spline of control points, taken within the limits and at rest at its ends; None where it has no motion."""
     control, equal = control.copy(), task.equal_points
     control[:equal], control[-equal:] = control[0], control[-1]
@@ -197,12 +205,18 @@ def guess_of_control(task: Reorientation, basis: SplineBasis, control: Array) ->
         motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
     except ShapePhaseError:
         return None
-    goal_error = task.goal_error(motion.final_attitude)
+    goal_error = task.goal_error(motion.final_attitude, control[-1])
     steps = np.diff(basis.matrix(PLACES) @ control, axis=0)
     length = np.sum((steps @ start_metric(task)) * steps)
     whole = float(np.linalg.norm(task.turn_to_goal()))
     share = max(whole - goal_error, _LEAST_SHARE * whole) / whole if whole else 1.0
-    return Guess(control=control, motion=motion, goal_error=goal_error, price=float(length / share**2))
+    return Guess(
+        control=control,
+        motion=motion,
+        goal_error=goal_error,
+        price=float(length / share**2),
+        via_places=np.zeros(0) if via_places is None else via_places,
+    )
 
 
 def start_metric(task: Reorientation) -> Array:

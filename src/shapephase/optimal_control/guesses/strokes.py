@@ -103,7 +103,7 @@ def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) 
     """
     if task.momentum.any() or task.windings is not None or np.count_nonzero(task.movable) < 2:
         return None
-    if task.body.chain.follows.balls or (pieces is not None and pieces < _LEAST_PIECES):
+    if task.via or task.body.chain.follows.balls or (pieces is not None and pieces < _LEAST_PIECES):
         return None
     metric = _metric(task)
     strokes = [stroke.begun_near(task.start, metric) for stroke in best_strokes(task, metric, seed)]
