@@ -107,8 +107,9 @@ def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, mot
         spatial = _transported(generator, basis, duration) @ spatial
     by_shape = (spatial @ gradient @ task.coupling) * (weights * duration)[:, None, None]
     by_rate = (spatial @ matrix @ task.coupling) * weights[:, None, None]
-    values, slopes = basis.matrix(places), basis.matrix(places, 1)
-    return np.einsum("nak,ns->ask", by_shape, values) + np.einsum("nak,ns->ask", by_rate, slopes)
+    values, slopes = basis.sparse_matrix(places), basis.sparse_matrix(places, 1)
+    felt = values.T @ by_shape.reshape(len(places), -1) + slopes.T @ by_rate.reshape(len(places), -1)
+    return np.swapaxes(felt.reshape(basis.dimension, 3, -1), 0, 1)
 
 
 def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> PolishedPath:
@@ -162,22 +163,22 @@ def _corrected(
     task: Reorientation, basis: SplineBasis, control: Array, duration: float, slopes: Array, turn: Array
 ) -> tuple[Array, float]:
     """The least change of the control points that turns the end by `turn`, within the limits."""
-    free = _free(task, basis, control).ravel()
-    places, weights = panel_nodes(basis)
-    rates = basis.matrix(places, 1)
-    gram = (rates * weights[:, None]).T @ rates + np.eye(basis.dimension)
-    inverse = np.kron(np.linalg.inv(gram), np.eye(task.dimension))
+    roots = _roots(basis, _free(task, basis, control))
     conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
     rows, right = np.concatenate([slopes, conditions]), np.concatenate([turn, np.zeros(len(conditions))])
-    # The least change in the metric's norm: with C C^T its inverse, the shortest x of rows C x = right.
-    root = np.linalg.cholesky(inverse[np.ix_(free, free)])
     held = _Held.at_limits(task, basis, control, duration)
     moved = control
     for _ in range(_ROUNDS):
         every, all_right = np.concatenate([rows, held.rows(basis)]), np.concatenate([right, held.changes])
-        change = np.zeros(control.size)
-        change[free] = root @ np.linalg.lstsq(every[:, free] @ root, all_right, rcond=_RANK)[0]
-        moved = np.clip(control + change.reshape(control.shape), task.lower, task.upper)
+        every = every.reshape(-1, *control.shape)
+        # With C C^T the inverse of the norm, the least change is C times the shortest x of rows C x = right.
+        seen = [every[:, points, place] @ root for place, (points, root) in enumerate(roots)]
+        shortest = np.linalg.lstsq(np.concatenate(seen, axis=1), all_right, rcond=_RANK)[0]
+        change, last = np.zeros_like(control), 0
+        for place, (points, root) in enumerate(roots):
+            change[points, place] = root @ shortest[last : last + len(root)]
+            last += len(root)
+        moved = np.clip(control + change, task.lower, task.upper)
         further = held.and_those_beyond(task, basis, control, moved, duration)
         if further is held:
             break
@@ -185,6 +186,19 @@ def _corrected(
     if task.cost == "time":
         duration = float(np.max(np.abs(basis.rate_control @ moved) / task.rate_limit))
     return moved, duration
+
+
+def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
+    """Of each coordinate its free points, and C with C C^T the inverse of the norm of their changes, at those points.
+
+    Coordinates with the same free points share it.
+    """
+    inverse = basis.inverse_norm
+    roots: dict[bytes, Array] = {}
+    for points in free.T:
+        if points.tobytes() not in roots:
+            roots[points.tobytes()] = np.linalg.cholesky(inverse[np.ix_(points, points)])
+    return [(points, roots[points.tobytes()]) for points in free.T]
 
 
 @dataclass(frozen=True, eq=False)

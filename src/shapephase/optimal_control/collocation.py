@@ -109,7 +109,7 @@ class CollocationProgram:
         shares = casadi.DM(step * np.tile(weights, basis.pieces))
         # All rows but those of the goal are linear in the unknowns, apart from the turning.
         linear, from_turning, low, high = self._linear_rows(step, weights, integrals)
-        final = _final_conditions(task, unknown[-4:])
+        final = final_conditions(task, unknown[-4:])
         rows = casadi.vertcat(linear @ unknown - from_turning @ casadi.vec(turning), final)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(linear - from_turning @ (slopes @ seen), casadi.jacobian(final, unknown))
@@ -327,7 +327,7 @@ class CollocationProgram:
         return bounds[0], bounds[1]
 
 
-def _final_conditions(task: Reorientation, last: Any) -> Any:
+def final_conditions(task: Reorientation, last: Any) -> Any:
     """Three rows of the last quaternion: zero at the target; for an axis the third is the cosine, not below zero."""
     import casadi
 

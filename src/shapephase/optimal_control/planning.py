@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -26,9 +25,10 @@ from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
 from ._solver_callback import IterationCallback, heard_interrupts
 from ._spline_basis import SplineBasis
-from .collocation import GOOD_STATUS, CollocationProgram
-from .guesses.loops import PLACES, Guess, guess_of, guesses
-from .guesses.strokes import guess_of_strokes
+from .collocation import GOOD_STATUS, CollocationProgram, NlpSolution
+from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
+from .guesses.stroke_program import COSTS_OF_STROKES, StrokeProgram
+from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search
 from .task import Reorientation, reorientation
@@ -162,28 +162,42 @@ def plan_reorientation(
     began = time.perf_counter()
     attempts: list[_Attempt] = []
     with heard_interrupts():
-        basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
         reporter = _ProgressReporter(iteration_callback)
-        starting_points, spare = _starting_points(task, basis, chosen, reporter)
-        searched = _searched_here if executor is None else partial(_searched_by, executor)
-        for attempt in searched(task, basis, chosen, starting_points, reporter):
-            attempts.append(attempt)
-            if reporter.stopped:
-                break
-        if not reporter.stopped and not any(attempt.report.converged for attempt in attempts):
-            further = chain(
-                _searched_here(task, basis, chosen, spare, reporter), _searched_by_strokes(task, chosen, reporter)
-            )
-            for attempt in further:
+        by_loops = partial(_searched_by_loops, task, chosen, reporter, executor)
+        by_strokes = partial(_searched_by_strokes, task, chosen, reporter)
+        # Where a loop cannot turn the body far enough, there is no need to try any.
+        far = float(np.linalg.norm(task.turn_to_goal())) > most_of_a_loop(task)
+        for searched in (by_strokes, by_loops) if far else (by_loops, by_strokes):
+            for attempt in searched():
                 attempts.append(attempt)
-                if reporter.stopped or attempt.report.converged:
+                if reporter.stopped:
                     break
+            if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+                break
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
     if best is None or plan is None or not best.report.converged:
         raise PlanNotFound(_failure_message(task, attempts, best, reporter.stopped), plan)
     return plan
+
+
+def _searched_by_loops(
+    task: Reorientation, search: Search, reporter: _ProgressReporter, executor: Executor | None
+) -> Iterator[_Attempt]:
+    """From loops, and from some more where none of those asked for leads to a plan."""
+    basis = SplineBasis(int(search.pieces or _default_pieces(task)))
+    starting_points, spare = _starting_points(task, basis, search, reporter)
+    searched = _searched_here if executor is None else partial(_searched_by, executor)
+    found = False
+    for attempt in searched(task, basis, search, starting_points, reporter):
+        found = found or attempt.report.converged
+        yield attempt
+    if not found:
+        for attempt in _searched_here(task, basis, search, spare, reporter):
+            yield attempt
+            if attempt.report.converged:
+                break
 
 
 def _searched_here(
@@ -196,14 +210,24 @@ def _searched_here(
 
 
 def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
-    """From a motion of many strokes, for few joints."""
+    """Motions of many strokes, for few joints: equal ones, and from there any."""
     if task.dimension > _MANY_JOINTS or search.method != "collocation":
         return
     stroked = guess_of_strokes(task, search.seed, search.pieces)
-    if stroked is not None:
-        basis, guess = stroked
-        local = _LocalSearch.of(task, basis, replace(search, pieces=basis.pieces), settles=basis.pieces > _PIECES)
-        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
+    if stroked is None:
+        return
+    (layout, control), callback = stroked, reporter.solver_callback("search", 1, 1)
+    if task.cost in COSTS_OF_STROKES:
+        began = time.perf_counter()
+        solution = StrokeProgram(task, layout).solve_strokes(control, callback)
+        equal = _judged(task, layout.basis, solution, began)
+        yield equal
+        if equal.report.converged or reporter.stopped:
+            return
+    guess = guess_of_control(task, layout.basis, control)
+    if guess is not None:
+        few = replace(search, pieces=layout.basis.pieces)
+        yield _LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
 
 
 def _searched_by(
@@ -414,28 +438,32 @@ class _LocalSearch:
             iteration_callback=callback,
             **settling,
         )
-        try:
-            polished = polish(task, basis, solution.control, solution.duration)
-            cost = _cost(task, basis, polished)
-        except ShapePhaseError:
-            # The path cannot be reconstructed: the attempt is ranked last, and only the solver's numbers describe it.
-            polished, cost = None, np.inf
-        reaches_goal = (
-            polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-        )
-        report = Start(
-            status=solution.status,
-            converged=solution.converged and reaches_goal,
-            cost=solution.cost,
-            goal_error=task.goal_error(solution.attitude),
-            kkt_residual=solution.kkt_residual,
-            infeasibility=solution.infeasibility,
-            iterations=solution.iterations,
-            seconds=time.perf_counter() - began,
-            second_order=solution.second_order,
-        )
-        attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
-        return attempt, solution.control
+        return _judged(task, basis, solution, began), solution.control
+
+
+def _judged(task: Reorientation, basis: SplineBasis, solution: NlpSolution, began: float) -> _Attempt:
+    """What a solver's path, searched for since some time, comes to when it is corrected."""
+    try:
+        polished = polish(task, basis, solution.control, solution.duration)
+        cost = _cost(task, basis, polished)
+    except ShapePhaseError:
+        # The path cannot be reconstructed: the attempt is ranked last, and only the solver's numbers describe it.
+        polished, cost = None, np.inf
+    reaches_goal = (
+        polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
+    )
+    report = Start(
+        status=solution.status,
+        converged=solution.converged and reaches_goal,
+        cost=solution.cost,
+        goal_error=task.goal_error(solution.attitude),
+        kkt_residual=solution.kkt_residual,
+        infeasibility=solution.infeasibility,
+        iterations=solution.iterations,
+        seconds=time.perf_counter() - began,
+        second_order=solution.second_order,
+    )
+    return _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
 
 
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
