@@ -52,21 +52,29 @@ _LIMIT_SLACK = 1e-7
 _WINDING_TOLERANCE = 0.1
 # Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
 _WINDING_SAMPLES = 50
-# Pieces of the coarse search that ranks the guesses: enough for a loop to bend, a fraction of the cost of the fine one.
+# Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
 _COARSE_PIECES = 10
+_COARSE_PIECES_OF_MORE = 20
 # Of a rate limit: what counts as being at it, where no plan was found.
 _NEARLY = 0.9
 # Joints that a warning names.
 _MOST_NAMED = 8
-# The fewest guesses that it ranks, so that a single start is the best of several.
-_COARSE_GUESSES = 8
+# Guesses that it ranks for each start, and at most unless there are more starts; for few joints, where they are cheap,
+# not fewer than eight.
+_RANKED = 4
+_MOST_RANKED = 16
+_LEAST_OF_FEW = 8
+# Joints up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`.
+_RANKED_JOINTS = 12
 # Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
 # rounding decides whether a search comes to it.
 _SPARE = 2
-# The most iterations for each: a guess that needs more is not a good start.
-_COARSE_ITERATIONS = 60
+# The most iterations for each: those that have not ended by then are near enough to be ranked.
+_COARSE_ITERATIONS = 40
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
-_COARSE_TOLERANCE = 1e-5
+_COARSE_TOLERANCE = 1e-4
+# Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
+_COARSE_INFEASIBILITY = 1e-2
 
 
 def plan_reorientation(
@@ -342,13 +350,15 @@ def _starting_points(
 ) -> tuple[list[Guess], list[Guess]]:
     """The guesses to start from, and those to go on with if none of them leads to a plan.
 
-    For few joints each is first improved on a coarse spline, and the cheapest are taken.
+    Unless there are many joints, each is first improved on a coarse spline, and the cheapest are taken.
     """
     count = int(search.starts)
-    if task.dimension > _MANY_JOINTS:
+    if task.dimension > (_RANKED_JOINTS if count > 1 else _MANY_JOINTS):
         return guesses(task, basis, search.seed, count), []
-    coarse = SplineBasis(_COARSE_PIECES)
-    candidates = guesses(task, coarse, search.seed, max(count, _COARSE_GUESSES))
+    few = task.dimension <= _FEW_JOINTS
+    coarse = SplineBasis(_COARSE_PIECES if few else _COARSE_PIECES_OF_MORE)
+    ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
+    candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
     found: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
@@ -362,12 +372,12 @@ def _starting_points(
             tolerance=_COARSE_TOLERANCE,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
-        curve = coarse.matrix(PLACES) @ (solution.control if solution.converged else candidate.control)
-        guess = guess_of(task, basis, curve)
+        near = solution.infeasibility < _COARSE_INFEASIBILITY
+        guess = guess_of(task, basis, coarse.matrix(PLACES) @ (solution.control if near else candidate.control))
         if guess is not None:
-            found.append((solution.cost if solution.converged else np.inf, number, guess))
-    ranked = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
-    return ranked[:count], ranked[count : count + _SPARE]
+            found.append((solution.cost if near else np.inf, number, guess))
+    order = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
+    return order[:count], order[count : count + _SPARE]
 
 
 def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
