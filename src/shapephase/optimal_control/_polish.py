@@ -197,7 +197,7 @@ def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
     roots: dict[bytes, Array] = {}
     for points in free.T:
         if points.tobytes() not in roots:
-            roots[points.tobytes()] = np.linalg.cholesky(inverse[np.ix_(points, points)])
+            roots[points.tobytes()] = np.asarray(np.linalg.cholesky(inverse[np.ix_(points, points)]), np.float64)
     return [(points, roots[points.tobytes()]) for points in free.T]
 
 
