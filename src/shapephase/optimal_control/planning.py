@@ -228,7 +228,7 @@ def _searched_by_strokes(task: Reorientation, search: Search, reporter: _Progres
     if task.cost in COSTS_OF_STROKES:
         began = time.perf_counter()
         solution = StrokeProgram(task, layout).solve_strokes(control, callback)
-        equal = _judged(task, layout.basis, solution, began)
+        equal = _corrected_attempt(task, layout.basis, solution, began)
         yield equal
         if equal.report.converged or reporter.stopped:
             return
@@ -448,10 +448,10 @@ class _LocalSearch:
             iteration_callback=callback,
             **settling,
         )
-        return _judged(task, basis, solution, began), solution.control
+        return _corrected_attempt(task, basis, solution, began), solution.control
 
 
-def _judged(task: Reorientation, basis: SplineBasis, solution: NlpSolution, began: float) -> _Attempt:
+def _corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolution, began: float) -> _Attempt:
     """What a solver's path, searched for since some time, comes to when it is corrected."""
     try:
         polished = polish(task, basis, solution.control, solution.duration)
