@@ -66,6 +66,8 @@ _MOST_RANKED = 16
 _LEAST_OF_FEW = 8
 # Joints up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`.
 _RANKED_JOINTS = 12
+# How often a loop that starts as a circle may go round: it bends into some rounds more than it starts with.
+_ROUNDS_OF_LOOPS = 4
 # Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
 # rounding decides whether a search comes to it.
 _SPARE = 2
@@ -174,7 +176,7 @@ def plan_reorientation(
         by_loops = partial(_searched_by_loops, task, chosen, reporter, executor)
         by_strokes = partial(_searched_by_strokes, task, chosen, reporter)
         # Where a loop cannot turn the body far enough, there is no need to try any.
-        far = float(np.linalg.norm(task.turn_to_goal())) > most_of_a_loop(task)
+        far = float(np.linalg.norm(task.turn_to_goal())) > _ROUNDS_OF_LOOPS * most_of_a_loop(task)
         for searched in (by_strokes, by_loops) if far else (by_loops, by_strokes):
             for attempt in searched():
                 attempts.append(attempt)
