@@ -27,9 +27,8 @@ def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, 
 
     Source: theory.md B6; Pontryagin's principle.
     """
-    bent = np.isfinite([task.acceleration_limit, task.jerk_limit]).any() or task.efforts_limited
     timed = any(point.place is not None for point in task.via)
-    if task.cost not in ("kinetic", "rate") or task.momentum.any() or bent or timed:
+    if task.cost not in ("kinetic", "rate") or task.momentum.any() or task.limits_beyond_rates or timed:
         return None
     places, _ = panel_nodes(basis)
     coordinates = basis.matrix(places) @ control

@@ -120,7 +120,7 @@ class CollocationProgram:
         shares = casadi.DM(panels)
         # All rows but those of the goal are linear in the unknowns, apart from the turning.
         linear, from_turning, low, high = self._linear_rows(step, weights, integrals)
-        end = _final_conditions(
+        end = final_conditions(
             task, unknown[duration_place - task.dimension : duration_place], unknown[core - 4 : core]
         )
         via, via_low, via_high = symbolic_via_rows(task, basis, unknown[:duration_place], unknown[self._open])
@@ -364,7 +364,7 @@ class CollocationProgram:
         return bounds[0], bounds[1]
 
 
-def _final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> Any:
+def final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> Any:
     """Three rows of the last coordinates and quaternion: zero at the target; of an axis the third is the cosine."""
     import casadi
 

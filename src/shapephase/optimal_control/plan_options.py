@@ -204,13 +204,14 @@ class Search:
         (not for the costs "time" and "effort", nor with limits of efforts). On equal splines both come to the same
         costs within 1.5 %, of the cat in 14 and 11 s; the first leaves a KKT residual of 1e-9, the second of some 1e-6,
         and for the astronaut it may need more than 300 iterations: so the first is the default
-    starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. Where none leads
-        to a plan of a body with up to eight free joints, two further guesses are tried, and then a motion of many
-        strokes
+    starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. For up to eight
+        free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
+        coarse search. Where none leads to a plan of up to eight, two further guesses are tried, and then a motion of
+        many equal strokes; at once where two joints cannot turn the body so far in four rounds
     seed : of the random guesses; the same seed gives the same plan
     pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
         else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the
-        goal; six for each of many strokes
+        goal; of many strokes as many as they need, six or more for each, but no more than these
     iterations : the most that the solver may take for each start
     time_limit : the longest that the search may take [s], looked at after each iteration; None: as long as it takes
 

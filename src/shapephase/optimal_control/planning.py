@@ -31,7 +31,8 @@ from ._spline_basis import SplineBasis
 from ._via_rows import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
-from .guesses.strokes import guess_of_strokes
+from .guesses.stroke_program import StrokeProgram, strokes_suffice
+from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search, goal_argument
 from .task import Reorientation, reorientation
@@ -56,19 +57,29 @@ _TIGHTENINGS = 6
 _WINDING_TOLERANCE = 0.1
 # Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
 _WINDING_SAMPLES = 50
-# Pieces of the coarse search that ranks the guesses: enough for a loop to bend, a fraction of the cost of the fine one.
+# Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
 _COARSE_PIECES = 10
+_COARSE_PIECES_OF_MORE = 20
 # Of a rate limit: what counts as being at it, where no plan was found.
 _NEARLY = 0.9
-# The fewest guesses that it ranks, so that a single start is the best of several.
-_COARSE_GUESSES = 8
+# Guesses that it ranks for each start, and at most unless there are more starts; for few joints, where they are cheap,
+# not fewer than eight.
+_RANKED = 4
+_MOST_RANKED = 16
+_LEAST_OF_FEW = 8
+# Joints up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`.
+_RANKED_JOINTS = 12
+# How often a loop that starts as a circle may go round: it bends into some rounds more than it starts with.
+_ROUNDS_OF_LOOPS = 4
 # Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
 # rounding decides whether a search comes to it.
 _SPARE = 2
-# The most iterations for each: a guess that needs more is not a good start.
-_COARSE_ITERATIONS = 60
+# The most iterations for each: those that have not ended by then are near enough to be ranked.
+_COARSE_ITERATIONS = 40
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
-_COARSE_TOLERANCE = 1e-5
+_COARSE_TOLERANCE = 1e-4
+# Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
+_COARSE_INFEASIBILITY = 1e-2
 
 
 def plan_reorientation(
@@ -179,18 +190,13 @@ def plan_reorientation(
     reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
     attempts: list[_Attempt] = []
     with heard_interrupts():
-        first, spare = _jobs(tasks, chosen, reporter)
-        searched = _searched_here if executor is None else partial(_searched_by, executor)
-        for attempt in searched(first, chosen, reporter):
-            attempts.append(attempt)
-            if reporter.stopped:
-                break
-        if not reporter.stopped and not any(attempt.report.converged for attempt in attempts):
-            strokes = (_searched_by_strokes(task, chosen, reporter) for task in tasks)
-            for attempt in chain(_searched_here(spare, chosen, reporter), *strokes):
+        for searched in _searches(tasks, chosen, reporter, executor):
+            for attempt in searched:
                 attempts.append(attempt)
-                if reporter.stopped or attempt.report.converged:
+                if reporter.stopped:
                     break
+            if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+                break
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
     plan = (
@@ -210,6 +216,38 @@ class _Job:
     task: Reorientation
     basis: SplineBasis
     guess: Guess
+
+
+def _searches(
+    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+) -> Iterator[Iterator[_Attempt]]:
+    """What is tried until something leads to a plan: loops first, unless none can turn the body so far."""
+    near, far = [], []
+    for task in tasks:
+        beyond = float(np.linalg.norm(task.turn_to_goal())) > _ROUNDS_OF_LOOPS * most_of_a_loop(task)
+        (far if beyond else near).append(task)
+    if near:
+        yield _searched_by_loops(near, search, reporter, executor)
+    yield chain.from_iterable(_searched_by_strokes(task, search, reporter) for task in tasks)
+    if far:
+        yield _searched_by_loops(far, search, reporter, executor)
+
+
+def _searched_by_loops(
+    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+) -> Iterator[_Attempt]:
+    """From loops, and from some more where none of those asked for leads to a plan."""
+    first, spare = _jobs(tasks, search, reporter)
+    searched = _searched_here if executor is None else partial(_searched_by, executor)
+    found = False
+    for attempt in searched(first, search, reporter):
+        found = found or attempt.report.converged
+        yield attempt
+    if not found:
+        for attempt in _searched_here(spare, search, reporter):
+            yield attempt
+            if attempt.report.converged:
+                break
 
 
 def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter) -> tuple[list[_Job], list[_Job]]:
@@ -235,14 +273,24 @@ def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressRepo
 
 
 def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
-    """From a motion of many strokes, for few joints."""
+    """Motions of many strokes, for few joints: equal ones, and from there any."""
     if task.dimension > _MANY_JOINTS or search.method != "collocation":
         return
     stroked = guess_of_strokes(task, search.seed, search.pieces)
-    if stroked is not None:
-        basis, guess = stroked
-        local = _LocalSearch.of(task, basis, replace(search, pieces=basis.pieces), settles=basis.pieces > _PIECES)
-        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
+    if stroked is None:
+        return
+    (layout, control), callback = stroked, reporter.solver_callback("search", 1, 1)
+    if strokes_suffice(task):
+        began = time.perf_counter()
+        solution = StrokeProgram(task, layout).solve_strokes(control, callback)
+        equal = _corrected_attempt(task, layout.basis, solution, _polished(task, layout.basis, solution), began)
+        yield equal
+        if equal.report.converged or reporter.stopped:
+            return
+    guess = guess_of_control(task, layout.basis, control)
+    if guess is not None:
+        few = replace(search, pieces=layout.basis.pieces)
+        yield _LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
 
 
 def _searched_by(
@@ -350,13 +398,15 @@ def _starting_points(
 ) -> tuple[list[Guess], list[Guess]]:
     """The guesses to start from, and those to go on with if none of them leads to a plan.
 
-    For few joints each is first improved on a coarse spline, and the cheapest are taken.
+    Unless there are many joints, each is first improved on a coarse spline, and the cheapest are taken.
     """
     count = int(search.starts)
-    if task.dimension > _MANY_JOINTS:
+    if task.dimension > (_RANKED_JOINTS if count > 1 else _MANY_JOINTS):
         return guesses(task, basis, search.seed, count), []
-    coarse = SplineBasis(_COARSE_PIECES)
-    candidates = guesses(task, coarse, search.seed, max(count, _COARSE_GUESSES))
+    few = task.dimension <= _FEW_JOINTS
+    coarse = SplineBasis(_COARSE_PIECES if few else _COARSE_PIECES_OF_MORE)
+    ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
+    candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
     found: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
@@ -371,12 +421,12 @@ def _starting_points(
             via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
-        curve = coarse.matrix(PLACES) @ (solution.control if solution.converged else candidate.control)
-        guess = guess_of(task, basis, curve)
+        near = solution.infeasibility < _COARSE_INFEASIBILITY
+        guess = guess_of(task, basis, coarse.matrix(PLACES) @ (solution.control if near else candidate.control))
         if guess is not None:
-            found.append((solution.cost if solution.converged else np.inf, number, guess))
-    ranked = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
-    return ranked[:count], ranked[count : count + _SPARE]
+            found.append((solution.cost if near else np.inf, number, guess))
+    order = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
+    return order[:count], order[count : count + _SPARE]
 
 
 def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
@@ -438,27 +488,8 @@ class _LocalSearch:
     ) -> tuple[_Attempt, Array]:
         """The attempt on some basis, and the control points that the solver found."""
         task, began = self.task, time.perf_counter()
-        solution, polished, iterations = self._optimum(basis, program, guess, callback)
-        # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
-        cost = np.inf if polished is None else _cost(task, basis, polished)
-        reaches_goal = (
-            polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-        )
-        report = Start(
-            status=solution.status,
-            converged=solution.converged and reaches_goal,
-            cost=solution.cost,
-            goal_error=task.goal_error(solution.attitude, solution.control[-1]),
-            kkt_residual=solution.kkt_residual,
-            infeasibility=solution.infeasibility,
-            iterations=iterations,
-            seconds=time.perf_counter() - began,
-            second_order=solution.second_order,
-        )
-        attempt = _Attempt(
-            task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis
-        )
-        return attempt, solution.control
+        solution, polished = self._optimum(basis, program, guess, callback)
+        return _corrected_attempt(task, basis, solution, polished, began), solution.control
 
     def _optimum(
         self,
@@ -466,8 +497,8 @@ class _LocalSearch:
         program: CollocationProgram | ReducedProgram,
         guess: Guess,
         callback: IterationCallback,
-    ) -> tuple[NlpSolution, PolishedPath | None, int]:
-        """What the solver found, its path corrected, and the iterations.
+    ) -> tuple[NlpSolution, PolishedPath | None]:
+        """What the solver found, with the iterations of all its rounds, and its path corrected.
 
         Where efforts are beyond their limits between the nodes, they are given less room there, and it goes on.
         """
@@ -483,17 +514,41 @@ class _LocalSearch:
         while True:
             solution = program.solve(control, duration, attitudes, **options)
             iterations += solution.iterations
+            solution = replace(solution, iterations=iterations)
             polished = _polished(task, basis, solution)
             if not task.efforts_limited or polished is None or not solution.converged or rounds == _TIGHTENINGS:
-                return solution, polished, iterations
+                return solution, polished
             shares = effort_shares(task, basis, polished.motion)
             again = guess_of_control(task, basis, solution.control)
             if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
-                return solution, polished, iterations
+                return solution, polished
             room = tightened(room, shares, STAGES, rounds)
             options |= {"room": room, "via_places": solution.via_places}
             control, duration, attitudes = solution.control, solution.duration, _guessed_attitudes(task, again)
             rounds += 1
+
+
+def _corrected_attempt(
+    task: Reorientation, basis: SplineBasis, solution: NlpSolution, polished: PolishedPath | None, began: float
+) -> _Attempt:
+    """What a solver's path, searched for since some time, comes to when it is corrected."""
+    # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
+    cost = np.inf if polished is None else _cost(task, basis, polished)
+    reaches_goal = (
+        polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
+    )
+    report = Start(
+        status=solution.status,
+        converged=solution.converged and reaches_goal,
+        cost=solution.cost,
+        goal_error=task.goal_error(solution.attitude, solution.control[-1]),
+        kkt_residual=solution.kkt_residual,
+        infeasibility=solution.infeasibility,
+        iterations=solution.iterations,
+        seconds=time.perf_counter() - began,
+        second_order=solution.second_order,
+    )
+    return _Attempt(task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
 
 
 def _polished(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:

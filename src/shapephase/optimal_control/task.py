@@ -103,6 +103,11 @@ class Reorientation:
         return 3 if self.cost == "acceleration" or np.isfinite(self.jerk_limit).any() else 2
 
     @property
+    def limits_beyond_rates(self) -> bool:
+        """Whether accelerations, jerks or efforts have limits."""
+        return self.efforts_limited or bool(np.isfinite([self.acceleration_limit, self.jerk_limit]).any())
+
+    @property
     def movable(self) -> Mask:
         """(m,) which coordinates can leave their start."""
         return self.upper > self.lower

@@ -78,8 +78,8 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     The curvature F of the mechanical connection along the axis of the turn, in the kinetic metric, is an antisymmetric
     form; its largest singular value sigma belongs to the plane of shapes in which a small loop turns the body most for
     its length: a circle of radius rho turns it by pi rho^2 sigma. Circles of several sizes, in several directions from
-    the start, once or twice round, are tried by the integrator; those that come near the goal at little cost come
-    first.
+    the start, once or twice round, are tried by the integrator; of each direction and number of rounds the size is
+    taken that comes near the goal at the least cost, and the cheapest come first.
 
     Raises
     ------
@@ -90,12 +90,16 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     -----
     Source: Montgomery 1990, isoholonomic problem; theory.md B6.
     """
-    curves = [*_circles(task), *_straight(task)]
+    families = [*_circles(task), *([curve] for curve in _straight(task))]
     rng = np.random.default_rng(seed)
-    tried = [guess for curve in curves if (guess := guess_of(task, basis, curve)) is not None]
+    tried: list[Guess] = []
+    for family in families:
+        of_family = [guess for curve in family if (guess := guess_of(task, basis, curve)) is not None]
+        if of_family:
+            tried.append(min(of_family, key=lambda guess: guess.price))
     tried.sort(key=lambda guess: guess.price)
-    # Every third start is random: circles are all alike where the optimum is not.
-    found = _different(tried)[: count - count // 3]
+    # Every second start is random: circles are all alike where the optimum is not.
+    found = _different(tried)[: count - count // 2]
     for _ in range(_ATTEMPTS * count):
         if len(found) == count:
             break
@@ -109,9 +113,9 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     return found
 
 
-def _circles(task: Reorientation) -> list[Array]:
-    """Loops (N, m) over `PLACES` through the start."""
-    loops = []
+def _circles(task: Reorientation) -> list[list[Array]]:
+    """Loops (N, m) over `PLACES` through the start; in each list those that differ by their radius only."""
+    families = []
     turn = task.turn_to_goal()
     angle = float(np.linalg.norm(turn))
     if angle == 0.0 or np.count_nonzero(task.movable) < 2:
@@ -125,14 +129,14 @@ def _circles(task: Reorientation) -> list[Array]:
             continue
         first, second, sigma = plane
         for rounds in _ROUNDS:
-            for factor in _RADIUS_FACTORS:
-                radius = factor * np.sqrt(angle / (np.pi * sigma * rounds))
-                phase = 2.0 * np.pi * rounds * PLACES
-                for lean in 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS:
-                    across = np.cos(phase + lean) - np.cos(lean)
-                    along = np.sin(phase + lean) - np.sin(lean)
-                    loops.append(task.start + radius * (across[:, None] * first + along[:, None] * second))
-    return loops
+            radii = np.array(_RADIUS_FACTORS) * np.sqrt(angle / (np.pi * sigma * rounds))
+            phase = 2.0 * np.pi * rounds * PLACES
+            for lean in 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS:
+                across = np.cos(phase + lean) - np.cos(lean)
+                along = np.sin(phase + lean) - np.sin(lean)
+                circle = across[:, None] * first + along[:, None] * second
+                families.append([task.start + radius * circle for radius in radii])
+    return families
 
 
 def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
