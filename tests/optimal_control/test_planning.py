@@ -35,7 +35,7 @@ from shapephase.optimal_control import (
     symbolic_body,
     wong_residual,
 )
-from shapephase.optimal_control.planning import _within_limits
+from shapephase.optimal_control._local_search import _within_limits
 from shapephase.optimal_control.task import reorientation
 from support.bodies import joint, link, urdf
 from support.independent import apart, pinocchio_motion

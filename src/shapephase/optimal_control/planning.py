@@ -17,23 +17,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_executor, check_object
-from ..arrays import Array
 from ..body.body import Body
-from ..dynamics.torques import joint_torques
-from ..errors import PlanNotFound, ShapePhaseError
+from ..errors import PlanNotFound
 from ._certificates import hamiltonian_spread
-from ._path_cost import path_cost
-from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, position_share, tightened, warn_of_unstated
-from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
-from ._reduced import ReducedProgram, check_reducible
+from ._local_search import Attempt, LocalSearch, corrected_attempt, guessed_attitudes, polished_path
+from ._plan_limits import limit_shares, position_share, warn_of_unstated
+from ._reduced import check_reducible
 from ._solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
 from ._spline_basis import SplineBasis
-from ._via_rows import via_rows
-from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
+from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
 from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
-from .plan import Plan, Progress, Start
+from .plan import Plan, Progress
 from .plan_options import Goal, Limits, Search, goal_argument
 from .task import Reorientation, reorientation
 from .waypoints import Waypoint
@@ -49,14 +45,6 @@ _PIECES_OF_FEW = 160
 # Pieces up to `_MANY_JOINTS`, and beyond.
 _PIECES = 40
 _PIECES_OF_MANY = 20
-# How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
-_HALVINGS = 2
-# How often efforts are given less room where they exceed their limits between the nodes.
-_TIGHTENINGS = 6
-# Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
-_WINDING_TOLERANCE = 0.1
-# Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
-_WINDING_SAMPLES = 50
 # Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
 _COARSE_PIECES = 10
 _COARSE_PIECES_OF_MORE = 20
@@ -188,7 +176,7 @@ def plan_reorientation(
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
     reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
-    attempts: list[_Attempt] = []
+    attempts: list[Attempt] = []
     with heard_interrupts():
         for searched in _searches(tasks, chosen, reporter, executor):
             for attempt in searched:
@@ -198,7 +186,7 @@ def plan_reorientation(
             if reporter.stopped or any(attempt.report.converged for attempt in attempts):
                 break
     seconds = time.perf_counter() - began
-    best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
+    best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
         None
         if best is None
@@ -220,7 +208,7 @@ class _Job:
 
 def _searches(
     tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
-) -> Iterator[Iterator[_Attempt]]:
+) -> Iterator[Iterator[Attempt]]:
     """What is tried until something leads to a plan: loops first, unless none can turn the body so far."""
     near, far = [], []
     for task in tasks:
@@ -235,7 +223,7 @@ def _searches(
 
 def _searched_by_loops(
     tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
-) -> Iterator[_Attempt]:
+) -> Iterator[Attempt]:
     """From loops, and from some more where none of those asked for leads to a plan."""
     first, spare = _jobs(tasks, search, reporter)
     searched = _searched_here if executor is None else partial(_searched_by, executor)
@@ -263,16 +251,16 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressRep
     return first, spare
 
 
-def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
+def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
     """The local searches, one after the other."""
     local = None
     for number, job in enumerate(jobs):
         if local is None or local.task is not job.task:
-            local = _LocalSearch.of(job.task, job.basis, search)
+            local = LocalSearch.of(job.task, job.basis, search)
         yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
 
 
-def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
+def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
     """Motions of many strokes, for few joints: equal ones, and from there any."""
     if task.dimension > _MANY_JOINTS or search.method != "collocation":
         return
@@ -283,19 +271,19 @@ def _searched_by_strokes(task: Reorientation, search: Search, reporter: _Progres
     if strokes_suffice(task):
         began = time.perf_counter()
         solution = StrokeProgram(task, layout).solve_strokes(control, callback)
-        equal = _corrected_attempt(task, layout.basis, solution, _polished(task, layout.basis, solution), began)
+        equal = corrected_attempt(task, layout.basis, solution, polished_path(task, layout.basis, solution), began)
         yield equal
         if equal.report.converged or reporter.stopped:
             return
     guess = guess_of_control(task, layout.basis, control)
     if guess is not None:
         few = replace(search, pieces=layout.basis.pieces)
-        yield _LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
+        yield LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
 
 
 def _searched_by(
     executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter
-) -> Iterator[_Attempt]:
+) -> Iterator[Attempt]:
     """The local searches by an executor, in their order."""
     recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
     found = executor.map(
@@ -312,18 +300,14 @@ def _searched_by(
 _KEPT = threading.local()
 
 
-def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> _Attempt:
+def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
     """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
     with stopping_interrupts() as stopped:
         if getattr(_KEPT, "recipe", None) != recipe:
             task, pieces, search = pickle.loads(recipe)
-            _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
+            _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
             _KEPT.recipe = recipe
         return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
-
-
-def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
-    return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
 
 
 class _ProgressReporter:
@@ -354,39 +338,6 @@ class _ProgressReporter:
         return report
 
 
-@dataclass(frozen=True, eq=False)
-class _Attempt:
-    """One local search.
-
-    Attributes
-    ----------
-    task : whose it is
-    report : what the user sees of it
-    polished : its path, corrected; None where that could not be reconstructed
-    cost : of the corrected path; infinite where there is none
-    reaches_goal : whether the corrected path reaches the goal within the limits
-    basis : of its spline
-    """
-
-    task: Reorientation
-    report: Start
-    polished: PolishedPath | None
-    cost: float
-    reaches_goal: bool
-    basis: SplineBasis
-
-    def rank(self) -> tuple[bool, bool, float]:
-        """The best has the least: first local optima, then paths that reach the goal by cost, then others by error."""
-        if self.polished is None:
-            return True, True, np.inf
-        return not self.report.converged, not self.reaches_goal, self.cost if self.reaches_goal else self.goal_error
-
-    @property
-    def goal_error(self) -> float:
-        """Of the corrected path [rad]."""
-        return np.inf if self.polished is None else self.polished.goal_error
-
-
 def _default_pieces(task: Reorientation) -> int:
     if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
         return _PIECES_OF_FEW
@@ -415,7 +366,7 @@ def _starting_points(
         solution = program.solve(
             candidate.control,
             task.duration,
-            _guessed_attitudes(task, candidate),
+            guessed_attitudes(task, candidate),
             iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
             tolerance=_COARSE_TOLERANCE,
             via_places=candidate.via_places,
@@ -429,170 +380,10 @@ def _starting_points(
     return order[:count], order[count : count + _SPARE]
 
 
-def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
-    """Attitudes at places of [0, 1] that a solver starts from: (N,) -> (N, 4)."""
-    if task.windings is not None:
-        return task.uniform_winding
-    turn = task.turn_to_goal(guess.motion.final_attitude, guess.control[-1])
-    return lambda places: guess.quaternions(places, turn)
-
-
-@dataclass(frozen=True, eq=False)
-class _LocalSearch:
-    """What finds the local optimum next to a guess.
-
-    Attributes
-    ----------
-    basis : of the path's spline at first
-    program : for this basis
-    halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
-    settles : whether the solver may end where the cost changes no more, as that of a long motion
-    """
-
-    task: Reorientation
-    basis: SplineBasis
-    program: CollocationProgram | ReducedProgram
-    iterations: int
-    halvings: int
-    settles: bool = False
-
-    @classmethod
-    def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> _LocalSearch:
-        halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
-        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings, settles)
-
-    def attempt(self, guess: Guess, callback: IterationCallback) -> _Attempt:
-        """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
-        found, control = self._on(self.basis, self.program, guess, callback)
-        for _ in range(self.halvings):
-            solved = found.report.status in GOOD_STATUS
-            if not solved or found.reaches_goal:
-                break
-            finer = SplineBasis(2 * found.basis.pieces)
-            onward = guess_of(self.task, finer, found.basis.matrix(PLACES) @ control)
-            if onward is None:
-                break
-            program = CollocationProgram(self.task, finer)
-            following, control = self._on(finer, program, onward, callback)
-            found = min(found, following, key=_Attempt.rank)
-            if found is not following:
-                break
-        return found
-
-    def _on(
-        self,
-        basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
-        guess: Guess,
-        callback: IterationCallback,
-    ) -> tuple[_Attempt, Array]:
-        """The attempt on some basis, and the control points that the solver found."""
-        task, began = self.task, time.perf_counter()
-        solution, polished = self._optimum(basis, program, guess, callback)
-        return _corrected_attempt(task, basis, solution, polished, began), solution.control
-
-    def _optimum(
-        self,
-        basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
-        guess: Guess,
-        callback: IterationCallback,
-    ) -> tuple[NlpSolution, PolishedPath | None]:
-        """What the solver found, with the iterations of all its rounds, and its path corrected.
-
-        Where efforts are beyond their limits between the nodes, they are given less room there, and it goes on.
-        """
-        task, room, iterations = self.task, None, 0
-        control, duration, attitudes = guess.control, task.duration, _guessed_attitudes(task, guess)
-        options: dict[str, Any] = {
-            "iterations": self.iterations,
-            "via_places": guess.via_places,
-            "iteration_callback": callback,
-        }
-        options |= {"settles": True} if self.settles else {}
-        rounds = 0
-        while True:
-            solution = program.solve(control, duration, attitudes, **options)
-            iterations += solution.iterations
-            solution = replace(solution, iterations=iterations)
-            polished = _polished(task, basis, solution)
-            if not task.efforts_limited or polished is None or not solution.converged or rounds == _TIGHTENINGS:
-                return solution, polished
-            shares = effort_shares(task, basis, polished.motion)
-            again = guess_of_control(task, basis, solution.control)
-            if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
-                return solution, polished
-            room = tightened(room, shares, STAGES, rounds)
-            options |= {"room": room, "via_places": solution.via_places}
-            control, duration, attitudes = solution.control, solution.duration, _guessed_attitudes(task, again)
-            rounds += 1
-
-
-def _corrected_attempt(
-    task: Reorientation, basis: SplineBasis, solution: NlpSolution, polished: PolishedPath | None, began: float
-) -> _Attempt:
-    """What a solver's path, searched for since some time, comes to when it is corrected."""
-    # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
-    cost = np.inf if polished is None else _cost(task, basis, polished)
-    reaches_goal = (
-        polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-    )
-    report = Start(
-        status=solution.status,
-        converged=solution.converged and reaches_goal,
-        cost=solution.cost,
-        goal_error=task.goal_error(solution.attitude, solution.control[-1]),
-        kkt_residual=solution.kkt_residual,
-        infeasibility=solution.infeasibility,
-        iterations=solution.iterations,
-        seconds=time.perf_counter() - began,
-        second_order=solution.second_order,
-    )
-    return _Attempt(task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
-
-
-def _polished(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
-    """The path that the solver found, corrected to reach the goal; None where it has no motion."""
-    try:
-        return polish(task, basis, solution.control, solution.duration, solution.via_places)
-    except ShapePhaseError:
-        return None
-
-
-def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
-    """The cost of a corrected path, by quadrature."""
-    if task.cost == "effort":
-        places, weights = panel_nodes(basis)
-        torque = joint_torques(polished.motion, places * polished.duration).torque
-        return float(polished.duration * weights @ np.sum((torque / task.effort_measure) ** 2, axis=1))
-    if task.cost == "time":
-        return polished.duration
-    if task.cost == "acceleration":
-        places, weights = panel_nodes(basis)
-        bend = basis.matrix(places, 2) @ polished.control @ task.coupling.T
-        return float(0.5 * weights @ np.sum(bend**2, axis=1)) / polished.duration**3
-    return path_cost(task.body, polished.path, task.cost)
-
-
-def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:
-    """Whether duration, rates, windings and waypoints are as asked for; the correction keeps positions in limits."""
-    if task.windings is not None:
-        times = np.linspace(0.0, polished.path.duration, _WINDING_SAMPLES * basis.pieces)
-        counted = task.counted_windings(polished.motion.attitude(times))
-        if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
-            return False
-    rows, values = via_rows(task, basis, polished.via_places)
-    if np.abs(np.einsum("jkm,km->j", rows, polished.control) - values).max(initial=0.0) > GOAL_TOLERANCE:
-        return False
-    slack = 1.0 + LIMIT_SLACK
-    shares = limit_shares(task, basis, polished.control, polished.motion)
-    return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
-
-
 def _plan(
     goals: Mapping[Reorientation, Goal],
-    best: _Attempt,
-    attempts: Sequence[_Attempt],
+    best: Attempt,
+    attempts: Sequence[Attempt],
     method: str,
     seconds: float,
     stopped: str,
@@ -627,7 +418,7 @@ def _plan(
     )
 
 
-def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: str) -> str:
+def _failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:
     """Why no plan is returned, start by start, and what the best attempt reached."""
     name = task.body.name
     summary = "; ".join(
