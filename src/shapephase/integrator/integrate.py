@@ -132,14 +132,18 @@ class Attempt(NamedTuple):
         return [it.error_estimate, *parts, self.distances]
 
     @property
+    def _of_all(self) -> dict[str, float]:
+        return {"order": self.order, "rounded_up": self.rounded_up}
+
+    @property
     def worst(self) -> Errors:
         """The largest of all momenta."""
-        return Errors(*(float(part.max(initial=0.0)) for part in self._errors), self.order, self.rounded_up)
+        return Errors(*(float(part.max(initial=0.0)) for part in self._errors), **self._of_all)
 
     def errors(self, rows: Integers) -> list[Errors]:
         """Of some momenta."""
         each = zip(*(part[rows].tolist() for part in self._errors), strict=True)
-        return [Errors(*row, self.order, self.rounded_up) for row in each]
+        return [Errors(*row, **self._of_all) for row in each]
 
 
 class Integration:
@@ -187,8 +191,8 @@ class Integration:
 
     def check_progress(self, errors: Errors, number: int, best: float) -> None:
         """Raise AccuracyNotReached after so many rounds, of which the best had this estimate, if more will not help."""
-        # Finer steps and samples that bring nothing twice: what is left is rounding.
-        stuck = number > 2 and errors.estimate > 0.9 * best
+        # Finer steps and samples that bring nothing: what is left is rounding. At first they may still be too long to.
+        stuck = number > 4 and errors.estimate > 0.9 * best
         # Or rounding alone takes up the tolerance.
         hopeless = errors.rounding > _MOST_ROUNDING * self._tolerance
         if number == _MOST_ROUNDS or (errors.are_informative and (stuck or hopeless)):
@@ -237,18 +241,19 @@ class Integration:
         alone = len(self._momentum) == 1 and self._subdivide is None and engine.is_ready()
         if not alone or (self._largest == 0.0 and interpolant.loops > 1):
             return None
-        # What is below by any growth is not looked at.
-        changed = MOST_EXPECTED_GROWTH * expected > NEGLIGIBLE * self._tolerance and perturbed.differ
+        # What is below by any growth that is foreseen is not looked at.
+        growth = self._refinement.amplified or MOST_EXPECTED_GROWTH
+        counts = growth * expected > NEGLIGIBLE * self._tolerance
         of_last = np.array([self._refinement.finer, self._refinement.amplified or np.inf])
         found = rounds_of_one(
             interpolant,
-            perturbed.coefficients if changed else None,
+            perturbed.coefficients if counts and perturbed.differ else None,
             _directions(self._momentum, self._magnitudes) if self._largest else None,
             self._magnitudes,
             ceiling=self._largest,
             tolerance=self._tolerance,
             expected=expected,
-            hidden=perturbed.hidden,
+            hidden=perturbed.hidden if counts else None,
             refinement=of_last,
         )
         if found is None:

@@ -50,14 +50,14 @@ FEW_TERMS = 10.0
 
 ORDER = 8.0
 """Of the formula."""
-SIGNIFICANT = 0.5
+SIGNIFICANT = 0.2
 """A term of the rate of turning, times the panel's width, is significant above this part of the tolerance."""
 DEGREES_A_RADIAN = 0.6
 """What a radian turned on a panel adds to the degrees of its series: they swing as seen from space."""
 MOST_TURN = 1e9
 """[rad] on a panel, that a plan of steps is made for."""
 
-DEGREES_A_STEP = 8.0
+DEGREES_A_STEP = 4.5
 """Significant Chebyshev degrees of a panel that one step may span."""
 TURN_A_STEP = 2.0
 """[rad] bound of the turn in one step; it is up to twice the turn itself."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib import import_module
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ def rounds_of_one(
     ceiling: float,
     tolerance: float,
     expected: float,
-    hidden: float,
+    hidden: float | None,
     refinement: Array,
 ) -> Round | None:
     """Plan the steps for one momentum and take them, finer ones where those do not do; None where it turns too far.
@@ -53,7 +54,8 @@ def rounds_of_one(
     perturbed : (P, n, 9) the interpolant's series with some terms changed; None: not marched on
     directions, magnitudes : (1, 3), (1,) of the momentum at the start [kg m^2/s]; directions None: at rest, one loop
     ceiling : of the magnitude, which the steps are planned for
-    expected, hidden : what the samples are off by, and its part that perturbed series do not show [rad]
+    expected, hidden : what the samples are off by, and its part that perturbed series do not show, None: not looked at
+        [rad]
     refinement : (2,) how much finer the steps are than planned at first, and what errors grow by, infinite where that
         is not known; then those of the last round
     """
@@ -62,8 +64,8 @@ def rounds_of_one(
         interpolant.widths, plain(series).reshape(len(series), -1),
         _NO_SERIES if perturbed is None else plain(perturbed).reshape(len(series), -1), loops,
         _NO_SERIES if directions is None else directions, magnitudes, ceiling, tolerance,
-        refinement, expected, hidden, segments_of(1, loops), CHECKPOINTS, plain(defect_table()),
-        marks_between(STEPS_OF_FINER), marks_between(STEPS_OF_OTHERS),
+        refinement, expected, inf if hidden is None else hidden, segments_of(1, loops), CHECKPOINTS,
+        plain(defect_table()), marks_between(STEPS_OF_FINER), marks_between(STEPS_OF_OTHERS),
     )  # fmt: skip
     done, steps, quaternions, ends, turns, dynamics, propagators, numbers = found
     if not done:

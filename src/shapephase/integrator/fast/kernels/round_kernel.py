@@ -101,7 +101,7 @@ def take_rounds(
     refinement: how much finer steps are than they were planned at first, and what errors grow by, infinite where that
         is not known yet; both are those of the last round after it
     expected: what the samplers say of themselves [rad]
-    hidden: its part that perturbed series do not show [rad]
+    hidden: its part that perturbed series do not show [rad]; infinite: these are not looked at
     checkpoints: at how many times propagators are kept
     table: of defects
     marks_of_finer, marks_of_growth: that refinements are rounded up to, of a factor of two
@@ -133,7 +133,7 @@ def take_rounds(
         growth = amplified
         if math.isinf(amplified):
             growth = min(1.0 + EXPECTED_GROWTH * (turn if moving else 0.0), MOST_EXPECTED_GROWTH)
-        found[0] = 1.0 if expected * growth > NEGLIGIBLE * tolerance else 0.0
+        found[0] = 1.0 if expected * growth > NEGLIGIBLE * tolerance and math.isfinite(hidden) else 0.0
         other = perturbed if found[0] > 0.0 else perturbed[:0]
         if moving:
             marks = np.arange(checkpoints) * total // (checkpoints - 1)

@@ -90,6 +90,10 @@ def yaml_documents(text: str, where: str) -> list[Any]:
                 stack.append(value)
                 keys.append(None)
     except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        if mark is not None and "nesting depth" in str(error):
+            # PyYAML has a limit of its own, and reads ahead.
+            raise TrajectoryError(f"{where}: line {mark.line + 1}: nested deeper than {_MOST_DEPTH}") from None
         said = " ".join(str(error).split())
         raise TrajectoryError(f"{where}: no YAML: {said:.200}") from None
     return [document for document in documents if not isinstance(document, Word) or document.text]
