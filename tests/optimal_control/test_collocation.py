@@ -322,7 +322,7 @@ def test_both_methods_find_the_same_optimum(name):
     body = sp.load_body("cat_two_halves")
     task = reorientation(body, target, **PLAIN | changes)
     plans = [
-        plan_reorientation(body, target, search=Search(method=method, pieces=12), **PLAIN | changes)
+        plan_reorientation(body, target, search=Search(method=method, pieces=10), **PLAIN | changes)
         for method in ("collocation", "reduced")
     ]
     assert plans[0].cost == pytest.approx(plans[1].cost, rel=1e-5)
