@@ -7,6 +7,9 @@ import re
 import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -54,11 +57,16 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("cat_two_halves", "--turn", "nan about x"), 2, "--turn"),
         (("cat_two_halves", "--point", "0 0", "0 0 1"), 2, "--point"),
         (("cat_two_halves", "--point", "tail 0 0 1", "0 0 1"), 2, "tail"),
-        (("cat_two_halves", "--point", "front 0 0 1", "0 0 1", "--to", "free"), 2, "--to free"),
+        (("cat_two_halves", "--turn", "9 about x", "--symmetry", "0 about x"), 2, "4 about x"),
+        (("cat_two_halves", "--turn", "9 about x", "--symmetry", "w"), 2, "--symmetry"),
+        (("cat_two_halves", "--somersaults", 1, "--symmetry", "x"), 2, "--symmetry"),
         (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw"), 2, "waist_yaw"),
         (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw=1,2"), 2, "NAME=VALUE"),
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_yaw=1rad"), 2, "--to"),
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_bend=1"), 2, "waist_bend"),
+        (("cat_two_halves", "--turn", "9 about x", "--via", "waist_yaw=1@soon"), 2, "--via"),
+        (("cat_two_halves", "--turn", "9 about x", "--via", "there.csv"), 2, "FILE@TIME"),
+        (("cat_two_halves", "--turn", "9 about x", "--via", "waist_yaw"), 2, "--via"),
         (("cat_two_halves", "--turn", "9 about x", "--joints", "a", "--hold", "b"), 2, "--hold"),
         (("cat_two_halves", "--turn", "9 about x", "--mirror", "waist_yaw"), 2, "--mirror"),
         (("cat_two_halves", "--turn", "9 about x", "--effort", "strong"), 2, "--effort"),
@@ -134,14 +142,63 @@ def test_limits_hold_and_are_told(tmp_path, capsys):
     assert (data["cost_name"], data["cost_unit"]) == ("effort", "s")
 
 
-def test_a_time_limit_ends_the_search_with_the_best_so_far(monkeypatch, capsys):
-    """The clock is a counter: the time is over when it is asked for the fourth time."""
-    ticks = iter(range(1000))
-    monkeypatch.setattr(cli_plan.time, "monotonic", lambda: float(next(ticks)))
+def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
+    """The time is over after the first iteration, with a file that says so and is read all the same."""
+    out = tmp_path / "plan.csv"
     with pytest.raises(SystemExit) as ended:
-        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "2.5", "--json"])
-    assert ended.value.code == 7
-    assert "stopped" in json.loads(capsys.readouterr().out)["warnings"][0]
+        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "1e-6", "--out", str(out), "--json"])
+    assert ended.value.code == 124
+    data = json.loads(capsys.readouterr().out)
+    assert data["status"] == "out of time"
+    assert "time limit" in data["warnings"][0]
+    assert out.read_text().startswith("# shapephase plan, cat_two_halves: out of time; ")
+    body = sp.load_body("cat_two_halves")
+    assert sp.read_shape_path(out, body).duration == 1.0
+
+
+def test_postures_on_the_way(tmp_path, capsys):
+    """One by its joints, one of the motion file of another plan at its time; each is where the file has it."""
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    _, one, body = planned("cat_two_halves", "--turn", "40 about x", capsys=capsys, out=first)
+    via = ("--via", "waist_roll=20deg", "--via", f"{first}@0.6", "--duration", 2)
+    data, other, _ = planned("cat_two_halves", "--turn", "10 about z", *via, capsys=capsys, out=second)
+    early, late = data["waypoint_times_s"]
+    assert 0.0 < early < late == 0.6
+    assert np.abs(other[30] - one[60]).max() < 1e-8
+    passed = sp.read_shape_path(second, body).shape(early)
+    assert abs(passed[body.joint_index("waist_roll")] - np.radians(20.0)) < 1e-7
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--turn", "10 about z", "--via", f"{first}@1.5"])
+    assert ended.value.code == 2
+    assert "ends at 1 s" in capsys.readouterr().err
+
+
+def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_take(monkeypatch):
+    said = []
+    monkeypatch.setattr(cli_plan.time, "monotonic", iter([100.0, 103.0, 170.0]).__next__)
+    search = cli_plan._InterruptibleSearch(SimpleNamespace(say=said.append), 60.0)
+    for start in (2, 3):
+        assert not search.report(Progress("search", start, 4, 12, 0.125, 1e-3, 0.02))
+    shown = "search {} of 4: iteration 12, off the goal by 2.0e-02 rad, cost 0.125, {} s left"
+    assert said == [shown.format(2, 57), shown.format(3, 0)]
+
+
+def test_of_several_turns_the_cheapest_is_made(tmp_path, capsys):
+    one, _, _ = planned("cat_two_halves", "--turn", "-8 about 0,1,0", capsys=capsys, out=tmp_path / "one.csv")
+    several = ("--turn", "150 about x", "--turn", "-8 about 0,1,0")
+    assert planned("cat_two_halves", *several, capsys=capsys, out=tmp_path / "two.csv")[0]["cost"] == one["cost"]
+
+
+@pytest.mark.full
+def test_a_symmetry_on_the_command_line(tmp_path, capsys):
+    for arguments, goal in (
+        (("--turn", "170 about z", "--symmetry", "2 about z"), [0.0, 0.0, np.radians(-10.0)]),
+        (("--point", "-1 0 0", "1 0 0.2", "--symmetry", "2 about z"), [0.0, -np.arctan(0.2), 0.0]),
+    ):
+        data, _, _ = planned("cat_two_halves", *arguments, capsys=capsys, out=tmp_path / "plan.csv")
+        attitude = so3.matrix_from_quat(np.array(data["final_attitude_quat_xyzw"]))
+        wanted = so3.exp(np.array(goal))
+        assert np.abs(attitude[:, 0] - wanted[:, 0]).max() < 1e-8, arguments
 
 
 @pytest.mark.full
@@ -151,6 +208,14 @@ def test_workers_find_what_one_process_finds(tmp_path, capsys):
     beside, same, _ = planned(*arguments, "--workers", 2, capsys=capsys, out=tmp_path / "two.csv")
     assert alone["cost"] == beside["cost"]
     assert np.array_equal(shapes, same)
+
+
+def test_a_page_says_that_nothing_was_found(tmp_path):
+    page = tmp_path / "plan.html"
+    with pytest.raises(SystemExit) as ended:
+        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "1e-6", "--html", str(page)])
+    assert ended.value.code == 124
+    assert "The search ended by its time limit; this is the best until then: off the goal by" in page.read_text()
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
@@ -179,6 +244,34 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     assert so3.angle(again.final_attitude.T @ so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))) < 1e-5
 
 
+def hears_of_ctrl_c(process):
+    """Whether a process has a handler for it, by the kernel's list."""
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{process}/status").read_text())
+    return bool(int(caught[1], 16) >> (signal.SIGINT - 1) & 1)
+
+
+@pytest.mark.full
+def test_ctrl_c_ends_what_searches_beside(tmp_path):
+    """As soon as they hear of it; they are gone when the command is, and the best of what they had is written."""
+    out = tmp_path / "plan.csv"
+    words = ("cat", "--turn", "60 about x", "--starts", "40", "--workers", "2", "--out", str(out))
+    with subprocess.Popen(
+        [sys.executable, "-m", "shapephase", "plan", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as command:
+        beside = Path(f"/proc/{command.pid}/task/{command.pid}/children")
+        # The first is Python's own tracker of what they share.
+        while command.poll() is None and sum(hears_of_ctrl_c(one) for one in beside.read_text().split()[1:]) < 2:
+            time.sleep(0.01)
+        workers = beside.read_text().split()[1:]
+        command.send_signal(signal.SIGINT)
+        _, said = command.communicate(timeout=300)
+    assert command.returncode == 130
+    assert "stopped on request" in said
+    assert "Traceback" not in said
+    assert out.read_text().startswith("# shapephase plan, cat: stopped; ")
+    assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
+
+
 def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
     def pressed(*_, **__):
         signal.raise_signal(signal.SIGINT)
@@ -193,7 +286,7 @@ def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
 def test_pressed_twice_gives_it_up():
     with steps(1) as work:
         search = cli_plan._InterruptibleSearch(work, None)
-        search.report(Progress(stage="search", start=1, starts=1, iteration=0, cost=1.0, infeasibility=0.0))
+        search.report(Progress("search", 1, 1, iteration=0, cost=1.0, infeasibility=0.0, goal_error=1.0))
         search.interrupted()
         assert search.stopped
         with pytest.raises(KeyboardInterrupt):

@@ -35,7 +35,7 @@ from shapephase.optimal_control import (
     symbolic_body,
     wong_residual,
 )
-from shapephase.optimal_control.planning import _within_limits
+from shapephase.optimal_control._local_search import _within_limits
 from shapephase.optimal_control.task import reorientation
 from support.bodies import joint, link, urdf
 from support.independent import apart, pinocchio_motion
@@ -396,7 +396,7 @@ def test_a_search_that_makes_no_sense_is_refused(options, error, match):
     ("options", "match"),
     [
         ({"rotation": np.eye(2)}, "rotation"),
-        ({"rotation": np.eye(3)[None]}, "one rotation"),
+        ({"rotation": np.eye(3)[None, None]}, "one rotation"),
         ({"rotation": -np.eye(3)}, "reflection"),
         ({"pointing": [[0, 0, 0], [0, 0, 1]]}, "not zero"),
         ({"pointing": [0, 0, 1]}, "pointing"),
@@ -617,11 +617,20 @@ def test_a_polished_plan_whose_windings_have_gone_elsewhere_is_not_kept(offset: 
         acceleration_limit=np.ones(1),
         jerk_limit=np.ones(1),
         efforts_limited=False,
+        via=(),
+        dimension=1,
         counted_windings=lambda attitudes: np.array(
             [np.unwrap(np.arctan2(-attitudes[:, 1, 2], attitudes[:, 2, 2]))[-1], 0.0]
         ),
     )
-    basis = SimpleNamespace(pieces=4, derivative_control=lambda _: np.zeros((1, 1)))
+    basis = SimpleNamespace(
+        pieces=4,
+        dimension=1,
+        matrix=lambda places: np.zeros((len(places), 1)),
+        derivative_control=lambda _: np.zeros((1, 1)),
+    )
     motion = SimpleNamespace(attitude=attitude, duration=1.0)
-    polished = SimpleNamespace(path=SimpleNamespace(duration=1.0), motion=motion, control=np.zeros((1, 1)))
+    polished = SimpleNamespace(
+        path=SimpleNamespace(duration=1.0), motion=motion, control=np.zeros((1, 1)), via_places=np.zeros(0)
+    )
     assert _within_limits(cast(Any, task), cast(Any, basis), cast(Any, polished)) is kept

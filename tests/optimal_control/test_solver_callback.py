@@ -15,7 +15,7 @@ from shapephase.optimal_control._solver_callback import BestIterate, heard_inter
 
 
 def test_the_cheapest_of_the_nearly_feasible_is_kept():
-    best = BestIterate(None)
+    best = BestIterate(None, float)
     iterates = [(5.0, 0.5), (1.0, 0.2), (3.0, 1e-5), (2.0, 2e-4), (2.5, 0.0), (0.1, 0.1)]
     for number, (cost, infeasibility) in enumerate(iterates):
         assert not best.report(np.array([float(number)]), cost, infeasibility)
@@ -24,7 +24,7 @@ def test_the_cheapest_of_the_nearly_feasible_is_kept():
 
 
 def test_the_least_infeasible_is_kept_where_none_is_feasible():
-    best = BestIterate(None)
+    best = BestIterate(None, float)
     for number, infeasibility in enumerate((0.5, 0.2, 0.4)):
         best.report(np.array([float(number)]), -infeasibility, infeasibility)
     assert best.unknowns[0] == 1.0
@@ -34,12 +34,12 @@ def test_an_iterate_is_reported_with_its_largest_violation():
     """x^2 between 4 and 9 and x y = 1 exactly: violated on either side, each reported as it is."""
     low, high = np.array([4.0, 1.0]), np.array([9.0, 1.0])
     reported = []
-    best = BestIterate(lambda iteration, cost, violated: reported.append((iteration, cost, violated)) or iteration == 1)
+    best = BestIterate(lambda *now: reported.append(now) or now[0] == 1, lambda unknowns: float(unknowns[1]))
     callback = ipopt_callback(best, 2, low, high)
     nothing = np.zeros(2), np.zeros(2), np.zeros(0)
     for rows, expected in (([3.5, 1.2], 0.5), ([9.25, 0.9], 0.25)):
         stop = callback(np.array([1.0, 2.0]), 7.0, np.array(rows), *nothing)
-        assert reported[-1][1:] == (7.0, pytest.approx(expected, abs=1e-15))
+        assert reported[-1][1:] == (7.0, pytest.approx(expected, abs=1e-15), 2.0)
     assert int(casadi.DM(stop)) == 1
     assert best.stopped
 
@@ -76,7 +76,7 @@ class Asked:
 def forgotten_weakly():
     """The end of a key of a weak dictionary, in whose own callback Ctrl-C is pressed."""
     known = weakref.WeakKeyDictionary()
-    key = BestIterate(None)
+    key = BestIterate(None, float)
     known[key] = 1
     known._iterating = Asked()
     del key

@@ -215,7 +215,7 @@ class Integration:
         interpolant, perturbed = self._sampler.interpolant(), self._sampler.perturbed(self._largest)
         expected = self._sampler.error(self._largest)
         taken = self._rounds_of_one(interpolant, perturbed, expected) or self._round(interpolant, perturbed, expected)
-        record, growth = taken.record, taken.growth
+        record, growth = taken.record, taken.amplification
         sampling = growth * expected
         if taken.counts:
             sampling = np.fmin(sampling, record.truncation + growth * perturbed.hidden)

@@ -8,6 +8,7 @@ from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search
 from .planning import plan_reorientation
 from .symbolic import SymbolicBody, symbolic_body
+from .waypoints import Waypoint
 
 __all__ = [
     "ConjugateTime",
@@ -21,6 +22,7 @@ __all__ = [
     "Search",
     "Start",
     "SymbolicBody",
+    "Waypoint",
     "WongFit",
     "conjugate_times",
     "extremal",

@@ -31,6 +31,8 @@ def plan_card(self: Plan) -> Card:
         ("KKT residual", f"{self.kkt_residual:.1e}"),
         ("second order", _SECOND_ORDER[self.second_order]),
     ]
+    if len(self.waypoint_times):
+        rows.append(("waypoints passed at", numbers(self.waypoint_times, "s")))
     if self.hamiltonian_spread is not None:
         rows.append(("Hamiltonian", f"constant to {self.hamiltonian_spread:.1e}"))
     shapes = self.path.shape(np.linspace(0.0, self.path.duration, MOST_POINTS))

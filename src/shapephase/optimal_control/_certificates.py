@@ -22,12 +22,13 @@ def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, 
 
     Without momentum the cost's density L is quadratic in the rates, and what the holonomy adds to it is linear in them,
     so that H = L; and H is constant as nothing depends on time. A limit of positions does not change that, a limit of
-    rates does; with limits of accelerations, jerks or efforts it is another Hamiltonian.
+    rates does, and so does a waypoint with a time; with limits of accelerations, jerks or efforts it is another
+    Hamiltonian.
 
     Source: theory.md B6; Pontryagin's principle.
     """
-    bent = np.isfinite([task.acceleration_limit, task.jerk_limit]).any() or task.efforts_limited
-    if task.cost not in ("kinetic", "rate") or task.momentum.any() or bent:
+    timed = any(point.place is not None for point in task.via)
+    if task.cost not in ("kinetic", "rate") or task.momentum.any() or task.limits_beyond_rates or timed:
         return None
     places, _ = panel_nodes(basis)
     coordinates = basis.matrix(places) @ control

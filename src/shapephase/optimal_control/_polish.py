@@ -15,6 +15,7 @@ from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits, shortest_duration
 from ._spline_basis import SplineBasis
+from ._via_rows import via_rows
 from .task import Reorientation
 
 # Accuracy of the reconstruction that plans are judged by [rad]: well below what they have to reach.
@@ -52,6 +53,7 @@ class PolishedPath:
     path, motion : of all joints, and its reconstruction
     first_goal_error, goal_error : before the corrections, and after them [rad]
     steps : corrections made
+    via_places : (v,) where `path` passes the waypoints
     """
 
     control: Array
@@ -61,6 +63,7 @@ class PolishedPath:
     first_goal_error: float
     goal_error: float
     steps: int
+    via_places: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,15 +111,29 @@ def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, mot
         spatial = _transported(generator, basis, duration) @ spatial
     by_shape = (spatial @ gradient @ task.coupling) * (weights * duration)[:, None, None]
     by_rate = (spatial @ matrix @ task.coupling) * weights[:, None, None]
-    values, slopes = basis.matrix(places), basis.matrix(places, 1)
-    return np.einsum("nak,ns->ask", by_shape, values) + np.einsum("nak,ns->ask", by_rate, slopes)
+    values, slopes = basis.sparse_matrix(places), basis.sparse_matrix(places, 1)
+    felt = values.T @ by_shape.reshape(len(places), -1) + slopes.T @ by_rate.reshape(len(places), -1)
+    return np.swapaxes(felt.reshape(basis.dimension, 3, -1), 0, 1)
 
 
-def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> PolishedPath:
+def goal_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, motion: Motion, control: Array) -> Array:
+    """The exact derivative of what has to reach the goal by each control point, where it is constrained: (j, k, m).
+
+    For a link that is pointed the last control point turns it against the base, too.
+    """
+    slopes = end_derivative(task, basis, path, motion)
+    slopes[:, -1] += motion.final_attitude @ task.pointed_turn(control[-1])
+    return np.tensordot(task.constrained_directions(), slopes, axes=1)
+
+
+def polish(
+    task: Reorientation, basis: SplineBasis, control: Array, duration: float, via_places: Array | None = None
+) -> PolishedPath:
     """The nearest control points whose reconstructed motion reaches the goal, by Newton's method.
 
     Nearest in the integral of the squared change of rates. Coordinates at their limits, and rates where the duration is
-    given, stay there; a path of least time is stretched instead by what its rates exceed their limits.
+    given, stay there; a path of least time is stretched instead by what its rates exceed their limits. Waypoints are
+    passed at their places.
 
     Raises
     ------
@@ -125,13 +142,17 @@ def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: fl
     """
     first = now = best = _reconstructed(task, basis, control, duration)
     steps_to_best = 0
+    at = np.zeros(0) if via_places is None else via_places
     for step in range(1, _STEPS + 1):
         if now.goal_error <= _CONVERGED or now.goal_error > _TOO_FAR:
             break
         directions = task.constrained_directions()
-        slopes = np.tensordot(directions, end_derivative(task, basis, now.path, now.motion), axes=1)
-        turn = directions @ task.turn_to_goal(now.motion.final_attitude)
-        corrected = _corrected(task, basis, now.control, now.duration, slopes.reshape(len(directions), -1), turn)
+        slopes = goal_derivative(task, basis, now.path, now.motion, now.control)
+        turn = directions @ task.turn_to_goal(now.motion.final_attitude, now.control[-1])
+        passed, values = via_rows(task, basis, at)
+        missing = values - np.einsum("jkm,km->j", passed, now.control)
+        rows, right = np.concatenate([slopes, passed]).reshape(-1, now.control.size), np.append(turn, missing)
+        corrected = _corrected(task, basis, now.control, now.duration, rows, right)
         now = _reconstructed(task, basis, *corrected)
         if now.goal_error < best.goal_error:
             best, steps_to_best = now, step
@@ -143,6 +164,7 @@ def polish(task: Reorientation, basis: SplineBasis, control: Array, duration: fl
         first_goal_error=first.goal_error,
         goal_error=best.goal_error,
         steps=steps_to_best,
+        via_places=at,
     )
 
 
@@ -155,30 +177,30 @@ def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, dura
         duration=duration,
         path=path,
         motion=motion,
-        goal_error=task.goal_error(motion.final_attitude),
+        goal_error=task.goal_error(motion.final_attitude, control[-1]),
     )
 
 
 def _corrected(
-    task: Reorientation, basis: SplineBasis, control: Array, duration: float, slopes: Array, turn: Array
+    task: Reorientation, basis: SplineBasis, control: Array, duration: float, slopes: Array, missing: Array
 ) -> tuple[Array, float]:
-    """The least change of the control points that turns the end by `turn`, within the limits."""
-    free = _free(task, basis, control).ravel()
-    places, weights = panel_nodes(basis)
-    rates = basis.matrix(places, 1)
-    gram = (rates * weights[:, None]).T @ rates + np.eye(basis.dimension)
-    inverse = np.kron(np.linalg.inv(gram), np.eye(task.dimension))
+    """The least change of the control points by which `slopes` (j, k m) change by `missing` (j,), within the limits."""
+    roots = _roots(basis, _free(task, basis, control))
     conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
-    rows, right = np.concatenate([slopes, conditions]), np.concatenate([turn, np.zeros(len(conditions))])
-    # The least change in the metric's norm: with C C^T its inverse, the shortest x of rows C x = right.
-    root = np.linalg.cholesky(inverse[np.ix_(free, free)])
+    rows, right = np.concatenate([slopes, conditions]), np.concatenate([missing, np.zeros(len(conditions))])
     held = _Held.at_limits(task, basis, control, duration)
     moved = control
     for _ in range(_ROUNDS):
         every, all_right = np.concatenate([rows, held.rows]), np.concatenate([right, held.changes])
-        change = np.zeros(control.size)
-        change[free] = root @ np.linalg.lstsq(every[:, free] @ root, all_right, rcond=_RANK)[0]
-        moved = np.clip(control + change.reshape(control.shape), task.lower, task.upper)
+        every = every.reshape(-1, *control.shape)
+        # With C C^T the inverse of the norm, the least change is C times the shortest x of rows C x = right.
+        seen = [every[:, points, place] @ root for place, (points, root) in enumerate(roots)]
+        shortest = np.linalg.lstsq(np.concatenate(seen, axis=1), all_right, rcond=_RANK)[0]
+        change, last = np.zeros_like(control), 0
+        for place, (points, root) in enumerate(roots):
+            change[points, place] = root @ shortest[last : last + len(root)]
+            last += len(root)
+        moved = np.clip(control + change, task.lower, task.upper)
         further = held.and_those_beyond(task, control, moved)
         if further is held:
             break
@@ -190,13 +212,26 @@ def _corrected(
     return moved, duration
 
 
+def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
+    """Of each coordinate its free points, and C with C C^T the inverse of the norm of their changes, at those points.
+
+    Coordinates with the same free points share it.
+    """
+    inverse = basis.inverse_norm
+    roots: dict[bytes, Array] = {}
+    for points in free.T:
+        if points.tobytes() not in roots:
+            roots[points.tobytes()] = np.asarray(np.linalg.cholesky(inverse[np.ix_(points, points)]), np.float64)
+    return [(points, roots[points.tobytes()]) for points in free.T]
+
+
 @dataclass(frozen=True, eq=False)
 class _Held:
     """Control points of rates, accelerations and jerks that a correction does not choose.
 
     Attributes
     ----------
-    bounding : (j, k) all of them by place, from control points of the path
+    bounding : (j, k) all that have limits, by place, from control points of the path
     limits : (j, m)
     chosen : (j, m) which
     targets : (j, m) what they become less what they are
@@ -210,10 +245,12 @@ class _Held:
     @classmethod
     def at_limits(cls, task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Held:
         """Those at their limits, which stay; for a path of least time, which is stretched instead, none."""
-        each = [basis.derivative_control(order) for order in (1, 2, 3)]
-        bounds = derivative_limits(task, duration).values()
-        limits = np.concatenate([np.tile(limit, (len(rows), 1)) for rows, limit in zip(each, bounds, strict=True)])
-        bounding = np.concatenate(each)
+        bounding, limits = np.zeros((0, basis.dimension)), np.zeros((0, task.dimension))
+        for order, limit in enumerate(derivative_limits(task, duration).values(), start=1):
+            if np.isfinite(limit).any():
+                rows = basis.derivative_control(order)
+                bounding = np.concatenate([bounding, rows])
+                limits = np.concatenate([limits, np.tile(limit, (len(rows), 1))])
         now = bounding @ control
         chosen = np.abs(now) > limits * (1.0 - _ACTIVE)
         return cls(bounding, limits, chosen & (task.cost != "time"), np.zeros_like(now))

@@ -10,14 +10,15 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Mask
 from ..deformation.deformation import articulated
-from ..errors import unknown_name
+from ..errors import TrajectoryError, unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits
-from ._polish import end_conditions, end_derivative, movable_points
+from ._polish import end_conditions, goal_derivative, movable_points
 from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
+from ._via_rows import open_points, via_rows
 from .collocation import NlpSolution
 from .guesses.loops import start_metric
 from .symbolic import symbolic_body
@@ -67,8 +68,8 @@ class ReducedProgram:
 
     Raises
     ------
-    UnknownNameError
-        For the costs "time" and "effort", and limits of efforts.
+    UnknownNameError, TrajectoryError
+        For the costs "time" and "effort", and limits of efforts; for waypoints without a time.
     """
 
     def __init__(self, task: Reorientation, basis: SplineBasis) -> None:
@@ -89,12 +90,13 @@ class ReducedProgram:
         *,
         iterations: int,
         tolerance: float = _TOLERANCE,
+        via_places: Array | None = None,  # noqa: ARG002 (all are given)
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
         """A local optimum from a guess: control points (k, m) and T. As `CollocationProgram.solve`."""
         task = self._task
         problem = _ScaledProblem(self, task, self._basis, np.clip(control, task.lower, task.upper), duration)
-        best = BestIterate(iteration_callback)
+        best = BestIterate(iteration_callback, lambda x: float(np.linalg.norm(problem.end(x)[0])))
 
         def callback(x: Array) -> None:
             residual, missing = problem.residuals(x)
@@ -118,6 +120,7 @@ class ReducedProgram:
             kkt_residual=max(residual, missing),
             infeasibility=missing,
             iterations=count,
+            via_places=np.array([point.place for point in task.via], dtype=np.float64),
         )
 
     def _motion(self, control: Array, duration: float) -> tuple[ShapePath, Motion]:
@@ -131,11 +134,10 @@ class ReducedProgram:
         For a pointed axis the derivative is exact to first order in what is missing.
         """
         path, motion = self._motion(control, duration)
-        directions = self._task.constrained_directions()
-        slopes = np.tensordot(directions, end_derivative(self._task, self._basis, path, motion), axes=1)
-        turn = self._task.turn_to_goal(motion.final_attitude)
+        slopes = goal_derivative(self._task, self._basis, path, motion, control)
+        turn = self._task.turn_to_goal(motion.final_attitude, control[-1])
         if self._task.target is None:
-            return directions @ turn, -slopes
+            return self._task.constrained_directions() @ turn, -slopes
         return turn, -np.tensordot(_inverse_right_jacobian(turn), slopes, axes=1)
 
     def cost(self, control: Array, duration: float) -> tuple[float, Array]:
@@ -159,11 +161,15 @@ class ReducedProgram:
 
 
 def check_reducible(task: Reorientation) -> None:
-    """Raise UnknownNameError for a task that is not for the method "reduced"."""
+    """Raise UnknownNameError or TrajectoryError for a task that is not for the method "reduced"."""
     if task.cost in _NOT_HERE:
         raise unknown_name("cost for method 'reduced'", task.cost, [cost for cost in COSTS if cost not in _NOT_HERE])
     if task.efforts_limited:
         raise unknown_name("method with limits of efforts", "reduced", ["collocation"])
+    if open_points(task):
+        raise TrajectoryError(
+            "method 'reduced' passes waypoints at given times; give their times, or use 'collocation'"
+        )
 
 
 class _ScaledProblem:
@@ -191,10 +197,13 @@ class _ScaledProblem:
         self._constraints: list[dict[str, Any]] = [
             {"type": "eq", "fun": lambda x: self.end(x)[0], "jac": lambda x: self.end(x)[1]}
         ]
-        every = np.kron(end_conditions(task, basis), np.eye(task.dimension))
+        passed, values = via_rows(task, basis, np.array([point.place for point in task.via], dtype=np.float64))
+        conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
+        every = np.concatenate([conditions, passed.reshape(-1, guess.size)])
         self._end_conditions = every[:, self._free.ravel()] * self._unit
         if len(every):
             fixed = np.asarray(every @ np.where(self._free, 0.0, guess).ravel(), dtype=np.float64)
+            fixed[len(conditions) :] -= values
             self._constraints.append(_linear_equations(self._end_conditions, fixed))
         if self.limits_rates:
             self._constraints.append(_within_rates(basis, list(bounds.values()), guess, self._free, self._unit))

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..arrays import Array
 
-IterationCallback = Callable[[int, float, float], bool]
-"""Called after each iteration with its number, the cost and the largest constraint violation; True stops the solver."""
+IterationCallback = Callable[[int, float, float, float], bool]
+"""Called after each iteration with its number, cost, largest constraint violation and goal error [rad]; True stops the
+solver."""
 
 # Constraint violation, scaled, up to which iterates are compared by cost: the Newton corrections remove this much.
 _FEASIBLE = 1e-3
@@ -30,6 +31,10 @@ _LATER = 1e-3
 class BestIterate:
     """The best of a solver's iterates so far.
 
+    Parameters
+    ----------
+    goal_error : of the unknowns of an iterate [rad]
+
     Attributes
     ----------
     unknowns, cost, infeasibility : of the best iterate: the cheapest of the feasible ones, or else the least infeasible
@@ -38,8 +43,8 @@ class BestIterate:
     error : what the callback raised, Ctrl-C included, where it cannot pass through the solver
     """
 
-    def __init__(self, callback: IterationCallback | None) -> None:
-        self._callback = callback
+    def __init__(self, callback: IterationCallback | None, goal_error: Callable[[Array], float]) -> None:
+        self._callback, self._goal_error = callback, goal_error
         self.unknowns: Array = np.empty(0)
         self.cost, self.infeasibility = np.inf, np.inf
         self.iterations = 0
@@ -51,7 +56,8 @@ class BestIterate:
         better = (max(infeasibility, _FEASIBLE), cost) < (max(self.infeasibility, _FEASIBLE), self.cost)
         if better or not len(self.unknowns):
             self.unknowns, self.cost, self.infeasibility = unknowns, cost, infeasibility
-        self.stopped = self._callback is not None and self._callback(self.iterations, cost, infeasibility)
+        if self._callback is not None:
+            self.stopped = self._callback(self.iterations, cost, infeasibility, self._goal_error(unknowns))
         self.iterations += 1
         return self.stopped
 
@@ -121,6 +127,41 @@ def heard_interrupts() -> Iterator[None]:
         if pressed:
             raise KeyboardInterrupt from error
         raise
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+# Whether Ctrl-C has come to a process that does nothing but search.
+_PRESSED = threading.Event()
+
+
+def keep_interrupts() -> None:
+    """From now on Ctrl-C ends the searches of this process, and nothing else."""
+    signal.signal(signal.SIGINT, _kept)
+
+
+def _kept(*_: Any) -> None:
+    _PRESSED.set()
+
+
+@contextmanager
+def stopping_interrupts() -> Iterator[Callable[[], bool]]:
+    """A function that says whether Ctrl-C has come, which does nothing else; outside the main thread it never does."""
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    if signal.getsignal(signal.SIGINT) is _kept:
+        yield _PRESSED.is_set
+        return
+    pressed = False
+
+    def handler(*_: Any) -> None:
+        nonlocal pressed
+        pressed = True
+
+    before = signal.signal(signal.SIGINT, handler)
+    try:
+        yield lambda: pressed
     finally:
         signal.signal(signal.SIGINT, before)
 

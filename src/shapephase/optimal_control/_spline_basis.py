@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +50,24 @@ class SplineBasis:
 
         spline = BSpline(self.knots, np.eye(self.dimension), _DEGREE)
         return np.asarray(spline.derivative(order)(places) if order else spline(places))
+
+    def sparse_matrix(self, places: Array, order: int = 0) -> Any:
+        """The same as a sparse matrix, for long splines; order 0 or 1, places within [0, 1]."""
+        from scipy.interpolate import BSpline
+        from scipy.sparse import csr_matrix
+
+        if order == 0:
+            return BSpline.design_matrix(places, self.knots, _DEGREE)
+        return BSpline.design_matrix(places, self.knots[1:-1], _DEGREE - 1) @ csr_matrix(self.rate_control)
+
+    @cached_property
+    def inverse_norm(self) -> Array:
+        """Inverse of the Gram matrix of values at the control points and of rates along the path: (k, k)."""
+        inside, weights = np.polynomial.legendre.leggauss(_DEGREE)
+        places = (self.nodes[:-1, None] + 0.5 * (inside + 1.0) / self.pieces).ravel()
+        rates = self.sparse_matrix(places, 1)
+        weighted = rates.multiply(np.tile(0.5 * weights, self.pieces)[:, None] / self.pieces)
+        return np.linalg.inv((weighted.T @ rates).toarray() + np.eye(self.dimension))
 
     @cached_property
     def rate_control(self) -> Array:

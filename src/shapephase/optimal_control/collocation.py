@@ -14,9 +14,11 @@ from ._gauss import gauss_tableau
 from ._polish import end_conditions
 from ._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ._spline_basis import SplineBasis
+from ._via_rows import open_points, symbolic_via_rows
 from .nodes.limit_rows import DerivativeRows, EffortTerms
 from .nodes.node_functions import node_functions
 from .nodes.unknowns import scipy_sparse, seen_at, sparse_matrix
+from .symbolic import symbolic_body
 from .task import Reorientation
 
 STAGES = 3
@@ -62,6 +64,7 @@ class NlpSolution:
     kkt_residual : largest remaining violation of the Karush-Kuhn-Tucker conditions, scaled
     infeasibility : largest violation of a constraint
     iterations : number taken
+    via_places : (v,) where the path passes the waypoints
     second_order : whether the Hessian of the Lagrangian, projected on what the constraints leave, is positive definite
         there, by the inertia of the last factorised matrix; None where that is not known
     """
@@ -75,6 +78,7 @@ class NlpSolution:
     kkt_residual: float
     infeasibility: float
     iterations: int
+    via_places: Array
     second_order: bool | None = None
 
 
@@ -86,8 +90,9 @@ class CollocationProgram:
         dq/ds = q (T omega)/2,    T omega = T I^-1 R^T mu - A u,
 
     whose collocation keeps |q| to rounding, as it keeps all quadratic invariants; order six. Unknown are
-    x = (control points, T, q at the nodes, q at the ends of the pieces). What a node sees of them is linear,
-    y = W x with y = (r, u, q, T), so that Jacobian and Hessian are those of one node, chained on by W: exact, banded.
+    x = (control points, T, q at the nodes, q at the ends of the pieces, open places of waypoints). What a node sees of
+    them is linear, y = W x with y = (r, u, q, T), so that Jacobian and Hessian are those of one node, chained on by W:
+    exact, banded.
 
     Attributes
     ----------
@@ -104,7 +109,9 @@ class CollocationProgram:
         self.places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
         count, step, width = len(self.places), 1.0 / basis.pieces, 2 * task.dimension + 5
         duration_place = task.dimension * basis.dimension
-        unknown = casadi.MX.sym("unknown", duration_place + 1 + 4 * (count + basis.pieces + 1))
+        core = duration_place + 1 + 4 * (count + basis.pieces + 1)
+        self._open = slice(core, core + len(open_points(task)))
+        unknown = casadi.MX.sym("unknown", self._open.stop)
         seen = seen_at(task, basis, self.places, 1, unknown.shape[0])
         at_node = casadi.reshape(seen @ unknown, width, count)
         node = node_functions(task)
@@ -113,7 +120,11 @@ class CollocationProgram:
         shares = casadi.DM(panels)
         # All rows but those of the goal are linear in the unknowns, apart from the turning.
         linear, from_turning, low, high = self._linear_rows(step, weights, integrals)
-        final = _final_conditions(task, unknown[-4:])
+        end = final_conditions(
+            task, unknown[duration_place - task.dimension : duration_place], unknown[core - 4 : core]
+        )
+        via, via_low, via_high = symbolic_via_rows(task, basis, unknown[:duration_place], unknown[self._open])
+        final = casadi.vertcat(end, via)
         further: list[DerivativeRows | EffortTerms] = [DerivativeRows(task, basis, unknown)]
         if task.efforts_limited or task.cost == "effort":
             further.append(EffortTerms(task, basis, self.places, panels, unknown))
@@ -156,9 +167,9 @@ class CollocationProgram:
         }
         # The third row of a pointed axis is a cosine, which only has to be positive.
         final_high = np.zeros(3) if task.target is not None else np.array([0.0, 0.0, np.inf])
-        room = np.ones(rows.shape[0] - len(low) - 3)
-        self._low = np.concatenate([low, np.zeros(3), -room])
-        self._high = np.concatenate([high, final_high, room])
+        room = np.ones(sum(part.values.shape[0] for part in further))
+        self._low = np.concatenate([low, np.zeros(3), via_low, -room])
+        self._high = np.concatenate([high, final_high, via_high, room])
 
     def _linear_rows(self, step: float, weights: Array, integrals: Array) -> tuple[Any, Any, Array, Array]:
         """Collocation and rate limits: the linear part of the rows, how the turning enters, lower and upper bounds."""
@@ -200,7 +211,8 @@ class CollocationProgram:
         unbounded = np.full(rates.shape[0], np.inf)
         met = np.zeros(conditions.shape[0])
         low, high = np.concatenate([equal, -unbounded, zero, met]), np.concatenate([equal, zero, unbounded, met])
-        return sparse_matrix(linear), sparse_matrix(turning), low, high
+        no_places = sparse.csr_matrix((linear.shape[0], self._open.stop - self._open.start))
+        return sparse_matrix(sparse.hstack([linear, no_places])), sparse_matrix(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
         """The integral of half the squared second derivative: exact by two nodes of a piece or more."""
@@ -222,19 +234,22 @@ class CollocationProgram:
         *,
         iterations: int,
         tolerance: float = _TOLERANCE,
+        via_places: Array | None = None,
         settles: bool = False,
         room: Array | None = None,
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
         """A local optimum from a guess: control points (k, m), T, and the attitude at places (N,) -> (N, 4).
 
+        Where there are waypoints, their places too, (v,).
+
         With `settles` it may end before, where the cost changes no more. `room` is how much of their limits efforts may
         take up at the nodes and the ends of pieces, (places, l); None: all of it.
         """
-        guess = np.concatenate(
-            [control.ravel(), [duration], quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
-        )
-        best = BestIterate(iteration_callback)
+        at = np.zeros(len(self._task.via)) if via_places is None else via_places
+        attitudes = [quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
+        guess = np.concatenate([control.ravel(), [duration], *attitudes, at[open_points(self._task)]])
+        best = BestIterate(iteration_callback, self._goal_error)
         rows_low, rows_high = self._low.copy(), self._high.copy()
         if room is not None:
             rows_low[-room.size :], rows_high[-room.size :] = -room.ravel(), room.ravel()
@@ -295,21 +310,36 @@ class CollocationProgram:
         return NlpSolution(
             control=values[:points].reshape(self._basis.dimension, self._task.dimension),
             duration=float(values[points]),
-            attitude=so3.matrix_from_quat(so3.normalised(values[-4:])),
+            attitude=self._last_attitude(values),
             cost=cost,
             status=status,
             converged=status in GOOD_STATUS,
             kkt_residual=max(dual, primal),
             infeasibility=primal,
             iterations=int(stats["iter_count"]),
+            via_places=self._via_places(values),
             # IPOPT adds a multiple of the identity to the Hessian until the matrix has n positive and m negative
             # eigenvalues, n unknowns and m rows: with none, that of the projected Hessian are all positive.
             second_order=shifts[-1] == 0.0 if shifts else None,
         )
 
+    def _goal_error(self, values: Array) -> float:
+        """Of unknowns [rad]."""
+        points = self._task.dimension * self._basis.dimension
+        return self._task.goal_error(self._last_attitude(values), values[points - self._task.dimension : points])
+
+    def _last_attitude(self, values: Array) -> Array:
+        return so3.matrix_from_quat(so3.normalised(values[self._open.start - 4 : self._open.start]))
+
+    def _via_places(self, values: Array) -> Array:
+        """Of all waypoints, whether given or found."""
+        places = np.array([np.nan if point.place is None else point.place for point in self._task.via])
+        places[open_points(self._task)] = values[self._open]
+        return places
+
     def _cost_scale(self, control: Array, duration: float) -> float:
         """The cost of a guess, or 1 where it is zero."""
-        rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1))
+        rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1) + self._open.stop - self._open.start)
         value = float(self._cost_function(np.concatenate([control.ravel(), [duration], rest])))
         return value if value > 0.0 else 1.0
 
@@ -329,19 +359,23 @@ class CollocationProgram:
             duration = _SHORTEST * task.duration if task.cost == "time" and free < 0.0 else task.duration
             inner, ends = np.full(4 * len(self.places), free), np.full((basis.pieces + 1, 4), free)
             ends[0] = [0.0, 0.0, 0.0, 1.0]
-            bounds.append(np.concatenate([control.ravel(), [duration], inner, ends.ravel()]))
+            opened = np.full(self._open.stop - self._open.start, 0.0 if free < 0.0 else 1.0)
+            bounds.append(np.concatenate([control.ravel(), [duration], inner, ends.ravel(), opened]))
         return bounds[0], bounds[1]
 
 
-def _final_conditions(task: Reorientation, last: Any) -> Any:
-    """Three rows of the last quaternion: zero at the target; for an axis the third is the cosine, not below zero."""
+def final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> Any:
+    """Three rows of the last coordinates and quaternion: zero at the target; of an axis the third is the cosine."""
     import casadi
 
     if task.target is not None:
         x, y, z, w = so3.quat_from_matrix(task.target)
-        return casadi.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ last
+        return casadi.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ quaternion
     axis, direction = task.pointing_axes()
-    vector, scalar = last[:3], last[3]
+    vector, scalar = quaternion[:3], quaternion[3]
     seen = casadi.DM(axis)
+    if task.link is not None:
+        shape = casadi.DM(task.coupling) @ coordinates + casadi.DM(task.offset)
+        seen = symbolic_body(task.body).link_pose(task.link)(shape)[:3, :3] @ seen
     turned = seen + 2.0 * scalar * casadi.cross(vector, seen) + 2.0 * casadi.cross(vector, casadi.cross(vector, seen))
     return casadi.DM(np.vstack([task.constrained_directions(), direction])) @ turned

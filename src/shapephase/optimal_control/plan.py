@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..arrays import Array
 from ..body.body import Body
 from ..display import card_html, card_text, short_repr
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._card import plan_card
+from .plan_options import Goal
 
 COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "effort": "s", "time": "s"}
 """Of each cost; metres stand for radians where joints slide."""
+
+PLAN_STATUS = ("found", "not found", "stopped", "out of time")
+"""How a search ended: after all starts, with a local optimum that reaches the goal or without, or before."""
 
 AGREEMENT = 1e-3
 """Relative difference of costs up to which starts have come to the same."""
@@ -30,10 +36,11 @@ class Progress:
     iteration : of the solver, from 0
     cost : so far [unit of the plan's cost]
     infeasibility : the largest violation of a constraint so far, scaled: the equations of motion, the goal, the limits
+    goal_error : angle between the solver's own attitude at the end and the goal so far [rad]
 
     Examples
     --------
-    >>> said = sp.optimal_control.Progress("solve", 1, 1, 12, 0.09, 1e-9)
+    >>> said = sp.optimal_control.Progress("search", 1, 1, 12, 0.09, 1e-9, 1e-10)
     >>> said.iteration, said.cost
     (12, 0.09)
     """
@@ -44,6 +51,7 @@ class Progress:
     iteration: int
     cost: float
     infeasibility: float
+    goal_error: float
 
     __repr__ = short_repr
 
@@ -100,7 +108,8 @@ class Plan:
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
     transcription_gap : the same before the Newton corrections: the error of the discretisation [rad]
     polish_steps : Newton corrections of the path's coefficients that removed it
-    kkt_residual : of the discrete optimum before the corrections, scaled
+    kkt_residual : of the discrete optimum before the corrections, scaled; for a motion of many strokes that of the
+        optimum among motions of so many equal ones
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
     method : that found it
     iterations : over all starts
@@ -110,10 +119,14 @@ class Plan:
     hamiltonian_spread : by how much Pontryagin's Hamiltonian varies, relative to its mean: along an optimal path of the
         costs "kinetic" and "rate" without momentum it is constant where no rate is at its limit. Means of the pieces of
         the spline, without three at both ends, where the joints start and stop; None for other costs, with momentum,
-        and where all pieces are at a rate limit, or accelerations, jerks or efforts have limits
+        and where all pieces are at a rate limit, or accelerations, jerks or efforts have limits, or waypoints times
     limit_shares : what `path` takes up of each kind of limit that it has, at most, 1 being all of it: of "position",
         half the range, from its middle; of "rate", by the spline's control points, which bound it; of "acceleration"
         and "jerk"; of "effort", at 4,001 even times or more
+    goal : what `path` was to reach; of several, the one that costs least
+    status : "found"; of a `PlanNotFound.best`, "not found"; "stopped" or "out of time" where not all starts were gone
+        through
+    waypoint_times : (v,) when `path` passes its waypoints [s]
 
     Examples
     --------
@@ -142,6 +155,9 @@ class Plan:
     second_order: bool | None = None
     hamiltonian_spread: float | None = None
     limit_shares: Mapping[str, float] = field(default_factory=dict)
+    goal: Goal | None = None
+    status: str = "found"
+    waypoint_times: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def agreeing_starts(self) -> int:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import number_argument
+from ..arguments import number_argument, positive_argument
 from ..arrays import Array, finite_array, real_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
+from ._symmetry import different, symmetry_argument
 
 METHODS = ("collocation", "reduced")
 RATES_AT_ENDS = ("zero", "periodic", "free")
@@ -41,9 +42,12 @@ class Goal:
 
     Attributes
     ----------
-    rotation : (3, 3) attitude at the end
+    rotation : (3, 3) attitude at the end; or several (k, 3, 3), of which the one that costs least is taken
     pointing : an axis of the base and the inertial direction that it has to have at the end, two vectors (3,), kept as
-        unit vectors (2, 3); the rotation about that direction is left free
+        unit vectors (2, 3); the rotation about that direction is left free. Or several such pairs (k, 2, 3)
+    link : whose axis is pointed instead of the base's, in axes of the link's frame as it stands at the end
+    symmetry : turns after which the body looks the same, in its base's axes, so that any of them may come before the
+        goal's: an axis (3,), for all turns about it; or some rotations (k, 3, 3), kept as the group that they make
     somersaults, half_twists : how often the body turns about its momentum and, in half turns, about its own
         `twist_axis`, counted through the motion, whole or not; one that is left out is 0. The momentum must be at right
         angles to the twist axis
@@ -53,7 +57,7 @@ class Goal:
     ------
     ShapeError
         If nothing, or more than one thing, is given; for a wrong shape, entries that are not finite, a matrix that is
-        no rotation, a vector of no length.
+        no rotation, a vector of no length, more than 120 rotations of a symmetry.
 
     Examples
     --------
@@ -64,6 +68,8 @@ class Goal:
 
     rotation: ArrayLike | None = None
     pointing: ArrayLike | None = None
+    link: str | None = None
+    symmetry: ArrayLike | None = None
     somersaults: float | None = None
     half_twists: float | None = None
     twist_axis: ArrayLike = (0.0, 0.0, 1.0)
@@ -85,11 +91,19 @@ class Goal:
             raise ShapeError("goal: one of rotation, pointing, or somersaults and half_twists is needed, got none")
         if self.rotation is not None:
             rotation = so3.rotation_argument(self.rotation, "rotation")
-            if rotation.shape != (3, 3):
-                raise ShapeError(f"rotation: one rotation (3, 3) is needed, got shape {rotation.shape}")
+            if rotation.ndim not in (2, 3) or not len(rotation):
+                raise ShapeError(
+                    f"rotation: one rotation (3, 3), or several (k, 3, 3), are needed, got shape {rotation.shape}"
+                )
             self._keep("rotation", rotation)
         if self.pointing is not None:
-            self._keep("pointing", _unit_pair(self.pointing))
+            self._keep("pointing", _unit_pairs(self.pointing))
+        if self.link is not None and (self.pointing is None or not isinstance(self.link, str)):
+            raise ShapeError(f"link: the name of the one whose axis `pointing` has, got {what_came(self.link)}")
+        if self.symmetry is not None:
+            self._keep("symmetry", symmetry_argument(self.symmetry))
+            if self.winds or (self.pointing is not None and np.ndim(self.symmetry) == 1):
+                raise ShapeError("symmetry: an axis goes with rotation, rotations go with rotation or pointing")
         axis = finite_array(self.twist_axis, "twist_axis", (3,))
         if axis.ndim != 1 or not axis.any():
             raise ShapeError(
@@ -104,6 +118,20 @@ class Goal:
     def winds(self) -> bool:
         """Whether somersaults and twists are counted."""
         return self.somersaults is not None or self.half_twists is not None
+
+    @property
+    def members(self) -> tuple[Goal, ...]:
+        """The goals of one attitude or one axis each, any of which will do."""
+        if self.winds:
+            return (self,)
+        turns = np.eye(3)[None] if self.symmetry is None else np.asarray(self.symmetry)
+        if self.rotation is None:
+            pairs = np.asarray(self.pointing).reshape(-1, 2, 3)
+            return tuple(Goal(pointing=(turn @ axis, d), link=self.link) for axis, d in pairs for turn in turns)
+        rotations = np.asarray(self.rotation).reshape(-1, 3, 3)
+        if turns.ndim == 1:
+            return tuple(Goal(pointing=(turns, rotation @ turns)) for rotation in rotations)
+        return tuple(Goal(rotation=one) for one in different((rotations[:, None] @ turns).reshape(-1, 3, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,14 +204,16 @@ class Search:
         (not for the costs "time" and "effort", nor with limits of efforts). On equal splines both come to the same
         costs within 1.5 %, of the cat in 14 and 11 s; the first leaves a KKT residual of 1e-9, the second of some 1e-6,
         and for the astronaut it may need more than 300 iterations: so the first is the default
-    starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. Where none leads
-        to a plan of a body with up to eight free joints, two further guesses are tried, and then a motion of many
-        strokes
+    starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. For up to eight
+        free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
+        coarse search. Where none leads to a plan of up to eight, two further guesses are tried, and then a motion of
+        many equal strokes; at once where two joints cannot turn the body so far in four rounds
     seed : of the random guesses; the same seed gives the same plan
     pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
         else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the
-        goal; six for each of many strokes
+        goal; of many strokes as many as they need, six or more for each, but no more than these
     iterations : the most that the solver may take for each start
+    time_limit : the longest that the search may take [s], looked at after each iteration; None: as long as it takes
 
     Raises
     ------
@@ -203,6 +233,7 @@ class Search:
     seed: int = 0
     pieces: int | None = None
     iterations: int = 300
+    time_limit: float | None = None
 
     __repr__ = short_repr
 
@@ -215,6 +246,8 @@ class Search:
         _check_count(self.starts, "starts", 1, _MOST_STARTS)
         _check_count(self.seed, "seed", 0)
         _check_count(self.iterations, "iterations", 1, _MOST_ITERATIONS)
+        if self.time_limit is not None:
+            positive_argument(self.time_limit, "time_limit")
 
 
 def goal_argument(value: Any) -> Goal:
@@ -228,15 +261,15 @@ def goal_argument(value: Any) -> Goal:
     return Goal(rotation=value)
 
 
-def _unit_pair(pointing: ArrayLike) -> Array:
-    pair = finite_array(pointing, "pointing")
-    lengths = np.linalg.norm(pair, axis=-1)
-    if pair.shape != (2, 3) or not np.all(lengths > 0.0):
+def _unit_pairs(pointing: ArrayLike) -> Array:
+    pairs = finite_array(pointing, "pointing")
+    lengths = np.linalg.norm(pairs, axis=-1)
+    if pairs.ndim not in (2, 3) or pairs.shape[-2:] != (2, 3) or not pairs.size or not np.all(lengths > 0.0):
         raise ShapeError(
             "pointing: an axis of the base and a direction in inertial axes, two vectors (3,) that are not zero, are "
-            f"needed, got {what_came(pointing)}"
+            f"needed, or several such pairs (k, 2, 3), got {what_came(pointing)}"
         )
-    return pair / lengths[:, None]
+    return pairs / lengths[..., None]
 
 
 def _check_count(value: Any, name: str, least: int, most: int | None = None) -> None:

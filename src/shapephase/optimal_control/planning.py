@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import threading
 import time
@@ -16,23 +17,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_executor, check_object
-from ..arrays import Array
 from ..body.body import Body
-from ..dynamics.torques import joint_torques
-from ..errors import PlanNotFound, ShapePhaseError
+from ..errors import PlanNotFound
 from ._certificates import hamiltonian_spread
-from ._path_cost import path_cost
-from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, position_share, tightened, warn_of_unstated
-from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
-from ._reduced import ReducedProgram, check_reducible
-from ._solver_callback import IterationCallback, heard_interrupts
+from ._local_search import Attempt, LocalSearch, corrected_attempt, guessed_attitudes, polished_path
+from ._plan_limits import limit_shares, position_share, warn_of_unstated
+from ._reduced import check_reducible
+from ._solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
 from ._spline_basis import SplineBasis
-from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
+from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
-from .guesses.strokes import guess_of_strokes
-from .plan import Plan, Progress, Start
-from .plan_options import Goal, Limits, Search
+from .guesses.stroke_program import StrokeProgram, strokes_suffice
+from .guesses.strokes import guess_of_strokes, most_of_a_loop
+from .plan import Plan, Progress
+from .plan_options import Goal, Limits, Search, goal_argument
 from .task import Reorientation, reorientation
+from .waypoints import Waypoint
 
 # Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
 _FEW_JOINTS = 4
@@ -45,27 +45,29 @@ _PIECES_OF_FEW = 160
 # Pieces up to `_MANY_JOINTS`, and beyond.
 _PIECES = 40
 _PIECES_OF_MANY = 20
-# How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
-_HALVINGS = 2
-# How often efforts are given less room where they exceed their limits between the nodes.
-_TIGHTENINGS = 6
-# Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
-_WINDING_TOLERANCE = 0.1
-# Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
-_WINDING_SAMPLES = 50
-# Pieces of the coarse search that ranks the guesses: enough for a loop to bend, a fraction of the cost of the fine one.
+# Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
 _COARSE_PIECES = 10
+_COARSE_PIECES_OF_MORE = 20
 # Of a rate limit: what counts as being at it, where no plan was found.
 _NEARLY = 0.9
-# The fewest guesses that it ranks, so that a single start is the best of several.
-_COARSE_GUESSES = 8
+# Guesses that it ranks for each start, and at most unless there are more starts; for few joints, where they are cheap,
+# not fewer than eight.
+_RANKED = 4
+_MOST_RANKED = 16
+_LEAST_OF_FEW = 8
+# Joints up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`.
+_RANKED_JOINTS = 12
+# How often a loop that starts as a circle may go round: it bends into some rounds more than it starts with.
+_ROUNDS_OF_LOOPS = 4
 # Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
 # rounding decides whether a search comes to it.
 _SPARE = 2
-# The most iterations for each: a guess that needs more is not a good start.
-_COARSE_ITERATIONS = 60
+# The most iterations for each: those that have not ended by then are near enough to be ranked.
+_COARSE_ITERATIONS = 40
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
-_COARSE_TOLERANCE = 1e-5
+_COARSE_TOLERANCE = 1e-4
+# Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
+_COARSE_INFEASIBILITY = 1e-2
 
 
 def plan_reorientation(
@@ -76,6 +78,7 @@ def plan_reorientation(
     duration: float = 1.0,
     start: ArrayLike | None = None,
     end: Any = None,
+    via: Sequence[Waypoint] = (),
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
@@ -92,11 +95,14 @@ def plan_reorientation(
 
     Parameters
     ----------
-    goal : (3, 3) attitude at the end; or a `Goal`: an axis to be pointed, or somersaults and twists to be counted
+    goal : (3, 3) attitude at the end, or any of several (k, 3, 3); or a `Goal`: an axis to be pointed, of the base or
+        of a link, an attitude up to a symmetry of the body, or somersaults and twists to be counted
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]; 0: none
     duration : [s]; for cost "time" the longest allowed
     start : (n,) shape at the start [rad or m]; None: neutral, or as near as the limits permit
     end : (n,) shape at the end; None: as at the start, a closed loop; "free": any
+    via : what the path passes through on its way, in this order: a `Waypoint` is a shape, or the coordinates of some
+        joints, with a time or without
     cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
         joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
         other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
@@ -111,8 +117,9 @@ def plan_reorientation(
         file has them
     search : method, starts, resolution; None: `Search()`
     iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
-        there: with the cheapest plan of the starts that had ended, or else PlanNotFound with the best so far.
-        Ctrl-C is raised as KeyboardInterrupt, and nothing is kept
+        there, as it does when its time is over (`Search.time_limit`): with the cheapest plan of the starts that had
+        ended, or else PlanNotFound with the best so far. Ctrl-C is raised as KeyboardInterrupt, and
+        nothing is kept
     executor : of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes search
         from several starts (`Search.starts`) side by side; `iteration_callback` then hears of a start when it has
         ended. None: one start after the other, here. Plans do not depend on it
@@ -122,8 +129,8 @@ def plan_reorientation(
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, unknown names.
     PlanNotFound
-        If no start came to a local optimum that reaches the goal, or `iteration_callback` stopped the search; it
-        carries the best attempt.
+        If no start came to a local optimum that reaches the goal, or `iteration_callback` or its time limit stopped
+        the search before; it carries the best attempt.
 
     Warns
     -----
@@ -146,154 +153,189 @@ def plan_reorientation(
     check_object(body, "Body", "body")
     check_executor(executor)
     chosen = Search() if search is None else search
-    task = reorientation(
-        body,
-        goal,
-        momentum=momentum,
-        duration=duration,
-        start=start,
-        end=end,
-        cost=cost,
-        rates_at_ends=rates_at_ends,
-        joints=joints,
-        symmetric=symmetric,
-        limits=limits,
-    )
+    goals = goal_argument(goal).members
+    tasks = [
+        reorientation(
+            body,
+            member,
+            momentum=momentum,
+            duration=duration,
+            start=start,
+            end=end,
+            via=via,
+            cost=cost,
+            rates_at_ends=rates_at_ends,
+            joints=joints,
+            symmetric=symmetric,
+            limits=limits,
+        )
+        for member in goals
+    ]
     if chosen.method == "reduced":
-        check_reducible(task)
-    warn_of_unstated(task, Limits() if limits is None else limits)
+        check_reducible(tasks[0])
+    warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
-    attempts: list[_Attempt] = []
+    reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
+    attempts: list[Attempt] = []
     with heard_interrupts():
-        basis = SplineBasis(int(chosen.pieces or _default_pieces(task)))
-        reporter = _ProgressReporter(iteration_callback)
-        starting_points, spare = _starting_points(task, basis, chosen, reporter)
-        searched = _searched_here if executor is None else partial(_searched_by, executor)
-        for attempt in searched(task, basis, chosen, starting_points, reporter):
-            attempts.append(attempt)
-            if reporter.stopped:
-                break
-        if not reporter.stopped and not any(attempt.report.converged for attempt in attempts):
-            further = chain(
-                _searched_here(task, basis, chosen, spare, reporter), _searched_by_strokes(task, chosen, reporter)
-            )
-            for attempt in further:
+        for searched in _searches(tasks, chosen, reporter, executor):
+            for attempt in searched:
                 attempts.append(attempt)
-                if reporter.stopped or attempt.report.converged:
+                if reporter.stopped:
                     break
+            if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+                break
     seconds = time.perf_counter() - began
-    best = min((attempt for attempt in attempts if attempt.polished is not None), key=_Attempt.rank, default=None)
-    plan = None if best is None else _plan(task, best, attempts, chosen.method, seconds)
+    best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
+    plan = (
+        None
+        if best is None
+        else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, chosen.method, seconds, reporter.stopped)
+    )
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(_failure_message(task, attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(_failure_message(tasks[0], attempts, best, reporter.stopped), plan)
     return plan
 
 
-def _searched_here(
-    task: Reorientation, basis: SplineBasis, search: Search, guesses: Sequence[Guess], reporter: _ProgressReporter
-) -> Iterator[_Attempt]:
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A local search that is to be done."""
+
+    task: Reorientation
+    basis: SplineBasis
+    guess: Guess
+
+
+def _searches(
+    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+) -> Iterator[Iterator[Attempt]]:
+    """What is tried until something leads to a plan: loops first, unless none can turn the body so far."""
+    near, far = [], []
+    for task in tasks:
+        beyond = float(np.linalg.norm(task.turn_to_goal())) > _ROUNDS_OF_LOOPS * most_of_a_loop(task)
+        (far if beyond else near).append(task)
+    if near:
+        yield _searched_by_loops(near, search, reporter, executor)
+    yield chain.from_iterable(_searched_by_strokes(task, search, reporter) for task in tasks)
+    if far:
+        yield _searched_by_loops(far, search, reporter, executor)
+
+
+def _searched_by_loops(
+    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+) -> Iterator[Attempt]:
+    """From loops, and from some more where none of those asked for leads to a plan."""
+    first, spare = _jobs(tasks, search, reporter)
+    searched = _searched_here if executor is None else partial(_searched_by, executor)
+    found = False
+    for attempt in searched(first, search, reporter):
+        found = found or attempt.report.converged
+        yield attempt
+    if not found:
+        for attempt in _searched_here(spare, search, reporter):
+            yield attempt
+            if attempt.report.converged:
+                break
+
+
+def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter) -> tuple[list[_Job], list[_Job]]:
+    """The local searches for each of several tasks, and those to go on with if none of them leads to a plan."""
+    first: list[_Job] = []
+    spare: list[_Job] = []
+    for task in tasks:
+        if first and reporter.stopped:
+            break
+        basis = SplineBasis(int(search.pieces or _default_pieces(task)))
+        for jobs, found in zip((first, spare), _starting_points(task, basis, search, reporter), strict=True):
+            jobs.extend(_Job(task, basis, guess) for guess in found)
+    return first, spare
+
+
+def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
     """The local searches, one after the other."""
-    local = _LocalSearch.of(task, basis, search)
-    for number, guess in enumerate(guesses):
-        yield local.attempt(guess, reporter.solver_callback("search", number + 1, len(guesses)))
+    local = None
+    for number, job in enumerate(jobs):
+        if local is None or local.task is not job.task:
+            local = LocalSearch.of(job.task, job.basis, search)
+        yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
 
 
-def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[_Attempt]:
-    """From a motion of many strokes, for few joints."""
+def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
+    """Motions of many strokes, for few joints: equal ones, and from there any."""
     if task.dimension > _MANY_JOINTS or search.method != "collocation":
         return
     stroked = guess_of_strokes(task, search.seed, search.pieces)
-    if stroked is not None:
-        basis, guess = stroked
-        local = _LocalSearch.of(task, basis, replace(search, pieces=basis.pieces), settles=basis.pieces > _PIECES)
-        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
+    if stroked is None:
+        return
+    (layout, control), callback = stroked, reporter.solver_callback("search", 1, 1)
+    if strokes_suffice(task):
+        began = time.perf_counter()
+        solution = StrokeProgram(task, layout).solve_strokes(control, callback)
+        equal = corrected_attempt(task, layout.basis, solution, polished_path(task, layout.basis, solution), began)
+        yield equal
+        if equal.report.converged or reporter.stopped:
+            return
+    guess = guess_of_control(task, layout.basis, control)
+    if guess is not None:
+        few = replace(search, pieces=layout.basis.pieces)
+        yield LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
 
 
 def _searched_by(
-    executor: Executor,
-    task: Reorientation,
-    basis: SplineBasis,
-    search: Search,
-    guesses: Sequence[Guess],
-    reporter: _ProgressReporter,
-) -> Iterator[_Attempt]:
-    """The local searches by an executor, in the order of the guesses."""
-    recipe = pickle.dumps((task, basis.pieces, search))
-    for number, attempt in enumerate(executor.map(partial(_searched_elsewhere, recipe), guesses)):
+    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter
+) -> Iterator[Attempt]:
+    """The local searches by an executor, in their order."""
+    recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
+    found = executor.map(
+        partial(_searched_elsewhere, reporter.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
+    )
+    for number, (job, attempt) in enumerate(zip(jobs, found, strict=True)):
         end = attempt.report
-        reporter.solver_callback("search", number + 1, len(guesses))(end.iterations, end.cost, end.infeasibility)
-        yield attempt
+        report = reporter.solver_callback("search", number + 1, len(jobs))
+        report(end.iterations, end.cost, end.infeasibility, end.goal_error)
+        yield replace(attempt, task=job.task)
 
 
 # What a thread of an executor has made of the last recipe that came: a program takes as long as some starts.
 _KEPT = threading.local()
 
 
-def _searched_elsewhere(recipe: bytes, guess: Guess) -> _Attempt:
-    """One of them, in another process or thread."""
-    if getattr(_KEPT, "recipe", None) != recipe:
-        task, pieces, search = pickle.loads(recipe)
-        _KEPT.local = _LocalSearch.of(task, SplineBasis(pieces), search)
-        _KEPT.recipe = recipe
-    return _KEPT.local.attempt(guess, lambda *_: False)
-
-
-def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
-    return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
+def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
+    """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
+    with stopping_interrupts() as stopped:
+        if getattr(_KEPT, "recipe", None) != recipe:
+            task, pieces, search = pickle.loads(recipe)
+            _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
+            _KEPT.recipe = recipe
+        return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
 
 
 class _ProgressReporter:
-    """Passes the progress of a search on to the user's callback.
+    """Passes the progress of a search on to the user's callback, and ends it in time.
 
     Attributes
     ----------
-    stopped : whether the callback has stopped the search
+    end : when the time is over [s since 1970]: a clock that other processes have, too
+    stopped : what has stopped the search, one of `PLAN_STATUS`; empty: nothing
     """
 
-    def __init__(self, callback: Callable[[Progress], Any] | None) -> None:
+    def __init__(self, callback: Callable[[Progress], Any] | None, time_limit: float | None) -> None:
         self._callback = callback
-        self.stopped = False
+        self.end = math.inf if time_limit is None else time.time() + time_limit
+        self.stopped = ""
 
     def solver_callback(self, stage: str, start: int, starts: int) -> IterationCallback:
         """The solver's callback during one start."""
 
-        def report(iteration: int, cost: float, infeasibility: float) -> bool:
-            if self._callback is not None and not self.stopped:
-                self.stopped = bool(self._callback(Progress(stage, start, starts, iteration, cost, infeasibility)))
-            return self.stopped
+        def report(iteration: int, cost: float, infeasibility: float, goal_error: float) -> bool:
+            now = Progress(stage, start, starts, iteration, cost, infeasibility, goal_error)
+            if not self.stopped and self._callback is not None and self._callback(now):
+                self.stopped = "stopped"
+            if not self.stopped and time.time() > self.end:
+                self.stopped = "out of time"
+            return bool(self.stopped)
 
         return report
-
-
-@dataclass(frozen=True, eq=False)
-class _Attempt:
-    """One local search.
-
-    Attributes
-    ----------
-    report : what the user sees of it
-    polished : its path, corrected; None where that could not be reconstructed
-    cost : of the corrected path; infinite where there is none
-    reaches_goal : whether the corrected path reaches the goal within the limits
-    basis : of its spline
-    """
-
-    report: Start
-    polished: PolishedPath | None
-    cost: float
-    reaches_goal: bool
-    basis: SplineBasis
-
-    def rank(self) -> tuple[bool, bool, float]:
-        """The best has the least: first local optima, then paths that reach the goal by cost, then others by error."""
-        if self.polished is None:
-            return True, True, np.inf
-        return not self.report.converged, not self.reaches_goal, self.cost if self.reaches_goal else self.goal_error
-
-    @property
-    def goal_error(self) -> float:
-        """Of the corrected path [rad]."""
-        return np.inf if self.polished is None else self.polished.goal_error
 
 
 def _default_pieces(task: Reorientation) -> int:
@@ -307,13 +349,15 @@ def _starting_points(
 ) -> tuple[list[Guess], list[Guess]]:
     """The guesses to start from, and those to go on with if none of them leads to a plan.
 
-    For few joints each is first improved on a coarse spline, and the cheapest are taken.
+    Unless there are many joints, each is first improved on a coarse spline, and the cheapest are taken.
     """
     count = int(search.starts)
-    if task.dimension > _MANY_JOINTS:
+    if task.dimension > (_RANKED_JOINTS if count > 1 else _MANY_JOINTS):
         return guesses(task, basis, search.seed, count), []
-    coarse = SplineBasis(_COARSE_PIECES)
-    candidates = guesses(task, coarse, search.seed, max(count, _COARSE_GUESSES))
+    few = task.dimension <= _FEW_JOINTS
+    coarse = SplineBasis(_COARSE_PIECES if few else _COARSE_PIECES_OF_MORE)
+    ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
+    candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
     found: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
@@ -322,172 +366,37 @@ def _starting_points(
         solution = program.solve(
             candidate.control,
             task.duration,
-            _guessed_attitudes(task, candidate),
+            guessed_attitudes(task, candidate),
             iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
             tolerance=_COARSE_TOLERANCE,
+            via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
-        curve = coarse.matrix(PLACES) @ (solution.control if solution.converged else candidate.control)
-        guess = guess_of(task, basis, curve)
+        near = solution.infeasibility < _COARSE_INFEASIBILITY
+        guess = guess_of(task, basis, coarse.matrix(PLACES) @ (solution.control if near else candidate.control))
         if guess is not None:
-            found.append((solution.cost if solution.converged else np.inf, number, guess))
-    ranked = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
-    return ranked[:count], ranked[count : count + _SPARE]
-
-
-def _guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
-    """Attitudes at places of [0, 1] that a solver starts from: (N,) -> (N, 4)."""
-    if task.windings is not None:
-        return task.uniform_winding
-    turn = task.turn_to_goal(guess.motion.final_attitude)
-    return lambda places: guess.quaternions(places, turn)
-
-
-@dataclass(frozen=True, eq=False)
-class _LocalSearch:
-    """What finds the local optimum next to a guess.
-
-    Attributes
-    ----------
-    basis : of the path's spline at first
-    program : for this basis
-    halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
-    settles : whether the solver may end where the cost changes no more, as that of a long motion
-    """
-
-    task: Reorientation
-    basis: SplineBasis
-    program: CollocationProgram | ReducedProgram
-    iterations: int
-    halvings: int
-    settles: bool = False
-
-    @classmethod
-    def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> _LocalSearch:
-        halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
-        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings, settles)
-
-    def attempt(self, guess: Guess, callback: IterationCallback) -> _Attempt:
-        """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
-        found, control = self._on(self.basis, self.program, guess, callback)
-        for _ in range(self.halvings):
-            solved = found.report.status in GOOD_STATUS
-            if not solved or found.reaches_goal:
-                break
-            finer = SplineBasis(2 * found.basis.pieces)
-            onward = guess_of(self.task, finer, found.basis.matrix(PLACES) @ control)
-            if onward is None:
-                break
-            program = CollocationProgram(self.task, finer)
-            following, control = self._on(finer, program, onward, callback)
-            found = min(found, following, key=_Attempt.rank)
-            if found is not following:
-                break
-        return found
-
-    def _on(
-        self,
-        basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
-        guess: Guess,
-        callback: IterationCallback,
-    ) -> tuple[_Attempt, Array]:
-        """The attempt on some basis, and the control points that the solver found."""
-        task, began = self.task, time.perf_counter()
-        solution, polished, iterations = self._optimum(basis, program, guess, callback)
-        # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
-        cost = np.inf if polished is None else _cost(task, basis, polished)
-        reaches_goal = (
-            polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-        )
-        report = Start(
-            status=solution.status,
-            converged=solution.converged and reaches_goal,
-            cost=solution.cost,
-            goal_error=task.goal_error(solution.attitude),
-            kkt_residual=solution.kkt_residual,
-            infeasibility=solution.infeasibility,
-            iterations=iterations,
-            seconds=time.perf_counter() - began,
-            second_order=solution.second_order,
-        )
-        attempt = _Attempt(report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
-        return attempt, solution.control
-
-    def _optimum(
-        self,
-        basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
-        guess: Guess,
-        callback: IterationCallback,
-    ) -> tuple[NlpSolution, PolishedPath | None, int]:
-        """What the solver found, its path corrected, and the iterations.
-
-        Where efforts are beyond their limits between the nodes, they are given less room there, and it goes on.
-        """
-        task, room, iterations = self.task, None, 0
-        control, duration, attitudes = guess.control, task.duration, _guessed_attitudes(task, guess)
-        options: dict[str, Any] = {"iterations": self.iterations, "iteration_callback": callback}
-        options |= {"settles": True} if self.settles else {}
-        rounds = 0
-        while True:
-            solution = program.solve(control, duration, attitudes, **options)
-            iterations += solution.iterations
-            polished = _polished(task, basis, solution)
-            if not task.efforts_limited or polished is None or not solution.converged or rounds == _TIGHTENINGS:
-                return solution, polished, iterations
-            shares = effort_shares(task, basis, polished.motion)
-            again = guess_of_control(task, basis, solution.control)
-            if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
-                return solution, polished, iterations
-            room = options["room"] = tightened(room, shares, STAGES, rounds)
-            control, duration, attitudes = solution.control, solution.duration, _guessed_attitudes(task, again)
-            rounds += 1
-
-
-def _polished(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
-    """The path that the solver found, corrected to reach the goal; None where it has no motion."""
-    try:
-        return polish(task, basis, solution.control, solution.duration)
-    except ShapePhaseError:
-        return None
-
-
-def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
-    """The cost of a corrected path, by quadrature."""
-    if task.cost == "effort":
-        places, weights = panel_nodes(basis)
-        torque = joint_torques(polished.motion, places * polished.duration).torque
-        return float(polished.duration * weights @ np.sum((torque / task.effort_measure) ** 2, axis=1))
-    if task.cost == "time":
-        return polished.duration
-    if task.cost == "acceleration":
-        places, weights = panel_nodes(basis)
-        bend = basis.matrix(places, 2) @ polished.control @ task.coupling.T
-        return float(0.5 * weights @ np.sum(bend**2, axis=1)) / polished.duration**3
-    return path_cost(task.body, polished.path, task.cost)
-
-
-def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:
-    """Whether duration, rates and windings are within limits; the correction itself keeps the positions there."""
-    if task.windings is not None:
-        times = np.linspace(0.0, polished.path.duration, _WINDING_SAMPLES * basis.pieces)
-        counted = task.counted_windings(polished.motion.attitude(times))
-        if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
-            return False
-    slack = 1.0 + LIMIT_SLACK
-    shares = limit_shares(task, basis, polished.control, polished.motion)
-    return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
+            found.append((solution.cost if near else np.inf, number, guess))
+    order = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
+    return order[:count], order[count : count + _SPARE]
 
 
 def _plan(
-    task: Reorientation, best: _Attempt, attempts: Sequence[_Attempt], method: str, seconds: float
+    goals: Mapping[Reorientation, Goal],
+    best: Attempt,
+    attempts: Sequence[Attempt],
+    method: str,
+    seconds: float,
+    stopped: str,
 ) -> Plan | None:
     """The plan of the best attempt; None where it has no path."""
     if best.polished is None:
         return None
+    task = best.task
     return Plan(
         body=task.body,
+        goal=goals[task],
+        waypoint_times=best.polished.via_places * best.polished.duration,
+        status=stopped or ("found" if best.report.converged else "not found"),
         path=best.polished.path,
         motion=best.polished.motion,
         cost_name=task.cost,
@@ -509,7 +418,7 @@ def _plan(
     )
 
 
-def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _Attempt | None, stopped: bool) -> str:
+def _failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:
     """Why no plan is returned, start by start, and what the best attempt reached."""
     name = task.body.name
     summary = "; ".join(
@@ -525,10 +434,11 @@ def _failure_message(task: Reorientation, attempts: Sequence[_Attempt], best: _A
         length = best.polished.path.duration
         outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
     if stopped:
-        return f"the search for a motion of the joints of {name} was stopped on request ({summary}); {outcome}"
+        how = "stopped on request" if stopped == "stopped" else "ended by its time limit"
+        return f"the search for a motion of the joints of {name} was {how} ({summary}); {outcome}"
     near: list[str] = []
     if best is not None and best.polished is not None:
-        shares = limit_shares(task, best.basis, best.polished.control, best.polished.motion)
+        shares = limit_shares(best.task, best.basis, best.polished.control, best.polished.motion)
         near = [name for name, share in shares.items() if share > _NEARLY]
     way_out = (
         f"joints are at their {' and '.join(near)} limits: give more than {task.duration:.6g} s (cost='time' finds the "

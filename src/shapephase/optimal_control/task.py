@@ -16,7 +16,9 @@ from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
+from ._via_points import ViaPoint, via_points
 from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
+from .waypoints import Waypoint
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 
@@ -44,6 +46,7 @@ class Reorientation:
     body : the body that turns
     target : (3, 3) attitude at the end, from the identity at the start; None: `pointing` determines it
     pointing : (2, 3) a unit axis of the base and the inertial direction that it has to have at the end; None: `target`
+    link : whose axis it is instead of the base's, where the end is free; None: it is the base's
     windings : (2,) somersault and twist, counted through the motion [rad]; None: not counted
     winding_axes : (3, 3) columns: the somersault axis, the tilt axis, the twist axis of the base
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
@@ -57,11 +60,13 @@ class Reorientation:
     efforts_limited : whether they stay within that measure
     rates_at_ends : one of `RATES_AT_ENDS`
     coupling, offset : (n, m) and (n,), each joint from the coordinates
+    via : what it passes through, in its order
     """
 
     body: Body
     target: Array | None
     pointing: Array | None
+    link: str | None
     windings: Array | None
     winding_axes: Array
     momentum: Array
@@ -79,6 +84,7 @@ class Reorientation:
     rates_at_ends: str
     coupling: Array
     offset: Array
+    via: tuple[ViaPoint, ...] = ()
 
     def shapes(self, coordinates: Array) -> Array:
         """The shape at coordinates: (..., m) -> (..., n)."""
@@ -97,21 +103,29 @@ class Reorientation:
         return 3 if self.cost == "acceleration" or np.isfinite(self.jerk_limit).any() else 2
 
     @property
+    def limits_beyond_rates(self) -> bool:
+        """Whether accelerations, jerks or efforts have limits."""
+        return self.efforts_limited or bool(np.isfinite([self.acceleration_limit, self.jerk_limit]).any())
+
+    @property
     def movable(self) -> Mask:
         """(m,) which coordinates can leave their start."""
         return self.upper > self.lower
 
-    def turn_to_goal(self, attitude: Array | None = None) -> Array:
-        """The shortest rotation vector that takes an attitude at the end to the goal: (3,), inertial axes [rad]."""
+    def turn_to_goal(self, attitude: Array | None = None, last: Array | None = None) -> Array:
+        """The shortest rotation vector that takes an attitude at the end to the goal: (3,), inertial axes [rad].
+
+        With the coordinates there (m,), which say where a link points; without both, those of the start.
+        """
         end = np.eye(3) if attitude is None else attitude
         if self.target is not None:
             return so3.log(self.target @ end.T)
-        axis, direction = self.pointing_axes()
-        return so3.log(so3.between(end @ axis, direction))
+        _, direction = self.pointing_axes()
+        return so3.log(so3.between(end @ self.pointed_axis(self.start if last is None else last), direction))
 
-    def goal_error(self, attitude: Array) -> float:
-        """How far an attitude at the end is from the goal [rad]."""
-        return float(np.linalg.norm(self.turn_to_goal(attitude)))
+    def goal_error(self, attitude: Array, last: Array | None = None) -> float:
+        """How far an attitude at the end is from the goal, with the coordinates there (m,), as `turn_to_goal` [rad]."""
+        return float(np.linalg.norm(self.turn_to_goal(attitude, last)))
 
     def constrained_directions(self) -> Array:
         """Rotation vectors at the end, inertial axes, that the goal determines: (3, 3), or (2, 3) for an axis."""
@@ -141,8 +155,20 @@ class Reorientation:
         return so3.quat_product(turns[0], turns[1])
 
     def pointing_axes(self) -> Array:
-        """The axis of the base and the direction it has to have: (2, 3). Only for a task with `pointing`."""
+        """The axis, of the base or a link, and the direction it has to have: (2, 3). Only with `pointing`."""
         return np.zeros((2, 3)) if self.pointing is None else self.pointing
+
+    def pointed_axis(self, last: Array) -> Array:
+        """The axis that is pointed, in axes of the base, at coordinates (m,): (3,). Only with `pointing`."""
+        axis, _ = self.pointing_axes()
+        return axis if self.link is None else self.body.link_pose(self.shapes(last), self.link)[:3, :3] @ axis
+
+    def pointed_turn(self, last: Array) -> Array:
+        """How what is pointed turns against the base by each coordinate, at coordinates (m,): (3, m), base axes."""
+        if self.link is None:
+            return np.zeros((3, self.dimension))
+        shapes = np.broadcast_to(self.shapes(last), (self.dimension, self.body.n_shape))
+        return self.body.link_angular_velocity(shapes, self.coupling.T, self.link).T
 
 
 def reorientation(
@@ -153,13 +179,14 @@ def reorientation(
     duration: float = 1.0,
     start: ArrayLike | None = None,
     end: Any = None,
+    via: Sequence[Waypoint] = (),
     cost: str = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
     limits: Limits | None = None,
 ) -> Reorientation:
-    """The task that `plan_reorientation`'s arguments, which are explained there, describe.
+    """The task that `plan_reorientation`'s arguments, which are explained there, describe; of a goal with one member.
 
     Raises
     ------
@@ -178,7 +205,8 @@ def reorientation(
             f"cost={cost!r}: it is told by the coordinates of joints, and {body.ball_joints[0]} is a ball joint, of "
             "which others would tell another cost; use 'kinetic', or three hinges in one point"
         )
-    checked_goal, within = goal_argument(goal), Limits() if limits is None else limits
+    (checked_goal,) = goal_argument(goal).members
+    within = Limits() if limits is None else limits
     mu = _momentum(momentum)
     windings, winding_axes = _windings(checked_goal, mu)
     bounds = body.joint_limits if within.joint_limits else np.full((body.n_shape, 2), (-np.inf, np.inf))
@@ -206,6 +234,8 @@ def reorientation(
     lower, upper = _coordinate_limits(coupling, factors, first[leaders], bounds)
     rate_limit, *further = (_coordinate_rates(coupling, factors, limits) for limits in (rates, *further))
     chart = BallChart.of(body, first, leaders)
+    length = positive_argument(duration)
+    points = via_points(body, via, None if cost == "time" else length, bounds, coupling, offset, chart)
     start, end = first[leaders], None if last is None else last[leaders]
     if chart is not None:
         coupling, offset = chart.shapes(coupling, offset)
@@ -217,14 +247,16 @@ def reorientation(
             )
         lower, upper, rate_limit = chart.limits(lower, upper, rate_limit)
         further = [np.full(len(rate_limit), np.inf) for _ in further]
+    pointing, link = _pointed(body, checked_goal, last)
     return Reorientation(
         body=body,
         target=_target(checked_goal, windings, winding_axes),
-        pointing=None if checked_goal.pointing is None else np.asarray(checked_goal.pointing),
+        pointing=pointing,
+        link=link,
         windings=windings,
         winding_axes=winding_axes,
         momentum=mu,
-        duration=positive_argument(duration),
+        duration=length,
         start=start,
         end=end,
         cost=cost,
@@ -238,6 +270,7 @@ def reorientation(
         rates_at_ends=rates_at_ends,
         coupling=coupling,
         offset=offset,
+        via=points,
     )
 
 
@@ -269,6 +302,17 @@ def _target(goal: Goal, windings: Array | None, winding_axes: Array) -> Array | 
     if windings is not None:
         return so3.exp(windings[0] * winding_axes[:, 0]) @ so3.exp(windings[1] * winding_axes[:, 2])
     return None if goal.rotation is None else np.asarray(goal.rotation)
+
+
+def _pointed(body: Body, goal: Goal, last: Array | None) -> tuple[Array | None, str | None]:
+    """Axis and direction (2, 3), and the link whose axis it is; from the shape at the end, if given, the base's."""
+    if goal.pointing is None:
+        return None, None
+    axis, direction = pair = np.asarray(goal.pointing)
+    if goal.link is None:
+        return pair, None
+    seen = body.link_pose(body.shape() if last is None else last, goal.link)[:3, :3] @ axis
+    return (pair, goal.link) if last is None else (np.stack([seen, direction]), None)
 
 
 def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) -> tuple[Array, Array | None]:

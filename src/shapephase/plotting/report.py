@@ -48,6 +48,7 @@ def write_report(
     *,
     shape_path: ShapePath | None = None,
     title: str | None = None,
+    purpose: str | None = None,
     trail: str | None = None,
     up: str | None = None,
     error_bars: Sequence[str] = (),
@@ -65,6 +66,7 @@ def write_report(
     path : of the file
     shape_path : of the joints, for a figure and a table of them
     title : None: the label of the deformation
+    purpose : a sentence or two that come first, such as what the motion was made for; None: none
     trail : a link whose origin leaves a trail in the animation
     up : as in `motion_page`
     error_bars : lines about how far the numbers may be off by what the inputs leave open, as `split` prints them
@@ -111,7 +113,12 @@ def write_report(
         styles=("page", "report_page"),
         data={"motion": data, **beside},
         lead=lead(motion),
-        story=[*story(motion, result, scene.body), *torques, accuracy(motion, error_bars)],
+        story=[
+            *([purpose] if purpose else []),
+            *story(motion, result, scene.body),
+            *torques,
+            accuracy(motion, error_bars),
+        ],
         gauge=result.gauge,
         with_sphere=bool(result.has_phase),
         split_rows=split_rows(result),

@@ -3,6 +3,7 @@
 `ODD_FILES` lists hostile and odd files of every kind with what must become of each.
 """
 
+import json
 import os
 
 import numpy as np
@@ -67,6 +68,34 @@ def test_a_spline_comes_back_as_it_was(tmp_path, satellite, suffix, closed):
     # Closed samples with the ends not knotted together are read as a loop: what a closed file means.
     np.testing.assert_allclose(back.shape(t), path.shape(t), atol=1e-14, rtol=0)
     np.testing.assert_allclose(back.rate(t), path.rate(t), atol=1e-12, rtol=0)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".tsv"])
+def test_comments_stand_above_a_table_and_its_faults_keep_their_rows(tmp_path, satellite, suffix):
+    """With quotes and other separators in them; what is no comment but the header behind a hash is not passed over."""
+    times, shapes = recorded(satellite, 2)
+    path, file = sp.ShapePath.spline(times, shapes, joint_names=satellite.joint_names), tmp_path / f"said{suffix}"
+    sp.write_shape_path(path, file, comment='half a "word; \tand, more\nsecond line')
+    lines = file.read_text().splitlines()
+    assert lines[:2] == ['# half a "word; \tand, more', "# second line"]
+    assert len(lines) == 3 + len(path.sample_times)
+    np.testing.assert_array_equal(
+        sp.read_shape_path(file, satellite).shape(times - times[0]), path.shape(times - times[0])
+    )
+    file.write_text("\n".join([*lines[:6], lines[6].replace("0.", "zero", 1), *lines[7:]]))
+    with pytest.raises(TrajectoryError, match="row 7"):
+        sp.read_shape_path(file, satellite)
+    file.write_text("\n".join(["# " + lines[2], *lines[3:]]))
+    with pytest.raises((TrajectoryError, UnknownNameError), match="# time"):
+        sp.read_shape_path(file, satellite)
+
+
+def test_a_comment_of_arrays_is_in_their_provenance(tmp_path, satellite):
+    times, shapes = recorded(satellite, 2)
+    path = sp.ShapePath.spline(times, shapes, joint_names=satellite.joint_names)
+    sp.write_shape_path(path, tmp_path / "said.npz", comment="why not")
+    with np.load(tmp_path / "said.npz") as found:
+        assert json.loads(str(found["provenance"]))["comment"] == "why not"
 
 
 def test_any_path_is_written_finely(tmp_path, diver):

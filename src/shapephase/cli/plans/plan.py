@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import multiprocessing
+import os
 import signal
 import threading
 import time
 import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -23,10 +24,9 @@ from ..outcome import Outcome, check_writable
 from ..progress import Steps, steps
 from ..terminal import say_written
 from .goals import GoalWords
-from .postures import mirrored, moving_joints, posture
+from .postures import mirrored, moving_joints, posture, waypoint
 
 if TYPE_CHECKING:
-    from ...arrays import Array
     from ...body.body import Body
     from ...optimal_control.plan import Plan, Progress
     from ...optimal_control.plan_options import Limits
@@ -37,6 +37,14 @@ _SAMPLES = 2001
 _OF_THE_FILE = "body"
 # What a part of a limit is of, where that is not plain.
 _FROM_MIDDLE = {"position": ", from the middle of the range"}
+# Numbers may begin with a minus.
+_SIGNED = Parameter(allow_leading_hyphen=True, negative_iterable="", show_default=False)
+_CODES = {
+    "found": ExitCode.DONE,
+    "not found": ExitCode.NOT_FOUND,
+    "stopped": ExitCode.STOPPED,
+    "out of time": ExitCode.OUT_OF_TIME,
+}
 
 
 def plan_command(
@@ -44,16 +52,18 @@ def plan_command(
     /,
     *,
     floating: BodyOptions = AS_WRITTEN,
-    turn: str | None = None,
-    point: Annotated[tuple[str, str] | None, Parameter(negative_iterable="")] = None,
+    turn: Annotated[tuple[str, ...], _SIGNED] = (),
+    point: Annotated[tuple[str, str] | None, _SIGNED] = None,
     rotate: float | None = None,
-    about: str | None = None,
+    about: Annotated[str | None, _SIGNED] = None,
+    symmetry: Annotated[str | None, _SIGNED] = None,
     momentum: Momentum = (0.0, 0.0, 0.0),
     duration: float = 1.0,
     somersaults: float | None = None,
     half_twists: float | None = None,
     from_: Annotated[str | None, Parameter(name="--from")] = None,
     to: str | None = None,
+    via: Annotated[tuple[str, ...], Parameter(negative_iterable="", show_default=False)] = (),
     joints: str | None = None,
     hold: str | None = None,
     mirror: str | None = None,
@@ -75,18 +85,23 @@ def plan_command(
 ) -> Outcome:
     """Find the cheapest motion of the joints that turns a body to a goal, and compute the resulting motion.
 
-    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130. If the search finds
-    nothing, its best try is printed and written, and the exit code is 7.
+    Ctrl-C ends the search; the best motion so far is printed and written, and the exit code is 130. So does its time
+    limit, with the exit code 124. If the search finds nothing, its best try is printed and written, and the exit code
+    is 7. The file says so in its first line.
 
     Parameters
     ----------
     turn
         The turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas
-        between them). For example `--turn "90 about y"`.
+        between them); of several the one that costs least. For example `--turn "90 about y"`.
     point
         Two vectors instead: an axis of the base, or behind its name of a link as it is at the end, and the direction
         that this has to have at the end, in inertial axes, of any length; the turn about it is free. For example
         `--point "dish 0 0 1" "0 1 0"`.
+    symmetry
+        Turns of the body, before that of the goal, after which it looks the same: how often about an axis of the base,
+        or behind a link's name in --point of this, or an axis alone, for all turns about it. For example
+        `--symmetry "4 about x"`.
     rotate
         Angle of the turn, in degrees, as with --turn. For example `--rotate 180`.
     about
@@ -107,6 +122,10 @@ def plan_command(
     to
         Posture at the end, like --from, of a file the last row; or free; without it as at the start. For example
         `--to free`.
+    via
+        Posture on the way, which the joints pass without stopping: NAME=VALUE pairs, the other joints being as they
+        like, with a time in s behind @ or without; or that of a motion file at a time, passed then. More than once, in
+        this order. For example `--via waist_pitch=60deg@0.4`.
     joints
         Those that may move, with commas between their names; without it all. For example
         `--joints waist_pitch,waist_yaw`.
@@ -158,8 +177,9 @@ def plan_command(
     from ...shape_space.files.read import write_shape_path
 
     limits = _limits(rate_limit, acceleration_limit, jerk_limit, effort)
-    words = GoalWords(turn, rotate, about, point, somersaults, half_twists)
+    words = GoalWords(turn, rotate, about, point, symmetry, somersaults, half_twists)
     words.check()
+    goal = words.goal()
     _check_search(workers, time_limit)
     if not 0.0 < duration < math.inf:
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
@@ -170,10 +190,13 @@ def plan_command(
         loaded = load_body(body, isolate=True, **vars(floating))
         start = None if from_ is None else posture(loaded, from_, "--from", first=True)
         end = to if to in (None, "free") else posture(loaded, to, "--to", first=False)
-        goal = words.goal(loaded, _shape_at_end(loaded, start, end))
-        code, status = ExitCode.DONE, ""
+        status = ""
         work.begin("searching")
-        with _stoppable(work, time_limit) as search, _executor(workers) as executor:
+        beside = workers is not None and workers > 1
+        with (
+            _stoppable(work, time_limit, beside=beside) as search,
+            _executor(workers if beside else None, search) as executor,
+        ):
             try:
                 found = plan_reorientation(
                     loaded,
@@ -182,36 +205,49 @@ def plan_command(
                     duration=duration,
                     start=start,
                     end=end,
+                    via=[waypoint(loaded, one) for one in via],
                     cost=cost,
                     rates_at_ends=rates_at_ends,
                     joints=moving_joints(loaded, joints, hold),
                     symmetric=mirrored(mirror),
                     limits=limits,
-                    search=Search(starts=starts, seed=seed, pieces=pieces, iterations=iterations),
+                    search=Search(
+                        starts=starts, seed=seed, pieces=pieces, iterations=iterations, time_limit=time_limit
+                    ),
                     iteration_callback=search.report,
                     executor=executor,
                 )
             except PlanNotFound as failure:
                 if failure.best is None:
                     raise
-                found, code, status = cast("Plan", failure.best), ExitCode.NOT_FOUND, str(failure)
-        if search.stopped:
-            code = ExitCode.STOPPED
+                found, status = cast("Plan", failure.best), str(failure)
         if status:
             warnings.warn(status, stacklevel=2)
         if out is not None:
             # Dense samples: a reader that joins the ends of a closed path smoothly then changes next to nothing.
-            write_shape_path(found.path, out, np.linspace(0.0, found.path.duration, _SAMPLES))
+            times = np.linspace(0.0, found.path.duration, _SAMPLES)
+            write_shape_path(found.path, out, times, comment=_comment(loaded, found))
             say_written(out)
         if html is not None:
             from ...plotting.report import write_report
 
-            title = f"{loaded.name} turns itself"
-            write_report(found.motion, split(found.motion), html, shape_path=found.path, title=title, begin=work.begin)
+            write_report(
+                found.motion,
+                split(found.motion),
+                html,
+                shape_path=found.path,
+                title=f"{loaded.name} turns itself",
+                purpose=_purpose(found),
+                begin=work.begin,
+            )
             say_written(html)
     text, data = _text(loaded, found, momentum), _data(loaded, found, momentum)
     return Outcome(
-        text, data | {"status": status or "found"}, code=code, aside=aside, made_from=found.motion.deformation.made_from
+        text,
+        data,
+        code=_CODES[found.status],
+        aside=aside,
+        made_from=found.motion.deformation.made_from,
     )
 
 
@@ -250,35 +286,52 @@ def _check_search(workers: int | None, time_limit: float | None) -> None:
         raise ShapeError(f"--time-limit: a time in s above 0 is needed, got {time_limit:g}")
 
 
-def _shape_at_end(body: Body, start: Array | None, end: Array | str | None) -> Array | None:
-    """The shape that a plan ends with; None: any."""
-    import numpy as np
-
-    if isinstance(end, str):
-        return None
-    if end is not None:
-        return end
-    return np.clip(body.shape(), *body.joint_limits.T) if start is None else start
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ctrl-C is ignored, also by processes that begin meanwhile."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
-def _executor(workers: int | None) -> Iterator[Executor | None]:
+def _executor(workers: int | None, search: _InterruptibleSearch) -> Iterator[Executor | None]:
     """Processes that search side by side; None where one is enough."""
-    if workers is None or workers == 1:
+    if workers is None:
         yield None
         return
+    from ...optimal_control._solver_callback import keep_interrupts
+
     # A process that was forked beside threads of the solver may hang.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as processes:
-        yield processes
+    spawned = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=keep_interrupts) as processes:
+        # They begin deaf to Ctrl-C, until they can take note of it.
+        with _deaf():
+            processes.submit(int)
+        search.beside = [process.pid for process in multiprocessing.active_children() if process.pid is not None]
+        try:
+            if search.stopped:
+                search.end_beside()
+            yield processes
+        finally:
+            search.end_beside()
+            processes.shutdown(cancel_futures=True)
 
 
 def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
     from ...phases.split_text import rotation_line
 
+    passed = " ".join(f"{time:.6g}" for time in found.waypoint_times)
     return "\n".join(
         [
             _heading(body, found.path.duration, momentum),
             "",
+            f"{'status':24}{found.status:>16}",
             rotation_line("turned", found.motion.final_attitude),
             f"{'off the goal':24}{found.goal_error:16.2e} rad",
             f"{'cost':24}{found.cost:16.9g}   {found.cost_unit} ({found.cost_name})",
@@ -287,6 +340,7 @@ def _text(body: Body, found: Plan, momentum: tuple[float, float, float]) -> str:
                 f"{f'{name} at most':24}{share:16.4%}   of its limit{_FROM_MIDDLE.get(name, '')}"
                 for name, share in found.limit_shares.items()
             ),
+            *([f"{'waypoints passed at':24}{passed:>16} s"] if passed else []),
             f"{'off the minimum':24}{found.kkt_residual:16.2e}       (residual of the conditions of a minimum, scaled)",
             f"{'iterations':24}{found.iterations:16d}       (in {found.seconds:.1f} s, {_searches(len(found.starts))})",
         ]
@@ -302,6 +356,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
 
     return {
         "body": body.name,
+        "status": found.status,
         "duration_s": found.path.duration,
         "momentum_kg_m2_s": list(momentum),
         "final_attitude_quat_xyzw": so3.quat_from_matrix(found.motion.final_attitude).tolist(),
@@ -311,6 +366,7 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
         "cost_unit": found.cost_unit,
         "rates_at_ends": found.rates_at_ends,
         "limit_shares": dict(found.limit_shares),
+        "waypoint_times_s": found.waypoint_times.tolist(),
         "kkt_residual": found.kkt_residual,
         "iterations": found.iterations,
         "seconds": found.seconds,
@@ -322,40 +378,51 @@ def _data(body: Body, found: Plan, momentum: tuple[float, float, float]) -> dict
 
 
 class _InterruptibleSearch:
-    """A search on the terminal, which Ctrl-C, or its time limit, ends after the iteration in progress.
+    """A search on the terminal, which Ctrl-C ends after the iteration in progress.
 
     Attributes
     ----------
-    reported : whether an iteration has been reported, so that there is something to keep
+    reported : whether there will be something to keep: an iteration has been reported, or others search
     stopped : whether Ctrl-C has been pressed since
+    beside : ids of the processes that search side by side
     """
 
-    def __init__(self, work: Steps, time_limit: float | None) -> None:
+    def __init__(self, work: Steps, time_limit: float | None, *, beside: bool = False) -> None:
         self._work = work
         self._end = math.inf if time_limit is None else time.monotonic() + time_limit
-        self.reported = self.stopped = False
+        self.reported, self.stopped = beside, False
+        self.beside: list[int] = []
 
     def report(self, now: Progress) -> bool:
         """Show the progress of the search; returns whether to stop it."""
         which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
+        left = "" if self._end == math.inf else f", {max(self._end - time.monotonic(), 0.0):.0f} s left"
         self._work.say(
-            f"{now.stage}{which}: iteration {now.iteration}, cost {now.cost:.6g}, infeasibility {now.infeasibility:.1e}"
+            f"{now.stage}{which}: iteration {now.iteration}, off the goal by {now.goal_error:.1e} rad, "
+            f"cost {now.cost:.6g}{left}"
         )
         self.reported = True
-        return self.stopped or time.monotonic() > self._end
+        return self.stopped
+
+    def end_beside(self) -> None:
+        """Ctrl-C for those that search side by side."""
+        for process in self.beside:
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGINT)
 
     def interrupted(self, *_: Any) -> None:
         """Ctrl-C: the search ends after this iteration; pressed again, at once."""
         if self.stopped or not self.reported:
             raise KeyboardInterrupt
         self.stopped = True
+        self.end_beside()
         self._work.say("stopping, to keep the best so far (Ctrl-C again gives it up)")
 
 
 @contextmanager
-def _stoppable(work: Steps, time_limit: float | None) -> Iterator[_InterruptibleSearch]:
+def _stoppable(work: Steps, time_limit: float | None, *, beside: bool) -> Iterator[_InterruptibleSearch]:
     """A search that Ctrl-C stops."""
-    search = _InterruptibleSearch(work, time_limit)
+    search = _InterruptibleSearch(work, time_limit, beside=beside)
     if threading.current_thread() is not threading.main_thread():
         # Python hands Ctrl-C to the main thread alone.
         yield search
@@ -365,6 +432,29 @@ def _stoppable(work: Steps, time_limit: float | None) -> Iterator[_Interruptible
         yield search
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+_ENDINGS = {
+    "found": "This is the cheapest plan that was found",
+    "not found": "No plan was found; this is the nearest that the search came",
+    "stopped": "The search was stopped; this is the best until then",
+    "out of time": "The search ended by its time limit; this is the best until then",
+}
+
+
+def _purpose(found: Plan) -> str:
+    """Sentences for a page."""
+    return (
+        f"{_ENDINGS[found.status]}: off the goal by {found.goal_error:.1e} rad, cost {found.cost:.6g} "
+        f"{found.cost_unit} ({found.cost_name})."
+    )
+
+
+def _comment(body: Body, found: Plan) -> str:
+    return (
+        f"shapephase plan, {body.name}: {found.status}; off the goal by {found.goal_error:.1e} rad, cost "
+        f"{found.cost:.9g} {found.cost_unit} ({found.cost_name}), KKT residual {found.kkt_residual:.1e}"
+    )
 
 
 def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:

@@ -11,6 +11,7 @@ from ...errors import ShapeError
 if TYPE_CHECKING:
     from ...arrays import Array
     from ...body.body import Body
+    from ...optimal_control.waypoints import Waypoint
 
 
 def posture(body: Body, text: str, option: str, *, first: bool) -> Array:
@@ -26,14 +27,44 @@ def posture(body: Body, text: str, option: str, *, first: bool) -> Array:
         path = read_shape_path(Path(text), body)
         return path.shape(0.0 if first else path.duration)
     shape = np.clip(body.shape(), *body.joint_limits.T)
+    for name, value in _coordinates(text, option).items():
+        shape[body.joint_index(name)] = value
+    return shape
+
+
+def _coordinates(text: str, option: str) -> dict[str, float]:
+    """Of joints, from NAME=VALUE pairs with commas between them."""
+    named = {}
     for pair in text.split(","):
         name, found, value = pair.partition("=")
         if not found:
             raise ShapeError(
                 f"{option}: NAME=VALUE pairs with commas between them, or a file, are needed, got {text!r}"
             )
-        shape[body.joint_index(name.strip())] = _value(value.strip(), option)
-    return shape
+        named[name.strip()] = _value(value.strip(), option)
+    return named
+
+
+def waypoint(body: Body, text: str) -> Waypoint:
+    """A posture to pass, with its time behind an `@` or without: of NAME=VALUE pairs the joints named, or of a file.
+
+    Of a motion file the posture at that time is passed at that time.
+    """
+    from ...optimal_control.waypoints import Waypoint
+
+    named, timed, at = text.rpartition("@")
+    named, at = (named, at) if timed else (text, "")
+    time = _time(at) if timed else None
+    if "=" in named:
+        return Waypoint(_coordinates(named, "--via"), time)
+    if time is None:
+        raise ShapeError(f"--via: NAME=VALUE pairs, or FILE@TIME, the time in s, are needed, got {text!r}")
+    from ...shape_space.files.read import read_shape_path
+
+    path = read_shape_path(Path(named), body)
+    if not time <= path.duration:
+        raise ShapeError(f"--via: {named} ends at {path.duration:g} s, which is before {time:g} s")
+    return Waypoint(path.shape(time), time)
 
 
 def names(text: str | None) -> list[str]:
@@ -61,6 +92,16 @@ def mirrored(text: str | None) -> dict[str, tuple[str, float]]:
         leader = leader.strip()
         followers[name.strip()] = (leader.removeprefix("-"), -1.0 if leader.startswith("-") else 1.0)
     return followers
+
+
+def _time(text: str) -> float:
+    try:
+        time = float(text)
+    except ValueError:
+        time = math.nan
+    if not 0.0 < time < math.inf:
+        raise ShapeError(f"--via: behind @ a time in s above 0 is needed, got {text!r}")
+    return time
 
 
 def _value(text: str, option: str) -> float:

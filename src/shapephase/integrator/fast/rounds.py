@@ -29,7 +29,7 @@ class Round(NamedTuple):
     steps: Integers  # (P,)
     record: StepRecord
     counts: bool  # whether errors of the samples were measured on perturbed series
-    growth: Array  # (B,) the largest of an error from one time to a later one
+    amplification: Array  # (B,) the largest growth of an error from one time to a later one
     rounding: Array  # (B,) [rad]
     defects: Defects
     rounded_up: float  # how many more steps were taken than planned

@@ -13,6 +13,7 @@ from ...errors import PlanNotFound, ShapePhaseError
 from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.connection import curvature, mechanical_connection
 from .._spline_basis import SplineBasis
+from .._via_rows import bent_through, nearest_places
 from ..symbolic import symbolic_body
 from ..task import Reorientation
 
@@ -53,12 +54,14 @@ class Guess:
     motion : its reconstruction, roughly
     goal_error : angle between its attitude at the end and the goal [rad]
     price : its cost in the metric of the start, more where it turns only part of the way; guesses are ranked by it
+    via_places : (v,) where it passes the waypoints, about
     """
 
     control: Array
     motion: Motion
     goal_error: float
     price: float
+    via_places: Array
 
     def quaternions(self, places: Array, turn: Array) -> Array:
         """Attitudes at places of [0, 1], the missing `turn` added steadily: (N,) -> (N, 4), continuous."""
@@ -75,8 +78,8 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     The curvature F of the mechanical connection along the axis of the turn, in the kinetic metric, is an antisymmetric
     form; its largest singular value sigma belongs to the plane of shapes in which a small loop turns the body most for
     its length: a circle of radius rho turns it by pi rho^2 sigma. Circles of several sizes, in several directions from
-    the start, once or twice round, are tried by the integrator; those that come near the goal at little cost come
-    first.
+    the start, once or twice round, are tried by the integrator; of each direction and number of rounds the size is
+    taken that comes near the goal at the least cost, and the cheapest come first.
 
     Raises
     ------
@@ -87,12 +90,16 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     -----
     Source: Montgomery 1990, isoholonomic problem; theory.md B6.
     """
-    curves = [*_circles(task), *_straight(task)]
+    families = [*_circles(task), *([curve] for curve in _straight(task))]
     rng = np.random.default_rng(seed)
-    tried = [guess for curve in curves if (guess := guess_of(task, basis, curve)) is not None]
+    tried: list[Guess] = []
+    for family in families:
+        of_family = [guess for curve in family if (guess := guess_of(task, basis, curve)) is not None]
+        if of_family:
+            tried.append(min(of_family, key=lambda guess: guess.price))
     tried.sort(key=lambda guess: guess.price)
-    # Every third start is random: circles are all alike where the optimum is not.
-    found = _different(tried)[: count - count // 3]
+    # Every second start is random: circles are all alike where the optimum is not.
+    found = _different(tried)[: count - count // 2]
     for _ in range(_ATTEMPTS * count):
         if len(found) == count:
             break
@@ -106,9 +113,9 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
     return found
 
 
-def _circles(task: Reorientation) -> list[Array]:
-    """Loops (N, m) over `PLACES` through the start."""
-    loops = []
+def _circles(task: Reorientation) -> list[list[Array]]:
+    """Loops (N, m) over `PLACES` through the start; in each list those that differ by their radius only."""
+    families = []
     turn = task.turn_to_goal()
     angle = float(np.linalg.norm(turn))
     if angle == 0.0 or np.count_nonzero(task.movable) < 2:
@@ -122,14 +129,14 @@ def _circles(task: Reorientation) -> list[Array]:
             continue
         first, second, sigma = plane
         for rounds in _ROUNDS:
-            for factor in _RADIUS_FACTORS:
-                radius = factor * np.sqrt(angle / (np.pi * sigma * rounds))
-                phase = 2.0 * np.pi * rounds * PLACES
-                for lean in 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS:
-                    across = np.cos(phase + lean) - np.cos(lean)
-                    along = np.sin(phase + lean) - np.sin(lean)
-                    loops.append(task.start + radius * (across[:, None] * first + along[:, None] * second))
-    return loops
+            radii = np.array(_RADIUS_FACTORS) * np.sqrt(angle / (np.pi * sigma * rounds))
+            phase = 2.0 * np.pi * rounds * PLACES
+            for lean in 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS:
+                across = np.cos(phase + lean) - np.cos(lean)
+                along = np.sin(phase + lean) - np.sin(lean)
+                circle = across[:, None] * first + along[:, None] * second
+                families.append([task.start + radius * circle for radius in radii])
+    return families
 
 
 def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
@@ -156,10 +163,11 @@ def _straight(task: Reorientation) -> list[Array]:
     """The way that turns the body best to first order, for a free end; else straight to another end."""
     ramp = PLACES[:, None]
     if task.end is not None:
-        return [task.start + ramp * (task.end - task.start)] if np.any(task.end != task.start) else []
+        moves = np.any(task.end != task.start) or task.via
+        return [task.start + ramp * (task.end - task.start)] if moves else []
     connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.coupling
     metric = start_metric(task)
-    turning = task.constrained_directions() @ -connection
+    turning = task.constrained_directions() @ (task.pointed_turn(task.start) - connection)
     cheap = np.linalg.solve(metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric)), turning.T)
     missing = task.constrained_directions() @ task.turn_to_goal()
     direction = cheap @ np.linalg.lstsq(turning @ cheap, missing, rcond=_RANK)[0]
@@ -181,10 +189,14 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
     """A curve (101, m) over `PLACES`, taken within the limits and from start to end; None where it has no motion."""
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
-    return guess_of_control(task, basis, basis.fitted(np.clip(curve, task.lower, task.upper), PLACES))
+    at = nearest_places(task, curve, PLACES)
+    curve = bent_through(task, curve, PLACES, at)
+    return guess_of_control(task, basis, basis.fitted(np.clip(curve, task.lower, task.upper), PLACES), at)
 
 
-def guess_of_control(task: Reorientation, basis: SplineBasis, control: Array) -> Guess | None:
+def guess_of_control(
+    task: Reorientation, basis: SplineBasis, control: Array, via_places: Array | None = None
+) -> Guess | None:
     """The spline of control points, taken within the limits and at rest at its ends; None where it has no motion."""
     control, equal = control.copy(), task.equal_points
     control[:equal], control[-equal:] = control[0], control[-1]
@@ -197,12 +209,18 @@ def guess_of_control(task: Reorientation, basis: SplineBasis, control: Array) ->
         motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
     except ShapePhaseError:
         return None
-    goal_error = task.goal_error(motion.final_attitude)
+    goal_error = task.goal_error(motion.final_attitude, control[-1])
     steps = np.diff(basis.matrix(PLACES) @ control, axis=0)
     length = np.sum((steps @ start_metric(task)) * steps)
     whole = float(np.linalg.norm(task.turn_to_goal()))
     share = max(whole - goal_error, _LEAST_SHARE * whole) / whole if whole else 1.0
-    return Guess(control=control, motion=motion, goal_error=goal_error, price=float(length / share**2))
+    return Guess(
+        control=control,
+        motion=motion,
+        goal_error=goal_error,
+        price=float(length / share**2),
+        via_places=np.zeros(0) if via_places is None else via_places,
+    )
 
 
 def start_metric(task: Reorientation) -> Array:

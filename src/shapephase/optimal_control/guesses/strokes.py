@@ -9,10 +9,10 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
-from ...shape_space.connection import connection_slopes, mechanical_connection
-from .._spline_basis import SplineBasis
+from ...shape_space.connection import connection_slopes, curvature, mechanical_connection
 from ..task import Reorientation
-from .loops import Guess, guess_of_control, start_metric
+from .loops import start_metric
+from .stroke_program import PIECES_OF_WAY, Layout
 
 # Control points of a stroke, a periodic cubic spline: a loop with two harmonics.
 _POINTS = 8
@@ -36,14 +36,12 @@ _DAMPING = 1e-3
 _STEERED = 1e-6
 # Turn for its length below which a stroke is none [rad].
 _IDLE = 1e-6
-# Rounds of aiming, as the ways between strokes turn the body too.
-_AIMS = 3
-# Pieces of the spline for each stroke.
+# Pieces of the spline for the shortest of the strokes; longer ones have more, so that all go at about one pace.
 PIECES_OF_STROKE = 6
-# And the most in all, for which the solver takes a minute.
+# And the most in all.
 MOST_PIECES = 2000
-# The least pieces of all.
-_LEAST_PIECES = 40
+# Cells along each side of the plane of two coordinates in which the curvature is summed: it is a rough bound.
+_CELLS = 24
 # Ridge on the metric, as a share of its mean eigenvalue, so that no motion is free.
 _RIDGE = 1e-3
 
@@ -79,23 +77,48 @@ class _Leg:
     rounds: float
 
     @property
-    def curve(self) -> Array:
-        """Whole rounds (N, m), each made smaller about its middle, so that together they turn as far as `rounds`."""
-        whole = int(np.ceil(abs(self.rounds)))
-        if whole == 0:
-            return self.stroke.curve[:0]
+    def whole(self) -> int:
+        """Whole rounds that turn as far, one at least, each made smaller."""
+        return max(int(np.ceil(abs(self.rounds))), 1)
+
+    def at(self, phases: Array) -> Array:
+        """Shapes at shares of a round: (N,) -> (N, m)."""
+        curve = self.stroke.curve
+        middle = curve[:-1].mean(axis=0)
         # A small loop turns the body by its area.
-        shrunk = np.sqrt(abs(self.rounds) / whole)
-        middle = self.stroke.curve[:-1].mean(axis=0)
-        once = middle + shrunk * (self.stroke.curve - middle)
-        once = once if self.rounds > 0.0 else once[::-1]
-        return np.concatenate([np.tile(once[:-1], (whole, 1)), once[-1:]])
+        smaller = middle + np.sqrt(abs(self.rounds) / self.whole) * (curve - middle)
+        places = np.linspace(0.0, 1.0, len(curve))
+        phases = phases if self.rounds >= 0.0 else 1.0 - phases
+        return np.stack([np.interp(phases, places, column) for column in smaller.T], axis=1)
 
 
-def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) -> tuple[SplineBasis, Guess] | None:
-    """A motion of many strokes that comes near the goal, on a spline fine enough; None where there is none.
+def most_of_a_loop(task: Reorientation) -> float:
+    """More than a loop that goes round once can turn the body [rad]; infinite where no such bound is known.
 
-    That spline has the pieces given, if those are enough.
+    By Stokes' theorem the turn is at most the integral of the curvature's length over what the loop encloses, which for
+    two coordinates is at most all that their limits permit.
+
+    Source: theory.md B6; Montgomery 1990.
+    """
+    moves = np.flatnonzero(task.movable)
+    reach = np.stack([task.lower, task.upper], axis=1)[moves]
+    closed = task.end is not None and np.array_equal(task.end, task.start)
+    if len(moves) != 2 or not closed or task.momentum.any() or not np.isfinite(reach).all():
+        return np.inf
+    shares = (np.arange(_CELLS) + 0.5) / _CELLS
+    first, second = (low + shares * (high - low) for low, high in reach)
+    coordinates = np.tile(task.start, (_CELLS**2, 1))
+    coordinates[:, moves] = np.stack(np.meshgrid(first, second), axis=-1).reshape(-1, 2)
+    columns = task.coupling[:, moves]
+    found = np.einsum("kija,i,j->ka", curvature(task.body, task.shapes(coordinates)), *columns.T)
+    area = float(np.prod(reach[:, 1] - reach[:, 0]))
+    return float(np.linalg.norm(found, axis=1).mean() * area)
+
+
+def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) -> tuple[Layout, Array] | None:
+    """A motion of many strokes that comes near the goal, and its control points; None where there is none.
+
+    Its spline has the pieces given at most.
 
     Each stroke turns the body furthest for its length about some axis, within the limits. Three legs, each some rounds
     of one of the strokes, make any rotation if their axes differ enough, as Euler's angles do; of those that reach the
@@ -103,30 +126,32 @@ def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) 
     """
     if task.momentum.any() or task.windings is not None or np.count_nonzero(task.movable) < 2:
         return None
-    if task.body.chain.follows.balls or (pieces is not None and pieces < _LEAST_PIECES):
+    least = 3 * PIECES_OF_STROKE + 4 * PIECES_OF_WAY
+    if task.via or task.body.chain.follows.balls or (pieces is not None and pieces < least):
         return None
     metric = _metric(task)
     strokes = [stroke.begun_near(task.start, metric) for stroke in best_strokes(task, metric, seed)]
-    goal = so3.exp(task.turn_to_goal())
-    aim, best = goal, None
-    for _ in range(_AIMS):
-        legs = _steered(strokes, aim, seed)
-        if legs is None:
-            break
-        curve = _joined(task, legs)
-        beside = goal @ _turned(task, curve[None])[0].T
-        if best is None or so3.angle(beside) < best[0]:
-            best = so3.angle(beside), curve, sum(abs(leg.rounds) for leg in legs)
-        aim = beside @ aim
-    if best is None:
+    legs = _steered(strokes, so3.exp(task.turn_to_goal()), seed)
+    if legs is None:
         return None
-    _, curve, rounds = best
-    needed = max(int(np.ceil(PIECES_OF_STROKE * (rounds + 1.0))), _LEAST_PIECES)
-    if needed > (pieces or MOST_PIECES):
+    shortest = min(leg.stroke.length for leg in legs)
+    layout = Layout(tuple((int(np.rint(PIECES_OF_STROKE * leg.stroke.length / shortest)), leg.whole) for leg in legs))
+    if layout.basis.pieces > (pieces or MOST_PIECES):
         return None
-    basis = SplineBasis(pieces or needed)
-    guess = guess_of_control(task, basis, basis.through(paced(task, curve, basis.nodes)))
-    return None if guess is None else (basis, guess)
+    return layout, layout.basis.through(_joined(task, layout, legs))
+
+
+def _joined(task: Reorientation, layout: Layout, legs: list[_Leg]) -> Array:
+    """Start, legs and end at the ends of the pieces, joined by straight ways: (pieces + 1, m)."""
+    values, place = np.tile(task.start, (layout.basis.pieces + 1, 1)), 0
+    for leg, first, (pieces, rounds) in zip(legs, layout.firsts, layout.strokes, strict=True):
+        last = first + pieces * rounds
+        values[first : last + 1] = leg.at(np.arange(pieces * rounds + 1) % pieces / pieces)
+        values[place : first + 1] = np.linspace(values[place], values[first], first - place + 1)
+        place = last
+    end = task.start if task.end is None else task.end
+    values[place:] = np.linspace(values[place], end, len(values) - place)
+    return values
 
 
 def best_strokes(task: Reorientation, metric: Array, seed: int) -> list[Stroke]:
@@ -273,19 +298,6 @@ def _length(curves: Array, metric: Array) -> Array:
     return np.sqrt(steps.shape[1] * np.sum((steps @ metric) * steps, axis=(1, 2)))
 
 
-def step_lengths(task: Reorientation, curve: Array) -> Array:
-    """Of the steps of a curve, by the cost's own measure where the body then is: (N + 1, m) -> (N,)."""
-    steps = np.diff(curve, axis=0)
-    if task.cost == "time":
-        return np.max(np.abs(steps) / task.rate_limit, axis=1)
-    joints = steps @ task.coupling.T
-    if task.cost != "kinetic":
-        return np.linalg.norm(joints, axis=1)
-    shapes = task.shapes(0.5 * (curve[1:] + curve[:-1]))
-    turning = -so3.apply(mechanical_connection(task.body, shapes), joints)
-    return np.sqrt(2.0 * np.maximum(task.body.kinetic_energy(shapes, joints, turning), 0.0))
-
-
 def _steered(strokes: list[Stroke], goal: Array, seed: int) -> list[_Leg] | None:
     """The shortest three legs that turn the body to the goal, each of a stroke; None where none do."""
     if not strokes:
@@ -311,24 +323,6 @@ def _steered(strokes: list[Stroke], goal: Array, seed: int) -> list[_Leg] | None
     if not np.isfinite(costs[best]):
         return None
     return [_Leg(strokes[k], float(angle / sizes[k])) for k, angle in zip(chosen[best], angles[best], strict=True)]
-
-
-def _joined(task: Reorientation, legs: list[_Leg]) -> Array:
-    """Start, legs and end, joined by straight ways: (N, m)."""
-    end = task.start if task.end is None else task.end
-    stations = [task.start[None], *(leg.curve for leg in legs), end[None]]
-    parts = [stations[0]]
-    for station in stations[1:]:
-        if len(station):
-            parts.append(np.linspace(parts[-1][-1], station[0], _STEPS // 2)[1:])
-            parts.append(station[1:])
-    return np.concatenate(parts)
-
-
-def paced(task: Reorientation, curve: Array, places: Array) -> Array:
-    """A curve at a steady pace, as a cheapest one has it, seen at places of [0, 1]: (N, m) -> (P, m)."""
-    passed = np.append(0.0, np.cumsum(step_lengths(task, curve)))
-    return np.stack([np.interp(places, passed / passed[-1], column) for column in curve.T], axis=1)
 
 
 _ROUND = _round()

@@ -111,7 +111,7 @@ def read_recorded_motion(
     By the file's ending:
 
     - `.csv`, `.tsv`, `.txt`: a header `time,<joint names>` in any order, separated by commas, tabs or semicolons;
-      decimal points or decimal commas.
+      decimal points or decimal commas. Comments behind `#` may stand above it.
     - `.xlsx`: such a table in a sheet of Excel. `.parquet`: such a table, also of pandas.
     - `.mot`, `.sto`: OpenSim; its header says whether turning coordinates are in degrees. Locked coordinates and
       coupled ones that are no joints of the body are left out.
@@ -301,7 +301,9 @@ def read_shape_path(
     ).path
 
 
-def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: ArrayLike | None = None) -> None:
+def write_shape_path(
+    path: ShapePath, file: str | os.PathLike[str], times: ArrayLike | None = None, *, comment: str | None = None
+) -> None:
     """Write a joint motion as CSV, TSV or NPZ, by the file's ending; what `read_shape_path` reads.
 
     A pipe or a device without such an ending gets CSV.
@@ -309,6 +311,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     Parameters
     ----------
     times : (N,) of the samples [s]; None: `path.sample_times`. A spline is read back as it was.
+    comment : what stands above the table, each of its lines behind `#`; in NPZ, in the provenance
 
     Labels of a table say a unit, `[s]` or `[SI]` (rad or m), where `read_shape_path` would ask for it: of times more
     than a second apart, and of joints that turn more than two times.
@@ -338,6 +341,8 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
     shapes = path.shape(t)
     if suffix == ".npz":
         made_from = {"joints": list(path.joint_names), "recording": None if path.record is None else dict(path.record)}
+        if comment is not None:
+            made_from["comment"] = comment
         arrays = {
             "time": t,
             "shapes": shapes,
@@ -347,6 +352,7 @@ def write_shape_path(path: ShapePath, file: str | os.PathLike[str], times: Array
         write_whole(where, lambda stream: np.savez(stream, **arrays))
         return
     text = io.StringIO()
+    text.writelines(f"# {line}\n" for line in (comment or "").splitlines())
     writer = csv.writer(text, delimiter="\t" if suffix == ".tsv" else ",", lineterminator="\n")
     turning = np.abs(shapes).max(axis=0) > 2.0 * np.pi
     labels = [

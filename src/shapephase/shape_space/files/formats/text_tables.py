@@ -29,7 +29,7 @@ def read_delimited(where: Path, data: bytes) -> Table:
     """A table with a header that names the columns, separated by commas, tabs or semicolons.
 
     Numbers have a decimal point, or all of them a decimal comma, where columns are separated by something else or
-    entries are quoted. A row of units may follow the header.
+    entries are quoted. A row of units may follow the header, and comments behind `#` come before it.
 
     Raises
     ------
@@ -37,9 +37,10 @@ def read_delimited(where: Path, data: bytes) -> Table:
         For faults, with row and column.
     """
     check_lines(data, where)
-    delimiter = _delimiter(data, where)
-    comma = _has_decimal_commas(data, delimiter, where)
-    rows = _rows(data, delimiter, where)
+    comments = _comments(data)
+    delimiter = _delimiter(data, where, comments)
+    comma = _has_decimal_commas(data, delimiter, where, comments)
+    rows = _rows(data, delimiter, where, comments)
     first = next(rows, None)
     if first is None:
         raise TrajectoryError(f"{where}: empty; a header `time,<joint names>` and rows of numbers are needed")
@@ -160,20 +161,32 @@ def _lines(data: bytes) -> Iterator[tuple[int, str]]:
     yield from enumerate(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig"), start=1)
 
 
-def _rows(data: bytes, delimiter: str, where: Path) -> Iterator[tuple[int, list[str]]]:
-    """Rows that are not blank, each with the number of its last line."""
+def _comments(data: bytes) -> int:
+    """How many lines at the top begin with `#`; none where the last of them is the header, with numbers below it."""
+    count = 0
+    for _, line in _lines(data):
+        if not line.startswith("#"):
+            return 0 if plain_numbers(re.split("[,;\t]", line.strip())) else count
+        count += 1
+    return count
+
+
+def _rows(data: bytes, delimiter: str, where: Path, comments: int) -> Iterator[tuple[int, list[str]]]:
+    """Rows below the comments that are not blank, each with the number of its last line."""
     text = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline="")
+    for _ in range(comments):
+        text.readline()
     reader = csv.reader(text, delimiter=delimiter, strict=True)
     try:
         for row in reader:
             if any(entry.strip() for entry in row):
-                yield reader.line_num, row
+                yield comments + reader.line_num, row
     except csv.Error as error:
-        raise TrajectoryError(f"{where}: row {reader.line_num}: {error}") from None
+        raise TrajectoryError(f"{where}: row {comments + reader.line_num}: {error}") from None
 
 
-def _delimiter(data: bytes, where: Path) -> str:
-    header = next((text for _, text in _lines(data) if text.strip()), "")
+def _delimiter(data: bytes, where: Path, comments: int) -> str:
+    header = next((text for number, text in _lines(data) if number > comments and text.strip()), "")
     unquoted = re.sub(r'"[^"]*"', "", header)
     found = [mark for mark in _DELIMITERS if mark in unquoted]
     if where.suffix.lower() == ".tsv" and found != ["\t"]:
@@ -188,11 +201,11 @@ def _delimiter(data: bytes, where: Path) -> str:
     return found[0] if found else ","
 
 
-def _has_decimal_commas(data: bytes, delimiter: str, where: Path) -> bool:
+def _has_decimal_commas(data: bytes, delimiter: str, where: Path, comments: int) -> bool:
     """Whether numbers have decimal commas. Raises TrajectoryError where these may as well be marks of thousands."""
     if (b'"' if delimiter == "," else b",") not in data:
         return False
-    rows = _rows(data, delimiter, where)
+    rows = _rows(data, delimiter, where, comments)
     next(rows, None)
     doubtful = None
     for label, entries in rows:

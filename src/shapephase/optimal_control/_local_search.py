@@ -1,0 +1,232 @@
+"""The local search from a guess of a plan, and its path corrected and compared with the goal and the limits."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..dynamics.torques import joint_torques
+from ..errors import ShapePhaseError
+from ._path_cost import path_cost
+from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
+from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
+from ._reduced import ReducedProgram
+from ._solver_callback import IterationCallback
+from ._spline_basis import SplineBasis
+from ._via_rows import via_rows
+from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
+from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
+from .plan import Start
+from .plan_options import Search
+from .task import Reorientation
+
+# How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
+_HALVINGS = 2
+# How often efforts are given less room where they exceed their limits between the nodes.
+_TIGHTENINGS = 6
+# Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
+_WINDING_TOLERANCE = 0.1
+# Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
+_WINDING_SAMPLES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """One local search.
+
+    Attributes
+    ----------
+    task : whose it is
+    report : what the user sees of it
+    polished : its path, corrected; None where that could not be reconstructed
+    cost : of the corrected path; infinite where there is none
+    reaches_goal : whether the corrected path reaches the goal within the limits
+    basis : of its spline
+    """
+
+    task: Reorientation
+    report: Start
+    polished: PolishedPath | None
+    cost: float
+    reaches_goal: bool
+    basis: SplineBasis
+
+    def rank(self) -> tuple[bool, bool, float]:
+        """The best has the least: first local optima, then paths that reach the goal by cost, then others by error."""
+        if self.polished is None:
+            return True, True, np.inf
+        return not self.report.converged, not self.reaches_goal, self.cost if self.reaches_goal else self.goal_error
+
+    @property
+    def goal_error(self) -> float:
+        """Of the corrected path [rad]."""
+        return np.inf if self.polished is None else self.polished.goal_error
+
+
+def guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
+    """Attitudes at places of [0, 1] that a solver starts from: (N,) -> (N, 4)."""
+    if task.windings is not None:
+        return task.uniform_winding
+    turn = task.turn_to_goal(guess.motion.final_attitude, guess.control[-1])
+    return lambda places: guess.quaternions(places, turn)
+
+
+@dataclass(frozen=True, eq=False)
+class LocalSearch:
+    """What finds the local optimum next to a guess.
+
+    Attributes
+    ----------
+    basis : of the path's spline at first
+    program : for this basis
+    halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
+    settles : whether the solver may end where the cost changes no more, as that of a long motion
+    """
+
+    task: Reorientation
+    basis: SplineBasis
+    program: CollocationProgram | ReducedProgram
+    iterations: int
+    halvings: int
+    settles: bool = False
+
+    @classmethod
+    def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> LocalSearch:
+        halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
+        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings, settles)
+
+    def attempt(self, guess: Guess, callback: IterationCallback) -> Attempt:
+        """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
+        found, control = self._on(self.basis, self.program, guess, callback)
+        for _ in range(self.halvings):
+            solved = found.report.status in GOOD_STATUS
+            if not solved or found.reaches_goal:
+                break
+            finer = SplineBasis(2 * found.basis.pieces)
+            onward = guess_of(self.task, finer, found.basis.matrix(PLACES) @ control)
+            if onward is None:
+                break
+            program = CollocationProgram(self.task, finer)
+            following, control = self._on(finer, program, onward, callback)
+            found = min(found, following, key=Attempt.rank)
+            if found is not following:
+                break
+        return found
+
+    def _on(
+        self,
+        basis: SplineBasis,
+        program: CollocationProgram | ReducedProgram,
+        guess: Guess,
+        callback: IterationCallback,
+    ) -> tuple[Attempt, Array]:
+        """The attempt on some basis, and the control points that the solver found."""
+        task, began = self.task, time.perf_counter()
+        solution, polished = self._optimum(basis, program, guess, callback)
+        return corrected_attempt(task, basis, solution, polished, began), solution.control
+
+    def _optimum(
+        self,
+        basis: SplineBasis,
+        program: CollocationProgram | ReducedProgram,
+        guess: Guess,
+        callback: IterationCallback,
+    ) -> tuple[NlpSolution, PolishedPath | None]:
+        """What the solver found, with the iterations of all its rounds, and its path corrected.
+
+        Where efforts are beyond their limits between the nodes, they are given less room there, and it goes on.
+        """
+        task, room, iterations = self.task, None, 0
+        control, duration, attitudes = guess.control, task.duration, guessed_attitudes(task, guess)
+        options: dict[str, Any] = {
+            "iterations": self.iterations,
+            "via_places": guess.via_places,
+            "iteration_callback": callback,
+        }
+        options |= {"settles": True} if self.settles else {}
+        rounds = 0
+        while True:
+            solution = program.solve(control, duration, attitudes, **options)
+            iterations += solution.iterations
+            solution = replace(solution, iterations=iterations)
+            polished = polished_path(task, basis, solution)
+            if not task.efforts_limited or polished is None or not solution.converged or rounds == _TIGHTENINGS:
+                return solution, polished
+            shares = effort_shares(task, basis, polished.motion)
+            again = guess_of_control(task, basis, solution.control)
+            if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
+                return solution, polished
+            room = tightened(room, shares, STAGES, rounds)
+            options |= {"room": room, "via_places": solution.via_places}
+            control, duration, attitudes = solution.control, solution.duration, guessed_attitudes(task, again)
+            rounds += 1
+
+
+def corrected_attempt(
+    task: Reorientation, basis: SplineBasis, solution: NlpSolution, polished: PolishedPath | None, began: float
+) -> Attempt:
+    """What a solver's path, searched for since some time, comes to when it is corrected."""
+    # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
+    cost = np.inf if polished is None else _cost(task, basis, polished)
+    reaches_goal = (
+        polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
+    )
+    report = Start(
+        status=solution.status,
+        converged=solution.converged and reaches_goal,
+        cost=solution.cost,
+        goal_error=task.goal_error(solution.attitude, solution.control[-1]),
+        kkt_residual=solution.kkt_residual,
+        infeasibility=solution.infeasibility,
+        iterations=solution.iterations,
+        seconds=time.perf_counter() - began,
+        second_order=solution.second_order,
+    )
+    return Attempt(task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
+
+
+def polished_path(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
+    """The path that the solver found, corrected to reach the goal; None where it has no motion."""
+    try:
+        return polish(task, basis, solution.control, solution.duration, solution.via_places)
+    except ShapePhaseError:
+        return None
+
+
+def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
+    """The cost of a corrected path, by quadrature."""
+    if task.cost == "effort":
+        places, weights = panel_nodes(basis)
+        torque = joint_torques(polished.motion, places * polished.duration).torque
+        return float(polished.duration * weights @ np.sum((torque / task.effort_measure) ** 2, axis=1))
+    if task.cost == "time":
+        return polished.duration
+    if task.cost == "acceleration":
+        places, weights = panel_nodes(basis)
+        bend = basis.matrix(places, 2) @ polished.control @ task.coupling.T
+        return float(0.5 * weights @ np.sum(bend**2, axis=1)) / polished.duration**3
+    return path_cost(task.body, polished.path, task.cost)
+
+
+def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:
+    """Whether duration, rates, windings and waypoints are as asked for; the correction keeps positions in limits."""
+    if task.windings is not None:
+        times = np.linspace(0.0, polished.path.duration, _WINDING_SAMPLES * basis.pieces)
+        counted = task.counted_windings(polished.motion.attitude(times))
+        if np.abs(counted - task.windings).max() > _WINDING_TOLERANCE:
+            return False
+    rows, values = via_rows(task, basis, polished.via_places)
+    if np.abs(np.einsum("jkm,km->j", rows, polished.control) - values).max(initial=0.0) > GOAL_TOLERANCE:
+        return False
+    slack = 1.0 + LIMIT_SLACK
+    shares = limit_shares(task, basis, polished.control, polished.motion)
+    return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
+
+
+def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
+    return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
