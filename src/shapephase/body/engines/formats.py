@@ -56,7 +56,7 @@ def format_of(content: bytes) -> str | None:
         return "biomod"
     if re.search(rb"<OpenSimDocument[\s>]", head):
         return "opensim"
-    if re.search(rb"^\s*measurementconversionfactor\s*:", head, re.MULTILINE):
+    if re.search(rb"^[ \t]*measurementconversionfactor[ \t]*:", head, re.MULTILINE):
         return "yeadon"
     return None
 
