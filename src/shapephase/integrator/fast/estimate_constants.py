@@ -111,7 +111,7 @@ DEGREES_OF_TURN = 0.5
 EVENNESS = (0.2, 0.4)
 """Of the panels' defects, one where all are alike: the fewer panels they come from, the likelier is a distance that is
 small by chance."""
-MOST_BY_CHANCE = (14.0, 9.0)
+MOST_BY_CHANCE = (14.0, 11.0)
 """How many times the part that defects foretell the error may be, joined by a straight line."""
 BY_CHANCE = 2.6
 """The same where the distance is all that defects would come to if they added up; they have to cancel for more."""
