@@ -12,6 +12,8 @@ from .display import short_repr
 
 # Numbers in the largest intermediate array of an evaluation: 16 megabytes.
 _CHUNK = 2_000_000
+MARGIN_OF_WIDTH = 1e-3
+"""Of an interval's width: times are not moved farther inside than this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,12 @@ def end_margin(width: Array, end: float) -> Array:
 
     It is wider than the rounding of stretching, reversing and joining paths, and too small to matter.
     """
-    return np.minimum(64.0 * np.spacing(end), 1e-3 * width)
+    return np.minimum(widest_margin(end), MARGIN_OF_WIDTH * width)
+
+
+def widest_margin(end: float) -> float:
+    """The same of wide intervals [s]."""
+    return 64.0 * float(np.spacing(end))
 
 
 @lru_cache(maxsize=64)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from numpy.polynomial import chebyshev
 
-from shapephase.chebyshev import end_margin
+from shapephase.chebyshev import end_margin, widest_margin
 from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._step_control import StepRequirements, even_steps
+from shapephase.integrator.fast.panels import Demand, PanelsToSample, sampled_round
 from shapephase.integrator.interpolant import Interpolant
 from shapephase.integrator.panels.finer_panels import FinerPanels, refining_factors
 from shapephase.integrator.panels.panel_series import PanelSeries, panel_errors, sample_times, series_through
@@ -98,6 +99,50 @@ def random_panels(rng: np.random.Generator) -> PanelSeries:
         return np.cos(times[:, None] * rates + rng.uniform(0.0, 6.0, 9)) + 2.0
 
     return sampled(rough)
+
+
+@pytest.mark.usefixtures("fast")
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9, 1e-12])
+@pytest.mark.parametrize("with_hidden", [False, True])
+def test_a_round_in_one_call_is_the_same_as_its_parts(monkeypatch: pytest.MonkeyPatch, tolerance: float, with_hidden: bool):
+    """Panels of known polynomials and rough ones: what is kept, what goes on, and where that is sampled next."""
+    left, right, end = EDGES[:-1], EDGES[1:], float(EDGES[-1])
+    first = PanelsToSample(*np.zeros((2, len(DEGREES)), dtype=np.int64), DEGREES, left, right, np.empty(0))
+    table = 10.0 ** np.random.default_rng(5).uniform(-12.0, -6.0, (len(DEGREES), 5)) if with_hidden else None
+    momentum, loops = 3.0, 2
+    demand = Demand(momentum, tolerance, loops * end, loops, widest_margin(end))
+
+    def rough(times: np.ndarray) -> np.ndarray:
+        return np.cos(times[:, None] * np.linspace(1.0, 60.0, 9)) + 2.0
+
+    fresh = rough(sample_times(DEGREES, left, right, end))
+    found = sampled_round(DEGREES[:0], np.empty((0, 9)), first, fresh, table, demand)
+    monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+    series = series_through(DEGREES, left, right, fresh.copy(), end, DEGREES > 0)
+    errors = panel_errors(series, None if table is None else Hidden(table), momentum)
+    assert np.allclose(found.values, series.values, rtol=4.0 * EPS, atol=4.0 * EPS)
+    assert np.allclose(found.coefficients, series.coefficients, rtol=0.0, atol=1e-13)
+    assert np.allclose(found.errors, np.array(errors), rtol=1e-6, atol=1e-13)
+    share = tolerance / (end * loops) * series.width
+    is_rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
+    if not is_rough.any() or loops * errors.whole.sum() <= tolerance:
+        assert not len(found.further)
+        return
+    factor = refining_factors(series, is_rough, errors.whole, share)
+    finer = FinerPanels.of(series, factor)
+    assert found.further.tolist() == factor.tolist()
+    for name in ("origin", "factor", "degree", "left", "right"):
+        assert getattr(found.finer, name).tolist() == getattr(finer, name).tolist(), name
+    times = finer.fresh_times(end)
+    assert np.allclose(found.finer.times, times, rtol=4.0 * EPS)
+    second = rough(times)
+    monkeypatch.delenv("SHAPEPHASE_FAST")
+    again = sampled_round(DEGREES, found.values, found.finer, second, None, demand)
+    values = finer.values(series, second)
+    monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+    anew = series_through(finer.degree, finer.left, finer.right, values, end, finer.factor == 0)
+    assert np.allclose(again.values, anew.values, rtol=16.0 * EPS, atol=16.0 * EPS)
+    assert np.allclose(again.coefficients, anew.coefficients, rtol=0.0, atol=1e-13)
 
 
 @pytest.mark.usefixtures("fast")

@@ -102,7 +102,7 @@ class EvenSampler:
 
     def _hidden(self, momentum: float) -> float:
         """What the tails cannot explain is no missing oscillation that averages out [rad]."""
-        inverse, drift = (_unexplained(gap, tail) for gap, tail in zip(self._gaps, self._tails, strict=True))
+        inverse, drift = self._unexplained
         return self._loops * 0.5 * self._period * (momentum * inverse + drift)
 
     def _times(self, index: Integers, count: int) -> Array:
@@ -111,10 +111,11 @@ class EvenSampler:
     def _take(self, values: Array) -> None:
         self._values = values
         self._tails = [estimate_tail(norms, 2.0 * pi * EPS) for norms in fourier_norms(values)]
-        self._gaps = [0.0, 0.0]
+        self._unexplained = [0.0, 0.0]
         if len(self._tests):
             between = _even_to_shares(len(values)) @ values
-            self._gaps = (_UNSEEN_BETWEEN * spectral_norms(between - self._tests).max(axis=0)).tolist()
+            gaps = (_UNSEEN_BETWEEN * spectral_norms(between - self._tests).max(axis=0)).tolist()
+            self._unexplained = [_unexplained(gap, tail) for gap, tail in zip(gaps, self._tails, strict=True)]
 
     @property
     def _decay(self) -> float:
@@ -127,7 +128,7 @@ class EvenSampler:
     @property
     def _has_gaps(self) -> bool:
         """Whether the series misses, between the nodes, what its spectrum does not show."""
-        return any(_unexplained(gap, tail) for gap, tail in zip(self._gaps, self._tails, strict=True))
+        return any(self._unexplained)
 
 
 def _panel_count(values: Array) -> int:

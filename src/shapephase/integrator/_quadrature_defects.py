@@ -96,6 +96,10 @@ class Defects(NamedTuple):
         """By which power of the steps' length errors fall."""
         return min(max(-log2(self.remaining), LEAST_ORDER), ORDER)
 
+    def foreseen(self, loops: int) -> float:
+        """The bound that `error` would be, were the distance all that defects can come to [rad]."""
+        return loops * BY_CHANCE * self.remaining * self.half
+
     def error(self, distance: Array, loops: int) -> Array:
         """Bound of the error of steps by their distance from half as many: (B,) -> (B,) [rad]."""
         cancelled = loops * self.half / np.maximum(distance, TINY)

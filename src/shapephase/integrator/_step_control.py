@@ -16,6 +16,10 @@ from .fast.estimate_constants import (
     DEGREES_A_STEP,
     DISTANCE,
     FAR,
+    FEW_STEPS,
+    FORESEEN,
+    LOOKS_AHEAD,
+    MOST_SHORTENED,
     MOST_TURN,
     ORDER,
     SHORT_TURN_A_STEP,
@@ -76,14 +80,21 @@ class StepRequirements(NamedTuple):
         """
         turn_a_step = SHORT_TURN_A_STEP if short else TURN_A_STEP
         if engine.is_ready():
-            return plan_of_steps(self.sizes, self.loops, tolerance, turn_a_step)
+            return plan_of_steps(self.rates, self.turns, self.sizes, self.loops, tolerance, turn_a_step)
         turn, swing, degree = self.sizes
         # As many on each panel as make the sum of all the least.
         each = swing ** (1.0 / (ORDER + 1.0))
         common = self.loops * DISTANCE * float(np.sqrt((each * each).sum())) / (AIM * tolerance)
         planned = 2.0 * common ** (1.0 / ORDER) * each
         least = np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step)
-        return np.maximum(np.maximum(planned, least), 1.0)
+        planned = np.maximum(np.maximum(planned, least), 1.0)
+        for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
+            found = self.defects(even_steps(planned, 1))
+            excess = found.foreseen(self.loops) / (FORESEEN * tolerance)
+            if not excess > 1.0:
+                break
+            planned *= min(excess ** (1.0 / found.order), MOST_SHORTENED)
+        return planned
 
     def defects(self, steps: Integers) -> Defects:
         """What the formula misses in so many steps (P,)."""

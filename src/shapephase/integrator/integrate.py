@@ -9,7 +9,7 @@ rounding grows.
 from __future__ import annotations
 
 from functools import cached_property
-from math import isfinite
+from math import isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -82,6 +82,9 @@ def stepped_rotation(
 
 def norms(momentum: Array) -> Array:
     """Of vectors (B, 3), each the same whatever the others are: (B,)."""
+    if len(momentum) == 1:
+        x, y, z = momentum[0].tolist()
+        return np.array([sqrt(x * x + y * y + z * z)])
     x, y, z = momentum.T
     return np.sqrt(x * x + y * y + z * z)
 
@@ -121,19 +124,17 @@ class Attempt(NamedTuple):
     """One round of steps with its error estimates."""
 
     rotation: SteppedRotation
-    distances: Array  # (B,) of half as many steps [rad]
-    order: float  # by which the error of steps falls
-    rounded_up: float  # how many more steps were taken than planned
+    taken: Round
 
     @property
     def _errors(self) -> list[Array]:
         it = self.rotation
         parts = [it.sampling_error, it.stepping_error, it.rounding_error, it.amplification]
-        return [it.error_estimate, *parts, self.distances]
+        return [it.error_estimate, *parts, self.taken.distances]
 
     @property
     def _of_all(self) -> dict[str, float]:
-        return {"order": self.order, "rounded_up": self.rounded_up}
+        return {"order": self.taken.defects.order, "rounded_up": self.taken.rounded_up}
 
     @property
     def worst(self) -> Errors:
@@ -215,11 +216,7 @@ class Integration:
         interpolant, perturbed = self._sampler.interpolant(), self._sampler.perturbed(self._largest)
         expected = self._sampler.error(self._largest)
         taken = self._rounds_of_one(interpolant, perturbed, expected) or self._round(interpolant, perturbed, expected)
-        record, growth = taken.record, taken.amplification
-        sampling = growth * expected
-        if taken.counts:
-            sampling = np.fmin(sampling, record.truncation + growth * perturbed.hidden)
-        stepping = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
+        record = taken.record
         rotation = SteppedRotation(
             interpolant=interpolant,
             momentum=self._momentum,
@@ -228,13 +225,13 @@ class Integration:
             directions=record.directions,
             turns=record.turns,
             dynamics=record.dynamics,
-            sampling_error=sampling,
-            stepping_error=taken.defects.error(stepping, interpolant.loops),
+            sampling_error=taken.sampling,
+            stepping_error=taken.stepping,
             rounding_error=taken.rounding,
-            amplification=growth,
+            amplification=taken.amplification,
             perturbed=perturbed,
         )
-        return Attempt(rotation, stepping, taken.defects.order, taken.rounded_up)
+        return Attempt(rotation, taken)
 
     def _rounds_of_one(self, interpolant: Interpolant, perturbed: Perturbed, expected: float) -> Round | None:
         """As `_round`, of one momentum in machine code, in as many rounds as steps alone need; None: not with that."""
@@ -275,17 +272,33 @@ class Integration:
             turn = requirements.whole_turn if self._largest else 0.0
             growth = min(1.0 + EXPECTED_GROWTH * turn, MOST_EXPECTED_GROWTH)
         counts = expected * growth > NEGLIGIBLE * self._tolerance
-        steps = self._plan(interpolant, requirements)
+        steps, planned = self._plan(interpolant, requirements)
         record = self._take_steps(interpolant, perturbed.coefficients if counts and perturbed.differ else None, steps)
         propagators = record.propagators if self._propagators is None else self._propagators
         little = LITTLE_ROUNDING * self._tolerance
-        amplifications, rounding = growth_and_rounding(propagators, record.quaternions, little)
-        planned = float(self._planned(requirements).sum())
-        rounded_up = float(steps.sum()) / planned
-        return Round(steps, record, counts, amplifications, rounding, requirements.defects(steps), rounded_up)
+        amplification, rounding = growth_and_rounding(propagators, record.quaternions, little)
+        sampling = amplification * expected
+        if counts:
+            sampling = np.fmin(sampling, record.truncation + amplification * perturbed.hidden)
+        distances = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
+        defects = requirements.defects(steps)
+        return Round(
+            steps=steps,
+            record=record,
+            distances=distances,
+            amplification=amplification,
+            sampling=sampling,
+            stepping=defects.error(distances, interpolant.loops),
+            rounding=rounding,
+            defects=defects,
+            rounded_up=float(steps.sum()) / planned,
+        )
 
-    def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> Integers:
-        """Steps on each panel: (P,). Finds the growth of errors first where the steps themselves will not show it."""
+    def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> tuple[Integers, float]:
+        """Steps on each panel (P,), and how many were planned.
+
+        Finds the growth of errors first where the steps themselves will not show it.
+        """
         planned = self._planned(requirements)
         count = interpolant.loops * float(planned.sum())
         if count > _MOST_STEPS:
@@ -300,7 +313,7 @@ class Integration:
         steps = even_steps(planned, 1 if self._subdivide is None else self._subdivide)
         if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
-        return steps
+        return steps, float(planned.sum())
 
     def _planned(self, requirements: StepRequirements, *, amplified: float | None = None) -> Array:
         """Steps per panel, not yet whole, short enough for the growth of errors unless that is known: (P,)."""

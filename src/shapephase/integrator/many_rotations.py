@@ -176,12 +176,12 @@ def _integrated(
     except AccuracyNotReached as error:
         raise _of_row(error, rows[:1], len(momentum)) from error
     estimates = attempt.rotation.error_estimate
-    failed = np.flatnonzero(~(estimates <= tolerance))
-    if not len(failed):
+    done = estimates <= tolerance
+    if done.all():
         return [RotationPart(rows, for_whole_batch(attempt.rotation, starts))], []
-    found = []
+    failed, found = np.flatnonzero(~done), []
     if len(failed) < len(estimates):
-        passed = np.flatnonzero(estimates <= tolerance)
+        passed = np.flatnonzero(done)
         found.append(RotationPart(rows[passed], of_rows(attempt.rotation, passed)))
     return found, list(_further(group, integration, sampler, attempt, failed, len(momentum)))
 

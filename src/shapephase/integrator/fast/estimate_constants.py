@@ -79,6 +79,14 @@ MANY_STEPS = 4000.0
 """Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
 NEGLIGIBLE = 0.005
 """Of the tolerance: what the samplers say, amplified, is not worth a march of its own below."""
+FORESEEN = 6.0
+"""Of the tolerance: the error that defects foretell may be this large, as most of it cancels along the way."""
+LOOKS_AHEAD = 3
+"""At what defects foretell of a plan, before any step is taken."""
+FEW_STEPS = 1000.0
+"""Of a motion, up to which a look ahead pays: of more a second round costs little but the steps themselves."""
+MOST_SHORTENED = 4.0
+"""How many times the steps become more at once."""
 EXPECTED_GROWTH = 0.5
 """What errors are expected to grow by for each radian turned, before it is known."""
 MOST_EXPECTED_GROWTH = 30.0

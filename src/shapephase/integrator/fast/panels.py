@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Integers, Mask
-from ...chebyshev import unit_nodes, values_to_coefficients
+from ...arrays import Array, Integers
+from ...chebyshev import MARGIN_OF_WIDTH, unit_nodes, values_to_coefficients
 from .._quadrature_defects import Defects, defect_table
 from ._plain import plain
+from .estimate_constants import HIGHEST_DEGREE
 
 _NOTHING_HIDDEN = np.zeros((0, 5))
 
@@ -41,37 +42,59 @@ def times_of_samples(degree: Integers, left: Array, right: Array, margin: Array)
     return times
 
 
-def factors_of_refining(degree: Integers, table: Array, rough: Mask, errors: Array, share: Array) -> Integers:
-    """What `refining_factors` finds: (P,)."""
-    factor = np.empty(len(degree), dtype=np.int64)
-    _kernel().factors_of_refining(degree, plain(table), rough, plain(errors), plain(share), factor)
-    return factor
+class PanelsToSample(NamedTuple):
+    """What becomes of panels, as of `FinerPanels`, and where they are to be sampled."""
+
+    origin: Integers
+    factor: Integers
+    degree: Integers
+    left: Array
+    right: Array
+    times: Array  # [s]
 
 
-def finer_panels(degree: Integers, left: Array, right: Array, factor: Integers) -> tuple[Any, ...]:
-    """The fields of `FinerPanels`."""
-    count = len(factor) + int(np.count_nonzero(factor == 0))
-    origin, times, degrees = np.empty((3, count), dtype=np.int64)
-    ends = np.empty((2, count))
-    _kernel().finer_panels(degree, plain(left), plain(right), factor, origin, times, degrees, ends)
-    return origin, times, degrees, ends[0], ends[1]
+class SampledPanels(NamedTuple):
+    """Panels after a round of sampling, and what to go on with."""
+
+    values: Array  # (S, 9)
+    coefficients: Array  # (P, n, 9)
+    table: Array  # (P, 9) of the errors of the series
+    errors: Array  # (3, P) as of `PanelErrors` [rad]
+    further: Integers  # (P,) as `refining_factors` has them; of length zero: these panels do
+    finer: PanelsToSample
 
 
-def times_of_fresh_samples(degree: Integers, factor: Integers, left: Array, right: Array, margin: Array) -> Array:
-    """What `FinerPanels.fresh_times` finds, by how far the first and last times of new panels are moved."""
-    _, _, nodes, places = _tables(tuple(sorted(set(degree.tolist()))))
-    times = np.empty(int(degree.sum()) + len(degree))
-    count = _kernel().times_of_fresh_samples(degree, factor, left, right, margin, nodes, places, times)
-    return times[:count]
+class Demand(NamedTuple):
+    """What panels are sampled for."""
+
+    momentum: float  # [kg m^2/s]
+    tolerance: float  # [rad]
+    whole: float  # duration of all loops [s]
+    loops: int
+    margin: float  # how far the ends of wide panels are moved [s]
 
 
-def merged_values(
-    old_degree: Integers, old_values: Array, origin: Integers, factor: Integers, degree: Integers, fresh: Array
-) -> Array:
-    """What `FinerPanels.values` finds."""
-    values = np.empty((int(degree.sum()) + len(degree), 9))
-    _kernel().merged_values(old_degree, plain(old_values), origin, factor, degree, plain(fresh), values)
-    return values
+def sampled_round(
+    old_degree: Integers, old_values: Array, panels: PanelsToSample, fresh: Array, hidden: Array | None, demand: Demand
+) -> SampledPanels:
+    """A round of sampling in one call.
+
+    Parameters
+    ----------
+    old_degree, old_values : (O,), (S, 9) of the panels that these come from
+    fresh : (F, 9) at the times of `panels`
+    hidden : (P, 5) of a path that is resolved; None: nothing is known of that
+    """
+    origin, factor, degree, left, right, _ = panels
+    matrices, places, _, _ = _tables(tuple(sorted(set(degree.tolist()))))
+    *found, further, made, ends, times = _kernel().sample_round(
+        old_degree, plain(old_values), origin, factor, degree, plain(left), plain(right), plain(fresh),
+        _NOTHING_HIDDEN if hidden is None else plain(hidden), demand.momentum, demand.tolerance, demand.whole,
+        demand.loops, demand.margin, MARGIN_OF_WIDTH, matrices, places, *_all_nodes(),
+    )  # fmt: skip
+    values, coefficients, table, errors = found
+    series = coefficients.reshape(len(degree), -1, 9)
+    return SampledPanels(values, series, table, errors, further, PanelsToSample(*made, *ends, times))
 
 
 def errors_of_panels(
@@ -103,10 +126,12 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
     return rates, found
 
 
-def plan_of_steps(sizes: Array, loops: int, tolerance: float, turn_a_step: float) -> Array:
-    """Steps per panel, not yet whole, from turn, swing and degree of each (3, P): (P,)."""
-    planned = np.empty(sizes.shape[1])
-    _kernel().plan_steps(*sizes, float(loops), float(tolerance), turn_a_step, planned)
+def plan_of_steps(
+    rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float
+) -> Array:
+    """What `StepRequirements.plan` finds: (P,)."""
+    planned, arrays = np.empty(len(turns)), (plain(rates), plain(turns), plain(sizes))
+    _kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, plain(defect_table()), planned)
     return planned
 
 
@@ -122,15 +147,13 @@ def warm() -> None:
     degree, one = np.array([4]), np.ones(1)
     coefficients, table = series_of_panels(degree, np.ones((5, 9)), one, one)
     times_of_samples(degree, one, one, one)
-    values, none = np.ones((5, 9)), np.zeros(1, dtype=np.bool_)
-    factor = factors_of_refining(degree, table, none, one, one)
-    finer_panels(degree, one, one, factor)
-    times_of_fresh_samples(degree, factor, one, one, one)
-    merged_values(degree, values, np.zeros(1, dtype=np.int64), factor, degree, values)
+    none, demand = np.zeros(1, dtype=np.int64), Demand(1.0, 1.0, 1.0, 1, 1.0)
+    panels = PanelsToSample(none, none, degree, np.zeros(1), one, np.zeros(5))
+    sampled_round(degree[:0], np.zeros((0, 9)), panels, np.ones((5, 9)), None, demand)
     errors_of_panels(degree, one, table, None, 1.0)
     series_with_changed_ends(coefficients, degree, one, 1.0)
     rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
-    plan_of_steps(sizes, 1, 1.0, 1.0)
+    plan_of_steps(rates, one, sizes, 1, 1.0, 1.0)
     defects_of_panels(rates, one, np.array([2]))
 
 
@@ -145,6 +168,13 @@ def _tables(degrees: tuple[int, ...]) -> tuple[Array, Integers, Array, Integers]
         places[list(degrees)] = np.cumsum([0, *(part.size for part in parts)])[:-1]
         found += [np.concatenate(parts), places]
     return found[0], found[1], found[2], found[3]
+
+
+@lru_cache(maxsize=1)
+def _all_nodes() -> tuple[Array, Integers]:
+    """Of [-1, 1], of all degrees that panels can have, and where those of each begin."""
+    nodes = [unit_nodes(degree) for degree in range(HIGHEST_DEGREE + 1)]
+    return np.concatenate(nodes), np.cumsum([0, *(len(one) for one in nodes)])[:-1]
 
 
 @lru_cache(maxsize=1)

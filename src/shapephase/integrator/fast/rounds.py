@@ -28,9 +28,11 @@ class Round(NamedTuple):
 
     steps: Integers  # (P,)
     record: StepRecord
-    counts: bool  # whether errors of the samples were measured on perturbed series
+    distances: Array  # (B,) of half as many steps [rad]
     amplification: Array  # (B,) the largest growth of an error from one time to a later one
-    rounding: Array  # (B,) [rad]
+    sampling: Array  # (B,) errors of the samples, of the steps, and by rounding [rad]
+    stepping: Array
+    rounding: Array
     defects: Defects
     rounded_up: float  # how many more steps were taken than planned
 
@@ -70,17 +72,13 @@ def rounds_of_one(
     done, steps, quaternions, ends, turns, dynamics, propagators, numbers = found
     if not done:
         return None
-    record = StepRecord(
-        quaternions=quaternions,
-        directions=ends,
-        turns=turns,
-        dynamics=dynamics,
-        propagators=propagators.reshape(1, -1, 3, 3),
-        stepping=numbers[1:2],
-        truncation=numbers[2:3],
+    _, distance, truncation, growth, rounding, *_, stepping, sampling = numbers.reshape(12, 1)
+    *of_defects, rounded_up = numbers[5:10].tolist()
+    errors = propagators.reshape(1, -1, 3, 3), distance, truncation
+    record = StepRecord(quaternions, ends, turns, dynamics, *errors)
+    return Round(
+        steps, record, distance, growth, sampling, stepping, rounding, Defects(*of_defects), rounded_up
     )
-    counts, *of_defects, rounded_up = numbers[[0, 5, 6, 7, 8, 9]].tolist()
-    return Round(steps, record, counts > 0.0, numbers[3:4], numbers[4:5], Defects(*of_defects), rounded_up)
 
 
 def warm() -> None:

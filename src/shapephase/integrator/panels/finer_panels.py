@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Integers, Mask
-from ...chebyshev import end_margin
-from ..fast import engine
 from ..fast.estimate_constants import HALF_DEGREE, HIGHEST_DEGREE, MOST_MISSING, MOST_RAISED
-from ..fast.panels import factors_of_refining, finer_panels, merged_values, times_of_fresh_samples
 from .panel_series import PanelSeries, sample_starts, sample_times
 
 
@@ -20,8 +17,6 @@ def refining_factors(series: PanelSeries, rough: Mask, errors: Array, share: Arr
     `rough` : which do not stay
     `errors`, `share` : what each is off by, and what it may be [rad]
     """
-    if engine.is_ready():
-        return factors_of_refining(series.degree, series.estimate.table, rough, errors, share)
     degree = series.degree
     with np.errstate(divide="ignore", invalid="ignore"):
         missing = np.log(np.maximum(errors / share, 1.0)) / series.estimate.decay
@@ -52,8 +47,6 @@ class FinerPanels:
     @classmethod
     def of(cls, old: PanelSeries, factor: Integers) -> FinerPanels:
         """By factors as `refining_factors` finds them."""
-        if engine.is_ready():
-            return cls(*finer_panels(old.degree, old.left, old.right, factor))
         origin = np.repeat(np.arange(len(factor)), 1 + (factor == 0))
         factor, left, right = factor[origin], old.left[origin], old.right[origin]
         degree = np.where(factor == 0, HALF_DEGREE, old.degree[origin] * factor)
@@ -63,15 +56,10 @@ class FinerPanels:
 
     def fresh_times(self, end: float) -> Array:
         """Where nothing was sampled yet (S,) [s]; `end` as of `sample_times`."""
-        if engine.is_ready():
-            margin = end_margin(self.right - self.left, end)
-            return times_of_fresh_samples(self.degree, self.factor, self.left, self.right, margin)
         return sample_times(self.degree, self.left, self.right, end)[self._is_fresh]
 
     def values(self, old: PanelSeries, fresh: Array) -> Array:
         """All samples, from those at the fresh times (S, 9) and those that there were."""
-        if engine.is_ready():
-            return merged_values(old.degree, old.values, self.origin, self.factor, self.degree, fresh)
         is_fresh, known = self._is_fresh, self.factor > 0
         values = np.empty((len(is_fresh), 9))
         values[is_fresh] = fresh

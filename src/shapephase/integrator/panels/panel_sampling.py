@@ -8,10 +8,12 @@ from functools import partial
 import numpy as np
 
 from ...arrays import Array, Integers, Mask
-from ...chebyshev import chebyshev, inside, nodes_on, values_to_coefficients
+from ...chebyshev import chebyshev, inside, nodes_on, values_to_coefficients, widest_margin
 from ...errors import AccuracyNotReached
 from .._last_terms import Perturbed, perturbed_series
 from .._spectral_error import Channels, spectral_norms
+from ..fast import engine
+from ..fast.panels import Demand, PanelsToSample, sampled_round
 from ..interpolant import Interpolant
 from ..resolved import Hidden, ResolvedPath
 from .finer_panels import FinerPanels, refining_factors
@@ -25,7 +27,7 @@ from .panel_series import (
 )
 
 # Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
-_FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 10), (0.0, 15, 30))
+_FIRST_DEGREES = ((1e-7, 5, 10), (1e-11, 10, 20), (0.0, 15, 30))
 # Panels that are a few.
 _FEW = 4
 # Panels before bisecting ends, besides 40 for every break: a motion that needs more is rough, not merely long.
@@ -36,6 +38,8 @@ _HIDDEN_SHARE = 0.1
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
 _TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
+_NO_DEGREES = np.empty(0, dtype=np.int64)
+_NO_VALUES = np.empty((0, 9))
 
 
 class PanelSampler:
@@ -68,6 +72,9 @@ class PanelSampler:
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
+        if self._is_bandlimited and engine.is_ready():
+            self._refine_in_machine_code(float(momentum), float(tolerance))
+            return
         if self._series is None:
             degree, left, right = self._first_panels(tolerance)
             # A copy: what machine code computes in work arrays is overwritten by the next call.
@@ -86,6 +93,34 @@ class PanelSampler:
             if not rough.any():
                 return
             self._refine_panels(rough, errors.whole, share, tolerance, total)
+
+    def _refine_in_machine_code(self, momentum: float, tolerance: float) -> None:
+        """Each round in one call, where nothing is to be looked at between the nodes."""
+        panels, series = self._panels_so_far(tolerance), self._series
+        degree, values = (_NO_DEGREES, _NO_VALUES) if series is None else (series.degree, series.values)
+        demand = Demand(momentum, tolerance, self._span * self._loops, self._loops, widest_margin(self.end))
+        while True:
+            _, _, here, left, right, times = panels
+            fresh = self._channels(times) if len(times) else _NO_VALUES
+            hidden = None if self._resolved is None else self._resolved.hidden(left, right, here).table
+            found = sampled_round(degree, values, panels, fresh, hidden, demand)
+            if not len(found.further):
+                self._keep(PanelSeries.of(here, left, right, found.values, found.coefficients, found.table))
+                self._errors = momentum, PanelErrors(*found.errors)
+                return
+            self._check_halves(found.further, left, right - left, tolerance, self._loops * float(found.errors[0].sum()))
+            degree, values, panels = here, found.values, found.finer
+
+    def _panels_so_far(self, tolerance: float) -> PanelsToSample:
+        """Those that are sampled already, or the first ones."""
+        series = self._series
+        if series is not None:
+            count = len(series.degree)
+            ends = series.left, series.right, np.empty(0)
+            return PanelsToSample(np.arange(count), np.ones(count, dtype=np.int64), series.degree, *ends)
+        degree, left, right = self._first_panels(tolerance)
+        none = np.zeros(len(degree), dtype=np.int64)
+        return PanelsToSample(none, none, degree, left, right, sample_times(degree, left, right, self.end))
 
     @property
     def series(self) -> PanelSeries:
@@ -122,7 +157,8 @@ class PanelSampler:
         """As `Sampler.interpolant`."""
         if self._interpolant is None:
             series = self.series
-            edges = np.append(series.left, series.right[-1])
+            edges = np.empty(len(series.left) + 1)
+            edges[:-1], edges[-1] = series.left, series.right[-1]
             if self._loops > 1:
                 starts = edges[-1] * np.arange(self._loops)
                 edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
@@ -157,16 +193,7 @@ class PanelSampler:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
         old = self.series
         factor = refining_factors(old, rough, errors, share)
-        halves = factor == 0
-        if halves.any():
-            narrow = (old.width[halves] < _LEAST_WIDTH * self._span).any()
-            if narrow or len(factor) > self._most_panels:
-                where = float(old.left[halves][np.argmin(old.width[halves])])
-                raise AccuracyNotReached(
-                    f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
-                    f"{tolerance:.3g} was requested; declare the times of its jumps as breaks, smooth the data, or "
-                    "loosen the tolerance"
-                )
+        self._check_halves(factor, old.left, old.width, tolerance, total)
         finer = FinerPanels.of(old, factor)
         # One call for all points.
         values = finer.values(old, self._channels(finer.fresh_times(self.end)))
@@ -174,6 +201,19 @@ class PanelSampler:
         series = series_through(finer.degree, finer.left, finer.right, values, self.end, finer.factor == 0)
         seen = np.flatnonzero((finer.factor == 1) & ~np.isnan(old.gaps[finer.origin, 0]))
         self._keep(series.with_gaps(seen, old.gaps[finer.origin[seen]]) if len(seen) else series)
+
+    def _check_halves(self, factor: Integers, left: Array, width: Array, tolerance: float, total: float) -> None:
+        """Raise AccuracyNotReached where halving panels does not end; `total` : of their errors [rad]."""
+        halves = factor == 0
+        if not halves.any():
+            return
+        if (width[halves] < _LEAST_WIDTH * self._span).any() or len(factor) > self._most_panels:
+            where = float(left[halves][np.argmin(width[halves])])
+            raise AccuracyNotReached(
+                f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
+                f"{tolerance:.3g} was requested; declare the times of its jumps as breaks, smooth the data, or "
+                "loosen the tolerance"
+            )
 
     def _keep(self, series: PanelSeries) -> None:
         self._series, self._errors, self._interpolant = series, None, None

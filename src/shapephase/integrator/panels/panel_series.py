@@ -38,6 +38,14 @@ class PanelSeries:
     estimate: SpectralEstimate
     gaps: Array
 
+    @classmethod
+    def of(
+        cls, degree: Integers, left: Array, right: Array, values: Array, coefficients: Array, table: Array
+    ) -> PanelSeries:
+        """That nobody looked at between the nodes; `table` : of `estimate`."""
+        gaps = np.full((len(degree), 2), np.nan)
+        return cls(degree, left, right, values, coefficients, SpectralEstimate(table), gaps)
+
     @cached_property
     def width(self) -> Array:
         """(P,) [s]."""
@@ -90,19 +98,10 @@ def series_through(degree: Integers, left: Array, right: Array, values: Array, e
     rounding = 2.0 * np.spacing(np.abs(right)) / (right - left)
     if engine.is_ready():
         coefficients, table = series_of_panels(degree, values, shift, rounding)
-        estimate = SpectralEstimate(table)
     else:
         coefficients = _coefficients(degree, values, shift)
-        estimate = estimate_spectra(spectral_norms(coefficients), degree, rounding)
-    return PanelSeries(
-        degree=degree,
-        left=left,
-        right=right,
-        values=values,
-        coefficients=coefficients,
-        estimate=estimate,
-        gaps=np.full((len(degree), 2), np.nan),
-    )
+        table = estimate_spectra(spectral_norms(coefficients), degree, rounding).table
+    return PanelSeries.of(degree, left, right, values, coefficients, table)
 
 
 def _coefficients(degree: Integers, values: Array, shift: Array) -> Array:

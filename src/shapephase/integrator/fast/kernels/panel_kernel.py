@@ -21,7 +21,9 @@ from ..estimate_constants import (
     EPS,
     EVENNESS,
     FEW_TERMS,
+    FEW_STEPS,
     FLOOR,
+    FORESEEN,
     FULL_ORDER,
     HALF_DEGREE,
     HIGHEST_DEGREE,
@@ -30,11 +32,14 @@ from ..estimate_constants import (
     LAST_TERMS,
     LEAST_BY_CHANCE,
     LEAST_DEGREE,
+    LEAST_ORDER,
+    LOOKS_AHEAD,
     LEAST_OF_FLOOR,
     MISSING_FACTOR,
     MOST_BY_CHANCE,
     MOST_MISSING,
     MOST_RAISED,
+    MOST_SHORTENED,
     MOST_TURN,
     ORDER,
     POWER_OF_CHANCE,
@@ -166,9 +171,9 @@ def series_of_panels(degree, values, shift, rounding, matrices, places, coeffici
         _estimate(series, degree[panel], rounding[panel], table[panel])
 
 
-@kernel
-def factors_of_refining(degree, table, rough, errors, share, factor):
-    """Arguments as of `panels.factors_of_refining`; the last one is filled."""
+@part
+def _factors_of_refining(degree, table, rough, errors, share, factor):
+    """As `refining_factors`; the last one is filled."""
     for panel in range(len(degree)):
         factor[panel] = 1
         if not rough[panel]:
@@ -182,9 +187,9 @@ def factors_of_refining(degree, table, rough, errors, share, factor):
         factor[panel] = 0 if too_many else times
 
 
-@kernel
-def finer_panels(degree, left, right, factor, origin, times, degrees, ends):
-    """Arguments as of `panels.finer_panels`; the last four are filled."""
+@part
+def _finer_panels(degree, left, right, factor, origin, times, degrees, ends):
+    """As `FinerPanels.of`; the last four are filled, ends in two rows."""
     at = 0
     for panel in range(len(degree)):
         halves = 2 if factor[panel] == 0 else 1
@@ -197,9 +202,9 @@ def finer_panels(degree, left, right, factor, origin, times, degrees, ends):
             at += 1
 
 
-@kernel
-def times_of_fresh_samples(degree, factor, left, right, margin, nodes, places, times):
-    """Arguments as of `panels.times_of_fresh_samples`, nodes as above; times are filled, and counted."""
+@part
+def _times_of_fresh_samples(degree, factor, left, right, margin, nodes, places, times):
+    """As `FinerPanels.fresh_times`, nodes as above; times are filled, and counted."""
     at = 0
     for panel in range(len(degree)):
         last, here, each = degree[panel], nodes[places[degree[panel]] :], factor[panel]
@@ -216,9 +221,9 @@ def times_of_fresh_samples(degree, factor, left, right, margin, nodes, places, t
     return at
 
 
-@kernel
-def merged_values(old_degree, old_values, origin, factor, degree, fresh, values):
-    """Arguments as of `panels.merged_values`; the last one is filled."""
+@part
+def _merged_values(old_degree, old_values, origin, factor, degree, fresh, values):
+    """As `FinerPanels.values`; the last one is filled."""
     at = new = first = 0
     panel = 0
     for finer in range(len(degree)):
@@ -256,6 +261,108 @@ def errors_of_panels(degree, width, table, hidden, momentum, found):
             of_path = (share * path[0] + path[2]) * turn + share * path[1] + path[3]
             noise = path[4] * (1.0 + turn)
         found[0, panel], found[1, panel], found[2, panel] = max(error, of_path), of_path, noise
+
+
+@part
+def make_even(planned, steps):
+    """As `even_steps`; steps are filled."""
+    for panel in range(len(planned)):
+        steps[panel] = 2 * int(math.ceil(0.5 * planned[panel]))  # noqa: RUF046 (a float in machine code)
+
+
+@kernel
+def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, table, planned):
+    """As `StepRequirements.plan`, with the table of defects; planned (P,) is filled."""
+    turn, swing, degree = sizes[0], sizes[1], sizes[2]
+    total = count = 0.0
+    for panel in range(len(turn)):
+        each = swing[panel] ** (1.0 / (ORDER + 1.0))
+        planned[panel] = each
+        total += each * each
+    common = 2.0 * (loops * DISTANCE * math.sqrt(total) / (AIM * tolerance)) ** (1.0 / ORDER)
+    for panel in range(len(turn)):
+        least = max(degree[panel] / DEGREES_A_STEP, turn[panel] / turn_a_step)
+        planned[panel] = max(max(common * planned[panel], least), 1.0)
+        count += planned[panel]
+    steps, found = np.empty(len(turn), np.int64), np.empty(4)
+    for _ in range(LOOKS_AHEAD if loops * count <= FEW_STEPS else 0):
+        make_even(planned, steps)
+        defects_of_panels(rates, turns, steps, table, found)
+        remaining = remaining_by_defects(found[0], found[1])
+        excess = loops * BY_CHANCE * remaining * found[1] / (FORESEEN * tolerance)
+        if not excess > 1.0:
+            break
+        shorter = min(excess ** (1.0 / order_by_defects(remaining)), MOST_SHORTENED)
+        for panel in range(len(turn)):
+            planned[panel] *= shorter
+
+
+@part
+def _rounding_of(time, width):
+    """Of times up to this one, in units of half a panel."""
+    return 2.0 * math.ldexp(1.0, math.frexp(time)[1] - 53) / width
+
+
+@part
+def _share_of(tolerance, whole, width):
+    """Of the tolerance, that a panel may take."""
+    return tolerance / whole * width
+
+
+@kernel
+def sample_round(
+    old_degree, old_values, origin, factor, degree, left, right, fresh, hidden, momentum, tolerance, whole, loops,
+    margin, of_width, matrices, places, nodes, node_places,
+):  # fmt: skip
+    """A round of sampling: the series through all samples, their errors, and what panels to go on with.
+
+    Arguments
+    ---------
+    old_degree, old_values: (O,), (S, 9) of the panels before
+    origin, factor, degree, left, right: (P,) each, what became of them, as of `FinerPanels`
+    fresh: (F, 9) what was sampled since
+    hidden: (P, 5) of a path that is resolved, else no rows
+    whole: duration of all loops [s]
+    margin, of_width: how far the ends of panels are moved at most [s], and of their width
+    matrices, places: as of `series_of_panels`
+    nodes, node_places: as of `times_of_samples`, of all degrees
+
+    Returns values, coefficients, table and errors (3, P) as above; of the panels to go on with, origin, factor, degree,
+    ends (2, Q) and the times of fresh samples; no panels: the errors are within the tolerance, or rounding.
+    """
+    panels, width, rounding, shift = len(degree), right - left, np.empty(len(degree)), np.zeros(len(degree))
+    margins = np.empty(panels)
+    for panel in range(panels):
+        rounding[panel] = _rounding_of(abs(right[panel]), width[panel])
+        margins[panel] = min(margin, of_width * width[panel])
+        if degree[panel] and not factor[panel]:
+            shift[panel] = 2.0 * margins[panel] / width[panel]
+    values = np.empty((degree.sum() + panels, _CHANNELS))
+    _merged_values(old_degree, old_values, origin, factor, degree, fresh, values)
+    coefficients, table = np.empty((panels, (degree.max() + 1) * _CHANNELS)), np.empty((panels, 9))
+    series_of_panels(degree, values, shift, rounding, matrices, places, coefficients, table)
+    errors = np.empty((3, panels))
+    errors_of_panels(degree, width, table, hidden, momentum, errors)
+    rough, share, count = np.zeros(panels, np.bool_), np.empty(panels), 0
+    for panel in range(panels):
+        share[panel] = _share_of(tolerance, whole, width[panel])
+        is_rough = table[panel, AT_ROUNDING] == 0.0 or errors[1, panel] > share[panel]
+        rough[panel] = errors[0, panel] > share[panel] and is_rough
+        count += rough[panel]
+    further = np.empty(panels, np.int64)
+    if count == 0 or loops * errors[0].sum() <= tolerance:
+        origins = np.empty((3, 0), np.int64)
+        return values, coefficients, table, errors, further[:0], origins, np.empty((2, 0)), np.empty(0)
+    _factors_of_refining(degree, table, rough, errors[0], share, further)
+    count = panels
+    for panel in range(panels):
+        count += further[panel] == 0
+    made, ends = np.empty((3, count), np.int64), np.empty((2, count))
+    _finer_panels(degree, left, right, further, made[0], made[1], made[2], ends)
+    margins = np.minimum(margin, of_width * (ends[1] - ends[0]))
+    times = np.empty(made[2].sum() + count)
+    found = _times_of_fresh_samples(made[2], made[1], ends[0], ends[1], margins, nodes, node_places, times)
+    return values, coefficients, table, errors, further, made, ends, times[:found]
 
 
 @kernel
@@ -305,20 +412,6 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
         found[0, panel], found[1, panel], found[2, panel] = turn, swing, last
 
 
-@kernel
-def plan_steps(turn, swing, degree, loops, tolerance, turn_a_step, planned):
-    """As `StepRequirements.plan`; planned (P,) is filled."""
-    total = 0.0
-    for panel in range(len(turn)):
-        each = swing[panel] ** (1.0 / (ORDER + 1.0))
-        planned[panel] = each
-        total += each * each
-    common = 2.0 * (loops * DISTANCE * math.sqrt(total) / (AIM * tolerance)) ** (1.0 / ORDER)
-    for panel in range(len(turn)):
-        least = max(degree[panel] / DEGREES_A_STEP, turn[panel] / turn_a_step)
-        planned[panel] = max(max(common * planned[panel], least), 1.0)
-
-
 @part
 def _defect(degree, row, slower, table):
     """Of a term, by the table's row for so many steps."""
@@ -361,6 +454,12 @@ def _between(x, places, values):
 def remaining_by_defects(whole, half):
     """As `Defects.remaining`."""
     return min(max(whole / half, FULL_ORDER), 1.0) if half > 0.0 else FULL_ORDER
+
+
+@part
+def order_by_defects(remaining):
+    """As `Defects.order`."""
+    return min(max(-math.log2(remaining), LEAST_ORDER), ORDER)
 
 
 @part

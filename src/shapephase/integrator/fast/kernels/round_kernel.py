@@ -11,14 +11,12 @@ from ..estimate_constants import (
     EXPECTED_GROWTH,
     FAR,
     INFORMATIVE_ERROR,
-    LEAST_ORDER,
     LITTLE_ROUNDING,
     MANY_STEPS,
     MOST_EXPECTED_GROWTH,
     MOST_SAMPLING,
     MOST_STEPPING,
     NEGLIGIBLE,
-    ORDER,
     REFINED,
     SHORT_TURN_A_STEP,
     SIGNIFICANT,
@@ -28,7 +26,15 @@ from ..estimate_constants import (
 from .growth_kernel import growths_and_rounding
 from .jit import kernel, part
 from .march_kernel import march_at_rest, march_momenta
-from .panel_kernel import defects_of_panels, error_by_defects, plan_steps, remaining_by_defects, sizes_of_terms
+from .panel_kernel import (
+    defects_of_panels,
+    error_by_defects,
+    make_even,
+    order_by_defects,
+    plan_steps,
+    remaining_by_defects,
+    sizes_of_terms,
+)
 
 _ONE_LANE = 1
 _MOST_ROUNDS = 4
@@ -75,14 +81,11 @@ def _up(number, marks):
 
 
 @part
-def _too_coarse(found, loops, expected, hidden, tolerance):
+def _too_coarse(found, tolerance):
     """The error of the steps, if they alone are why the estimate is above the tolerance and finer ones help; else 0."""
-    counts, distance, truncation, growth, rounding = found[0], found[1], found[2], found[3], found[4]
+    distance, growth, rounding, stepping, sampling = found[1], found[3], found[4], found[10], found[11]
     if not (distance < INFORMATIVE_ERROR and math.isfinite(growth) and rounding <= LITTLE_ROUNDING * tolerance):
         return 0.0
-    stepping, sampling = error_by_defects(found[5:], distance, loops), growth * expected
-    if counts > 0.0:
-        sampling = min(sampling, truncation + growth * hidden)
     room = tolerance - rounding
     if (1.0 + DENSE_SHARE) * (sampling + stepping + rounding) <= tolerance or sampling > MOST_SAMPLING * room:
         return 0.0
@@ -107,23 +110,23 @@ def take_rounds(
     marks_of_finer, marks_of_growth: that refinements are rounded up to, of a factor of two
 
     Returns whether the motion is short enough to be done here, and if so steps, quaternions, ends, turns, dynamics,
-    propagators as of `march_momenta`, and ten numbers: whether perturbed series count, distance of half as many steps,
-    of the perturbed series, growth, rounding, the four of `defects_of_panels`, and how many more steps were taken than
-    planned.
+    propagators as of `march_momenta`, and twelve numbers: whether perturbed series count, distance of half as many
+    steps, of the perturbed series, growth, rounding, the four of `defects_of_panels`, how many more steps were taken
+    than planned, and the errors of steps and of samples.
     """
     panels, moving = len(widths), ceiling > 0.0
     rates, sizes, planned = np.empty((panels, series.shape[1] // 9)), np.empty((3, panels)), np.empty(panels)
     sizes_of_terms(series, widths, ceiling, SIGNIFICANT * tolerance, rates, sizes)
     turn = loops * sizes[0].sum()
     a_step = SHORT_TURN_A_STEP if moving and turn > FAR else TURN_A_STEP
-    plan_steps(sizes[0], sizes[1], sizes[2], loops, tolerance, a_step, planned)
     seen = sizes[0] if moving else np.zeros(panels)
-    steps, found, rounds = np.empty(panels, np.int64), np.zeros(10), 0
+    plan_steps(rates, seen, sizes, loops, tolerance, a_step, table, planned)
+    steps, found, rounds = np.empty(panels, np.int64), np.zeros(12), 0
     while True:
         finer, amplified = refinement[0], refinement[1]
         is_short = loops * finer * planned.sum() <= MANY_STEPS and not (moving and turn > VERY_FAR)
-        for panel in range(panels if is_short else 0):
-            steps[panel] = 2 * int(math.ceil(0.5 * finer * planned[panel]))  # noqa: RUF046 (a float in machine code)
+        if is_short:
+            make_even(finer * planned, steps)
         total = loops * steps.sum() if is_short else 0
         quaternions, ends = np.empty((1, total + 1, 4)), np.empty((1, total + 1 if moving else 0, 3))
         turns, dynamics = np.zeros((1, total)), np.zeros((1, total))
@@ -146,11 +149,17 @@ def take_rounds(
         growths_and_rounding(propagators, quaternions, found[3:4], found[4:5])
         defects_of_panels(rates, seen, steps, table, found[5:9])
         found[9] = steps.sum() / (finer * planned.sum())
+        if not math.isfinite(found[1]):
+            found[1] = math.pi
+        found[10], found[11] = error_by_defects(found[5:9], found[1], loops), found[3] * expected
+        if found[0] > 0.0:
+            measured = found[2] + found[3] * hidden
+            found[11] = measured if math.isnan(found[11]) or measured < found[11] else found[11]
         rounds += 1
-        excess = _too_coarse(found, loops, expected, hidden, tolerance)
+        excess = _too_coarse(found, tolerance)
         if rounds == _MOST_ROUNDS or excess == 0.0:
             return True, steps, quaternions, ends, turns, dynamics, propagators, found
-        order = min(max(-math.log2(remaining_by_defects(found[5], found[6])), LEAST_ORDER), ORDER)
+        order = order_by_defects(remaining_by_defects(found[5], found[6]))
         finer *= min(max((excess / REFINED) ** (1.0 / order), 1.1, 1.02 * found[9]), 4.0)
         refinement[0] = _up(finer, marks_of_finer)
         refinement[1] = _up(found[3], marks_of_growth)
