@@ -100,9 +100,12 @@ class StepRequirements(NamedTuple):
         """What the formula misses in so many steps (P,)."""
         return (defects_of_panels if engine.is_ready() else defects)(self.rates, self.turns, steps)
 
-    def stepping_error(self, steps: Integers, distance: Array) -> Array:
-        """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad]."""
-        return self.defects(steps).error(distance, self.loops)
+    def stepping_error(self, steps: Integers, distance: Array, growth: Array | float = 1.0) -> Array:
+        """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad].
+
+        `growth` : as of `Defects.error`
+        """
+        return self.defects(steps).error(distance, self.loops, growth)
 
 
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:

@@ -288,7 +288,7 @@ class Integration:
             distances=distances,
             amplification=amplification,
             sampling=sampling,
-            stepping=defects.error(distances, interpolant.loops),
+            stepping=defects.error(distances, interpolant.loops, amplification),
             rounding=rounding,
             defects=defects,
             rounded_up=float(steps.sum()) / planned,

@@ -126,6 +126,10 @@ BY_CHANCE = 2.6
 POWER_OF_CHANCE = 0.4
 """Of how many times that is the distance."""
 LEAST_BY_CHANCE = 3.0
+POWER_OF_GROWTH = 0.15
+"""Of the growth of errors along the motion: where they grow, fewer steps make the distance, and chance counts more."""
+MOST_GROWTH_BY_CHANCE = 1e3
+"""A larger growth counts no more."""
 LEAST_ORDER = 2.0
 """By which errors fall at least when steps are made shorter."""
 UNRESOLVED = 0.125

@@ -362,8 +362,8 @@ def _stepped(
     requirements, rates = plan.requirements(turning), plan.rates(series.coefficients)
     stepping = np.array(
         [
-            requirements._replace(rates=own).stepping_error(steps, distance)
-            for own, distance in zip(rates, distances[:, None], strict=True)
+            requirements._replace(rates=own).stepping_error(steps, distance, growth)
+            for own, distance, growth in zip(rates, distances[:, None], amplifications, strict=True)
         ]
     )
     return VariantPart(

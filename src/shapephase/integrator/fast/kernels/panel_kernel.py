@@ -37,12 +37,14 @@ from ..estimate_constants import (
     LEAST_OF_FLOOR,
     MISSING_FACTOR,
     MOST_BY_CHANCE,
+    MOST_GROWTH_BY_CHANCE,
     MOST_MISSING,
     MOST_RAISED,
     MOST_SHORTENED,
     MOST_TURN,
     ORDER,
     POWER_OF_CHANCE,
+    POWER_OF_GROWTH,
     ROUNDED_TERM,
     ROUNDING,
     SLOWEST_DECAY,
@@ -463,7 +465,7 @@ def order_by_defects(remaining):
 
 
 @part
-def error_by_defects(found, distance, loops):
+def error_by_defects(found, distance, loops, growth):
     """As `Defects.error`."""
     whole, half, unresolved, evenness = found[0], found[1], found[2], found[3]
     remaining = remaining_by_defects(whole, half)
@@ -471,4 +473,5 @@ def error_by_defects(found, distance, loops):
     factor = min(
         max(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE), _between(evenness, EVENNESS, MOST_BY_CHANCE)
     )
+    factor *= min(growth, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
     return min(max(factor * remaining * distance, loops * unresolved), distance)

@@ -151,7 +151,7 @@ def take_rounds(
         found[9] = steps.sum() / (finer * planned.sum())
         if not math.isfinite(found[1]):
             found[1] = math.pi
-        found[10], found[11] = error_by_defects(found[5:9], found[1], loops), found[3] * expected
+        found[10], found[11] = error_by_defects(found[5:9], found[1], loops, found[3]), found[3] * expected
         if found[0] > 0.0:
             measured = found[2] + found[3] * hidden
             found[11] = measured if math.isnan(found[11]) or measured < found[11] else found[11]
