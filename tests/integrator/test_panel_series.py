@@ -104,7 +104,9 @@ def random_panels(rng: np.random.Generator) -> PanelSeries:
 @pytest.mark.usefixtures("fast")
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-9, 1e-12])
 @pytest.mark.parametrize("with_hidden", [False, True])
-def test_a_round_in_one_call_is_the_same_as_its_parts(monkeypatch: pytest.MonkeyPatch, tolerance: float, with_hidden: bool):
+def test_a_round_in_one_call_is_the_same_as_its_parts(
+    monkeypatch: pytest.MonkeyPatch, tolerance: float, with_hidden: bool
+):
     """Panels of known polynomials and rough ones: what is kept, what goes on, and where that is sampled next."""
     left, right, end = EDGES[:-1], EDGES[1:], float(EDGES[-1])
     first = PanelsToSample(*np.zeros((2, len(DEGREES)), dtype=np.int64), DEGREES, left, right, np.empty(0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,7 +31,8 @@ from .fast.panels import defects_of_panels, plan_of_steps, sizes_of_terms
 from .interpolant import Interpolant
 
 
-class StepRequirements(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StepRequirements:
     """How finely the panels of an interpolant must be stepped.
 
     Attributes
@@ -49,6 +50,7 @@ class StepRequirements(NamedTuple):
     turns: Array
     whole_turn: float
     loops: int
+    _defects: dict[bytes, Defects] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def from_interpolant(cls, interpolant: Interpolant, magnitude: float, tolerance: float) -> StepRequirements:
@@ -98,7 +100,11 @@ class StepRequirements(NamedTuple):
 
     def defects(self, steps: Integers) -> Defects:
         """What the formula misses in so many steps (P,)."""
-        return (defects_of_panels if engine.is_ready() else defects)(self.rates, self.turns, steps)
+        key = steps.tobytes()
+        if key not in self._defects:
+            find = defects_of_panels if engine.is_ready() else defects
+            self._defects[key] = find(self.rates, self.turns, steps)
+        return self._defects[key]
 
     def stepping_error(self, steps: Integers, distance: Array, growth: Array | float = 1.0) -> Array:
         """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad].

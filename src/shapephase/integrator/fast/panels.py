@@ -126,9 +126,7 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
     return rates, found
 
 
-def plan_of_steps(
-    rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float
-) -> Array:
+def plan_of_steps(rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float) -> Array:
     """What `StepRequirements.plan` finds: (P,)."""
     planned, arrays = np.empty(len(turns)), (plain(rates), plain(turns), plain(sizes))
     _kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, plain(defect_table()), planned)

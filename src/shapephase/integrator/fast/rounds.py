@@ -76,9 +76,7 @@ def rounds_of_one(
     *of_defects, rounded_up = numbers[5:10].tolist()
     errors = propagators.reshape(1, -1, 3, 3), distance, truncation
     record = StepRecord(quaternions, ends, turns, dynamics, *errors)
-    return Round(
-        steps, record, distance, growth, sampling, stepping, rounding, Defects(*of_defects), rounded_up
-    )
+    return Round(steps, record, distance, growth, sampling, stepping, rounding, Defects(*of_defects), rounded_up)
 
 
 def warm() -> None:

@@ -73,7 +73,8 @@ class PanelSampler:
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
         if self._is_bandlimited and engine.is_ready():
-            self._refine_in_machine_code(float(momentum), float(tolerance))
+            if self._series is None or self._rough(momentum, tolerance)[1].any():
+                self._refine_in_machine_code(float(momentum), float(tolerance))
             return
         if self._series is None:
             degree, left, right = self._first_panels(tolerance)
@@ -81,18 +82,14 @@ class PanelSampler:
             values = self._channels(sample_times(degree, left, right, self.end)).copy()
             self._keep(series_through(degree, left, right, values, self.end, degree > 0))
         while True:
-            errors = self._errors_at(momentum)
-            total = self._loops * float(errors.whole.sum())
+            total, rough = self._rough(momentum, tolerance)
             if total <= tolerance:
                 if self._is_bandlimited or not self._check_between_nodes():
                     return
                 continue
-            series = self.series
-            share = tolerance / (self._span * self._loops) * series.width
-            rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
             if not rough.any():
                 return
-            self._refine_panels(rough, errors.whole, share, tolerance, total)
+            self._refine_panels(rough, momentum, tolerance, total)
 
     def _refine_in_machine_code(self, momentum: float, tolerance: float) -> None:
         """Each round in one call, where nothing is to be looked at between the nodes."""
@@ -189,10 +186,21 @@ class PanelSampler:
         degree[self._panels_at_rest(left, right)] = 0
         return degree, left, right
 
-    def _refine_panels(self, rough: Mask, errors: Array, share: Array, tolerance: float, total: float) -> None:
+    def _rough(self, momentum: float, tolerance: float) -> tuple[float, Mask]:
+        """The error of all panels [rad], and if it is above the tolerance which of them more samples help: (P,)."""
+        series, errors, share = self.series, self._errors_at(momentum), self._share(tolerance)
+        total = self._loops * float(errors.whole.sum())
+        rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
+        return total, rough & (total > tolerance)
+
+    def _share(self, tolerance: float) -> Array:
+        """What each panel may be off by: (P,) [rad]."""
+        return tolerance / (self._span * self._loops) * self.series.width
+
+    def _refine_panels(self, rough: Mask, momentum: float, tolerance: float, total: float) -> None:
         """Raise the degree where the spectrum decays fast enough for that to do, else bisect."""
         old = self.series
-        factor = refining_factors(old, rough, errors, share)
+        factor = refining_factors(old, rough, self._errors_at(momentum).whole, self._share(tolerance))
         self._check_halves(factor, old.left, old.width, tolerance, total)
         finer = FinerPanels.of(old, factor)
         # One call for all points.

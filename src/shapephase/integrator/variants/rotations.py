@@ -362,7 +362,7 @@ def _stepped(
     requirements, rates = plan.requirements(turning), plan.rates(series.coefficients)
     stepping = np.array(
         [
-            requirements._replace(rates=own).stepping_error(steps, distance, growth)
+            replace(requirements, rates=own).stepping_error(steps, distance, growth)
             for own, distance, growth in zip(rates, distances[:, None], amplifications, strict=True)
         ]
     )
