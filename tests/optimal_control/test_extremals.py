@@ -17,15 +17,9 @@ from shapephase.errors import (
     UndeclaredBreakWarning,
     UnknownNameError,
 )
-from shapephase.optimal_control import (
-    _hamiltonian,
-    _wong_residual,
-    conjugate_times,
-    extremal,
-    jacobi_fields,
-    shoot,
-    wong_residual,
-)
+from shapephase.optimal_control import conjugate_times, extremal, jacobi_fields, shoot, wong_residual
+from shapephase.optimal_control.extremals import hamiltonian as hamiltonian_module
+from shapephase.optimal_control.extremals import wong_residual as wong_residual_module
 from support.bodies import joint, link, random_loop, urdf
 from support.independent import cross
 from support.long_runs import full_but
@@ -464,14 +458,14 @@ def test_a_motion_without_energy_is_refused(load_urdf, cat):
 
 
 def test_an_extremal_that_cannot_be_integrated_is_refused(cat, monkeypatch):
-    monkeypatch.setattr(_hamiltonian, "_MOST", 2000)
+    monkeypatch.setattr(hamiltonian_module, "_MOST", 2000)
     with pytest.raises(AccuracyNotReached, match="charge"):
         extremal(cat, START, RATE, 1e6 * CHARGE, 1.0)
 
 
 def test_a_solution_that_grows_without_end_is_refused():
     with pytest.raises(AccuracyNotReached, match="breaks down at 1 s"):
-        _hamiltonian.integrated(lambda y: y**2, 2.0, np.ones(1), 1e-9, np.ones(1))
+        hamiltonian_module.integrated(lambda y: y**2, 2.0, np.ones(1), 1e-9, np.ones(1))
 
 
 def test_an_extremal_at_rest_has_no_conjugate_times(cat):
@@ -495,7 +489,7 @@ def test_a_path_whose_rate_jumps_is_no_extremal(cat):
 
 
 def test_a_path_too_rough_for_its_samples_is_refused(cat, rng, monkeypatch):
-    monkeypatch.setattr(_wong_residual, "_PANELS", (1, 2))
+    monkeypatch.setattr(wong_residual_module, "_PANELS", (1, 2))
     with pytest.raises(AccuracyNotReached, match="as breaks of the path"):
         wong_residual(cat, random_loop(cat, rng, harmonics=6))
 

@@ -22,7 +22,7 @@ from shapephase.optimal_control import (
     shoot,
     wong_residual,
 )
-from shapephase.optimal_control._hamiltonian import integrated
+from shapephase.optimal_control.extremals.hamiltonian import integrated
 from support.independent import apart, mujoco_motion, pinocchio_motion
 
 X, Y, Z = np.eye(3)

@@ -276,6 +276,6 @@ def test_unknown_quantities_and_links_are_named(mixed):
 
 
 def test_importing_the_library_does_not_import_casadi():
-    program = "import sys, shapephase, shapephase.optimal_control._shooting; print('casadi' in sys.modules)"
+    program = "import sys, shapephase, shapephase.optimal_control.extremals.shooting; print('casadi' in sys.modules)"
     seen = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert seen.stdout.strip() == "False"

@@ -102,15 +102,15 @@ class Defects(NamedTuple):
         """The bound that `error` would be, were the distance all that defects can come to [rad]."""
         return loops * BY_CHANCE * self.remaining * self.half
 
-    def error(self, distance: Array, loops: int, growth: Array | float = 1.0) -> Array:
+    def error(self, distance: Array, loops: int, amplification: Array | float = 1.0) -> Array:
         """Bound of the error of steps by their distance from half as many, (B,) [rad].
 
-        `growth` : of an error from one time to a later one, (B,): what grows most hides the rest of the distance
+        `amplification` : of an error from one time to a later one, (B,): what grows most hides the rest of the distance
         """
         cancelled = loops * self.half / np.maximum(distance, TINY)
         by_chance = np.maximum(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE)
         factor = np.minimum(by_chance, np.interp(self.evenness, EVENNESS, MOST_BY_CHANCE))
-        factor = factor * np.minimum(growth, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
+        factor = factor * np.minimum(amplification, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
         return np.minimum(np.maximum(factor * self.remaining * distance, loops * self.unresolved), distance)
 
 

@@ -106,12 +106,12 @@ class StepRequirements:
             self._defects[key] = find(self.rates, self.turns, steps)
         return self._defects[key]
 
-    def stepping_error(self, steps: Integers, distance: Array, growth: Array | float = 1.0) -> Array:
+    def stepping_error(self, steps: Integers, distance: Array, amplification: Array | float = 1.0) -> Array:
         """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad].
 
-        `growth` : as of `Defects.error`
+        `amplification` : as of `Defects.error`
         """
-        return self.defects(steps).error(distance, self.loops, growth)
+        return self.defects(steps).error(distance, self.loops, amplification)
 
 
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:

@@ -1,9 +1,9 @@
-from ._hamiltonian import Hamiltonian, hamiltonian
-from ._jacobi_fields import ConjugateTime, JacobiFields, conjugate_times, jacobi_fields
 from ._path_cost import path_cost
-from ._shooting import shoot
-from ._wong_residual import WongFit, wong_residual
-from .extremals import Extremal, extremal
+from .extremals.extremal import Extremal, extremal
+from .extremals.hamiltonian import Hamiltonian, hamiltonian
+from .extremals.jacobi_fields import ConjugateTime, JacobiFields, conjugate_times, jacobi_fields
+from .extremals.shooting import shoot
+from .extremals.wong_residual import WongFit, wong_residual
 from .plan import Plan, Progress, Start
 from .plan_options import Goal, Limits, Search
 from .planning import plan_reorientation

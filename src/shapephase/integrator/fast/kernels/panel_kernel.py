@@ -465,7 +465,7 @@ def order_by_defects(remaining):
 
 
 @part
-def error_by_defects(found, distance, loops, growth):
+def error_by_defects(found, distance, loops, amplification):
     """As `Defects.error`."""
     whole, half, unresolved, evenness = found[0], found[1], found[2], found[3]
     remaining = remaining_by_defects(whole, half)
@@ -473,5 +473,5 @@ def error_by_defects(found, distance, loops, growth):
     factor = min(
         max(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE), _between(evenness, EVENNESS, MOST_BY_CHANCE)
     )
-    factor *= min(growth, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
+    factor *= min(amplification, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
     return min(max(factor * remaining * distance, loops * unresolved), distance)

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from .. import so3
-from ..arguments import check_object, number_argument, positive_argument, tolerance_argument
-from ..arrays import Array
-from ..body.body import Body
-from ..display import short_repr
-from ..errors import ShapeError
-from ..integrator.casadi_calls import call_casadi
-from ..shape_space.connection import mechanical_connection
-from ._hamiltonian import hamiltonian, initial_state, integrated, natural_scales
-from .extremals import Extremal
+from ... import so3
+from ...arguments import check_object, number_argument, positive_argument, tolerance_argument
+from ...arrays import Array
+from ...body.body import Body
+from ...display import short_repr
+from ...errors import ShapeError
+from ...integrator.casadi_calls import call_casadi
+from ...shape_space.connection import mechanical_connection
+from .extremal import Extremal
+from .hamiltonian import hamiltonian, initial_state, integrated, natural_scales
 
 # Times at which the fields are sampled for zeros: neighbouring conjugate times of a loop are a good part of it apart.
 _SCAN = 600

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
-from ..arguments import check_object, tolerance_argument
-from ..arrays import Array
-from ..body.body import Body
-from ..errors import AccuracyNotReached, ShapeError
-from ..integrator.casadi_calls import call_casadi
-from ..shape_space.connection import horizontal_lift
-from ..shape_space.knot_crossings import route_along
-from ..shape_space.shape_path import ShapePath
-from ._hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
-from ._jacobi_fields import inverse_scale, jacobi_fields
-from ._wong_residual import wong_residual
-from .extremals import Extremal, extremal
+from ... import so3
+from ...arguments import check_object, tolerance_argument
+from ...arrays import Array
+from ...body.body import Body
+from ...errors import AccuracyNotReached, ShapeError
+from ...integrator.casadi_calls import call_casadi
+from ...shape_space.connection import horizontal_lift
+from ...shape_space.knot_crossings import route_along
+from ...shape_space.shape_path import ShapePath
+from .extremal import Extremal, extremal
+from .hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
+from .jacobi_fields import inverse_scale, jacobi_fields
+from .wong_residual import wong_residual
 
 # The most Newton steps at each accuracy: damped steps along a weakly curved valley converge slowly.
 _STEPS = 40

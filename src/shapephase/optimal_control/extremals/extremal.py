@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
-from ..arguments import check_object, positive_argument, times_argument, tolerance_argument, vector_argument
-from ..arrays import Array, check_reach
-from ..body.body import Body
-from ..display import short_repr
-from ..integrator.casadi_calls import call_casadi
-from ..shape_space.shape_path import ShapePath
-from ._hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
+from ... import so3
+from ...arguments import check_object, positive_argument, times_argument, tolerance_argument, vector_argument
+from ...arrays import Array, check_reach
+from ...body.body import Body
+from ...display import short_repr
+from ...integrator.casadi_calls import call_casadi
+from ...shape_space.shape_path import ShapePath
+from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,18 +8,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from .. import so3
-from ..arguments import check_object
-from ..arrays import Array
-from ..body.body import Body
-from ..display import short_repr
-from ..errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
-from ..integrator.casadi_calls import call_casadi
-from ..shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
-from ..shape_space.knot_crossings import route_along
-from ..shape_space.shape_path import ShapePath
-from ._hamiltonian import Hamiltonian, checked_metric, hamiltonian
-from .task import joint_coupling
+from ... import so3
+from ...arguments import check_object
+from ...arrays import Array
+from ...body.body import Body
+from ...display import short_repr
+from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
+from ...integrator.casadi_calls import call_casadi
+from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
+from ...shape_space.knot_crossings import route_along
+from ...shape_space.shape_path import ShapePath
+from ..task import joint_coupling
+from .hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
 # Gauss nodes of a panel: the residual of a smooth path is then exact to rounding on few panels.
 _STAGES = 12

@@ -12,15 +12,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ..arguments import check_object
-from ..arrays import Array
-from ..body.body import Body
-from ..body.couplings.coordinate_map import check_no_balls, check_smooth
-from ..display import short_repr
-from ..errors import AccuracyNotReached, SingularInertiaError, unknown_name
-from ..integrator.casadi_calls import call_casadi
-from ..shape_space.connection import mechanical_connection
-from .symbolic import solve_linear, symbolic_body
+from ...arguments import check_object
+from ...arrays import Array
+from ...body.body import Body
+from ...body.couplings.coordinate_map import check_no_balls, check_smooth
+from ...display import short_repr
+from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
+from ...integrator.casadi_calls import call_casadi
+from ...shape_space.connection import mechanical_connection
+from ..symbolic import solve_linear, symbolic_body
 
 # Costs that are the integral of a metric, which is what the equations need.
 _COSTS = ("kinetic", "rate")
