@@ -7,6 +7,8 @@ cost "time". What is measured is the plan of least kinetic energy in that durati
     --goals N  of each body at most
     --seed S   of the axes and angles
     --kept F   every turn is a line of this file; turns that it has are not made again
+    --first N  of all goals, these alone
+    --mujoco   where each plan leaves the body by MuJoCo, too
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import PlanNotFound, ShapePhaseError
 from shapephase.optimal_control import Limits, Plan, plan_reorientation
+
+from .cases import Case
+from .simulators import mujoco_attitude
 
 GOALS = 100
 SEED = 20261123
@@ -147,7 +152,7 @@ def turns(seed: int) -> list[tuple[str, np.ndarray]]:
 # ---- One turn --------------------------------------------------------------------------------------------------------
 
 
-def judged(name: str, turn: np.ndarray) -> dict[str, Any]:
+def judged(name: str, turn: np.ndarray, by_mujoco: bool = False) -> dict[str, Any]:
     """The plan of one turn, and what it comes to."""
     warnings.simplefilter("ignore")
     body, goal = body_named(name), so3.exp(turn)
@@ -167,7 +172,14 @@ def judged(name: str, turn: np.ndarray) -> dict[str, Any]:
         return row | {"miss": np.pi, "cost": np.inf, "kkt": np.inf, "beyond": np.inf}
     motion = sp.reconstruct(sp.articulated(body, plan.path), [0.0, 0.0, 0.0], tolerance=1e-10)
     miss = so3.angle(goal.T @ motion.final_attitude) + float(motion.error_estimate)
-    return row | {"miss": miss, "cost": plan.cost, "kkt": plan.kkt_residual, "beyond": beyond(body, plan.path, limits)}
+    row |= {"miss": miss, "cost": plan.cost, "kkt": plan.kkt_residual, "beyond": beyond(body, plan.path, limits)}
+    return row | {"mujoco": _miss_by_mujoco(body, plan.path, goal)} if by_mujoco else row
+
+
+def _miss_by_mujoco(body: sp.Body, path: sp.ShapePath, goal: np.ndarray) -> float:
+    """The angle from the goal at which MuJoCo's inertia and momentum leave the body, integrated by SciPy [rad]."""
+    end, _ = mujoco_attitude(Case(body.name, body, path, np.zeros(3)), 1e-12, 1e-13)
+    return float(so3.angle(goal.T @ so3.matrix_from_quat(end)))
 
 
 def _shortest(body: sp.Body, goal: np.ndarray, limits: Limits) -> float:
@@ -206,20 +218,22 @@ def main() -> None:
     parser.add_argument("--goals", type=int, default=GOALS)
     parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--kept", type=Path)
+    parser.add_argument("--first", type=int, default=GOALS)
+    parser.add_argument("--mujoco", action="store_true")
     asked = parser.parse_args()
     rows = _kept(asked.kept)
     counts: dict[str, int] = {}
     print(
         f"{'body':22}{'joints':>7}{'degrees':>9}{'duration':>10}{'seconds':>9}{'miss':>10}{'KKT':>10}{'beyond':>9}{'cost':>12}"
     )
-    for number, (name, turn) in enumerate(turns(asked.seed)):
+    for number, (name, turn) in enumerate(turns(asked.seed)[: asked.first]):
         counts[name] = counts.get(name, 0) + 1
         if counts[name] > asked.goals or (asked.bodies and name not in asked.bodies):
             continue
         if number not in rows:
             # A process for each, so that its memory and its first look at the body are its own.
             with multiprocessing.get_context("spawn").Pool(1) as alone:
-                rows[number] = alone.apply(judged, (name, turn))
+                rows[number] = alone.apply(judged, (name, turn, asked.mujoco))
             if asked.kept is not None:
                 with asked.kept.open("a") as file:
                     file.write(json.dumps(rows[number] | {"number": number, "seed": asked.seed}) + "\n")
@@ -245,6 +259,8 @@ def _print_row(row: dict[str, Any]) -> None:
 def _print_summary(rows: list[dict[str, Any]]) -> None:
     reached = [row for row in rows if row["miss"] < REACHED and row["beyond"] < 1e-6 and not row["said"]]
     print(f"\n{len(reached)} of {len(rows)} reach their goal within their limits")
+    if seen := [row["mujoco"] for row in rows if "mujoco" in row]:
+        print(f"{len(seen)} by MuJoCo: at most {max(seen):.1e} rad from the goal")
     for name in BODIES:
         of_body = [row for row in rows if row["body"] == name]
         if of_body:
