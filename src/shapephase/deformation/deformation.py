@@ -46,7 +46,7 @@ from .descriptions import (
     RigidDescription,
     SampledDescription,
 )
-from .rotors import RotorDescription, mapping_of_joints, rotors_argument, widened_path
+from .rotors import Rotor, RotorDescription, mapping_of_joints, rotors_argument, widened_path
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,7 +331,11 @@ def articulated(
     wheels = rotors_argument(body, momenta, speeds)
     if wheels:
         path = widened_path(body, path, tuple(wheel.joint for wheel in wheels))
-    route = followed_by(body, path)
+    return deformation_along(body, followed_by(body, path), wheels)
+
+
+def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = ()) -> Deformation:
+    """As `articulated`, along a route as `route_along` makes it, whose angles are in radians without a doubt."""
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
     description = RotorDescription(body, route, wheels) if wheels else ArticulatedDescription(body, route)

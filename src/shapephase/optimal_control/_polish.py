@@ -8,9 +8,10 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
-from ..deformation.deformation import articulated
+from ..deformation.deformation import deformation_along
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits, shortest_duration
@@ -171,7 +172,8 @@ def polish(
 def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Iterate:
     """The path of control points, and its motion."""
     path = basis.path(task.shapes(control), duration, task.body.joint_names)
-    motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
+    along = deformation_along(task.body, route_along(task.body, path))
+    motion = reconstruct(along, task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
     return _Iterate(
         control=control,
         duration=duration,

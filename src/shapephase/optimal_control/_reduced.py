@@ -9,9 +9,10 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
-from ..deformation.deformation import articulated
+from ..deformation.deformation import deformation_along
 from ..errors import TrajectoryError, unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits
@@ -125,7 +126,7 @@ class ReducedProgram:
 
     def _motion(self, control: Array, duration: float) -> tuple[ShapePath, Motion]:
         path = self._basis.path(self._task.shapes(control), duration, self._task.body.joint_names)
-        deformation = articulated(self._task.body, path)
+        deformation = deformation_along(self._task.body, route_along(self._task.body, path))
         return path, reconstruct(deformation, self._task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
 
     def end(self, control: Array, duration: float) -> tuple[Array, Array]:

@@ -8,10 +8,11 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
-from ...deformation.deformation import articulated
+from ...deformation.deformation import deformation_along
 from ...errors import PlanNotFound, ShapePhaseError
 from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.connection import curvature, mechanical_connection
+from ...shape_space.knot_crossings import route_along
 from .._spline_basis import SplineBasis
 from .._via_rows import bent_through, nearest_places
 from ..symbolic import symbolic_body
@@ -206,7 +207,8 @@ def guess_of_control(
     control = np.clip(control, task.lower, task.upper)
     path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
     try:
-        motion = reconstruct(articulated(task.body, path), task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
+        along = deformation_along(task.body, route_along(task.body, path))
+        motion = reconstruct(along, task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
     except ShapePhaseError:
         return None
     goal_error = task.goal_error(motion.final_attitude, control[-1])
