@@ -109,7 +109,8 @@ def test_a_round_in_one_call_is_the_same_as_its_parts(
 ):
     """Panels of known polynomials and rough ones: what is kept, what goes on, and where that is sampled next."""
     left, right, end = EDGES[:-1], EDGES[1:], float(EDGES[-1])
-    first = PanelsToSample(*np.zeros((2, len(DEGREES)), dtype=np.int64), DEGREES, left, right, np.empty(0))
+    none = np.zeros(len(DEGREES), dtype=np.int64)
+    first = PanelsToSample(none, none, DEGREES, left, right, np.empty(0))
     table = 10.0 ** np.random.default_rng(5).uniform(-12.0, -6.0, (len(DEGREES), 5)) if with_hidden else None
     momentum, loops = 3.0, 2
     demand = Demand(momentum, tolerance, loops * end, loops, widest_margin(end))

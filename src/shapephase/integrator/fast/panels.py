@@ -93,8 +93,8 @@ def sampled_round(
         demand.loops, demand.margin, MARGIN_OF_WIDTH, matrices, places, *_all_nodes(),
     )  # fmt: skip
     values, coefficients, table, errors = found
-    series = coefficients.reshape(len(degree), -1, 9)
-    return SampledPanels(values, series, table, errors, further, PanelsToSample(*made, *ends, times))
+    finer = PanelsToSample(made[0], made[1], made[2], ends[0], ends[1], times)
+    return SampledPanels(values, coefficients.reshape(len(degree), -1, 9), table, errors, further, finer)
 
 
 def errors_of_panels(
