@@ -173,15 +173,22 @@ class PanelSampler:
 
     def _first_panels(self, tolerance: float) -> tuple[Integers, Array, Array]:
         """Degrees and ends."""
+        of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
         if self._resolved is not None:
             first = self._resolved.first_panels(_HIDDEN_SHARE * tolerance)
-            return first.degree, first.left, first.right
+            degree = first.degree
+            if len(degree) <= _FEW:
+                # A body's inertia swings faster than its shape.
+                degree = np.where(degree, np.maximum(degree, of_few), 0)
+            return degree, first.left, first.right
         pieces = 4 if self._oscillations is None else max(1, int(np.ceil(self._oscillations / 2.0)))
         left, right = self._breaks[:-1], self._breaks[1:]
+        if 2 * pieces * len(left) <= _FEW:
+            # Wide panels would need degrees so high that each step takes longer.
+            pieces *= 2
         if pieces > 1:
             ends = np.linspace(left, right, pieces + 1, axis=1)
             left, right = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-        of_many, of_few = next(degrees for least, *degrees in _FIRST_DEGREES if tolerance > least)
         degree = np.full(len(left), of_many if len(left) > _FEW else of_few)
         degree[self._panels_at_rest(left, right)] = 0
         return degree, left, right
