@@ -78,6 +78,13 @@ def compiled(monkeypatch):
     monkeypatch.setenv("SHAPEPHASE_FAST", "1")
 
 
+@pytest.fixture
+def few_guesses(monkeypatch):
+    """Plans from the best of two guesses, not of eight: for tests of what is true of any plan."""
+    monkeypatch.setattr("shapephase.optimal_control.planning._RANKED", 2)
+    monkeypatch.setattr("shapephase.optimal_control.planning._LEAST_OF_FEW", 2)
+
+
 @pytest.fixture(scope="session")
 def _warm_engines():
     from support.warm_engines import WarmEngines
