@@ -289,9 +289,8 @@ def test_every_benchmark_can_be_imported():
 
 
 def test_the_benchmark_s_opponent_still_stands_on_the_body():
-    code = (
-        "from benchmarks.cases import cases; from benchmarks.contestants import FloatingModel; "
-        "[FloatingModel(case).set(0.1) for case in cases()]; print('set')"
-    )
-    said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT).stdout
-    assert said == "set\n"
+    from benchmarks.cases import cases
+    from benchmarks.contestants import FloatingModel
+
+    for case in cases():
+        FloatingModel(case).set(0.1)

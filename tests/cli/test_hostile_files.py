@@ -21,8 +21,8 @@ NAMED = re.compile(
     r":\d+: (link|joint|body|geom|mesh|texture|fixed|robot|<[^>]*>|"
     r"not UTF-8|not well-formed XML|a document type|the body has \d)"
 )
-QUICK, FULL, BATCH = 600, 20_000, 100
-QUICK_OF_AN_ENGINE = 40
+QUICK, FULL, BATCH = 300, 20_000, 100
+QUICK_OF_AN_ENGINE = 20
 """Files that a process of their own reads are fewer."""
 BASES = ("small", "cat", "astronaut", "satellite", "mjcf")
 

@@ -389,8 +389,8 @@ def test_going_round_often_costs_nothing_more(monkeypatch, rng):
 
 def test_a_loop_of_hundreds_of_pieces(rng):
     diver = sp.load_body("diver")
-    times = np.linspace(0.0, 1.0, 361)
-    corners = ellipse(diver, diver.joint_names, (1.0, 0.8), 1.0).shape(times) + 0.02 * rng.normal(size=(361, 2))
+    times = np.linspace(0.0, 1.0, 201)
+    corners = ellipse(diver, diver.joint_names, (1.0, 0.8), 1.0).shape(times) + 0.02 * rng.normal(size=(201, 2))
     corners[-1] = corners[0]
     path = sp.ShapePath.spline(times, corners)
     assert apart(stokes_holonomy(diver, path, 1e-6), sp.holonomy(diver, path, 1e-9)) < 1e-7
