@@ -85,6 +85,12 @@ def few_guesses(monkeypatch):
     monkeypatch.setattr("shapephase.optimal_control.planning._LEAST_OF_FEW", 2)
 
 
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Reports whose figures are drawn as nothing, for tests of their words."""
+    monkeypatch.setattr("shapephase.plotting.report.figure_image", lambda *_: b"<svg/>")
+
+
 @pytest.fixture(scope="session")
 def _warm_engines():
     from support.warm_engines import WarmEngines

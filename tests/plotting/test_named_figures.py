@@ -89,6 +89,7 @@ def test_rows_of_figures_have_no_holes():
     assert figure_rows([]) == []
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_the_report_of_a_rigid_body_does_not_speak_of_its_shape(tmp_path):
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     write_report(motion, sp.split(motion), tmp_path / "report.html")
@@ -292,6 +293,7 @@ def test_rotation_vectors_go_on_through_half_a_turn():
     np.testing.assert_allclose(found, angles[:, None] * axis, atol=1e-12)
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_no_zero_of_a_report_has_a_sign(tmp_path):
     """Joints that tremble by less than what is shown, and a phase that is rounding."""
     cat = sp.load_body("cat")
