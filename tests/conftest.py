@@ -106,6 +106,22 @@ def warm_engines(_warm_engines, monkeypatch):
     monkeypatch.setattr("shapephase.body.engines.engine_tree.run_alone", _warm_engines)
 
 
+@pytest.fixture(scope="session")
+def _warm_start():
+    from support.warm_engines import WarmStart
+
+    started = WarmStart()
+    yield started
+    started.stop()
+
+
+@pytest.fixture
+def warm_readers(_warm_start, monkeypatch):
+    """What is read in a process of its own is read in a forked one, without the time of its imports."""
+    monkeypatch.setattr("shapephase.body.catalog.run_alone", _warm_start)
+    monkeypatch.setattr("shapephase.shape_space.files.formats.parser_process.run_alone", _warm_start)
+
+
 @pytest.fixture
 def heard_ctrl_c():
     """Ctrl-C as on a terminal: a process that a script starts in the background is told to ignore it."""

@@ -95,6 +95,7 @@ def test_a_momentum_of_a_billion_turns_is_one_line():
     assert memory < 500e6
 
 
+@pytest.mark.usefixtures("warm_readers")
 def test_every_command_takes_hostile_names(tmp_path, monkeypatch, capsys):
     """Names with commas and semicolons, too: the motion is an NPZ file, whose columns are no line of text."""
     (tmp_path / "star.urdf").write_text(star_urdf(OF_FILES), encoding="utf-8")

@@ -211,6 +211,7 @@ def test_faults_take_one_line_and_an_exit_code(capsys, arguments, code, said):
     assert said in text
 
 
+@pytest.mark.usefixtures("warm_readers")
 def test_faults_of_files_have_their_codes(capsys, tmp_path):
     (tmp_path / "bad.urdf").write_text("<robot name='r'><link name='a'>")
     assert failed(capsys, "split", tmp_path / "bad.urdf", "cat_righting")[0] == 3

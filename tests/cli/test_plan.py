@@ -195,7 +195,7 @@ def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_ta
 @pytest.mark.usefixtures("few_guesses")
 def test_of_several_turns_the_cheapest_is_made(tmp_path, capsys):
     one, _, _ = planned("cat_two_halves", "--turn", "-8 about 0,1,0", capsys=capsys, out=tmp_path / "one.csv")
-    several = ("--turn", "150 about x", "--turn", "-8 about 0,1,0")
+    several = ("--turn", "110 about x", "--turn", "-8 about 0,1,0")
     assert planned("cat_two_halves", *several, capsys=capsys, out=tmp_path / "two.csv")[0]["cost"] == one["cost"]
 
 
