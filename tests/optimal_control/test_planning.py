@@ -535,8 +535,9 @@ def test_a_plan_with_free_rates_is_an_extremal(cost):
 
 
 @pytest.mark.parametrize("method", full_but(["collocation", "reduced"], "collocation"))
-@pytest.mark.usefixtures("few_guesses")
-def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method):
+def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method, request):
+    if method == "collocation":
+        request.getfixturevalue("few_guesses")
     body = sp.load_body("cat_two_halves")
     turn = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))
     search = Search(method=method, pieces=10)
