@@ -33,13 +33,14 @@ def pytest_configure(config):
 def pytest_collection():
     """Collect the tests without looking for garbage: millions of new objects, nearly all of which stay.
 
-    Nor are they looked through again while the tests run.
+    Nor are they looked through again while the tests run; what comes then is looked through less often than usual.
     """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(20_000, 20, 20)
         gc.enable()
 
 
@@ -78,6 +79,19 @@ def compiled(monkeypatch):
     monkeypatch.setenv("SHAPEPHASE_FAST", "1")
 
 
+@pytest.fixture
+def few_guesses(monkeypatch):
+    """Plans from the best of two guesses, not of eight: for tests of what is true of any plan."""
+    monkeypatch.setattr("shapephase.optimal_control.planning._RANKED", 2)
+    monkeypatch.setattr("shapephase.optimal_control.planning._LEAST_OF_FEW", 2)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch):
+    """Reports whose figures are drawn as nothing, for tests of their words."""
+    monkeypatch.setattr("shapephase.plotting.report.figure_image", lambda *_: b"<svg/>")
+
+
 @pytest.fixture(scope="session")
 def _warm_engines():
     from support.warm_engines import WarmEngines
@@ -91,6 +105,22 @@ def _warm_engines():
 def warm_engines(_warm_engines, monkeypatch):
     """Engines without the time of their imports, for tests that load many files."""
     monkeypatch.setattr("shapephase.body.engines.engine_tree.run_alone", _warm_engines)
+
+
+@pytest.fixture(scope="session")
+def _warm_start():
+    from support.warm_engines import WarmStart
+
+    started = WarmStart()
+    yield started
+    started.stop()
+
+
+@pytest.fixture
+def warm_readers(_warm_start, monkeypatch):
+    """What is read in a process of its own is read in a forked one, without the time of its imports."""
+    monkeypatch.setattr("shapephase.body.catalog.run_alone", _warm_start)
+    monkeypatch.setattr("shapephase.shape_space.files.formats.parser_process.run_alone", _warm_start)
 
 
 @pytest.fixture

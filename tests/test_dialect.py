@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1] / "src" / "shapephase"
 # The name given up, and what says the same in the words of the field.
 GIVEN_UP = {
@@ -89,26 +91,29 @@ def packed(tree: ast.Module) -> Iterator[tuple[str, int]]:
                 yield ", ".join(names), node.lineno
 
 
-def modules() -> Iterator[tuple[str, str, ast.Module]]:
-    """Of each module its room, its path and its content."""
+@pytest.fixture(scope="module")
+def modules() -> list[tuple[str, list[tuple[str, int]], list[tuple[str, int]]]]:
+    """Of each module its path, the names that it defines, and its constants that share an assignment."""
+    found = []
     for file in sorted(file for file in ROOT.rglob("*") if file.suffix in (".py", ".pyi")):
-        place = file.relative_to(ROOT)
-        yield place.parts[0], str(place), ast.parse(file.read_text(encoding="utf-8"))
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        found.append((str(file.relative_to(ROOT)), [*named(tree), (file.stem, 0)], [*packed(tree)]))
+    return found
 
 
-def test_no_name_that_was_given_up_is_defined():
+def test_no_name_that_was_given_up_is_defined(modules):
     found = [
         f"{place}:{line}: {name} (say {GIVEN_UP[name.strip('_')]})"
-        for _, place, tree in modules()
-        for name, line in [*named(tree), (Path(place).stem, 0)]
+        for place, names, _ in modules
+        for name, line in names
         if name.strip("_") in GIVEN_UP
     ]
     assert not found, "\n".join(found)
 
 
-def test_every_constant_has_a_line_of_its_own():
+def test_every_constant_has_a_line_of_its_own(modules):
     """No A, B = 1, 2 at the top of a module: each constant has a unit and a reason to be stated."""
-    found = [f"{place}:{line}: {names}" for _, place, tree in modules() for names, line in packed(tree)]
+    found = [f"{place}:{line}: {names}" for place, _, constants in modules for names, line in constants]
     assert not found, "\n".join(found)
 
 

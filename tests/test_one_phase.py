@@ -18,6 +18,9 @@ from shapephase.phases.split_text import CLOSED_GAP
 from shapephase.plotting import plots
 from support.independent import BODIES, body_of, random_loop, random_vector
 
+# What is computed is the same with and without machine code, which is quicker.
+pytestmark = pytest.mark.usefixtures("compiled")
+
 COUNT = 30
 NAMES = ("cat_two_halves", "satellite", "cat")
 PHASES = {

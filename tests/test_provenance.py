@@ -46,6 +46,7 @@ def checked(found, take, command):
     assert recording["closing"]["by"] == "smooth"
 
 
+@pytest.mark.usefixtures("no_pictures")
 def test_the_motion_s_file_and_the_answer_and_the_report_say_it(take, tmp_path, capsys):
     out, page = tmp_path / "fall.npz", tmp_path / "fall.html"
     words = [

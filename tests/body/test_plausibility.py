@@ -165,6 +165,7 @@ def test_an_astronaut_in_other_units(tmp_path, units, words):
     assert any(words in said for said in found), found
 
 
+@pytest.mark.usefixtures("warm_readers")
 def test_check_says_so_and_shows_the_parts(capsys, tmp_path):
     (tmp_path / "b.urdf").write_text(f"<robot name='r'>{box('a')}{box('torso', 60_000.0)}{joint('torso')}</robot>")
     main(["check", str(tmp_path / "b.urdf"), "--json"])

@@ -12,7 +12,8 @@ import pytest
 import shapephase as sp
 from shapephase.errors import IgnoredElementWarning
 
-pytestmark = pytest.mark.usefixtures("kept_locale")
+# What is computed is the same with and without machine code, which is quicker.
+pytestmark = [pytest.mark.usefixtures("kept_locale"), pytest.mark.usefixtures("compiled")]
 FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
 MODEL = FLIGHTS / "Model_JeCh_15DoFs.bioMod"
 BASE = ("TransX", "TransY", "TransZ", "RotX", "RotY", "RotZ")

@@ -11,6 +11,7 @@ import stat
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -192,16 +193,15 @@ def test_a_result_goes_through_standard_output_and_the_table_aside():
     assert b"Montgomery phase" in done.stderr
 
 
-def test_a_named_pipe_as_target(tmp_path):
+def test_a_named_pipe_as_target(capfd, tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    command = [sys.executable, "-m", "shapephase", *CAT, "--out", str(pipe)]
-    writer = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    received = pipe.read_bytes()
-    assert writer.communicate(timeout=300)[1] == f"wrote {pipe}\n".encode()
-    assert writer.returncode == 0
+    with ThreadPoolExecutor(1) as reader:
+        received = reader.submit(pipe.read_bytes)
+        code, _, said = ended(capfd, *CAT, "--out", pipe)
+    assert (code, said) == (0, f"wrote {pipe}\n")
     assert stat.S_ISFIFO(pipe.stat().st_mode)
-    assert np.load(io.BytesIO(received))["spatial_momentum"].tolist() == [0.0, 0.0, 0.0]
+    assert np.load(io.BytesIO(received.result()))["spatial_momentum"].tolist() == [0.0, 0.0, 0.0]
 
 
 # ---- Ctrl-C ---------------------------------------------------------------------------------------------------------
@@ -545,9 +545,9 @@ def coloured(*arguments, **environment):
     return on_a_terminal(command, {**plain, "TERM": "xterm-256color", **environment})
 
 
-def test_colours_are_for_terminals_that_want_them():
+def test_colours_are_for_terminals_that_want_them(capfd):
     colour = re.compile(r"\x1b\[[0-9;]*(3[0-9]|9[0-7]|4[0-9])[0-9;]*m")
-    assert "\x1b" not in ran("--help").stdout
+    assert "\x1b" not in ended(capfd, "--help")[1]
     assert not colour.search(coloured("--help", NO_COLOR="1"))
     assert "\x1b" not in coloured("robots")
 

@@ -19,7 +19,7 @@ from support.odd_motion_files import ODD_FILES, odd_file
 
 CASES_OF_BODIES = cases()
 # Of the odd motions, all of which test_read.py reads in this process, and of the bodies, as test_hostile_files.py does.
-QUICK_MOTIONS, QUICK_BODIES = list(ODD_FILES)[::5], CASES_OF_BODIES[::40]
+QUICK_MOTIONS, QUICK_BODIES = list(ODD_FILES)[::8], CASES_OF_BODIES[::60]
 
 
 @pytest.fixture(scope="module")

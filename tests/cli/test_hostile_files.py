@@ -11,7 +11,7 @@ import re
 import pytest
 
 from shapephase.body import catalog
-from support.asked_process import ProcessEnded
+from support.asked_process import AskedProcess, ProcessEnded
 from support.hostile_files import GOOD, GOOD_MJCF, Case, cases
 from support.loading_process import Worker
 
@@ -70,15 +70,16 @@ def test_hostile_files_with_warnings_about_nothing_else(worker: Worker, tmp_path
 
 
 def test_the_worker_tells_a_crash_from_a_hang():
-    """The examiner examined: memory is limited, and a process that ends is seen."""
-    worker = Worker()
+    """The examiner examined: a process that ends is seen, and one that only waits is not taken for it."""
+    process = AskedProcess("-c", "input()")
     try:
-        worker.process.kill()
-        worker.process.wait()
+        with pytest.raises(TimeoutError):
+            process.answer(0.05)
+        process.process.kill()
         with pytest.raises(ProcessEnded, match="ended with -9"):
-            worker.answer(1.0)
+            process.answer(10.0)
     finally:
-        worker.stop()
+        process.stop()
 
 
 def base_file(name, folder):

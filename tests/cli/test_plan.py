@@ -21,6 +21,9 @@ from shapephase.cli.plans import plan as cli_plan
 from shapephase.cli.progress import steps
 from shapephase.optimal_control.plan import Progress
 
+# A plan on few pieces.
+SHORT = ("cat_two_halves", "--turn", "60 about x", "--pieces", "8")
+
 
 def ran(*arguments):
     command = [sys.executable, "-m", "shapephase", "plan", *map(str, arguments)]
@@ -29,7 +32,8 @@ def ran(*arguments):
 
 def test_a_plan_is_found_written_and_read_again(tmp_path):
     out = tmp_path / "plan.csv"
-    done = ran("cat_two_halves", "--rotate", 60, "--about", "x", "--duration", 0.8, "--out", out, "--json")
+    words = ("--rotate", 60, "--about", "x", "--duration", 0.8, "--pieces", 20)
+    done = ran("cat_two_halves", *words, "--out", out, "--json")
     assert done.returncode == 0
     assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", done.stderr)
     data = json.loads(done.stdout)
@@ -94,6 +98,7 @@ def planned(*arguments, capsys, out):
     return json.loads(capsys.readouterr().out), path.shape(np.linspace(0.0, path.duration, 101)), body
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_link_is_pointed(tmp_path, capsys):
     """By the attitude printed and the link's frame as the body has it at the posture asked for."""
     direction = np.array([0.3, -1.0, 2.5])
@@ -108,6 +113,7 @@ def test_a_link_is_pointed(tmp_path, capsys):
     assert not shapes[:, body.joint_index("waist_roll")].any()
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_postures_lists_and_mirrors(tmp_path, capsys):
     """A plan ends where another ended, and a joint moves against its leader."""
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
@@ -126,6 +132,7 @@ def test_postures_lists_and_mirrors(tmp_path, capsys):
     assert data["miss_rad"] < 1e-8
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_limits_hold_and_are_told(tmp_path, capsys):
     """Second and third differences of the file's shapes, between which they do not change much."""
     limits = ("--effort", "0.2", "--acceleration-limit", "12", "--jerk-limit", "120", "--cost", "effort")
@@ -142,11 +149,12 @@ def test_limits_hold_and_are_told(tmp_path, capsys):
     assert (data["cost_name"], data["cost_unit"]) == ("effort", "s")
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
     """The time is over after the first iteration, with a file that says so and is read all the same."""
     out = tmp_path / "plan.csv"
     with pytest.raises(SystemExit) as ended:
-        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "1e-6", "--out", str(out), "--json"])
+        main(["plan", *SHORT, "--time-limit", "1e-6", "--out", str(out), "--json"])
     assert ended.value.code == 124
     data = json.loads(capsys.readouterr().out)
     assert data["status"] == "out of time"
@@ -156,6 +164,7 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
     assert sp.read_shape_path(out, body).duration == 1.0
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_postures_on_the_way(tmp_path, capsys):
     """One by its joints, one of the motion file of another plan at its time; each is where the file has it."""
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
@@ -183,9 +192,10 @@ def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_ta
     assert said == [shown.format(2, 57), shown.format(3, 0)]
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_of_several_turns_the_cheapest_is_made(tmp_path, capsys):
     one, _, _ = planned("cat_two_halves", "--turn", "-8 about 0,1,0", capsys=capsys, out=tmp_path / "one.csv")
-    several = ("--turn", "150 about x", "--turn", "-8 about 0,1,0")
+    several = ("--turn", "110 about x", "--turn", "-8 about 0,1,0")
     assert planned("cat_two_halves", *several, capsys=capsys, out=tmp_path / "two.csv")[0]["cost"] == one["cost"]
 
 
@@ -210,14 +220,16 @@ def test_workers_find_what_one_process_finds(tmp_path, capsys):
     assert np.array_equal(shapes, same)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_page_says_that_nothing_was_found(tmp_path):
     page = tmp_path / "plan.html"
     with pytest.raises(SystemExit) as ended:
-        main(["plan", "cat_two_halves", "--turn", "60 about x", "--time-limit", "1e-6", "--html", str(page)])
+        main(["plan", *SHORT, "--time-limit", "1e-6", "--html", str(page)])
     assert ended.value.code == 124
     assert "The search ended by its time limit; this is the best until then: off the goal by" in page.read_text()
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     """The signal itself, in the third iteration; the motion written reaches the goal nearly."""
     plain = cli_plan._InterruptibleSearch.report
@@ -231,7 +243,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     handler = signal.getsignal(signal.SIGINT)
     out = tmp_path / "plan.csv"
     with pytest.raises(SystemExit) as ended:
-        main(["plan", "cat_two_halves", "--rotate", "60", "--out", str(out), "--json"])
+        main(["plan", *SHORT, "--out", str(out), "--json"])
     assert ended.value.code == 130
     assert signal.getsignal(signal.SIGINT) is handler
     said = capsys.readouterr()

@@ -13,6 +13,9 @@ import shapephase as sp
 from shapephase.cli.main import main
 from support.recorded_flights import ATTITUDE_NOISE, FLIGHT, TAKE_OFF, Y_UP, momentum, simulated, write_take
 
+# What is computed is the same with and without machine code, which is quicker.
+pytestmark = pytest.mark.usefixtures("compiled")
+
 DIVER = sp.load_body("diver")
 
 

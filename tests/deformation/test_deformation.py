@@ -19,6 +19,7 @@ from shapephase.errors import (
     UnphysicalInertiaError,
 )
 from support.bodies import joint, link, random_loop, urdf
+from support.long_runs import full_but
 
 
 def hat(v):
@@ -567,9 +568,10 @@ def test_cabreras_examples_as_printed_are_allowed_and_named_c_e13():
     assert -0.01 < capped.triangle_defect()[0] < 0.0
 
 
-def test_flat_and_round_bodies_are_physical_a4():
+@pytest.mark.parametrize("count", full_but([15, 50], 15))
+def test_flat_and_round_bodies_are_physical_a4(count):
     """At the limit rounding decides nothing."""
-    turns = Rotation.random(50, rng=np.random.default_rng(4)).as_matrix()
+    turns = Rotation.random(count, rng=np.random.default_rng(4)).as_matrix()
     for turn in turns:
         flat = turn @ np.diag([0.7, 1.9, 2.6]) @ turn.T
         deformation = sp.prescribed(constant(flat), None, 1.0, on_unphysical="error")

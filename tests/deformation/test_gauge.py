@@ -27,6 +27,7 @@ from support.independent import (
     turn,
     wrapped,
 )
+from support.long_runs import full_but
 
 FIRST, SECOND = np.array([0.6, 0.0, 0.8]), np.array([0.0, 1.0, 0.0])
 
@@ -267,7 +268,7 @@ def applied(matrices, vectors):
     return np.einsum("...ij,...j->...i", matrices, vectors)
 
 
-@pytest.mark.parametrize("seed", GAUGES)
+@pytest.mark.parametrize("seed", full_but(GAUGES, *GAUGES[::3]))
 @pytest.mark.parametrize("name", ["example:human", "cat", "satellite"])
 def test_one_motion_in_ten_random_gauges(name, seed):
     """B4 at all times, ends included; Delta R is the same; theta_M and the gap of Pi are what U makes of them."""
@@ -394,7 +395,7 @@ KINKS = (0.5, 0.515625, 0.31, 0.328125, 0.9, 0.9921875, 0.12345, 1e-3, 0.9999)
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-4])
-@pytest.mark.parametrize("place", KINKS)
+@pytest.mark.parametrize("place", full_but(KINKS, *KINKS[::2]))
 def test_a_kink_in_u_alone_is_seen(place, size):
     """Wherever it is: named and taken as a break, the rate right on both sides; it jumps there by twice the size."""
     kink = 6.0 * place

@@ -21,6 +21,9 @@ from shapephase.errors import AccuracyNotReached, NoisyPathError, TrajectoryErro
 from support.independent import hat
 from support.long_runs import full_but
 
+# What is computed is the same with and without machine code, which is quicker.
+pytestmark = pytest.mark.usefixtures("compiled")
+
 T = 3.0
 TOLERANCE = 1e-9
 MOMENTUM = np.array([0.3, 1.0, 0.5])

@@ -10,6 +10,9 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.shape_space.path_samples import path_samples
 
+# What is computed is the same with and without machine code, which is quicker.
+pytestmark = pytest.mark.usefixtures("compiled")
+
 _SIGMA = np.radians(0.3)
 BODY = sp.load_body("diver")
 OPTIONS = {

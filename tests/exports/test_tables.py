@@ -98,6 +98,7 @@ def test_tables_come_back_bit_by_bit(motion, expected, tmp_path, ending):
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.usefixtures("warm_readers")
 def test_our_readers_find_joints_and_base(motion, expected, tmp_path, ending):
     sp.export_motion(motion, tmp_path / f"motion{ending}", TIMES, **FALL)
     found = sp.read_recorded_motion(tmp_path / f"motion{ending}", body_of("satellite"), close=False)

@@ -312,6 +312,7 @@ def test_the_correction_keeps_rates_at_their_limits(rng):
     assert np.abs(after - rates).max() > 1e-6
 
 
+@pytest.mark.usefixtures("few_guesses")
 @pytest.mark.parametrize(
     "name",
     ["rate", *(pytest.param(name, marks=pytest.mark.full) for name in TASKS if name not in ("rate", *OURS_ALONE))],

@@ -42,6 +42,7 @@ def flown(name, plan, momentum=(0.0, 0.0, 0.0)):
     return pinocchio_motion(name, plan.body.joint_names, plan.path, np.asarray(momentum), breaks=breaks).attitude[-1]
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_of_several_attitudes_the_cheapest_is_taken(two_halves):
     near = turn([0.3, 1.0, 0.4], 0.5)
     plan = plan_reorientation(two_halves, np.stack([FAR, near]), search=COARSE)
@@ -90,6 +91,7 @@ def test_groups_are_made_of_their_rotations():
     np.testing.assert_allclose([one.pointing[1] for one in both], [DIRECTION] * 3, atol=1e-15)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_body_that_looks_right_already_does_not_move(two_halves):
     half = turn([1.0, 0.0, 0.0], np.pi)
     plan = plan_reorientation(two_halves, Goal(rotation=half, symmetry=half), search=COARSE)
@@ -99,6 +101,7 @@ def test_a_body_that_looks_right_already_does_not_move(two_halves):
 
 
 @pytest.mark.parametrize("name", ["cat_two_halves", pytest.param("satellite", marks=pytest.mark.full)])
+@pytest.mark.usefixtures("few_guesses")
 def test_a_link_is_pointed_and_its_joints_help(name):
     """By Pinocchio's kinematics; where the posture at the end is the plan's own choice, too, it costs less."""
     body, link = sp.load_body(name), {"cat_two_halves": "rear", "satellite": "dish"}[name]
@@ -126,6 +129,7 @@ def test_both_methods_point_a_link_alike(two_halves):
     assert plans[1].goal_error < 1e-8
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_tumbling_body_ends_in_a_steady_spin(two_halves):
     """Its axis of largest inertia along the momentum at the end: as a rigid body it turns about it for ever."""
     momentum = np.array([0.002, 0.0008, 0.0012])
@@ -164,6 +168,7 @@ def test_goals_that_make_no_sense_are_refused(two_halves, goal, end, error, matc
 
 
 @pytest.mark.parametrize("stop", ["callback", "time"])
+@pytest.mark.usefixtures("few_guesses")
 def test_what_ended_a_search_is_told(two_halves, stop):
     """With the best so far, the same by whichever means."""
     heard = []

@@ -76,8 +76,10 @@ def mujoco_torques(name: str, plan: Plan, momentum: Array) -> Array:
         pytest.param("time", 0.0, [0.4, 0.4, 0.015], marks=pytest.mark.full),
     ],
 )
-def test_efforts_stay_within_their_limits_between_the_nodes(cost, momentum, limits):
+def test_efforts_stay_within_their_limits_between_the_nodes(cost, momentum, limits, request):
     """At some three fifths of what the plan without limits needs, by MuJoCo; all of that is used."""
+    if cost == "kinetic":
+        request.getfixturevalue("few_guesses")
     body, mu = sp.load_body("cat_two_halves"), momentum * np.array([1.0, 0.5, -0.7])
     duration = 2.0 if cost == "time" else 1.0
     plan = plan_reorientation(
@@ -98,6 +100,7 @@ def test_efforts_stay_within_their_limits_between_the_nodes(cost, momentum, limi
 
 
 @pytest.mark.parametrize("method", ["collocation", pytest.param("reduced", marks=pytest.mark.full)])
+@pytest.mark.usefixtures("few_guesses")
 def test_accelerations_and_jerks_stay_within_their_limits(method):
     """Of SciPy's spline; from rest without acceleration, as a limit of jerks wants it."""
     body, search = sp.load_body("cat_two_halves"), Search(pieces=12, method=method)
@@ -113,6 +116,7 @@ def test_accelerations_and_jerks_stay_within_their_limits(method):
     assert plan.goal_error < 1e-8
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_least_effort_of_one_joint_is_a_cubic(discs):
     """x = X (3 s^2 - 2 s^3) makes the integral of x''^2 least from rest to rest: 12 X^2 / T^3."""
     plan = spun(discs, 0.5, cost="effort", duration=1.5, limits=Limits(rate_limits=None))
@@ -124,6 +128,7 @@ def test_least_effort_of_one_joint_is_a_cubic(discs):
     np.testing.assert_allclose(plan.path.shape(1.5 * s)[:, 0], expected, rtol=0, atol=1e-7)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_the_least_time_of_a_jerk(discs):
     """From rest to rest without acceleration: j, -j, j for a quarter, a half and a quarter of (32 X / j)^(1/3)."""
     plan = spun(discs, 0.5, cost="time", duration=5.0, limits=Limits(rate_limits=50.0, jerk_limits=20.0))
@@ -132,6 +137,7 @@ def test_the_least_time_of_a_jerk(discs):
     assert np.abs(jerks).max() < 20.0 * (1.0 + 1e-6)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_the_least_time_of_an_effort_is_near_that_of_full_effort(discs):
     """Full effort one way, then the other, takes 2 (X J / tau)^(1/2); the acceleration of a spline has no jumps."""
     plan = spun(discs, 0.5, cost="time", duration=5.0, limits=Limits(rate_limits=50.0, effort_limits=0.4))
@@ -141,6 +147,7 @@ def test_the_least_time_of_an_effort_is_near_that_of_full_effort(discs):
     assert 0.999 < np.abs(torque).max() / 0.4 < 1.0 + 1e-6
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_coupled_joints_take_the_tightest_limit():
     """The follower moves half as far, against its leader."""
     body = sp.load_body("cat_two_halves")
@@ -156,6 +163,7 @@ def test_coupled_joints_take_the_tightest_limit():
     assert np.all(bends <= most * (1.0 + 1e-6))
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_what_no_motor_can_do_is_told(discs):
     with pytest.raises(PlanNotFound, match="joints are at their effort limits"):
         spun(discs, 0.05, duration=0.2, limits=Limits(rate_limits=None, effort_limits=0.1))
@@ -186,6 +194,7 @@ def test_limits_that_are_none_are_refused(name, value):
         Limits(**{name: value})
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_efforts_that_no_file_states(discs, load_urdf):
     bare = load_urdf(
         urdf(link("a", 1.0, (0.4, 0.4, 0.3)), link("b", 1.0, (0.4, 0.4, 0.5)), joint("axle", "continuous", "a", "b"))

@@ -102,8 +102,10 @@ def planar_chain(load_urdf):
 @pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.full) for name in CASES if name not in QUICK)]
 )
-def test_a_plan_reaches_its_goal_within_its_limits(name):
+def test_a_plan_reaches_its_goal_within_its_limits(name, request):
     """By Pinocchio's centroidal momentum and SciPy's integrator, with nothing of the library but the path."""
+    if name in QUICK:
+        request.getfixturevalue("few_guesses")
     target, options = CASES[name]
     body = sp.load_body("cat_two_halves")
     plan = plan_reorientation(body, target, search=Search(pieces=12 if name in QUICK else 40), **options)
@@ -205,6 +207,7 @@ def test_the_cost_of_a_steady_loop():
 
 
 @pytest.mark.parametrize("degrees", [1.0, *(pytest.param(size, marks=pytest.mark.full) for size in (0.1, 0.01))])
+@pytest.mark.usefixtures("few_guesses")
 def test_small_turns_are_isoperimetric_circles(degrees):
     """E T sigma/(2 pi theta) -> 1; sigma is the curvature's largest singular value in the kinetic metric."""
     body = sp.load_body("cat_two_halves")
@@ -218,6 +221,7 @@ def test_small_turns_are_isoperimetric_circles(degrees):
     assert plan.cost * 0.7 * sigma / (2.0 * np.pi * theta) == pytest.approx(1.0, abs=0.0045 * degrees + 5e-6)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_rotor_in_closed_form(load_urdf):
     """The wheel goes 9 times as far as the body turns back, evenly where nothing else is asked for."""
     body = rotor(load_urdf)
@@ -240,6 +244,7 @@ def test_a_rotor_in_closed_form(load_urdf):
 
 
 @pytest.mark.parametrize(("cost", "end"), [("rate", "free"), ("acceleration", "free"), ("acceleration", "given")])
+@pytest.mark.usefixtures("few_guesses")
 def test_a_rotor_from_rest_to_rest(load_urdf, cost, end):
     """The best control points of a spline at rest at its ends are linear equations; nothing beats the cubic.
 
@@ -325,6 +330,7 @@ def test_windings_need_a_momentum_at_right_angles(goal, momentum, match):
 
 @pytest.mark.parametrize(("iterations", "pieces"), full_but([(8, 10), (40, None)], (8, 10)))
 @pytest.mark.parametrize("method", ["collocation", "reduced"])
+@pytest.mark.usefixtures("few_guesses")
 def test_a_closed_loop_of_one_joint_turns_nothing(method, iterations, pieces, load_urdf):
     body, target = rotor(load_urdf), so3.exp(np.array([0.0, 0.0, 0.4]))
     with pytest.raises(PlanNotFound, match="no motion of the joints of body was found") as failure:
@@ -337,6 +343,7 @@ def test_a_closed_loop_of_one_joint_turns_nothing(method, iterations, pieces, lo
 
 
 @pytest.mark.parametrize("cost", full_but(["kinetic", "time"], "time"))
+@pytest.mark.usefixtures("few_guesses")
 def test_too_short_a_time(cost, load_urdf):
     """The wheel needs 2.7 s at 4 rad/s."""
     with pytest.raises(PlanNotFound) as failure:
@@ -352,6 +359,7 @@ def test_too_short_a_time(cost, load_urdf):
     assert max(start.iterations for start in failure.value.best.starts) <= 60
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_an_axis_that_no_joint_turns(load_urdf):
     with pytest.raises(PlanNotFound):
         plan_reorientation(
@@ -363,6 +371,7 @@ def test_an_axis_that_no_joint_turns(load_urdf):
         )
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_the_same_seed_gives_the_same_plan():
     body = sp.load_body("cat_two_halves")
     search = Search(seed=7, starts=2, pieces=10)
@@ -371,6 +380,7 @@ def test_the_same_seed_gives_the_same_plan():
     assert [start.cost for start in first.starts] == [start.cost for start in second.starts]
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_nothing_to_turn_costs_nothing():
     plan = plan_reorientation(sp.load_body("cat_two_halves"), np.eye(3), search=Search(pieces=20))
     assert plan.cost == pytest.approx(0.0, abs=1e-12)
@@ -431,6 +441,7 @@ def test_rate_limits_of_another_body_are_refused():
         plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, limits=Limits(rate_limits=[1.0, 2.0]))
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_rates_that_no_file_states_are_told(load_urdf):
     """And those that it states hold: of the shipped body 20 rad/s, of a wheel without a limit none."""
     with pytest.warns(UnstatedLimitWarning, match="body states no rate limit for spin: they may move at any rate"):
@@ -448,6 +459,7 @@ def test_rates_at_ends_that_make_no_sense_are_refused(rates):
         plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, end="free", rates_at_ends=rates)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_too_fast_for_the_joints_says_how_much_time_to_give(load_urdf):
     with pytest.raises(PlanNotFound, match=r"joints are at their rate limits: give more than 1 s \(cost='time'"):
         plan_reorientation(
@@ -506,6 +518,7 @@ def test_the_cost_of_another_kind_is_refused():
 
 
 @pytest.mark.parametrize("cost", full_but(["kinetic", "rate"], "kinetic"))
+@pytest.mark.usefixtures("few_guesses")
 def test_a_plan_with_free_rates_is_an_extremal(cost):
     """Wong's equations hold, shooting finds the same optimum, and no conjugate time comes before its end, where the
     kernel has the dimension of the symmetries that fix start and target: one, the optima come in circles."""
@@ -522,7 +535,9 @@ def test_a_plan_with_free_rates_is_an_extremal(cost):
 
 
 @pytest.mark.parametrize("method", full_but(["collocation", "reduced"], "collocation"))
-def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method):
+def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method, request):
+    if method == "collocation":
+        request.getfixturevalue("few_guesses")
     body = sp.load_body("cat_two_halves")
     turn = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))
     search = Search(method=method, pieces=10)
@@ -544,6 +559,7 @@ def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method)
     assert best.cost == pytest.approx(path_cost(body, best.path), rel=1e-12)
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_search_stopped_among_its_guesses_keeps_one():
     goal = so3.exp(np.array([0.6, 0.0, 0.0]))
     with pytest.raises(PlanNotFound, match="stopped on request") as stopped:
@@ -556,6 +572,7 @@ def test_a_search_stopped_among_its_guesses_keeps_one():
     assert so3.angle(stopped.value.best.motion.final_attitude.T @ goal) < 1e-8
 
 
+@pytest.mark.usefixtures("few_guesses")
 def test_a_search_stopped_after_a_start_has_its_plan():
     body = sp.load_body("cat_two_halves")
     plan = plan_reorientation(
@@ -573,6 +590,7 @@ class OutOfPatience(Exception):
 
 
 @pytest.mark.parametrize("error", full_but([OutOfPatience, KeyboardInterrupt], OutOfPatience))
+@pytest.mark.usefixtures("few_guesses")
 def test_what_the_callback_raises_comes_through(error):
     def callback(now):
         if now.iteration == 2:

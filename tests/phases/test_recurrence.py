@@ -164,7 +164,7 @@ def test_a_closed_orbit_returns_at_its_end(name: str):
     assert found.gaps[-1] < 1e-10
 
 
-@pytest.mark.parametrize("seed", [None, 1, 2])
+@pytest.mark.parametrize("seed", full_but([None, 1, 2], 1))
 def test_a_steady_turn_does_not_leave_and_so_does_not_return(seed: int | None):
     axes = np.eye(3) if seed is None else random_rotation(seed)
     motion = sp.reconstruct(sp.rigid(axes @ np.diag([1.0, 2.0, 3.0]) @ axes.T, 40.0), 2.4 * axes[:, 2])

@@ -389,10 +389,11 @@ def test_most_of_the_curve_is_in_front(motions):
         assert near > far
 
 
-def test_cells_cover_the_inside_of_polygons_with_their_windings():
+@pytest.mark.parametrize("count", full_but([3, 6], 3))
+def test_cells_cover_the_inside_of_polygons_with_their_windings(count):
     random = np.random.default_rng(3)
     t = np.linspace(0.0, 2.0 * np.pi, 700, endpoint=False)
-    for _ in range(6):
+    for _ in range(count):
         waves = [np.cos(t[:, None] * np.arange(5)), np.sin(t[:, None] * np.arange(5))]
         curve = sum(wave @ random.normal(size=(5, 3)) for wave in waves)
         curve /= np.linalg.norm(curve, axis=-1, keepdims=True)

@@ -8,6 +8,7 @@ import pytest
 import shapephase as sp
 from shapephase.examples.scenarios import MOTIONS
 from support.bodies import random_loop, random_shapes
+from support.long_runs import full_but
 
 pytestmark = pytest.mark.usefixtures("fast")
 EPS = np.finfo(float).eps
@@ -48,7 +49,7 @@ def magnitude(deformation):
     return 4.0 / deformation.duration * float(np.trace(deformation.inertia(0.0))) / 3.0
 
 
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize("tolerance", full_but([1e-6, 1e-9, 1e-11], 1e-6, 1e-11))
 @pytest.mark.parametrize("kind", ["loop", "three loops", "move", "function"])
 def test_motions_of_all_kinds(body, rng, monkeypatch, kind, tolerance):
     if kind == "move":

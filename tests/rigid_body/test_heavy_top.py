@@ -21,6 +21,7 @@ from shapephase.rigid_body.lagrange_top import (
     stability_chart,
 )
 from support.independent import cross
+from support.long_runs import full_but
 
 UP = np.array([0.0, 0.0, 1.0])
 EPS = float(np.finfo(float).eps)
@@ -114,10 +115,11 @@ def test_the_semidirect_bracket_gives_the_equations_and_is_a_poisson_bracket_m2(
         assert np.concatenate(top.rates(momentum, gamma)) == pytest.approx(rates, abs=1e-12)
 
 
-def test_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations_m1():
+@pytest.mark.parametrize("count", full_but([1, 3], 1))
+def test_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations_m1(count):
     rng = np.random.default_rng(3)
     times = np.linspace(0.0, 10.0, 333)
-    for _ in range(3):
+    for _ in range(count):
         top = random_top(rng)
         momentum, gamma = rng.normal(size=3) * 3.0, so3.normalised(rng.normal(size=3))
         motion = top.motion(momentum, gamma, duration=10.0, tolerance=1e-10)
@@ -142,9 +144,10 @@ def test_motion_keeps_both_casimirs_to_rounding_and_solves_the_raw_equations_m1(
         assert np.abs(turn - motion.angular_velocity(middle)).max() < 1e-5
 
 
-def test_the_error_estimate_is_honest_m1():
+@pytest.mark.parametrize("count", full_but([1, 3], 1))
+def test_the_error_estimate_is_honest_m1(count):
     rng = np.random.default_rng(4)
-    for _ in range(3):
+    for _ in range(count):
         top, momentum, gamma = random_top(rng), rng.normal(size=3) * 2.0, so3.normalised(rng.normal(size=3))
         best = top.motion(momentum, gamma, duration=6.0, tolerance=1e-11)
         times = np.linspace(0.0, 6.0, 200)

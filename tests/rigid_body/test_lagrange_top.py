@@ -22,6 +22,7 @@ from shapephase.rigid_body.lagrange_top import (
     stability_chart,
     upright_potential,
 )
+from support.long_runs import full_but
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -235,21 +236,21 @@ def test_the_discriminant_vanishes_for_a_flat_disc_and_the_spectrum_still_decide
 
 
 def test_energy_casimir_spectrum_and_simulation_agree_m8():
-    chart = stability_chart(np.linspace(0.5, 2.0, 4), [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=80.0)
+    chart = stability_chart([0.5, 2.0], [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=80.0)
     assert np.array_equal(chart.simulation, chart.spectrum)
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
-    assert chart.simulation.tolist() == [[False] * 5 + [True] * 4] * 4
+    assert chart.simulation.tolist() == [[False] * 5 + [True] * 4] * 2
     # Of the tilt itself: an upright spin of a slow top falls to cos(theta) = p^2/2 - 1.
     slow = np.arccos(0.5 * chart.momenta[:4] ** 2 - 1.0)
     assert np.abs(chart.largest_tilt[:, :4] - slow).max() < 1e-2
 
 
-def test_simulation_finds_the_threshold_within_a_percent_m8():
-    ratios = [0.5, 1.0, 2.0]
-    low, high = np.full(3, 1.0), np.full(3, 3.0)
+@pytest.mark.parametrize("ratio", full_but([0.5, 1.0, 2.0], 0.5))
+def test_simulation_finds_the_threshold_within_a_percent_m8(ratio):
+    low, high = np.full(1, 1.0), np.full(1, 3.0)
     for duration in (40.0, 120.0):
         grid = np.unique(np.linspace(low, high, 21))
-        stable = stability_chart(ratios, grid, duration=duration).simulation
+        stable = stability_chart([ratio], grid, duration=duration).simulation
         assert np.all(np.sort(stable, axis=1) == stable)
         first = stable.argmax(axis=1)
         low, high = grid[first - 1], grid[first]
@@ -265,23 +266,25 @@ def test_a_fine_chart_m8():
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
 
 
-def test_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_long_m9():
-    for eps, duration in ((1e-3, 20.0), (0.05, 150.0)):
-        moments = np.array([1.0, 1.0 + eps, 0.6])
-        top = HeavyTop(np.diag(moments), 1.0)
-        for p, stable in ((1.7, False), (2.5, True), (4.0, True)):
-            whole = np.linalg.eigvals(top.linearisation(p * UP, UP))
-            ours = sleeping_spectrum(moments, 1.0, p)
-            assert np.abs(ours[:, None] - whole).min(axis=1).max() < 1e-9
-            assert spectrally_stable(moments, 1.0, p) == stable == (whole.real.max() < 1e-9)
-            if stable:
-                gamma = so3.normalised(np.array([0.01, 0.005, 1.0]))
-                motion = top.motion(p * UP, gamma, duration=duration, tolerance=1e-4)
-                times = np.linspace(0.0, duration, 4000)
-                assert np.arccos(motion.gamma(times)[:, 2]).max() < 0.04
-                momentum = motion.body_momentum(times)[:, 2]
-                # The axial momentum is no longer conserved.
-                assert 1e-9 < np.abs(momentum - p).max() < 1e-2
+@pytest.mark.parametrize(
+    ("eps", "duration"), full_but([(1e-3, 20.0), (0.05, 50.0), (0.05, 150.0)], (1e-3, 20.0), (0.05, 50.0))
+)
+def test_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_long_m9(eps, duration):
+    moments = np.array([1.0, 1.0 + eps, 0.6])
+    top = HeavyTop(np.diag(moments), 1.0)
+    for p, stable in ((1.7, False), (2.5, True), (4.0, True)):
+        whole = np.linalg.eigvals(top.linearisation(p * UP, UP))
+        ours = sleeping_spectrum(moments, 1.0, p)
+        assert np.abs(ours[:, None] - whole).min(axis=1).max() < 1e-9
+        assert spectrally_stable(moments, 1.0, p) == stable == (whole.real.max() < 1e-9)
+        if stable:
+            gamma = so3.normalised(np.array([0.01, 0.005, 1.0]))
+            motion = top.motion(p * UP, gamma, duration=duration, tolerance=1e-4)
+            times = np.linspace(0.0, duration, 4000)
+            assert np.arccos(motion.gamma(times)[:, 2]).max() < 0.04
+            momentum = motion.body_momentum(times)[:, 2]
+            # The axial momentum is no longer conserved.
+            assert 1e-9 < np.abs(momentum - p).max() < 1e-2
 
 
 def test_linear_matrix_and_polynomial_of_asymmetric_tops_m9():

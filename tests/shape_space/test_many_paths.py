@@ -67,8 +67,8 @@ def test_memory_does_not_grow_with_the_paths():
         tracemalloc.stop()
         return top
 
-    peak(200)
-    assert peak(200) < peak(20) + 200 * 1000
+    peak(100)
+    assert peak(100) < peak(20) + 100 * 1000
 
 
 def test_a_stretch_on_which_nothing_moves_costs_one_evaluation():

@@ -218,6 +218,7 @@ momentum = [0.1, 0.2, 0.3]
 """
 
 
+@pytest.mark.usefixtures("warm_engines")
 def test_what_floats_of_an_mjcf_is_said_in_the_file_or_to_the_command(write, tmp_path, capfd):
     pytest.importorskip("mujoco")
     (tmp_path / "walker.xml").write_text(WALKER)

@@ -8,14 +8,13 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import doctest
-import gc
 import inspect
 import io
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from types import CodeType, FrameType
+from types import CodeType, FrameType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -25,6 +24,8 @@ from shapephase.errors import ShapePhaseError
 from shapephase.examples.scenarios import kane_scher
 
 SOURCE = str(Path(sp.__file__).parent)
+# Where what wraps a function keeps it.
+WRAPPED = ("__wrapped__", "__func__", "fget", "func")
 # Functions of arrays that check nothing, since the library itself calls them within its loops; and the integrator,
 # which gets what was checked.
 TRUSTING = ("so3", "sphere", "elliptic", "inertia_tensor", "chebyshev", "roots", "refinement", "errors",
@@ -76,14 +77,14 @@ def wrong_things() -> dict[str, Any]:
 def example_calls(name: str, thing: Any) -> Iterator[ExampleCall]:
     """The calls of functions of ours that the example in a docstring makes itself, each function once."""
     steps = doctest.DocTestParser().get_examples(inspect.getdoc(thing) or "")
-    seen: dict[CodeType, dict[str, Any]] = {}
+    seen: dict[CodeType, tuple[dict[str, Any], dict[str, Any]]] = {}
 
     def look(frame: FrameType, event: str, _: object) -> None:
         code, caller = frame.f_code, frame.f_back
         ours = code.co_filename.startswith(SOURCE) or code.co_name == "__init__"
         if event == "call" and ours and caller is not None and caller.f_code.co_filename.startswith("<doctest"):
             names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-            seen.setdefault(code, {one: frame.f_locals[one] for one in names})
+            seen.setdefault(code, (frame.f_globals, {one: frame.f_locals[one] for one in names}))
 
     test = doctest.DocTest(steps, {"np": np, "sp": sp}, name, None, None, None)
     before = sys.getprofile()
@@ -92,13 +93,11 @@ def example_calls(name: str, thing: Any) -> Iterator[ExampleCall]:
         doctest.DocTestRunner(verbose=False).run(test, out=lambda _: None, clear_globs=False)
     finally:
         sys.setprofile(before)
-    # What `conftest` has frozen is not seen by who looks for references.
-    gc.unfreeze()
-    for code, arguments in seen.items():
-        functions = [one for one in gc.get_referrers(code) if inspect.isfunction(one)]
-        if not functions or code.co_name in ("<lambda>", "__exit__", "__enter__"):
+    for code, (names, arguments) in seen.items():
+        found = _function(code, names, arguments)
+        if found is None or code.co_name in ("<lambda>", "__exit__", "__enter__"):
             continue
-        function: Callable[..., Any] = functions[0]
+        function: Callable[..., Any] = found
         module = function.__module__
         if not module.startswith("shapephase."):
             continue
@@ -116,6 +115,22 @@ def example_calls(name: str, thing: Any) -> Iterator[ExampleCall]:
             annotations={one: said for one, said in annotations.items() if one not in ("self", "cls")},
             positional=tuple(one for one in positional if one not in ("self", "cls")),
         )
+
+
+def _function(code: CodeType, names: Mapping[str, Any], arguments: Mapping[str, Any]) -> FunctionType | None:
+    """The function of a code, by its name in its module, in whatever it is wrapped; None for one within another."""
+    if code.co_name == "__init__":
+        return type(arguments["self"]).__init__
+    found: Any = names
+    for part in code.co_qualname.split("."):
+        found = (found if isinstance(found, Mapping) else vars(found)).get(part)
+        if found is None:
+            return None
+    while getattr(found, "__code__", None) is not code:
+        found = next((getattr(found, name) for name in WRAPPED if hasattr(found, name)), None)
+        if found is None:
+            return None
+    return found
 
 
 def works(call: ExampleCall) -> bool:

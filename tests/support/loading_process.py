@@ -17,7 +17,7 @@ from typing import Any
 from support.asked_process import Answers, AskedProcess, ProcessEnded, requests
 from support.damaged_files import mutated
 from support.reference_load import Effort, TooMuchWork
-from support.warm_engines import WarmEngine
+from support.warm_engines import WarmEngine, WarmStart
 
 HANG_SECONDS = 120
 """A process that has not answered in this time never will [s]; nothing is concluded from times below."""
@@ -128,10 +128,13 @@ def work(memory: int) -> None:
     import shapephase.cli.main
     import shapephase.cli.motion
     import shapephase.cli.texts.result_text  # noqa: F401
+    from shapephase.body import catalog
     from shapephase.body.engines import engine_tree
+    from shapephase.shape_space.files.formats import parser_process
 
-    # MuJoCo has limits of its own, in processes that start without these.
+    # MuJoCo and what else reads in a process of its own has limits of its own, in processes that start without these.
     engine_tree.run_alone = WarmEngine()
+    catalog.run_alone = parser_process.run_alone = WarmStart()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 

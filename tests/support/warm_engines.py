@@ -10,12 +10,16 @@ import subprocess
 import sys
 import tempfile
 import traceback
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from shapephase.body.engines.formats import FORMATS, MJCF
 from support.asked_process import Answers, AskedProcess, ProcessEnded, requests
+
+# For the process that waits, in place of a format.
+ANYTHING = "anything"
 
 
 class WarmEngines:
@@ -62,6 +66,51 @@ class WarmEngine(AskedProcess):
         return subprocess.CompletedProcess(list(words), code, printed, said)
 
 
+class WarmStart(AskedProcess):
+    """In place of `run_alone`: what is to run in a process of its own runs in one that is forked from one that waits.
+
+    With what readers of bodies and of motions import, whose processes are told apart by their words alone.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(__file__, ANYTHING, silent=True)
+
+    def __call__(
+        self, source: str, words: tuple[str, ...], data: bytes, seconds: float
+    ) -> subprocess.CompletedProcess[bytes]:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "stdin").write_bytes(data)
+            self.send({"source": source, "words": words, "folder": folder})
+            try:
+                code = self.answer(seconds)["code"]
+            except TimeoutError:
+                self.stop()
+                self.start()
+                raise subprocess.TimeoutExpired(words[0], seconds) from None
+            printed, said = ((Path(folder) / name).read_bytes() for name in ("stdout", "stderr"))
+        return subprocess.CompletedProcess(list(words), code, printed, said)
+
+
+def work_at_anything() -> None:
+    """Import what most sources need, and run each in a process that is forked."""
+    answers = Answers()
+    import pinocchio  # noqa: F401
+    import scipy.io  # noqa: F401
+
+    from shapephase.body import catalog  # noqa: F401
+    from shapephase.shape_space.files.formats import parser_process  # noqa: F401
+
+    for request in requests():
+        child = os.fork()
+        if child == 0:
+            os.dup2(os.open(f"{request['folder']}/stdin", os.O_RDONLY), 0)
+            # Not the one that requests come through, which may have read ahead.
+            sys.stdin = os.fdopen(0, closefd=False)
+            os._exit(_read(request, partial(exec, request["source"], {"__name__": "__main__"})))
+        _, status = os.waitpid(child, 0)
+        answers.say({"code": os.waitstatus_to_exitcode(status)})
+
+
 def work(name: str) -> None:
     """Import the format's reader, which every file needs, and read in processes that are forked."""
     answers = Answers()
@@ -103,4 +152,4 @@ def _read(request: dict[str, Any], read: Any) -> int:
 
 
 if __name__ == "__main__":
-    work(sys.argv[1])
+    work_at_anything() if sys.argv[1] == ANYTHING else work(sys.argv[1])

@@ -142,11 +142,12 @@ def test_period_in_closed_form_p2():
                 assert float(value) == pytest.approx(float(exact), rel=1e-14)
 
 
-def test_values_against_mpmath_p2():
-    """T, R and R' to 1e-12 at 25 random ellipsoids and momenta."""
+@pytest.mark.parametrize("count", full_but([10, 25], 10))
+def test_values_against_mpmath_p2(count):
+    """T, R and R' to 1e-12 at random ellipsoids and momenta."""
     rng = np.random.default_rng(2013)
     with mp.workdps(30):
-        for _ in range(25):
+        for _ in range(count):
             aspect, p = float(np.exp(rng.uniform(-2.0, 1.5))), float(rng.uniform(0.02, 0.999))
             surface = ellipsoid(aspect)
             period, turn = integrals(aspect, p)
@@ -154,11 +155,12 @@ def test_values_against_mpmath_p2():
             assert float(surface.first_return(p)) == pytest.approx(float(turn), rel=1e-12)
 
 
-def test_rates_against_mpmath_p2():
+@pytest.mark.parametrize("count", full_but([2, 4], 2))
+def test_rates_against_mpmath_p2(count):
     """R' and R'' of the closed form, and R' = T'/(2p), by derivatives at 40 digits: to 1e-12."""
     rng = np.random.default_rng(41)
     with mp.workdps(40):
-        for _ in range(4):
+        for _ in range(count):
             aspect, p = float(np.exp(rng.uniform(-2.0, 1.5))), float(rng.uniform(0.02, 0.999))
             surface = ellipsoid(aspect)
 

@@ -115,6 +115,7 @@ def test_positions_have_units_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize("order", ["xyzw", "wxyz"])
+@pytest.mark.usefixtures("warm_readers")
 def test_arrays_say_the_order_by_their_name(order: str, tmp_path):
     import h5py
     import scipy.io

@@ -203,6 +203,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, diver, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["m.npz"]
 
 
+@pytest.mark.usefixtures("warm_readers")
 @pytest.mark.parametrize("case", ODD_FILES)
 def test_an_odd_file_has_the_outcome_of_the_list(tmp_path, diver, effort, case):
     name, _, outcome, words = ODD_FILES[case]

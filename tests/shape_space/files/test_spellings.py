@@ -17,6 +17,7 @@ from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryErro
 from shapephase.shape_space.files.read import read_recorded_motion
 from support.motion_writers import write_opensim
 
+pytestmark = pytest.mark.usefixtures("warm_readers")
 BODY = sp.load_body("satellite")
 JOINTS = BODY.joint_names
 TURNS = np.array([unit == "rad" for unit in BODY.joint_units])
