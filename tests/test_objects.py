@@ -31,7 +31,9 @@ INNER = ("deformation.frames", "shape_space.body_path", "plotting.plot_style", "
          "optimal_control.symbolic", "body.appearance", "examples.slow_deformation.first_loop",
          "shape_space.connection.connection_slopes", "shape_space.closing_arc", "plotting.pages",
          "shape_space.path_samples", "phases.split_text", "body.engines", "shape_space.unit_doubts",
-         "dynamics.moving_body")  # fmt: skip
+         "dynamics.moving_body", "deformation.deformation.deformation_along",
+         "optimal_control.extremals.hamiltonian.checked_metric",
+         "optimal_control.extremals.hamiltonian.natural_scales")  # fmt: skip
 
 
 @pytest.fixture(scope="module")

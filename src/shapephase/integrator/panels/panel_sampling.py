@@ -183,14 +183,17 @@ class PanelSampler:
             return degree, first.left, first.right
         pieces = 4 if self._oscillations is None else max(1, int(np.ceil(self._oscillations / 2.0)))
         left, right = self._breaks[:-1], self._breaks[1:]
-        if 2 * pieces * len(left) <= _FEW:
+        at_rest = self._panels_at_rest(left, right)
+        moving = len(left) - int(np.count_nonzero(at_rest))
+        if 2 * pieces * moving <= _FEW:
             # Wide panels would need degrees so high that each step takes longer.
             pieces *= 2
-        if pieces > 1:
-            ends = np.linspace(left, right, pieces + 1, axis=1)
-            left, right = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-        degree = np.full(len(left), of_many if len(left) > _FEW else of_few)
-        degree[self._panels_at_rest(left, right)] = 0
+        degree = np.where(at_rest, 0, of_many if pieces * moving > _FEW else of_few)
+        if pieces > 1 and moving:
+            counts = np.where(at_rest, 1, pieces)
+            within = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+            left = np.repeat(left, counts) + within * np.repeat((right - left) / counts, counts)
+            right, degree = np.append(left[1:], right[-1]), np.repeat(degree, counts)
         return degree, left, right
 
     def _rough(self, momentum: float, tolerance: float) -> tuple[float, Mask]:
