@@ -119,11 +119,11 @@ DEGREES_OF_TURN = 0.5
 EVENNESS = (0.2, 0.4)
 """Of the panels' defects, one where all are alike: the fewer panels they come from, the likelier is a distance that is
 small by chance."""
-MOST_BY_CHANCE = (14.0, 11.0)
+MOST_BY_CHANCE = (18.0, 12.0)
 """How many times the part that defects foretell the error may be, joined by a straight line."""
 BY_CHANCE = 2.6
 """The same where the distance is all that defects would come to if they added up; they have to cancel for more."""
-POWER_OF_CHANCE = 0.4
+POWER_OF_CHANCE = 0.44
 """Of how many times that is the distance."""
 LEAST_BY_CHANCE = 3.0
 POWER_OF_GROWTH = 0.15
