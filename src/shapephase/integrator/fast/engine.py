@@ -36,9 +36,9 @@ _KERNELS = {
     "sample_round": ".kernels.panel_kernel",
     "errors_of_panels": ".kernels.panel_kernel",
     "change_ends": ".kernels.panel_kernel",
-    "sizes_of_terms": ".kernels.panel_kernel",
-    "plan_steps": ".kernels.panel_kernel",
-    "defects_of_panels": ".kernels.panel_kernel",
+    "sizes_of_terms": ".kernels.plan_kernel",
+    "plan_steps": ".kernels.plan_kernel",
+    "defects_of_panels": ".kernels.plan_kernel",
     "take_rounds": ".kernels.round_kernel",
 }
 """And the modules that they are in."""

@@ -122,21 +122,21 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
     count, terms = coefficients.shape[:2]
     rates, found = np.empty((count, terms)), np.empty((3, count))
     series = plain(coefficients).reshape(count, -1)
-    _kernel().sizes_of_terms(series, plain(widths), float(magnitude), float(least), rates, found)
+    _plan_kernel().sizes_of_terms(series, plain(widths), float(magnitude), float(least), rates, found)
     return rates, found
 
 
 def plan_of_steps(rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float) -> Array:
     """What `StepRequirements.plan` finds: (P,)."""
     planned, arrays = np.empty(len(turns)), (plain(rates), plain(turns), plain(sizes))
-    _kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, plain(defect_table()), planned)
+    _plan_kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, plain(defect_table()), planned)
     return planned
 
 
 def defects_of_panels(rates: Array, turns: Array, steps: Integers) -> Defects:
     """What `defects` finds."""
     found = np.empty(4)
-    _kernel().defects_of_panels(plain(rates), plain(turns), steps, plain(defect_table()), found)
+    _plan_kernel().defects_of_panels(plain(rates), plain(turns), steps, plain(defect_table()), found)
     return Defects(*found.tolist())
 
 
@@ -178,3 +178,8 @@ def _all_nodes() -> tuple[Array, Integers]:
 @lru_cache(maxsize=1)
 def _kernel() -> Any:
     return import_module(".kernels.panel_kernel", __package__)
+
+
+@lru_cache(maxsize=1)
+def _plan_kernel() -> Any:
+    return import_module(".kernels.plan_kernel", __package__)

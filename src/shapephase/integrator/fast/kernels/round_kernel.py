@@ -26,7 +26,7 @@ from ..estimate_constants import (
 from .growth_kernel import growths_and_rounding
 from .jit import kernel, part
 from .march_kernel import march_at_rest, march_momenta
-from .panel_kernel import (
+from .plan_kernel import (
     defects_of_panels,
     error_by_defects,
     make_even,
