@@ -250,6 +250,7 @@ def test_the_astronaut_twists_in_a_somersault():
         end="free",
         joints=joints,
         cost="rate",
+        limits=ANY_RATES,
         search=Search(pieces=20),
     )
     assert plan.goal_error < 1e-8
