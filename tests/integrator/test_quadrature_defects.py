@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import DOP853
 
 from shapephase.integrator._quadrature_defects import Defects, defect_table, defects
-from shapephase.integrator._step_control import StepRequirements
-from shapephase.integrator.fast.estimate_constants import DEFECT_STEPS, FULL_ORDER
+from shapephase.integrator._step_control import StepRequirements, even_steps
+from shapephase.integrator.fast.estimate_constants import DEFECT_STEPS, FEW_STEPS, FORESEEN, FULL_ORDER
 from shapephase.integrator.interpolant import Interpolant
 from support.both_engines import both
 
@@ -94,3 +94,33 @@ def test_terms_that_no_step_sees_count_whole():
     found = defects(rates, np.zeros(1), np.array([2]))
     assert found.unresolved == found.whole > 0.1e-9
     assert found.error(np.array([1e-3]), 1) >= found.whole
+
+
+def test_where_errors_grow_a_distance_counts_more():
+    """More with every growth up to a thousandfold, never less than without, and never more than the distance."""
+    rates = np.zeros((1, 20))
+    rates[0, 12] = 1.0
+    found = defects(rates, np.zeros(1), np.array([6]))
+    assert found.unresolved == 0.0
+    distance = np.full(5, 1e-3 * found.half)
+    errors = found.error(distance, 1, np.array([1.0, 10.0, 100.0, 1e3, 1e9]))
+    assert errors[0] == found.error(distance[:1], 1)
+    assert np.all(np.diff(errors[:4]) > 0.0)
+    assert errors[3] == errors[4] <= distance[4]
+
+
+@pytest.mark.parametrize("fast", ["0", "1"])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_plan_looks_ahead(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, fast: str, seed: int):
+    """What the defects of the planned steps come to is what the plan allows for, or nearly that."""
+    if fast == "1":
+        request.getfixturevalue("fast")
+    else:
+        monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+    rng, tolerance = np.random.default_rng(seed), 1e-9
+    coefficients = rng.normal(size=(4, 24, 9)) * 10.0 ** -np.linspace(0.0, 8.0, 24)[:, None]
+    interpolant = Interpolant(np.linspace(0.0, 1.0, 5), coefficients, 1, 0)
+    needed = StepRequirements.from_interpolant(interpolant, 0.0, tolerance)
+    steps = even_steps(needed.plan(tolerance), 1)
+    assert steps.sum() <= FEW_STEPS
+    assert needed.defects(steps).foreseen(1) <= 1.5 * FORESEEN * tolerance
