@@ -17,7 +17,9 @@ from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START,
 from .fast.marches import derivatives, growths_and_rounding
 
 
-def growth_and_rounding(propagators: Array, quaternions: Array, least: float) -> tuple[Array, Array]:
+def growth_and_rounding(
+    propagators: Array, quaternions: Array, least: float, threads: int | None = None
+) -> tuple[Array, Array]:
     """Largest growth of an error from one time to a later one, and the error due to rounding when it is largest.
 
     A turn about the momentum's axis stays what it is, and volumes are kept: taking the singular
@@ -29,13 +31,16 @@ def growth_and_rounding(propagators: Array, quaternions: Array, least: float) ->
     propagators : (B, CHECKPOINTS, 3, 3), or (B, 0, 3, 3) without momentum
     quaternions : (B, K + 1, 4) at the step ends
     least : [rad]; where the rounding is below by the largest growth alone, that is enough
+    threads : at most, in machine code; None: one for each processor
 
     Returns
     -------
     growth, infinite where it is not known, and rounding [rad]: (B,) each
     """
-    find = growths_and_rounding if engine.is_ready() else _growths_and_rounding
-    growth, rounding = find(propagators, quaternions)
+    if engine.is_ready():
+        growth, rounding = growths_and_rounding(propagators, quaternions, threads)
+    else:
+        growth, rounding = _growths_and_rounding(propagators, quaternions)
     return growth, looked_at_closely(rounding, propagators, quaternions, least)
 
 

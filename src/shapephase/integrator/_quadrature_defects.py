@@ -19,15 +19,11 @@ from .fast.estimate_constants import (
     DEFECT_DEGREES,
     DEFECT_STEPS,
     DEGREES_OF_TURN,
-    EVENNESS,
     FULL_ORDER,
-    LEAST_BY_CHANCE,
     LEAST_ORDER,
-    MOST_BY_CHANCE,
     MOST_GROWTH_BY_CHANCE,
     ORDER,
-    POWER_OF_CHANCE,
-    POWER_OF_GROWTH,
+    POWER_OF_EVENNESS,
     TINY,
     UNRESOLVED,
 )
@@ -99,18 +95,17 @@ class Defects(NamedTuple):
         return min(max(-log2(self.remaining), LEAST_ORDER), ORDER)
 
     def foreseen(self, loops: int) -> float:
-        """The bound that `error` would be, were the distance all that defects can come to [rad]."""
-        return loops * BY_CHANCE * self.remaining * self.half
+        """What all steps would be off by, were nothing to cancel [rad]."""
+        return loops * self.remaining * self.half
 
     def error(self, distance: Array, loops: int, amplification: Array | float = 1.0) -> Array:
         """Bound of the error of steps by their distance from half as many, (B,) [rad].
 
         `amplification` : of an error from one time to a later one, (B,): what grows most hides the rest of the distance
         """
-        cancelled = loops * self.half / np.maximum(distance, TINY)
-        by_chance = np.maximum(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE)
-        factor = np.minimum(by_chance, np.interp(self.evenness, EVENNESS, MOST_BY_CHANCE))
-        factor = factor * np.minimum(amplification, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
+        cancelled = np.maximum(loops * self.half / np.maximum(distance, TINY), 1.0)
+        factor = BY_CHANCE * self.evenness**-POWER_OF_EVENNESS * np.sqrt(np.sqrt(np.sqrt(np.sqrt(cancelled))))
+        factor = factor * np.sqrt(np.minimum(amplification, MOST_GROWTH_BY_CHANCE))
         return np.minimum(np.maximum(factor * self.remaining * distance, loops * self.unresolved), distance)
 
 

@@ -276,7 +276,7 @@ class Integration:
         record = self._take_steps(interpolant, perturbed.coefficients if counts and perturbed.differ else None, steps)
         propagators = record.propagators if self._propagators is None else self._propagators
         little = LITTLE_ROUNDING * self._tolerance
-        amplification, rounding = growth_and_rounding(propagators, record.quaternions, little)
+        amplification, rounding = growth_and_rounding(propagators, record.quaternions, little, self._threads)
         sampling = amplification * expected
         if counts:
             sampling = np.fmin(sampling, record.truncation + amplification * perturbed.hidden)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from importlib import import_module
@@ -71,16 +72,9 @@ def march_in_threads(
             propagators[rows], whole.stepping[rows], whole.truncation[rows],
         )  # fmt: skip
 
-    workers = _workers(batch, threads)
-    parts = _parts(batch, module.LANES, workers)
     run_progress.begin(run_progress.STEPPING, max(batch, 1))
-    if len(parts) == 1:
-        run(parts[0])
-        run_progress.advance(batch)
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            for rows, _ in zip(parts, pool.map(run, parts), strict=True):
-                run_progress.advance(rows.stop - rows.start)
+    for rows in _in_threads(run, batch, module.LANES, threads):
+        run_progress.advance(rows.stop - rows.start)
     return whole
 
 
@@ -92,21 +86,28 @@ def quaternions_at_rest(widths: Array, coefficients: Array, steps: Integers) -> 
     return quaternions
 
 
-def growths_and_rounding(propagators: Array, quaternions: Array) -> tuple[Array, Array]:
+def growths_and_rounding(propagators: Array, quaternions: Array, threads: int | None = None) -> tuple[Array, Array]:
     """The largest growth of an error from one mark to a later one, and what the rounding of all steps grows to.
 
     Parameters
     ----------
     propagators : (B, M, 3, 3); without any nothing grows
     quaternions : (B, K + 1, 4) at the ends of steps
+    threads : how many at most; None: one for each processor
 
     Returns
     -------
     growths, infinite where not known, and rounding [rad]: (B,) each
     """
-    growths, rounding = np.empty(len(quaternions)), np.empty(len(quaternions))
-    matrices = plain(propagators).reshape(*propagators.shape[:2], 9)
-    _growth_kernel().growths_and_rounding(matrices, plain(quaternions), growths, rounding)
+    batch, find = len(quaternions), _growth_kernel().growths_and_rounding
+    growths, rounding = np.empty(batch), np.empty(batch)
+    matrices, ends = plain(propagators).reshape(*propagators.shape[:2], 9), plain(quaternions)
+
+    def run(rows: slice) -> None:
+        find(matrices[rows], ends[rows], growths[rows], rounding[rows])
+
+    for _ in _in_threads(run, batch, 1, threads):
+        pass
     return growths, rounding
 
 
@@ -159,6 +160,20 @@ def warm() -> None:
 def segments_of(batch: int, loops: int) -> int:
     """How many segments a chunk of steps has."""
     return _SEGMENTS_OF_LOOPS if loops > 1 else 1 if batch == 1 else _SEGMENTS_OF_MANY
+
+
+def _in_threads(run: Callable[[slice], None], batch: int, lanes: int, threads: int | None) -> Iterator[slice]:
+    """Run for all rows, a part of them in each call, in threads where there are enough; the rows that are done."""
+    workers = _workers(batch, threads)
+    parts = _parts(batch, lanes, workers)
+    if workers == 1 or len(parts) == 1:
+        for rows in parts:
+            run(rows)
+            yield rows
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        for rows, _ in zip(parts, pool.map(run, parts), strict=True):
+            yield rows
 
 
 def _workers(batch: int, threads: int | None) -> int:

@@ -357,7 +357,7 @@ def _stepped(
     record = _record(panels, series, steps, momentum)
     distances = np.where(np.isfinite(record.stepping), record.stepping, np.pi)
     amplifications, rounding = growth_and_rounding(
-        record.propagators, record.quaternions, _LITTLE_ROUNDING * plan.tolerance
+        record.propagators, record.quaternions, _LITTLE_ROUNDING * plan.tolerance, threads=1
     )
     requirements, rates = plan.requirements(turning), plan.rates(series.coefficients)
     stepping = np.array(

@@ -13,20 +13,16 @@ from ..estimate_constants import (
     DEGREES_A_STEP,
     DEGREES_OF_TURN,
     DISTANCE,
-    EVENNESS,
     FEW_STEPS,
     FORESEEN,
     FULL_ORDER,
-    LEAST_BY_CHANCE,
     LEAST_ORDER,
     LOOKS_AHEAD,
-    MOST_BY_CHANCE,
     MOST_GROWTH_BY_CHANCE,
     MOST_SHORTENED,
     MOST_TURN,
     ORDER,
-    POWER_OF_CHANCE,
-    POWER_OF_GROWTH,
+    POWER_OF_EVENNESS,
     TINY,
     UNRESOLVED,
 )
@@ -79,7 +75,7 @@ def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, table, planne
         make_even(planned, steps)
         defects_of_panels(rates, turns, steps, table, found)
         remaining = remaining_by_defects(found[0], found[1])
-        excess = loops * BY_CHANCE * remaining * found[1] / (FORESEEN * tolerance)
+        excess = loops * remaining * found[1] / (FORESEEN * tolerance)
         if not excess > 1.0:
             break
         shorter = min(excess ** (1.0 / order_by_defects(remaining)), MOST_SHORTENED)
@@ -119,13 +115,6 @@ def defects_of_panels(rates, turns, steps, table, found):
 
 
 @part
-def _between(x, places, values):
-    """Along a straight line from the first place to the second, beyond them as there."""
-    share = min(max((x - places[0]) / (places[1] - places[0]), 0.0), 1.0)
-    return values[0] + share * (values[1] - values[0])
-
-
-@part
 def remaining_by_defects(whole, half):
     """As `Defects.remaining`."""
     return min(max(whole / half, FULL_ORDER), 1.0) if half > 0.0 else FULL_ORDER
@@ -142,9 +131,7 @@ def error_by_defects(found, distance, loops, amplification):
     """As `Defects.error`."""
     whole, half, unresolved, evenness = found[0], found[1], found[2], found[3]
     remaining = remaining_by_defects(whole, half)
-    cancelled = loops * half / max(distance, TINY)
-    factor = min(
-        max(BY_CHANCE * cancelled**POWER_OF_CHANCE, LEAST_BY_CHANCE), _between(evenness, EVENNESS, MOST_BY_CHANCE)
-    )
-    factor *= min(amplification, MOST_GROWTH_BY_CHANCE) ** POWER_OF_GROWTH
+    cancelled = max(loops * half / max(distance, TINY), 1.0)
+    factor = BY_CHANCE * evenness**-POWER_OF_EVENNESS * math.sqrt(math.sqrt(math.sqrt(math.sqrt(cancelled))))
+    factor *= math.sqrt(min(amplification, MOST_GROWTH_BY_CHANCE))
     return min(max(factor * remaining * distance, loops * unresolved), distance)
