@@ -102,7 +102,7 @@ def _in(unit: str) -> str:
 def read_only(array: AnyArray) -> AnyArray:
     """A view of an array that cannot be written to; the array itself stays as it is."""
     view = array.view()
-    view.flags.writeable = False
+    view.setflags(write=False)
     return view
 
 

@@ -20,6 +20,8 @@ from ._spectral_error import (
     tail_length,
     unaveraged_share,
 )
+from .fast import engine
+from .fast.loops import errors_of_loop
 from .interpolant import Interpolant
 
 # Samples of a loop, beyond which panels need fewer.
@@ -36,6 +38,8 @@ _TEST_SHARES = np.mod(0.2137 + 0.6180339887498949 * np.arange(3), 1.0)
 _UNSEEN_BETWEEN = 2.0
 # Rounding of a sample may be this many times the floor of the spectrum, where it averages out.
 _ROUNDING_OF_TESTS = 4.0
+# Of the times, in turns of the loop [rad].
+_TIME_ROUNDING = 2.0 * pi * EPS
 # Of the interpolant's panels: a Fourier series resolved by 16 samples is a Chebyshev series of this degree to rounding.
 _PANEL_DEGREE = 32
 
@@ -110,12 +114,9 @@ class EvenSampler:
 
     def _take(self, values: Array) -> None:
         self._values = values
-        self._tails = [estimate_tail(norms, 2.0 * pi * EPS) for norms in fourier_norms(values)]
-        self._unexplained = [0.0, 0.0]
-        if len(self._tests):
-            between = _even_to_shares(len(values)) @ values
-            gaps = (_UNSEEN_BETWEEN * spectral_norms(between - self._tests).max(axis=0)).tolist()
-            self._unexplained = [_unexplained(gap, tail) for gap, tail in zip(gaps, self._tails, strict=True)]
+        found = (_errors_in_machine_code if engine.is_ready() else _errors)(values, self._tests)
+        self._tails = [tail for tail, _ in found]
+        self._unexplained = [_unexplained(_UNSEEN_BETWEEN * gap, tail) for tail, gap in found]
 
     @property
     def _decay(self) -> float:
@@ -129,6 +130,24 @@ class EvenSampler:
     def _has_gaps(self) -> bool:
         """Whether the series misses, between the nodes, what its spectrum does not show."""
         return any(self._unexplained)
+
+
+def _errors(values: Array, tests: Array) -> list[tuple[TailEstimate, float]]:
+    """What the spectra of I^-1 and I^-1 L_o tell, and the largest gap at tests (T, 9), of samples (N, 9)."""
+    tails = [estimate_tail(norms, _TIME_ROUNDING) for norms in fourier_norms(values)]
+    gaps = spectral_norms(_even_to_shares(len(values))[: len(tests)] @ values - tests).max(axis=0, initial=0.0)
+    return list(zip(tails, gaps.tolist(), strict=True))
+
+
+def _errors_in_machine_code(values: Array, tests: Array) -> list[tuple[TailEstimate, float]]:
+    """The same."""
+    shares = _even_to_shares(len(values))[: len(tests)]
+    return [
+        (TailEstimate(error, decay, converging > 0.0, at_rounding > 0.0, largest, floor, tail), gap)
+        for error, decay, converging, at_rounding, largest, floor, tail, gap in errors_of_loop(
+            values, tests, shares, _TIME_ROUNDING
+        )
+    ]
 
 
 def _panel_count(values: Array) -> int:

@@ -73,6 +73,7 @@ def sampler(
     directly: Directly | None = None,
     checked: bool = False,
     knots: KnotPath | None = None,
+    known: dict[Any, Any] | None = None,
 ) -> Sampler:
     """The sampler that suits a deformation.
 
@@ -92,6 +93,7 @@ def sampler(
         result: `evaluate` is asked
     checked : it depends on more, and is checked between nodes nevertheless
     knots : the first loop of a recorded path, whose knots are the breaks: panels may span several of them
+    known : what earlier samplers with the same arguments found out that does not depend on the body
 
     Examples
     --------
@@ -117,6 +119,7 @@ def sampler(
         probe=probe,
         resolved=resolved,
         checked=checked,
+        known=known,
     )
 
 
@@ -130,13 +133,14 @@ def _on_panels(
     probe: Callable[[Array], Array] | None = None,
     resolved: ResolvedPath | None = None,
     checked: bool = False,
+    known: dict[Any, Any] | None = None,
 ) -> PanelSampler:
     """Arguments as of `sampler`."""
     period = float(breaks[-1]) / loops
     if smooth_loop and oscillations is not None:
-        return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe)
+        return PanelSampler(channels, np.array([0.0, period]), loops, oscillations, probe, known=known)
     ends = breaks[breaks <= period * (1.0 + 1e-12)] if loops > 1 else breaks
-    return PanelSampler(channels, ends, loops, oscillations, probe, resolved, checked=checked)
+    return PanelSampler(channels, ends, loops, oscillations, probe, resolved, checked=checked, known=known)
 
 
 class Samplers:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from ..arrays import Array
 from ..integrator.recorded.knot_path import KnotPath
@@ -26,6 +27,7 @@ class Smoothness:
     resolved : the first loop of what it depends on as series, where that is all there is to know; None: unknown
     checked : whether there is more to know, so that it is compared with its samples between the nodes all the same
     knots : the first loop as polynomials that a body follows, panels of which may span several breaks; None: it is none
+    known : what samplers found out of all this, kept for the next motion
     """
 
     breaks: Array
@@ -37,3 +39,4 @@ class Smoothness:
     resolved: ResolvedPath | None = None
     checked: bool = False
     knots: KnotPath | None = None
+    known: dict[Any, Any] = field(default_factory=dict, repr=False)

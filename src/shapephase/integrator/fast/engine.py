@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import curves, gradients, marches, nodes, panels, rounds, tree, variants
+from . import curves, gradients, loops, marches, nodes, panels, rounds, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, is_wanted, may_compile
 
@@ -36,6 +36,7 @@ _KERNELS = {
     "sample_round": ".kernels.panel_kernel",
     "errors_of_panels": ".kernels.panel_kernel",
     "change_ends": ".kernels.panel_kernel",
+    "errors_of_loop": ".kernels.loop_kernel",
     "sizes_of_terms": ".kernels.plan_kernel",
     "plan_steps": ".kernels.plan_kernel",
     "defects_of_panels": ".kernels.plan_kernel",
@@ -171,5 +172,6 @@ def _warm() -> None:
     marches.warm()
     panels.warm()
     curves.warm()
+    loops.warm()
     variants.warm()
     rounds.warm()

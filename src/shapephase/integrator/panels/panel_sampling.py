@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,8 @@ _FEW = 4
 _MOST_PANELS = 4000
 # Of the tolerance: what the first panels may leave hidden of a path that is resolved.
 _HIDDEN_SHARE = 0.1
+# First panels, for so many tolerances, that are kept for the next motion.
+_MOST_KNOWN = 64
 # Of a panel, relative to the interval: narrower ones would consist of rounding.
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
@@ -60,7 +63,9 @@ class PanelSampler:
         resolved: ResolvedPath | None = None,
         *,
         checked: bool = False,
+        known: dict[Any, PanelsToSample] | None = None,
     ) -> None:
+        self._known = {} if known is None else known
         self._channels, self._probe, self._loops, self._resolved = channels, probe, loops, resolved
         self._is_bandlimited = oscillations is not None or (resolved is not None and not checked)
         self._breaks, self._oscillations = breaks, oscillations
@@ -77,9 +82,9 @@ class PanelSampler:
                 self._refine_in_machine_code(float(momentum), float(tolerance))
             return
         if self._series is None:
-            degree, left, right = self._first_panels(tolerance)
+            _, _, degree, left, right, times = self._panels_so_far(tolerance)
             # A copy: what machine code computes in work arrays is overwritten by the next call.
-            values = self._channels(sample_times(degree, left, right, self.end)).copy()
+            values = self._channels(times).copy()
             self._keep(series_through(degree, left, right, values, self.end, degree > 0))
         while True:
             total, rough = self._rough(momentum, tolerance)
@@ -115,6 +120,14 @@ class PanelSampler:
             count = len(series.degree)
             ends = series.left, series.right, np.empty(0)
             return PanelsToSample(np.arange(count), np.ones(count, dtype=np.int64), series.degree, *ends)
+        key = tolerance, self._breaks.tobytes(), self._oscillations, self._resolved is None
+        if key not in self._known:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[key] = self._panels_at_first(tolerance)
+        return self._known[key]
+
+    def _panels_at_first(self, tolerance: float) -> PanelsToSample:
         degree, left, right = self._first_panels(tolerance)
         none = np.zeros(len(degree), dtype=np.int64)
         return PanelsToSample(none, none, degree, left, right, sample_times(degree, left, right, self.end))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -154,4 +155,5 @@ def panel_errors(series: PanelSeries, hidden: Hidden | None, momentum: float) ->
 
 def sum_of_noise(noise: Array) -> float:
     """Of panels whose noise is independent of one another: (P,)."""
-    return min(float(noise.sum()), NOISE_FACTOR * float(np.sqrt((noise * noise).sum())))
+    squares = float(noise @ noise)
+    return min(float(noise.sum()), NOISE_FACTOR * sqrt(squares)) if squares else 0.0
