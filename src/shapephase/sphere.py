@@ -74,10 +74,23 @@ def polygon_area(corners: Array, references: Array | None = None) -> Array:
     if references is None:
         found = [far_reference(polygon) for polygon in corners.reshape(-1, *corners.shape[-2:])]
         references = np.reshape(found, (*corners.shape[:-2], 3))
+    return arc_areas(corners, references).sum(axis=-1)[()]
+
+
+def arc_areas(corners: Array, references: Array) -> Array:
+    """Of a closed polygon's arcs to its reference (..., 3), in two halves the last, to the start: (..., N + 1) [sr].
+
+    (..., N, 3), (..., 3) -> (..., N + 1). Opposite ends are joined through `so3.middle`.
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)
+    >>> print(sp.sphere.arc_areas(np.array([x, y]), (x + y + z) / np.sqrt(3.0)).round(6))
+    [ 0.523599 -0.261799 -0.261799]
+    """
     first, last = corners[..., :1, :], corners[..., -1:, :]
     closed = np.concatenate([corners, so3.middle(last, first), first], axis=-2)
-    areas = triangle_area(references[..., None, :], closed[..., :-1, :], closed[..., 1:, :])
-    return areas.sum(axis=-1)[()]
+    return triangle_area(references[..., None, :], closed[..., :-1, :], closed[..., 1:, :])
 
 
 def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:

@@ -155,7 +155,7 @@ class MomentumCurve(CurvePieces):
     def frame_at(self, place: Integers) -> Array | None:
         """The same at edges: (N,) -> (N, 3, 3)."""
         if self.lift is not None and len(self.edges) == len(self.lift.ends):
-            return so3.matrix_from_quat(self.lift.rotation.quaternions[0, self.lift.ends[place]])
+            return self.lift.at_ends(place)
         return self.frame(self.edges[place])
 
     def displaced(self, turns: Array) -> Displacements:
@@ -169,18 +169,17 @@ class MomentumCurve(CurvePieces):
         return Displacements(grown[0], grown[1], rates[2])
 
     @property
-    def end_attitudes(self) -> tuple[Array, Array]:
-        """Of the deformation's own frame and of the gauge's at both ends: (B, 2, 3, 3), (B, 2, 3, 3)."""
-        ends, solution = self.edges[[0, -1]], self.motion.solution
-        if isinstance(solution, SteppedRotation):
-            last = solution.end[:, None]
-            turned = np.concatenate([np.broadcast_to(np.eye(3), last.shape), last], axis=1)
-            own = self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ turned
-        else:
-            own = self._own_attitudes(ends)
+    def end_attitudes(self) -> tuple[Array, Array, Array]:
+        """Of the deformation's own frame at the end, and of the gauge's at the start and at the end: (B, 3, 3) each."""
+        start, solution = self.motion.initial_attitude.reshape(-1, 3, 3), self.motion.solution
+        stepped = isinstance(solution, SteppedRotation)
+        end = start @ (solution.end if stepped else solution.rotation(self.edges[-1:])[:, 0])
         if self.lift is not None:
-            return own, own @ so3.transpose(np.stack([np.eye(3), self.lift.rotation.end[0]]))
-        return own, own if self.frames is None else own @ so3.transpose(self.frames(ends)[0])
+            return end, start, end @ so3.transpose(self.lift.end)
+        if self.frames is None:
+            return end, start, end
+        frames = so3.transpose(self.frames(self.edges[[0, -1]])[0])
+        return end, start @ frames[0], end @ frames[1]
 
     def _own_attitudes(self, times: Array) -> Array:
         return self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)

@@ -94,21 +94,21 @@ def split(
     deformation, batch = motion.deformation, motion.batch
     with watched(progress):
         curve = momentum_curve(motion, gauge)
-        lift = motion.horizontal_lift
+        lift = motion.lift_with_errors
     has_phase = curve.has_phase
     moving = has_phase[:, None, None]
-    own, seen = curve.end_attitudes
-    start, end = motion.initial_attitude.reshape(-1, 3, 3), own[:, -1]
-    first, last = seen[:, 0], seen[:, -1]
+    start = motion.initial_attitude.reshape(-1, 3, 3)
+    end, first, last = curve.end_attitudes
     departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     total = end @ closure @ so3.transpose(start)
-    holonomy = start @ lift.end[0] @ closure @ so3.transpose(start)
+    holonomy = start @ lift.end @ closure @ so3.transpose(start)
     dynamical = np.where(moving, total @ so3.transpose(holonomy), np.eye(3))
     tilt = np.where(moving, first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
-    area = np.where(has_phase, curve.slivers.sum(axis=1) + sphere.polygon_area(curve.corners, curve.references), 0.0)
-    closing = curve.closing(curve.edges[-1:])[0][:, 0]
+    arcs = sphere.arc_areas(curve.corners, curve.references)
+    area = np.where(has_phase, curve.slivers.sum(axis=1) + arcs.sum(axis=1), 0.0)
+    closing = np.where(has_phase, arcs[:, -2:].sum(axis=1), 0.0)
     phase = dynamic - area
     read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
     residual = np.abs(so3.wrap(phase - read_off))
