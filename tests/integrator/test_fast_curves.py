@@ -2,43 +2,49 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
-from shapephase.integrator.curve_integrals import _curve_terms, _rules
-from shapephase.integrator.fast.curves import curve_terms
+from shapephase import so3
+from shapephase.integrator.curve_integrals import _curve_pieces, _rules
+from shapephase.integrator.fast.curves import PiecesOfCurve, curve_pieces
 from shapephase.integrator.fast.estimate_constants import TERMS
 
 EPS = np.finfo(float).eps
 pytestmark = pytest.mark.usefixtures("fast")
 
 
-def unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=0)
-
-
 @pytest.mark.parametrize("lifted", [False, True])
 def test_it_is_what_arrays_give(rng: np.random.Generator, lifted: bool):
-    batch, steps = 3, 7
-    channels = 0.3 * rng.normal(size=(9, TERMS, 2, steps))
-    directions = unit(rng.normal(size=(3, batch, 2, steps)))
-    # Not opposite each other, where the turn about the corner is not defined.
-    corners = unit(directions + 0.2 * rng.normal(size=directions.shape))
-    arguments = channels, directions, corners, rng.uniform(0.1, 2.0, batch), _rules()
-    for found, expected in zip(
-        curve_terms(*arguments, lifted=lifted), _curve_terms(*arguments, lifted=lifted), strict=True
-    ):
-        assert found.shape == expected.shape
-        # Sums of some hundred products, whose quotients grow with the order.
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e3 * EPS * np.abs(expected).max())
+    """Of all pieces at once, and of some of them after the others."""
+    batch, count = 3, 7
+    channels = 0.3 * rng.normal(size=(9, TERMS, 2, count))
+    # Ends of pieces are near each other: the turn about a corner is not defined opposite it.
+    directions = so3.normalised(rng.normal(size=(batch, 1, 3)) + 0.1 * rng.normal(size=(batch, count + 1, 3)))
+    frames = so3.exp(rng.normal(size=3)) @ so3.exp(0.1 * rng.normal(size=(count + 1, 3))) if lifted else None
+    lengths, magnitudes = rng.uniform(0.5, 2.0, count), rng.uniform(0.1, 2.0, batch)
+    arguments = directions, frames, lengths, magnitudes, _rules()
+    expected = PiecesOfCurve.empty(batch, count)
+    _curve_pieces(channels, 0, *arguments, expected)
+    for cuts in ([0, count], [0, 3, 5, count]):
+        found = PiecesOfCurve.empty(batch, count)
+        for first, stop in pairwise(cuts):
+            curve_pieces(channels[..., first:stop], first, *arguments, found)
+        for one, other in zip(found, expected, strict=True):
+            # Sums of some hundred products, whose quotients grow with the order.
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e3 * EPS * np.abs(other).max())
 
 
 def test_a_steady_turn_about_another_axis():
     """A round body of inertia one turns by |Pi| about Pi: the dynamic phase is the angle, and the curve is a point."""
     channels = np.zeros((9, TERMS, 2, 1))
     channels[:3, 0] = 0.4
-    point = np.broadcast_to(unit(np.array([1.0, 2.0, 2.0]))[:, None, None, None], (3, 1, 2, 1))
-    (by_rule, rates) = curve_terms(channels, point, point, np.array([1.5]), _rules(), lifted=False)
-    np.testing.assert_allclose(by_rule[:, 0, 0, 0], 0.6, rtol=0, atol=8.0 * EPS)
-    np.testing.assert_allclose(by_rule[:, 1, 0, 0], 0.0, rtol=0, atol=8.0 * EPS)
-    np.testing.assert_allclose(rates, 0.6 * point, rtol=0, atol=8.0 * EPS)
+    point = np.broadcast_to(np.array([1.0, 2.0, 2.0]) / 3.0, (1, 2, 3))
+    found = PiecesOfCurve.empty(1, 1)
+    curve_pieces(channels, 0, point, None, np.array([0.4]), np.array([1.5]), _rules(), found)
+    np.testing.assert_allclose(found.dynamic, 0.6, rtol=0, atol=8.0 * EPS)
+    np.testing.assert_allclose(found.corners, point, rtol=0, atol=0)
+    for nothing in (found.slivers, found.slopes, found.by_momentum, found.differences):
+        np.testing.assert_allclose(nothing, 0.0, rtol=0, atol=8.0 * EPS)

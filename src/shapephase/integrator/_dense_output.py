@@ -185,13 +185,15 @@ def _at_places(polynomials: Array, components: int, x: Array, place: Integers) -
     return values(flat[:, :components], place * count + piece, 2.0 * (scaled - piece) - 1.0)
 
 
-def end_channels(interpolant: Interpolant, steps: Integers, which: Integers, count: int = 1) -> tuple[Array, Array]:
+def end_channels(
+    interpolant: Interpolant, steps: Integers, which: Integers | None, count: int = 1
+) -> tuple[Array, Array]:
     """Taylor terms at both ends of the pieces of steps, and how far the polynomials made of them miss the integrals.
 
     Parameters
     ----------
     steps : (P,) on each panel of the first loop
-    which : (W,) ascending, of the steps of all loops
+    which : (W,) ascending, of the steps of all loops; None: every one
     count : pieces of each step, M = W count in all
 
     Returns
@@ -199,23 +201,31 @@ def end_channels(interpolant: Interpolant, steps: Integers, which: Integers, cou
     channels : (9, TERMS, 2, M) of I^-1 (6) and I^-1 L_o (3), times a piece's length
     misses : (3, 9, M) of the integrals of the channels, at three places in each piece
     """
-    inner = which % int(steps.sum())
-    starts = np.cumsum(steps) - steps
-    panels, place = np.unique(np.searchsorted(starts, inner, side="right") - 1, return_inverse=True)
-    widths = np.diff(interpolant.edges[: len(steps) + 1])[panels]
-    coefficients = interpolant.coefficients[panels] * widths[:, None, None]
-    degrees = coefficients.shape[1]
-    found = []
-    start = 0
-    for each, run in groupby((count * steps[panels]).tolist()):
-        stop = start + len(list(run))
-        parts = _taylor_matrix(degrees, each) @ coefficients[start:stop]
-        found.append(parts.reshape((stop - start) * each, 2 * TERMS + len(_PLACES), 9))
-        start = stop
-    rows = inner - starts[panels[place]] + (np.cumsum(steps[panels]) - steps[panels])[place]
-    whole = np.concatenate(found)[(count * rows[:, None] + np.arange(count)).ravel()]
+    if which is None:
+        whole = _pieces_of_panels(interpolant.coefficients, interpolant.widths, count * steps)
+        if interpolant.loops > 1:
+            whole = np.tile(whole, (interpolant.loops, 1, 1))
+    else:
+        inner = which % int(steps.sum())
+        starts = np.cumsum(steps) - steps
+        panels, place = np.unique(np.searchsorted(starts, inner, side="right") - 1, return_inverse=True)
+        pieces = _pieces_of_panels(interpolant.coefficients[panels], interpolant.widths[panels], count * steps[panels])
+        rows = inner - starts[panels[place]] + (np.cumsum(steps[panels]) - steps[panels])[place]
+        whole = pieces[(count * rows[:, None] + np.arange(count)).ravel()]
     channels = whole[:, : 2 * TERMS].reshape(-1, 2, TERMS, 9)
     return np.ascontiguousarray(channels.transpose(3, 2, 1, 0)), whole[:, 2 * TERMS :].transpose(1, 2, 0)
+
+
+def _pieces_of_panels(coefficients: Array, widths: Array, counts: Integers) -> Array:
+    """Taylor terms and misses of all pieces of panels: (P, n, 9), (P,), (P,) -> (M, 2 TERMS + 3, 9)."""
+    scaled = coefficients * widths[:, None, None]
+    degrees, rows = scaled.shape[1], 2 * TERMS + len(_PLACES)
+    found, start = [], 0
+    for each, run in groupby(counts.tolist()):
+        stop = start + len(list(run))
+        found.append((_taylor_matrix(degrees, each) @ scaled[start:stop]).reshape(-1, rows, 9))
+        start = stop
+    return np.concatenate(found)
 
 
 def piece_channels(interpolant: Interpolant, edges: Array) -> Array:

@@ -16,7 +16,7 @@ from .. import so3
 from ..arrays import Array
 from ._dense_output import convolved, direction_terms, end_channels, hermite_matrix, piece_channels, transported
 from .fast import engine
-from .fast.curves import curve_terms
+from .fast.curves import PiecesOfCurve, curve_pieces
 from .fast.estimate_constants import TERMS
 from .lift import Lift
 from .stepped import SteppedRotation
@@ -46,60 +46,60 @@ def curve_integrals(rotation: SteppedRotation, lift: Lift | None = None, edges: 
 
     `edges` (M + 1,) [s], the ends of the steps among them, are the ends of the pieces; None: those of the steps.
     """
-    batch, magnitude = len(rotation.momentum), np.linalg.norm(rotation.momentum, axis=-1)
+    magnitudes = np.linalg.norm(rotation.momentum, axis=-1)
+    lengths = np.maximum(np.diff(rotation.times if edges is None else edges), _TINY)
     # The gauge's frame, body axes to gauge axes.
     frames = None
-    lengths = np.maximum(np.diff(rotation.times if edges is None else edges), _TINY)
-    total = len(lengths)
     if edges is None:
         directions = rotation.directions
         if lift is not None:
-            frames = so3.matrix_from_quat(lift.rotation.quaternions[0, lift.ends])
+            frames = lift.at_ends(slice(None))
     else:
         directions = so3.apply(so3.transpose(rotation.rotation(edges)), rotation.directions[:, :1])
-        frames = None if lift is None else lift.rotation.rotation(edges)[0]
-    corners = directions if frames is None else so3.apply(frames, directions)
-    ends = np.ascontiguousarray(directions.transpose(2, 0, 1))
-    dynamic, slivers = np.empty((2, batch, total))
-    turning, drift = np.empty((batch, total + 1, 3)), np.empty((total + 1, 3))
-    differences = np.zeros((2, 2, batch))
+        if lift is not None:
+            frames = lift.rotation.rotation(edges)[0]
+    batch, total = len(magnitudes), len(lengths)
+    pieces = PiecesOfCurve.empty(batch, total)
+    find = curve_pieces if engine.is_ready() else _curve_pieces
     at_once = max(1, _MOST_STEPS // max(1, batch))
     for first in range(0, total, at_once):
-        part = slice(first, min(first + at_once, total))
-        after = slice(part.start + 1, part.stop + 1)
-        if edges is None:
-            channels, _ = end_channels(rotation.interpolant, rotation.steps, np.arange(part.start, part.stop))
+        stop = min(first + at_once, total)
+        if edges is not None:
+            channels = piece_channels(rotation.interpolant, edges[first : stop + 1])
         else:
-            channels = piece_channels(rotation.interpolant, edges[part.start : part.stop + 1])
-        both = np.stack([ends[:, :, part], ends[:, :, after]], axis=2)
-        # The piece's first corner, as it is seen from the body at both ends.
-        still = np.broadcast_to(both[:, :, :1], both.shape).copy()
-        if frames is not None:
-            still[:, :, 1] = so3.apply(so3.transpose(frames[after]), corners[:, part]).transpose(2, 0, 1)
-        find = curve_terms if engine.is_ready() else _curve_terms
-        by_rule, rates = find(channels, both, still, magnitude, _rules(), lifted=frames is not None)
-        if frames is None:
-            drift[part], drift[part.stop] = (channels[6:, 0, 0] / lengths[part]).T, channels[6:, 0, 1, -1]
-            drift[part.stop] /= lengths[part.stop - 1]
-        turning[:, part] = (rates[:, :, 0] / lengths[part]).transpose(1, 2, 0)
-        turning[:, part.stop] = (rates[:, :, 1, -1] / lengths[part.stop - 1]).T
-        dynamic[:, part], slivers[:, part] = by_rule[0]
-        differences += np.abs(by_rule[:2] - by_rule[1:]).sum(axis=-1)
-    late, early = differences
+            which = None if stop - first == total else np.arange(first, stop)
+            channels, _ = end_channels(rotation.interpolant, rotation.steps, which)
+        find(channels, first, directions, frames, lengths, magnitudes, _rules(), pieces)
+    late, early = pieces.differences
     error = _SAFETY_FACTOR * (late * np.minimum(late / (early + _TINY), 1.0)).sum(axis=0)
-    slopes = so3.cross(directions, turning)
-    by_momentum = slopes + so3.cross(directions, drift) if frames is None else slopes
-    return CurveIntegrals(dynamic, slivers, corners, error, slopes, by_momentum, directions)
+    return CurveIntegrals(
+        pieces.dynamic, pieces.slivers, pieces.corners, error, pieces.slopes, pieces.by_momentum, directions
+    )
 
 
-def _curve_terms(
-    channels: Array, directions: Array, corners: Array, magnitudes: Array, rules: Array, *, lifted: bool
-) -> tuple[Array, Array]:
-    """As `fast.curves.curve_terms`."""
-    p, rates = direction_terms(directions, magnitudes, channels)
-    still = np.zeros((3, TERMS, *directions.shape[1:]))
-    still[:, 0] = corners
-    if lifted:
+def _curve_pieces(
+    channels: Array,
+    first: int,
+    directions: Array,
+    frames: Array | None,
+    lengths: Array,
+    magnitudes: Array,
+    rules: Array,
+    found: PiecesOfCurve,
+) -> None:
+    """As `fast.curves.curve_pieces`."""
+    part = slice(first, first + channels.shape[-1])
+    edges, after = slice(part.start, part.stop + 1), slice(part.start + 1, part.stop + 1)
+    found.corners[:, edges] = directions[:, edges] if frames is None else so3.apply(frames[edges], directions[:, edges])
+    ends = directions.transpose(2, 0, 1)
+    both = np.stack([ends[:, :, part], ends[:, :, after]], axis=2)
+    # The piece's first corner, as it is seen from the body at both ends.
+    still = np.zeros((3, TERMS, *both.shape[1:]))
+    still[:, 0] = both[:, :, :1]
+    p, rates = direction_terms(both, magnitudes, channels)
+    if frames is not None:
+        seen = so3.apply(so3.transpose(frames[after]), found.corners[:, part])
+        still[:, 0, :, 1] = seen.transpose(2, 0, 1)
         transported(still, -channels[6:, :, None])
         rates += channels[6:, :, None]
     along = convolved(p, rates)
@@ -111,8 +111,20 @@ def _curve_terms(
             turn[order] -= (cosine[1 : order + 1] * turn[:order][::-1]).sum(axis=0)
         turn[order] /= cosine[0]
     integrands = np.stack([along, along - turn])
-    by_rule = rules @ integrands.transpose(3, 1, 0, 2, 4).reshape(2 * TERMS, -1)
-    return by_rule.reshape(3, 2, *directions.shape[1::2]), rates[:, 0]
+    by_rule = (rules @ integrands.transpose(3, 1, 0, 2, 4).reshape(2 * TERMS, -1)).reshape(3, 2, *both.shape[1::2])
+    found.dynamic[:, part], found.slivers[:, part] = by_rule[0]
+    found.differences[:] += np.abs(by_rule[:2] - by_rule[1:]).sum(axis=-1)
+    turning = _at_edges(rates[:, 0], lengths[part])
+    found.slopes[:, edges] = found.by_momentum[:, edges] = so3.cross(directions[:, edges], turning)
+    if frames is None:
+        drift = _at_edges(channels[6:, 0, None], lengths[part])
+        found.by_momentum[:, edges] += so3.cross(directions[:, edges], drift)
+
+
+def _at_edges(of_pieces: Array, lengths: Array) -> Array:
+    """What is known at both ends of pieces, times their lengths, at the edges: (3, B, 2, N), (N,) -> (B, N + 1, 3)."""
+    rates = of_pieces / lengths
+    return np.concatenate([rates[:, :, 0], rates[:, :, 1, -1:]], axis=-1).transpose(1, 2, 0)
 
 
 @lru_cache(maxsize=1)

@@ -30,7 +30,7 @@ _KERNELS = {
     "momentum_gradients": ".kernels.gradient_kernel",
     "inertial_sums": ".kernels.gradient_kernel",
     "rotations_within_steps": ".kernels.node_kernel",
-    "curve_terms": ".kernels.curve_kernel",
+    "curve_pieces": ".kernels.curve_kernel",
     "times_of_samples": ".kernels.panel_kernel",
     "series_of_panels": ".kernels.panel_kernel",
     "sample_round": ".kernels.panel_kernel",

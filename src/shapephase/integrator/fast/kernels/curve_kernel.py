@@ -1,4 +1,4 @@
-"""Integrals along the momentum's curve, step by step, from Taylor terms at both ends of each step."""
+"""The momentum's curve and the integrals along it, piece by piece, from Taylor terms at both ends of each piece."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from .jit import kernel, part
 _INVERSE = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 """Where the entries of I^-1 stand among the channels."""
 _DRIFT = 6
+_CHANNELS = 9
 
 
 @part
@@ -34,48 +35,83 @@ def _product(a, b, order):
 
 
 @part
-def _directions(channels, side, step, magnitude, p, rates):
+def _directions(channels, magnitude, p, rates):
     """The terms of the momentum's direction, whose first ones are given, and of omega."""
     for order in range(TERMS):
         for i in range(3):
             total = 0.0
             for k in range(order + 1):
                 for j in range(3):
-                    total += channels[_INVERSE[i, j], order - k, side, step] * p[j, k]
-            rates[i, order] = magnitude * total - channels[_DRIFT + i, order, side, step]
+                    total += channels[_INVERSE[i, j], order - k] * p[j, k]
+            rates[i, order] = magnitude * total - channels[_DRIFT + i, order]
         if order + 1 < TERMS:
             _next_cross(p, rates, order, p)
 
 
-@kernel
-def curve_terms(channels, directions, corners, magnitudes, lifted, rules, integrals, first_rates):
-    """The last two arguments are filled.
+@part
+def _cross(a, b, out):
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
-    channels: (9, TERMS, 2, M) of the steps, as `end_channels` gives them
-    directions, corners: (3, B, 2, M) of the momentum at both ends; of the first one as it is seen from both ends
+
+@kernel
+def curve_pieces(
+    channels, first, directions, frames, lengths, magnitudes, rules,
+    dynamic, slivers, corners, slopes, by_momentum, differences,
+):  # fmt: skip
+    """Pieces `first`, `first` + 1, ...; what is in the last line of arguments is filled there, `differences` added to.
+
+    channels: (9, TERMS, 2, N) of N pieces, as `end_channels` gives them
+    directions: (B, M + 1, 3) of the momentum at the ends of all pieces, body axes
+    frames: (M + 1, 3, 3) of the horizontal gauge there, body axes to gauge axes; without any the gauge is the base
+    lengths: (M,) [s]
     magnitudes: (B,)
-    lifted: whether the gauge is the horizontal one, else the base
     rules: (3, 2 TERMS) from Taylor terms at both ends to integrals
-    integrals: (3, 2, B, M) of the dynamic phase and of the sliver, by each rule
-    first_rates: (3, B, 2, M) of the gauge's omega at both ends
+    dynamic, slivers: (B, M); corners, slopes, by_momentum: (B, M + 1, 3); differences: (2, 2, B)
     """
+    lifted = len(frames) > 0
     p, rates, still, drift = np.empty((3, TERMS)), np.empty((3, TERMS)), np.zeros((3, TERMS)), np.empty((3, TERMS))
     terms, turn, cosine = np.empty((2, 2 * TERMS)), np.empty(TERMS), np.empty(TERMS)
+    there, turning, sideways, by_rule = np.empty((_CHANNELS, TERMS)), np.empty(3), np.empty(3), np.empty((3, 2))
     for row in range(len(magnitudes)):
-        for step in range(channels.shape[3]):
+        for piece in range(channels.shape[3]):
+            start = first + piece
             for side in range(2):
+                at = start + side
+                for channel in range(_CHANNELS):
+                    for order in range(TERMS):
+                        there[channel, order] = channels[channel, order, side, piece]
                 for i in range(3):
-                    p[i, 0], still[i, 0] = directions[i, row, side, step], corners[i, row, side, step]
-                _directions(channels, side, step, magnitudes[row], p, rates)
+                    p[i, 0], still[i, 0], corners[row, at, i] = (
+                        directions[row, at, i], directions[row, start, i], directions[row, at, i]
+                    )  # fmt: skip
                 if lifted:
+                    for i in range(3):
+                        corners[row, at, i] = 0.0
+                        for j in range(3):
+                            corners[row, at, i] += frames[at, i, j] * p[j, 0]
+                _directions(there, magnitudes[row], p, rates)
+                if lifted:
+                    if side:
+                        # The piece's first corner, as it is seen from the body at its end.
+                        for i in range(3):
+                            still[i, 0] = 0.0
+                            for j in range(3):
+                                still[i, 0] += frames[at, j, i] * corners[row, start, j]
                     for order in range(TERMS):
                         for i in range(3):
-                            drift[i, order] = -channels[_DRIFT + i, order, side, step]
+                            drift[i, order] = -there[_DRIFT + i, order]
                             rates[i, order] -= drift[i, order]
                     for order in range(TERMS - 1):
                         _next_cross(still, drift, order, still)
                 for i in range(3):
-                    first_rates[i, row, side, step] = rates[i, 0]
+                    turning[i] = rates[i, 0] / lengths[start]
+                _cross(p[:, 0], turning, slopes[row, at])
+                by_momentum[row, at] = slopes[row, at]
+                if not lifted:
+                    for i in range(3):
+                        turning[i] = there[_DRIFT + i, 0] / lengths[start]
+                    _cross(p[:, 0], turning, sideways)
+                    by_momentum[row, at] += sideways
                 for order in range(TERMS):
                     along = _product(p, rates, order)
                     # The rate of the turn about the first corner, a quotient of series.
@@ -85,9 +121,11 @@ def curve_terms(channels, directions, corners, magnitudes, lifted, rules, integr
                         turn[order] -= cosine[order - k] * turn[k]
                     turn[order] /= cosine[0]
                     terms[0, side * TERMS + order], terms[1, side * TERMS + order] = along, along - turn[order]
-            for rule in range(3):
-                for which in range(2):
-                    total = 0.0
+            for which in range(2):
+                for rule in range(3):
+                    by_rule[rule, which] = 0.0
                     for k in range(2 * TERMS):
-                        total += rules[rule, k] * terms[which, k]
-                    integrals[rule, which, row, step] = total
+                        by_rule[rule, which] += rules[rule, k] * terms[which, k]
+                for rule in range(2):
+                    differences[rule, which, row] += abs(by_rule[rule, which] - by_rule[rule + 1, which])
+            dynamic[row, start], slivers[row, start] = by_rule[0, 0], by_rule[0, 1]
