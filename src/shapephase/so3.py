@@ -10,9 +10,9 @@ import numpy as np
 from .arrays import Array, finite_array
 from .errors import ShapeError
 
-_FAR_FROM_OPPOSITE = 0.2
+FAR_FROM_OPPOSITE = 0.2
 """One and the product of two unit vectors: above it half the turn between them is far from a right angle."""
-_OPPOSITE = 1e-8
+OPPOSITE = 1e-8
 """Length of the sum of two unit vectors below which they count as opposite: half of its digits are rounding."""
 _SMALL_SINE = 1e-9
 """Sine of half an angle below which sine and angle agree to the last digit (they differ by a sixth of its cube)."""
@@ -176,7 +176,7 @@ def between(start: Array, end: Array) -> Array:
     """
     start, end = np.broadcast_arrays(start, end)
     scalar = 1.0 + np.einsum("...i,...i->...", start, end)
-    if scalar.min(initial=1.0) > _FAR_FROM_OPPOSITE:
+    if scalar.min(initial=1.0) > FAR_FROM_OPPOSITE:
         return matrix_from_quat(normalised(np.concatenate([cross(start, end), scalar[..., None]], axis=-1)))
     half = middle(start, end)
     # Two turns of at most a quarter each, so that the plane is well determined also for nearly opposite ends.
@@ -217,7 +217,7 @@ def middle(start: Array, end: Array) -> Array:
     """
     total = start + end
     length = np.linalg.norm(total, axis=-1, keepdims=True)
-    opposite = length < _OPPOSITE
+    opposite = length < OPPOSITE
     if not opposite.any():
         return total / length
     return np.where(opposite, perpendicular(start), total / np.where(opposite, 1.0, length))

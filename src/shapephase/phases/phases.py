@@ -22,6 +22,7 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
+from ._closing import closed_curves
 from ._curve_errors import arc_errors, running_errors, split_errors
 from ._deferred import Deferred
 from ._momentum_curve import Gauge, momentum_curve
@@ -99,19 +100,16 @@ def split(
     moving = has_phase[:, None, None]
     start = motion.initial_attitude.reshape(-1, 3, 3)
     end, first, last = curve.end_attitudes
-    departing, arriving = curve.corners[:, 0], curve.corners[:, -1]
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     total = end @ closure @ so3.transpose(start)
     holonomy = start @ lift.end @ closure @ so3.transpose(start)
     dynamical = np.where(moving, total @ so3.transpose(holonomy), np.eye(3))
-    tilt = np.where(moving, first @ so3.between(arriving, departing) @ so3.transpose(first), np.eye(3))
+    closed = closed_curves(curve.corners, curve.references, curve.axis, first, last)
+    tilt = np.where(moving, closed.tilt, np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
-    arcs = sphere.arc_areas(curve.corners, curve.references)
-    area = np.where(has_phase, curve.slivers.sum(axis=1) + arcs.sum(axis=1), 0.0)
-    closing = np.where(has_phase, arcs[:, -2:].sum(axis=1), 0.0)
+    area = np.where(has_phase, curve.slivers.sum(axis=1) + closed.area, 0.0)
     phase = dynamic - area
-    read_off = so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), curve.axis) * has_phase
-    residual = np.abs(so3.wrap(phase - read_off))
+    residual = np.abs(so3.wrap(phase - closed.turn * has_phase))
     matrix = (*batch, 3, 3)
     return PhaseSplit(
         gauge=gauge if isinstance(gauge, str) else "given",
@@ -124,8 +122,8 @@ def split(
         geometric_phase=(0.0 - area).reshape(batch)[()],
         solid_angle=area.reshape(batch)[()],
         tilt=tilt.reshape(matrix),
-        momentum_gap=(so3.angle_between(departing, arriving) * has_phase).reshape(batch)[()],
-        closing_phase=(0.0 - closing).reshape(batch)[()],
+        momentum_gap=(closed.gap * has_phase).reshape(batch)[()],
+        closing_phase=(0.0 - closed.closing * has_phase).reshape(batch)[()],
         shape_gap=deformation.shape_gap,
         residual=residual.reshape(batch)[()],
         is_loop=deformation.closure is not None,

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import CompiledCodeWarning, CompilerError, MissingExtraError
-from . import curves, gradients, loops, marches, nodes, panels, rounds, tree, variants
+from . import closing, curves, gradients, loops, marches, nodes, panels, rounds, tree, variants
 from .cache_folder import kernel_folder
 from .switch import is_installed, is_on, is_wanted, may_compile
 
@@ -31,6 +31,7 @@ _KERNELS = {
     "inertial_sums": ".kernels.gradient_kernel",
     "rotations_within_steps": ".kernels.node_kernel",
     "curve_pieces": ".kernels.curve_kernel",
+    "close_curves": ".kernels.closing_kernel",
     "times_of_samples": ".kernels.panel_kernel",
     "series_of_panels": ".kernels.panel_kernel",
     "sample_round": ".kernels.panel_kernel",
@@ -173,5 +174,6 @@ def _warm() -> None:
     panels.warm()
     curves.warm()
     loops.warm()
+    closing.warm()
     variants.warm()
     rounds.warm()

@@ -1,0 +1,27 @@
+"""Curves of directions closed by great circles."""
+
+from __future__ import annotations
+
+from .. import so3, sphere
+from ..arrays import Array
+from ..integrator.fast import closing, engine
+from ..integrator.fast.closing import ClosedCurves
+
+
+def closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:
+    """As `integrator.fast.closing.closed_curves`."""
+    find = closing.closed_curves if engine.is_ready() else _closed_curves
+    return find(corners, references, axes, first, last)
+
+
+def _closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:
+    departing, arriving = corners[:, 0], corners[:, -1]
+    arcs = sphere.arc_areas(corners, references)
+    tilt = first @ so3.between(arriving, departing) @ so3.transpose(first)
+    return ClosedCurves(
+        area=arcs.sum(axis=1),
+        closing=arcs[:, -2:].sum(axis=1),
+        tilt=tilt,
+        gap=so3.angle_between(departing, arriving),
+        turn=so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), axes),
+    )
