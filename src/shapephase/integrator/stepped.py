@@ -78,10 +78,11 @@ class SteppedRotation:
 
     @cached_property
     def _times(self) -> Array:
-        edges, panel = self.interpolant.edges, self.panel
-        each = np.tile(self.steps, self.interpolant.loops)
-        within = np.arange(len(panel)) - np.repeat(np.cumsum(each) - each, each)
-        return np.append(edges[panel] + (edges[panel + 1] - edges[panel]) * (within / each[panel]), edges[-1])
+        edges, each = self.interpolant.edges, np.tile(self.steps, self.interpolant.loops)
+        done = np.cumsum(each)
+        within = np.arange(done[-1]) - np.repeat(done - each, each)
+        starts, widths = np.repeat(edges[:-1], each), np.repeat(np.diff(edges), each)
+        return np.append(starts + widths * (within / np.repeat(each, each)), edges[-1])
 
     @property
     def error_estimate(self) -> Array:

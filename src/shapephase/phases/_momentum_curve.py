@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -85,6 +85,7 @@ class MomentumCurve(CurvePieces):
     motion : whose momentum it is
     lift : of the horizontal gauge, else None
     frames : U(t) and its rates of another gauge; None too: the deformation's own frame
+    has_phase : (B,) which motions of the batch have momentum
     axis : (B, 3) unit vector of the momentum, inertial axes; any where there is none
     references : (B, 3) for each curve the direction whose opposite is farthest from it
     """
@@ -92,18 +93,9 @@ class MomentumCurve(CurvePieces):
     motion: Motion
     lift: Lift | None
     frames: Frames | None
+    has_phase: Mask
     axis: Array
     references: Array
-
-    @cached_property
-    def magnitude(self) -> Array:
-        """Of the momentum: (B,) [kg m^2/s]."""
-        return np.linalg.norm(self.motion.momentum.reshape(-1, 3), axis=-1)
-
-    @cached_property
-    def has_phase(self) -> Mask:
-        """Which motions of the batch have momentum: (B,)."""
-        return self.magnitude > 0.0
 
     def swept(self, times: Array) -> tuple[Array, Array]:
         """Dynamic phase and area swept from the start to each of these edges: (N,) -> (B, N), (B, N).
@@ -210,12 +202,11 @@ def momentum_curve(
     frames, edges = (None, motion.solution.times) if follows else _frames(motion, gauge)
     spatial = motion.momentum.reshape(-1, 3)
     magnitude = np.linalg.norm(spatial, axis=-1)
-    without = magnitude == 0.0
+    has_phase = magnitude > 0.0
     # Without momentum any axis serves: what depends on it is set to zero.
-    axis = np.where(without[:, None], [0.0, 0.0, 1.0], spatial) / np.where(without, 1.0, magnitude)[:, None]
-    start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
+    axis = np.where(has_phase[:, None], spatial, [0.0, 0.0, 1.0]) / np.where(has_phase, magnitude, 1.0)[:, None]
     goal = np.maximum((_SHARE if times is None else _SHARE_AT_TIMES) * motion.solution.error_estimate, _ROUNDING)
-    integrals = _integrals_of(motion, lift, frames, start, goal)
+    integrals = _integrals_of(motion, lift, frames, axis, goal, at_rest=not has_phase.any())
     found = integrals(edges if times is None else np.union1d(edges, times))
     # Whatever the times, the region that is not counted is the same.
     by_steps = times is not None and follows and isinstance(motion.solution, SteppedRotation)
@@ -228,17 +219,28 @@ def momentum_curve(
         found = _clear(integrals, found, references, _HALVINGS)
     if clear_of_start:
         found = _clear(integrals, found, found.corners[:, 0], _HALVINGS_AT_START)
-    return MomentumCurve(motion=motion, lift=lift, frames=frames, axis=axis, references=references, **vars(found))
+    return MomentumCurve(
+        motion=motion,
+        lift=lift,
+        frames=frames,
+        has_phase=has_phase,
+        axis=axis,
+        references=references,
+        **vars(found),
+    )
 
 
 def _integrals_of(
-    motion: Motion, lift: Lift | None, frames: Frames | None, start: Array, goal: Array
+    motion: Motion, lift: Lift | None, frames: Frames | None, axis: Array, goal: Array, *, at_rest: bool
 ) -> Callable[[Array], CurvePieces]:
     """The integrals between any edges (K + 1,), the ends of the motion's steps among them."""
     solution = motion.solution
-    if not np.linalg.norm(motion.momentum, axis=-1).any():
+    if not at_rest and frames is None and isinstance(solution, SteppedRotation):
+        return lambda edges: _from_steps(solution, lift, edges, goal)
+    start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
+    if at_rest:
 
-        def at_rest(edges: Array) -> CurvePieces:
+        def still_curve(edges: Array) -> CurvePieces:
             still, nothing = np.zeros((len(start), len(edges) - 1)), np.zeros((len(start), len(edges), 3))
             there = np.repeat(start[:, None], len(edges), axis=1)
             return CurvePieces(
@@ -252,9 +254,7 @@ def _integrals_of(
                 body_directions=there,
             )
 
-        return at_rest
-    if frames is None and isinstance(solution, SteppedRotation):
-        return lambda edges: _from_steps(solution, lift, edges, goal)
+        return still_curve
     curve = _curve(motion, lift, frames, start)
     return lambda edges: _by_quadrature(curve, edges, goal)
 

@@ -115,5 +115,5 @@ class PhaseSplit:
 
     @property
     def error_estimates(self) -> SplitErrors:
-        """Of each of these numbers; computed when they are first looked at, for about half of what the split took."""
+        """Of each of these numbers; computed when first looked at, which takes once or twice as long as the split."""
         return self._errors.value
