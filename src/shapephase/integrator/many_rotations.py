@@ -182,7 +182,7 @@ def _integrated(
     failed, found = np.flatnonzero(~done), []
     if len(failed) < len(estimates):
         passed = np.flatnonzero(done)
-        found.append(RotationPart(rows[passed], of_rows(attempt.rotation, passed)))
+        found.append(RotationPart(rows[passed], of_rows(attempt.rotation, passed, threads)))
     return found, list(_further(group, integration, sampler, attempt, failed, len(momentum)))
 
 

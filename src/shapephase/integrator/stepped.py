@@ -15,6 +15,7 @@ from ._error_propagator import momentum_slope
 from ._last_terms import Perturbed
 from ._step_loop import stage_channels
 from .fast.estimate_constants import DENSE_SHARE
+from .fast.threads import in_threads
 from .interpolant import Interpolant
 
 _BATCHED_FIELDS = (
@@ -202,7 +203,15 @@ def for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotati
     return replace(solution, momentum=momentum, **broadcast)
 
 
-def of_rows(solution: SteppedRotation, rows: Integers) -> SteppedRotation:
-    """The solution for some of its momenta."""
-    chosen = {name: getattr(solution, name)[rows] for name in ("momentum", *_BATCHED_FIELDS)}
+def of_rows(solution: SteppedRotation, rows: Integers, threads: int | None = None) -> SteppedRotation:
+    """The solution for some of its momenta; `threads` : that copy, as of `in_threads`."""
+    whole = {name: getattr(solution, name) for name in ("momentum", *_BATCHED_FIELDS)}
+    chosen = {name: np.empty((len(rows), *values.shape[1:])) for name, values in whole.items()}
+
+    def copy(part: slice) -> None:
+        for name, values in whole.items():
+            values.take(rows[part], axis=0, out=chosen[name][part], mode="clip")
+
+    for _ in in_threads(copy, len(rows), 1, threads):
+        pass
     return replace(solution, **chosen)

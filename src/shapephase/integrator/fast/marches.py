@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from importlib import import_module
 from typing import Any
@@ -15,14 +12,11 @@ from ... import run_progress
 from ...arrays import Array, Integers
 from ..step_record import StepRecord
 from ._plain import plain
+from .threads import in_threads
 
 # Steps of a chunk, whose channels stay in the processor's cache: for many momenta, and where a loop is repeated.
 _SEGMENTS_OF_MANY = 8
 _SEGMENTS_OF_LOOPS = 64
-# Momenta for a thread of its own: some milliseconds of work.
-_LEAST_FOR_A_THREAD = 128
-# Momenta in one call: some tenths of a second, after which a run that is watched says so.
-_MOST_AT_ONCE = 8192
 
 
 def march_in_threads(
@@ -73,7 +67,7 @@ def march_in_threads(
         )  # fmt: skip
 
     run_progress.begin(run_progress.STEPPING, max(batch, 1))
-    for rows in _in_threads(run, batch, module.LANES, threads):
+    for rows in in_threads(run, batch, module.LANES, threads):
         run_progress.advance(rows.stop - rows.start)
     return whole
 
@@ -106,7 +100,7 @@ def growths_and_rounding(propagators: Array, quaternions: Array, threads: int | 
     def run(rows: slice) -> None:
         find(matrices[rows], ends[rows], growths[rows], rounding[rows])
 
-    for _ in _in_threads(run, batch, 1, threads):
+    for _ in in_threads(run, batch, 1, threads):
         pass
     return growths, rounding
 
@@ -160,33 +154,3 @@ def warm() -> None:
 def segments_of(batch: int, loops: int) -> int:
     """How many segments a chunk of steps has."""
     return _SEGMENTS_OF_LOOPS if loops > 1 else 1 if batch == 1 else _SEGMENTS_OF_MANY
-
-
-def _in_threads(run: Callable[[slice], None], batch: int, lanes: int, threads: int | None) -> Iterator[slice]:
-    """Run for all rows, a part of them in each call, in threads where there are enough; the rows that are done."""
-    workers = _workers(batch, threads)
-    parts = _parts(batch, lanes, workers)
-    if workers == 1 or len(parts) == 1:
-        for rows in parts:
-            run(rows)
-            yield rows
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        for rows, _ in zip(parts, pool.map(run, parts), strict=True):
-            yield rows
-
-
-def _workers(batch: int, threads: int | None) -> int:
-    return max(1, min(processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
-
-
-def _parts(batch: int, lanes: int, workers: int) -> list[slice]:
-    """The rows for each call, whole groups of lanes: one call for each thread, or as many as show progress."""
-    each = min(-(-batch // (workers * lanes)) * lanes, -(-_MOST_AT_ONCE // lanes) * lanes)
-    return [slice(first, min(first + each, batch)) for first in range(0, max(batch, 1), each or 1)]
-
-
-@lru_cache(maxsize=1)
-def processors() -> int:
-    """That this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -24,7 +24,7 @@ from .._spectral_error import spectral_norms
 from .._step_control import StepRequirements, even_steps
 from .._step_loop import checkpoint_steps, integrate_steps
 from ..fast import engine
-from ..fast.marches import processors
+from ..fast.threads import processors
 from ..fast.variants import march_variants
 from ..integrate import norms
 from ..interpolant import Interpolant
