@@ -10,11 +10,23 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._rotation_step import STAGES, attitude_step
-from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, momentum_step_function
+from ._step_loop import BLOCK, CHECKPOINTS, checkpoint_steps, momentum_step_function
 from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
 from .fast.marches import derivatives, growths_and_rounding
+
+# Of each entry of an adjugate, row by row: first times second less third times fourth of these entries.
+_COFACTORS = np.array(
+    [
+        [4, 2, 1, 5, 0, 2, 3, 1, 0],
+        [8, 7, 5, 6, 8, 3, 7, 6, 4],
+        [5, 1, 2, 3, 2, 0, 4, 0, 1],
+        [7, 8, 4, 8, 6, 5, 6, 7, 3],
+    ]
+)
+# Of the products of squares of propagators: six digits.
+_FEW_DIGITS_LOST = 1e6
 
 
 def growth_and_rounding(
@@ -71,10 +83,24 @@ def _growths_and_rounding(propagators: Array, quaternions: Array) -> tuple[Array
 
 def _growth_between(propagators: Array) -> Array:
     """The growth of errors from each checkpoint to each: (B, M, 3, 3) -> (B, to, from)."""
-    adjugates = np.moveaxis(np.array(adjugate_of(np.moveaxis(propagators, (2, 3), (0, 1)))), (0, 1), (2, 3))
-    between = propagators[:, :, None] @ adjugates[:, None]
-    half = np.maximum(0.5 * (np.einsum("bjkmn,bjkmn->bjk", between, between) - 1.0), 1.0)
+    adjugates = _adjugates(propagators)
+    # Of a product the sum of squares is the scalar product of two matrices of squares, where these are not so large
+    # that their digits cancel.
+    later, earlier = np.swapaxes(propagators, 2, 3) @ propagators, adjugates @ np.swapaxes(adjugates, 2, 3)
+    if later.max(initial=0.0) * earlier.max(initial=0.0) < _FEW_DIGITS_LOST:
+        squares = later.reshape(*later.shape[:2], 9) @ np.swapaxes(earlier.reshape(*earlier.shape[:2], 9), 1, 2)
+    else:
+        between = propagators[:, :, None] @ adjugates[:, None]
+        squares = np.einsum("bjkmn,bjkmn->bjk", between, between)
+    half = np.maximum(0.5 * (squares - 1.0), 1.0)
     return np.asarray(np.sqrt(half + np.sqrt(half * half - 1.0)))
+
+
+def _adjugates(matrices: Array) -> Array:
+    """(B, M, 3, 3) -> (B, M, 3, 3)."""
+    flat = matrices.reshape(*matrices.shape[:2], 9)
+    first, second, third, fourth = (flat[..., place] for place in _COFACTORS)
+    return (first * second - third * fourth).reshape(matrices.shape)
 
 
 def _turns(quaternions: Array) -> Array:

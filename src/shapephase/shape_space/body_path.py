@@ -66,10 +66,10 @@ def path_samplers(body: Body | ParticleBody, path: ShapePath) -> Samplers:
     """The same, as many as are needed."""
 
     def evaluate(times: Array) -> tuple[Array, Array]:
-        return body.sample(*path.curve(times))
+        return body.sample(*path.at_samples(times))
 
     def directly(times: Array) -> Array | None:
-        return channels_at(body, *path.curve(times))
+        return channels_at(body, *path.at_samples(times))
 
     smoothness = replace(path.smoothness, knots=recorded_path(body, path))
     return Samplers(evaluate, **vars(smoothness), directly=directly)
