@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from ..arrays import Array, Integers, Mask, lock_arrays
 from ..chebyshev import chebyshev, local_coordinate, unit_nodes, values_to_coefficients
+
+Made = TypeVar("Made")
 
 # Of the series of a panel: about what a sampler at 1e-9 rad asks for.
 DEGREE = 32
@@ -97,9 +99,8 @@ class ResolvedPath:
 
     def first_panels(self, tolerance: float) -> FirstPanels:
         """The panels and degrees with the fewest samples that leave less than `tolerance` [rad] of the path hidden."""
-        if tolerance not in self._first:
-            _remember(self._first, tolerance, self._chosen(tolerance))
-        return self._first[tolerance]
+        found = self._first.get(tolerance)
+        return _remembered(self._first, tolerance, self._chosen(tolerance)) if found is None else found
 
     def _chosen(self, tolerance: float) -> FirstPanels:
         tails = self._tails(self.coefficients) + self.misfit.max(axis=1)[:, None]
@@ -130,9 +131,8 @@ class ResolvedPath:
     def hidden(self, left: Array, right: Array, degree: Integers) -> Hidden:
         """What of the path lies beyond the degrees (P,) of panels [rad]; of degree zero nothing does."""
         key = degree.tobytes(), left.tobytes(), right.tobytes()
-        if key not in self._hidden:
-            _remember(self._hidden, key, self._found_hidden(left, right, degree))
-        return self._hidden[key]
+        found = self._hidden.get(key)
+        return _remembered(self._hidden, key, self._found_hidden(left, right, degree)) if found is None else found
 
     def _found_hidden(self, left: Array, right: Array, degree: Integers) -> Hidden:
         rows, half = self._smallest_around(left, right), 0.5 * (right - left)
@@ -215,11 +215,12 @@ class ResolvedPath:
             rows = np.where(holds, half, rows)
 
 
-def _remember(known: dict[Any, Any], key: Any, value: Any) -> None:
-    """Keep a result for the next motion along the same path."""
+def _remembered(known: dict[Any, Any], key: Any, value: Made) -> Made:
+    """Keep a result for the next motion along the same path, which may be in another thread."""
     if len(known) >= _MOST_REMEMBERED:
         known.clear()
     known[key] = value
+    return value
 
 
 def joined(paths: Sequence[ResolvedPath]) -> ResolvedPath:

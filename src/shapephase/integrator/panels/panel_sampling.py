@@ -121,11 +121,13 @@ class PanelSampler:
             ends = series.left, series.right, np.empty(0)
             return PanelsToSample(np.arange(count), np.ones(count, dtype=np.int64), series.degree, *ends)
         key = tolerance, self._breaks.tobytes(), self._oscillations, self._resolved is None
-        if key not in self._known:
+        found = self._known.get(key)
+        if found is None:
+            found = self._panels_at_first(tolerance)
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
-            self._known[key] = self._panels_at_first(tolerance)
-        return self._known[key]
+            self._known[key] = found
+        return found
 
     def _panels_at_first(self, tolerance: float) -> PanelsToSample:
         degree, left, right = self._first_panels(tolerance)
