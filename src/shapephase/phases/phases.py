@@ -17,12 +17,12 @@ from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
+from ..integrator.closing import closed_curves
 from ..letters import what_came
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
-from ._closing import closed_curves
 from ._curve_errors import arc_errors, running_errors, split_errors
 from ._deferred import Deferred
 from ._momentum_curve import Gauge, momentum_curve

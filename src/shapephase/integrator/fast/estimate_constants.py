@@ -93,11 +93,11 @@ MOST_EXPECTED_GROWTH = 30.0
 
 # ---- Another round -------------------------------------------------------------------------------------------------
 
-MOST_STEPPING = 0.6
+MOST_STEPPING = 0.5
 """Of the room that rounding leaves: what the error of the steps may take up of a round that is not good enough."""
 MOST_SAMPLING = 0.4
 """And that of the samples."""
-REFINED = 0.6
+REFINED = 0.5
 """Of that room: what a further round aims at."""
 INFORMATIVE_ERROR = 0.1
 """[rad] distance of coarser steps up to which the propagators of the steps are trusted."""

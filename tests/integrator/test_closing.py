@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shapephase import so3
-from shapephase.phases._closing import closed_curves
+from shapephase.integrator.closing import closed_curves
 from support.both_engines import both
 
 EPS = np.finfo(float).eps

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from .. import so3, sphere
 from ..arrays import Array
-from ..integrator.fast import closing, engine
-from ..integrator.fast.closing import ClosedCurves
+from .fast import closing, engine
+from .fast.closing import ClosedCurves
 
 
 def closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:
-    """As `integrator.fast.closing.closed_curves`."""
+    """As `fast.closing.closed_curves`."""
     find = closing.closed_curves if engine.is_ready() else _closed_curves
     return find(corners, references, axes, first, last)
 
