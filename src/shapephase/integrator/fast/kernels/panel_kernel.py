@@ -87,6 +87,21 @@ def _move_ends(values, matrix, rows, shift, out):
 
 
 @part
+def error_by_tail(largest, middle, tail, weighted, degree, rounding):
+    """Of a spectrum's largest, middle and last terms, and of the sum of degrees times terms: as `estimate_tail`.
+
+    Error and decay; whether it converges, whether its tail is rounding; what rounding alone leaves.
+    """
+    floor = ROUNDING * largest + 4.0 * rounding * weighted
+    decay = math.log(max(middle, TINY) / max(tail, TINY)) * (2.0 / degree)
+    beyond = 2.0 * tail / math.expm1(max(decay, TINY))
+    rounded = tail <= floor
+    error = max(min(beyond, (2.0 if rounded else float(degree)) * tail), LEAST_OF_FLOOR * floor)
+    converging = rounded or tail < CONVERGED_TAIL * middle
+    return error, math.inf if rounded else max(decay, 0.0), converging, rounded, floor
+
+
+@part
 def _estimate(series, degree, rounding, out):
     """The errors of a panel's series by its tail, as `estimate_spectra` has them."""
     out[DECAY], out[CONVERGING], out[AT_ROUNDING] = math.inf, 1.0, 1.0
@@ -105,16 +120,12 @@ def _estimate(series, degree, rounding, out):
                 middle = max(middle, size)
             if k > start:
                 tail = max(tail, size)
-        floor = ROUNDING * largest + 4.0 * rounding * weighted
-        decay = math.log(max(middle, TINY) / max(tail, TINY)) * (2.0 / degree)
-        beyond = 2.0 * tail / math.expm1(max(decay, TINY))
-        rounded = tail <= floor
-        out[INVERSE + which] = max(min(beyond, (2.0 if rounded else float(degree)) * tail), LEAST_OF_FLOOR * floor)
+        error, decay, converging, rounded, floor = error_by_tail(largest, middle, tail, weighted, degree, rounding)
+        out[INVERSE + which], out[DECAY] = error, min(out[DECAY], decay)
         if not rounded:
-            out[DECAY] = min(out[DECAY], max(decay, 0.0))
             out[AT_ROUNDING] = 0.0
-            if not tail < CONVERGED_TAIL * middle:
-                out[CONVERGING] = 0.0
+        if not converging:
+            out[CONVERGING] = 0.0
         out[INVERSE_NORM + which], out[FLOOR + which] = largest, floor
 
 
