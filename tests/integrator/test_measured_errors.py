@@ -14,6 +14,8 @@ from shapephase.integrator._even_sampling import EvenSampler
 from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._spectral_error import Channels
 from shapephase.integrator._step_control import StepRequirements, even_steps
+from shapephase.integrator.fast.estimate_constants import DENSE_SHARE
+from shapephase.integrator.integrate import Errors, Integration, Refinement
 from shapephase.integrator.interpolant import Interpolant
 from support.compiler import needs_compiler
 from support.independent import random_rotation
@@ -226,3 +228,28 @@ def test_a_body_at_rest_and_a_momentum_of_zero_are_one_motion():
     moving = sp.reconstruct(deformation, [0.0, 0.0, 1e-18], tolerance=1e-11)
     gap = so3.angle(rest.final_attitude.T @ moving.final_attitude)
     assert gap <= rest.error_estimate + moving.error_estimate
+
+
+class _SaysOfItself:
+    """A sampler of which only its own error is asked."""
+
+    def error(self, momentum: float) -> float:
+        return 1e-9 * (1.0 + momentum)
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.3, 0.85])
+def test_what_is_above_the_tolerance_is_made_finer(rounding: float):
+    """Samples or steps, however both share the error: else the next round would be the same."""
+    tolerance, before = 1e-9, Refinement(2e-9, 1.0, 1.0)
+    for share in np.linspace(0.0, 1.0, 4001):
+        rest = (1.0 - rounding) * tolerance
+        sampling, stepping = share * rest, (1.0 - share) * rest
+        errors = Errors(
+            estimate=(1.0 + DENSE_SHARE) * tolerance, sampling=sampling, stepping=stepping,
+            rounding=rounding * tolerance, amplification=1.0, distance=1e-6, order=8.0, rounded_up=1.0,
+        )  # fmt: skip
+        integration = Integration(
+            _SaysOfItself(), np.array([[0.0, 0.0, 1.0]]), tolerance, ceiling=1.0, refinement=before
+        )
+        after = integration.refined(errors)
+        assert after.finer > before.finer or after.sampling_target < _SaysOfItself().error(1.0)

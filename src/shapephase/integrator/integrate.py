@@ -23,6 +23,7 @@ from ._step_control import StepRequirements, even_steps
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .fast import engine
 from .fast.estimate_constants import (
+    DENSE_SHARE,
     EXPECTED_GROWTH,
     INFORMATIVE_ERROR,
     LITTLE_ROUNDING,
@@ -340,7 +341,8 @@ class Integration:
     def refined(self, errors: Errors) -> Refinement:
         """Finer steps and samples for the next round."""
         target, finer, growth = self._refinement
-        room = max(self._tolerance - errors.rounding, 0.1 * self._tolerance)
+        # What the polynomials between the ends of steps may add is not theirs to take.
+        room = max(self._tolerance / (1.0 + DENSE_SHARE) - errors.rounding, 0.1 * self._tolerance)
         if errors.stepping > MOST_STEPPING * room:
             shorter = (errors.stepping / (REFINED * room)) ** (1.0 / errors.order)
             # So much finer that steps are more, too.
