@@ -70,7 +70,7 @@ def test_the_error_of_steps_is_within_its_estimate_and_not_far_below(tolerance: 
     requirements = StepRequirements.from_interpolant(interpolant, 0.0, tolerance)
     estimate, finer = np.inf, 1.0
     while estimate > tolerance:
-        steps = even_steps(finer * requirements.plan(tolerance), 1)
+        steps = even_steps(finer * requirements.plan(tolerance))
         record = step_loop.integrate_steps_at_rest(interpolant, None, steps)
         (estimate,) = requirements.stepping_error(steps, record.stepping)
         finer *= 1.1

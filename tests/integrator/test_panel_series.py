@@ -164,7 +164,7 @@ def test_kernels_and_arrays_are_one_formula(monkeypatch: pytest.MonkeyPatch, see
         errors = panel_errors(series, hidden, momentum)
         interpolant = Interpolant(EDGES, series.coefficients, 1, 0)
         needed = StepRequirements.from_interpolant(interpolant, momentum, tolerance)
-        steps = even_steps(needed.plan(tolerance, short=seed % 2 == 0), 1)
+        steps = even_steps(needed.plan(tolerance, short=seed % 2 == 0))
         distances = 10.0 ** np.arange(-14.0, 0.0)
         return SimpleNamespace(
             coefficients=series.coefficients,

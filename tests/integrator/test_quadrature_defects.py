@@ -127,6 +127,6 @@ def test_a_plan_looks_ahead(monkeypatch: pytest.MonkeyPatch, request: pytest.Fix
     coefficients = rng.normal(size=(4, 24, 9)) * 10.0 ** -np.linspace(0.0, 8.0, 24)[:, None]
     interpolant = Interpolant(np.linspace(0.0, 1.0, 5), coefficients, 1, 0)
     needed = StepRequirements.from_interpolant(interpolant, 0.0, tolerance)
-    steps = even_steps(needed.plan(tolerance), 1)
+    steps = even_steps(needed.plan(tolerance))
     assert steps.sum() <= FEW_STEPS
     assert needed.defects(steps).foreseen(1) <= 1.5 * FORESEEN * tolerance

@@ -91,7 +91,7 @@ class StepRequirements:
         least = np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step)
         planned = np.maximum(np.maximum(planned, least), 1.0)
         for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
-            found = self.defects(even_steps(planned, 1))
+            found = self.defects(even_steps(planned))
             excess = found.foreseen(self.loops) / (FORESEEN * tolerance)
             if not excess > 1.0:
                 break
@@ -129,7 +129,6 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
 
 
-def even_steps(planned: Array, subdivide: Integers | int) -> Integers:
-    """Whole numbers of steps on each panel that are even, and multiples of `subdivide`: (P,) -> (P,)."""
-    least = np.lcm(subdivide, 2)
-    return least * np.ceil(planned / least).astype(int)
+def even_steps(planned: Array) -> Integers:
+    """Whole and even numbers of steps on each panel: (P,) -> (P,)."""
+    return 2 * np.ceil(0.5 * planned).astype(int)

@@ -52,16 +52,13 @@ _MOST_FORESEEN = 1e4
 _MOST_ROUNDING = 0.9
 
 
-def stepped_rotation(
-    sampler: Sampler, momentum: Array, tolerance: float, *, subdivide: Integers | None = None
-) -> SteppedRotation:
+def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> SteppedRotation:
     """Integrate the attitude equation to a tolerance, sampling the deformation as far as that needs.
 
     Parameters
     ----------
     momentum : (B, 3) body angular momentum at the start [kg m^2/s]
     tolerance : of the attitude over the whole interval [rad]
-    subdivide : (P,) steps on each panel of finished samples, whose ends are to be ends of steps
 
     Raises
     ------
@@ -78,7 +75,7 @@ def stepped_rotation(
     2.000000000
     """
     ceiling = float(norms(momentum).max(initial=0.0))
-    return Integration(sampler, momentum, tolerance, ceiling=ceiling, subdivide=subdivide).solution()
+    return Integration(sampler, momentum, tolerance, ceiling=ceiling).solution()
 
 
 def norms(momentum: Array) -> Array:
@@ -153,7 +150,6 @@ class Integration:
 
     Parameters
     ----------
-    subdivide : as in `stepped_rotation`
     ceiling : samples and steps are made for it, and no momentum is larger [kg m^2/s]
     threads : at most, for many momenta; None: one for each processor
     refinement : from earlier rounds
@@ -166,12 +162,10 @@ class Integration:
         tolerance: float,
         *,
         ceiling: float,
-        subdivide: Integers | None = None,
         threads: int | None = None,
         refinement: Refinement | None = None,
     ) -> None:
         self._sampler, self._momentum, self._tolerance = sampler, momentum, tolerance
-        self._subdivide = subdivide
         self._magnitudes = norms(momentum)
         self._largest, self._threads = ceiling, threads
         self._refinement = refinement or Refinement.at_first(tolerance)
@@ -236,7 +230,7 @@ class Integration:
 
     def _rounds_of_one(self, interpolant: Interpolant, perturbed: Perturbed, expected: float) -> Round | None:
         """As `_round`, of one momentum in machine code, in as many rounds as steps alone need; None: not with that."""
-        alone = len(self._momentum) == 1 and self._subdivide is None and engine.is_ready()
+        alone = len(self._momentum) == 1 and engine.is_ready()
         if not alone or (self._largest == 0.0 and interpolant.loops > 1):
             return None
         # What is below by any growth that is foreseen is not looked at.
@@ -311,7 +305,7 @@ class Integration:
             growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
-        steps = even_steps(planned, 1 if self._subdivide is None else self._subdivide)
+        steps = even_steps(planned)
         if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         return steps, float(planned.sum())
@@ -379,7 +373,7 @@ def _propagators_by_derivative(interpolant: Interpolant, momentum: Array, larges
     """
     magnitudes = norms(momentum)
     requirements = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE)
-    steps = even_steps(requirements.plan(LOOSEST_TOLERANCE), 1)
+    steps = even_steps(requirements.plan(LOOSEST_TOLERANCE))
     channels, directions = stage_channels(interpolant, steps), _directions(momentum, magnitudes)
     with np.errstate(all="ignore"):
         return exact_propagators(channels, directions, magnitudes, interpolant.loops)

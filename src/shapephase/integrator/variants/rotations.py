@@ -271,7 +271,7 @@ class _Plan:
             needed = self.requirements(turning)
             planned = needed.plan(self.tolerance, short=self.ceiling > 0.0 and needed.far)
             many = needed.very_far or needed.loops * float(planned.sum()) > _MANY_STEPS
-            self._steps[turning] = None if many else even_steps(planned, 1)
+            self._steps[turning] = None if many else even_steps(planned)
         return self._steps[turning]
 
 
