@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,6 +30,12 @@ NONE = np.zeros(0, dtype=int)
 EPS = np.finfo(float).eps
 
 
+def pair_ends(count: int) -> list[int]:
+    """Of steps taken two at a time; before the one that is alone are as many pairs as after it, or one more."""
+    before = (count // 2 + 1) // 2 if count % 2 else count // 2
+    return [*range(0, 2 * before + 1, 2), *range(2 * before + 1, count + 1, 2)]
+
+
 class Path:
     """Random series of a body that changes: three panels of different widths, degree eleven."""
 
@@ -42,12 +49,12 @@ class Path:
     def channels(self, panel, x, series=None):
         return chebyshev.chebval(x, (self.series if series is None else series)[panel])
 
-    def stages(self, steps, series=None):
-        """Of every step its channels at the stages, times its length: (K, 12, 9)."""
+    def stages(self, steps, series=None, together=1):
+        """Of every step its channels at the stages, times its length: (K, 12, 9); or of two at a time."""
         for panel, (count, width) in enumerate(zip(steps, self.widths, strict=True)):
-            for k in range(count):
-                x = 2.0 * (k + DOP853.C[:STAGES]) / count - 1.0
-                yield width / count * self.channels(panel, x, series).T
+            for start, end in pairwise(range(count + 1) if together == 1 else pair_ends(count)):
+                x = 2.0 * (start + (end - start) * DOP853.C[:STAGES]) / count - 1.0
+                yield (end - start) * width / count * self.channels(panel, x, series).T
 
     def march(self, directions, magnitudes, *, loops=1, marks=NONE, perturbed=None, threads=None, steps=None):
         steps = self.steps if steps is None else steps
@@ -66,11 +73,11 @@ def momenta(rng, count, largest=6.0):
     return directions / np.linalg.norm(directions, axis=1)[:, None], rng.uniform(0.1, largest, count)
 
 
-def in_python(path, direction, magnitude, steps, series=None, loops=1):
+def in_python(path, direction, magnitude, steps, series=None, loops=1, together=1):
     """The same steps, one operation after another."""
     quaternion, found, turns, dynamics = [0.0, 0.0, 0.0, 1.0], [[0.0, 0.0, 0.0, 1.0]], [], []
     directions = [list(direction)]
-    for channels in [*path.stages(steps, series)] * loops:
+    for channels in [*path.stages(steps, series, together)] * loops:
         end, turn, dynamic = momentum_step(directions[-1], magnitude, channels.tolist())[:3]
         quaternion = turned(quaternion, directions[-1], end, (np.sin(0.5 * turn), np.cos(0.5 * turn)))
         found.append(quaternion)
@@ -94,9 +101,15 @@ def test_the_steps_are_those_in_plain_python(path, rng, count):
         assert np.abs(found.dynamics[row] - dynamics).max() < 500.0 * EPS
 
 
+@pytest.mark.parametrize("steps", [[6, 2, 40], [3, 2, 15], [5, 13, 7]])
 @pytest.mark.parametrize("what", ["last terms left out", "all terms", "three terms more", "five terms more"])
-def test_the_differences_are_those_of_the_coarser_marches(path, rng, what):
+def test_the_differences_are_those_of_the_coarser_marches(path, rng, what, steps):
+    """Of steps taken two at a time, one of an odd number alone."""
     directions, magnitudes = momenta(rng, 9)
+    path.steps = np.array(steps)
+    ends = [0]
+    for count in steps:
+        ends += [ends[-1] + end for end in pair_ends(count)[1:]]
     perturbed = path.series.copy()
     if what == "last terms left out":
         perturbed[:, -2:] = 0.0
@@ -108,10 +121,10 @@ def test_the_differences_are_those_of_the_coarser_marches(path, rng, what):
     found = path.march(directions, magnitudes, perturbed=perturbed)
     for row in range(9):
         start = directions[row], magnitudes[row]
-        whole, half = in_python(path, *start, path.steps)[0], in_python(path, *start, path.steps // 2)[0]
-        other = in_python(path, *start, path.steps // 2, perturbed)[0]
-        assert angle(whole[::2], half) == pytest.approx(found.stepping[row], rel=1e-9, abs=4000.0 * EPS)
-        assert angle(half, other) == pytest.approx(found.truncation[row], rel=1e-9, abs=4000.0 * EPS)
+        whole, pairs = (in_python(path, *start, path.steps, together=n)[0] for n in (1, 2))
+        other = in_python(path, *start, path.steps, perturbed, together=2)[0]
+        assert angle(whole[ends], pairs) == pytest.approx(found.stepping[row], rel=1e-9, abs=4000.0 * EPS)
+        assert angle(pairs, other) == pytest.approx(found.truncation[row], rel=1e-9, abs=4000.0 * EPS)
     assert found.truncation.min() > 1e-6
     assert not path.march(directions, magnitudes).truncation.any()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import DOP853
 
 import shapephase as sp
 from shapephase import so3
@@ -13,7 +14,7 @@ from shapephase.integrator._error_propagator import growth_and_rounding, largest
 from shapephase.integrator._even_sampling import EvenSampler
 from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._spectral_error import Channels
-from shapephase.integrator._step_control import StepRequirements, even_steps
+from shapephase.integrator._step_control import StepRequirements, whole_steps
 from shapephase.integrator.fast.estimate_constants import DENSE_SHARE
 from shapephase.integrator.integrate import Errors, Integration, Refinement
 from shapephase.integrator.interpolant import Interpolant
@@ -22,6 +23,14 @@ from support.independent import random_rotation
 from support.long_runs import full_but
 
 EPS = np.finfo(float).eps
+# The ends of pairs of an odd number of steps.
+MIDDLE_ALONE = {
+    3: [0, 2, 3],
+    5: [0, 2, 3, 5],
+    7: [0, 2, 4, 5, 7],
+    13: [0, 2, 4, 6, 7, 9, 11, 13],
+    15: [0, 2, 4, 6, 8, 9, 11, 13, 15],
+}
 
 
 def about_one_axis(coefficients: np.ndarray, edges: np.ndarray) -> Interpolant:
@@ -70,7 +79,7 @@ def test_the_error_of_steps_is_within_its_estimate_and_not_far_below(tolerance: 
     requirements = StepRequirements.from_interpolant(interpolant, 0.0, tolerance)
     estimate, finer = np.inf, 1.0
     while estimate > tolerance:
-        steps = even_steps(finer * requirements.plan(tolerance))
+        steps = whole_steps(finer * requirements.plan(tolerance))
         record = step_loop.integrate_steps_at_rest(interpolant, None, steps)
         (estimate,) = requirements.stepping_error(steps, record.stepping)
         finer *= 1.1
@@ -79,16 +88,38 @@ def test_the_error_of_steps_is_within_its_estimate_and_not_far_below(tolerance: 
     assert estimate <= 1000.0 * error + 0.02 * tolerance
 
 
-def test_steps_are_as_far_from_half_as_many_as_their_difference_says():
-    """The record's number is the largest angle between the two integrations at the times that they share."""
+@pytest.mark.parametrize("fast", ["0", "1"])
+@pytest.mark.parametrize("steps", [[4, 8], [3, 4], [2, 5], [13, 15], [32, 7]])
+def test_steps_are_as_far_from_pairs_as_their_difference_says(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, steps: list[int], fast: str
+):
+    """About one axis an angle is a sum by the formula's weights, of steps as of pairs, one in the middle being alone.
+
+    The record's number is the largest difference of such sums at the ends of pairs.
+    """
+    if fast == "1":
+        request.getfixturevalue("fast")
+    else:
+        monkeypatch.setenv("SHAPEPHASE_FAST", "0")
     rng = np.random.default_rng(3)
-    interpolant = about_one_axis(rng.normal(size=(2, 20)) * np.exp(-0.3 * np.arange(20.0)), np.array([0.0, 1.0, 2.0]))
-    steps = np.array([4, 8])
-    record = step_loop.integrate_steps_at_rest(interpolant, None, steps)
-    half = step_loop.integrate_steps_at_rest(interpolant, None, steps // 2)
-    gap = np.abs(so3.wrap(turned_by(record.quaternions[0, ::2]) - turned_by(half.quaternions[0])))
-    # Of quaternions four times the squared sine of a quarter of the angle: short of it by a 24th of its square.
-    assert record.stepping[0] == pytest.approx(gap.max(), rel=gap.max() ** 2 / 20.0 + 1e-12)
+    # So slow that what a step makes of its stages is their sum, but for the angle's square.
+    series = 1e-3 * rng.normal(size=(2, 20)) * np.exp(-0.3 * np.arange(20.0))
+    record = step_loop.integrate_steps_at_rest(about_one_axis(series, np.arange(3.0)), None, np.array(steps))
+
+    def by_weights(ends: list[np.ndarray]) -> np.ndarray:
+        turns = []
+        for panel, places in enumerate(ends):
+            for left, length in zip(places[:-1], np.diff(places), strict=True):
+                stages = 2.0 * (left + length * DOP853.C[:12]) - 1.0
+                turns.append(length * float(DOP853.B @ np.polynomial.chebyshev.chebval(stages, series[panel])))
+        return np.cumsum(turns)
+
+    single = [np.arange(count + 1) / count for count in steps]
+    paired = [places[MIDDLE_ALONE.get(len(places) - 1, slice(None, None, 2))] for places in single]
+    shared = np.concatenate([panel + ends[1:] for panel, ends in enumerate(paired)])
+    every = np.concatenate([panel + ends[1:] for panel, ends in enumerate(single)])
+    gap = np.abs(by_weights(single)[np.searchsorted(every, shared)] - by_weights(paired))
+    assert record.stepping[0] == pytest.approx(gap.max(), rel=1e-5)
     assert record.truncation[0] == 0.0
 
 

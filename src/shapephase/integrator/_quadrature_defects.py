@@ -1,7 +1,8 @@
-"""What the steps' formula misses of each term of a Chebyshev series: how errors fall when steps are halved.
+"""What the steps' formula misses of each term of a Chebyshev series: how errors fall when steps are more.
 
 Of a motion about one axis the error of steps is the defect of a quadrature, term by term. Of any other motion the sum
-of these defects is no measure of the error itself, but from half as many steps to all of them it falls as that does.
+of these defects is no measure of the error itself, but from steps taken two at a time to single ones it falls as that
+does.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from .fast.estimate_constants import (
     TINY,
     UNRESOLVED,
 )
+from .step_record import ends_of_pairs
 
 # Of sums of stages by weights up to six.
 _ROUNDING = 1e-14
@@ -34,20 +36,28 @@ _ROUNDING = 1e-14
 
 @lru_cache(maxsize=1)
 def defect_table() -> Array:
-    """Of the term T_k on a panel of width one in m steps, the largest at any end of a step: [m, k]; row 0 is zero.
+    """Of the term T_k on a panel of width one the largest at any end of a step: [m, k].
 
-    (DEFECT_STEPS + 1, DEFECT_DEGREES).
+    In m equal steps; in row DEFECT_STEPS + 1 + m, in m that are twice as long as one more among them. Rows of m = 0 are
+    zero. (2 (DEFECT_STEPS + 1), DEFECT_DEGREES).
     """
-    _, weights, nodes = tableau()
-    table = np.zeros((DEFECT_STEPS + 1, DEFECT_DEGREES))
+    table = np.zeros((2 * (DEFECT_STEPS + 1), DEFECT_DEGREES))
     for steps in range(1, DEFECT_STEPS + 1):
-        stages = 2.0 * (np.arange(steps)[:, None] + nodes) / steps - 1.0
-        ends = np.linspace(-1.0, 1.0, steps + 1)
-        taken = _polynomials(stages, DEFECT_DEGREES) @ weights / steps
-        exact = 0.5 * np.diff(_integrals(ends), axis=1)
-        table[steps] = np.abs(np.cumsum(taken - exact, axis=1)).max(axis=1)
+        table[steps] = _largest_defects(np.arange(steps + 1.0) / steps)
+        pairs = ends_of_pairs(np.array([2 * steps + 1]), 1)
+        table[DEFECT_STEPS + 1 + steps] = _largest_defects(pairs / float(pairs[-1]))
     # Low terms are integrated exactly: what is left of them is rounding.
     return read_only(np.where(table > _ROUNDING, table, 0.0))
+
+
+def _largest_defects(ends: Array) -> Array:
+    """Of every term in steps with these ends, of [0, 1]: (DEFECT_DEGREES,)."""
+    _, weights, nodes = tableau()
+    widths = np.diff(ends)
+    stages = 2.0 * (ends[:-1, None] + widths[:, None] * nodes) - 1.0
+    taken = (_polynomials(stages, DEFECT_DEGREES) @ weights) * widths
+    exact = 0.5 * np.diff(_integrals(2.0 * ends - 1.0), axis=1)
+    return np.abs(np.cumsum(taken - exact, axis=1)).max(axis=1)
 
 
 def _polynomials(x: Array, count: int) -> Array:
@@ -74,20 +84,23 @@ class Defects(NamedTuple):
 
     Attributes
     ----------
-    whole, half : of the steps and of half as many [rad]
-    unresolved : of the steps, by terms that halving them does little about [rad]
-    evenness : of the panels' part in `half`, one over their number where all comes from one panel
+    whole, coarse : of the steps and of pairs of them [rad]
+    unresolved : of the steps, by terms that these do little about [rad]
+    evenness : of the panels' part in `coarse`, one over their number where all comes from one panel
+    paired : how many of the steps belong to a pair, of one
     """
 
     whole: float
-    half: float
+    coarse: float
     unresolved: float
     evenness: float
+    paired: float
 
     @property
     def remaining(self) -> float:
-        """The part of the distance from half as many steps that the error of the steps is."""
-        return min(max(self.whole / self.half, FULL_ORDER), 1.0) if self.half > 0.0 else FULL_ORDER
+        """The part of the distance from pairs that the error of the steps is."""
+        least = FULL_ORDER / self.paired
+        return min(max(self.whole / self.coarse, least), 1.0) if self.coarse > 0.0 else least
 
     @property
     def order(self) -> float:
@@ -96,14 +109,14 @@ class Defects(NamedTuple):
 
     def foreseen(self, loops: int) -> float:
         """What all steps would be off by, were nothing to cancel [rad]."""
-        return loops * self.remaining * self.half
+        return loops * self.remaining * self.coarse
 
     def error(self, distance: Array, loops: int, amplification: Array | float = 1.0) -> Array:
-        """Bound of the error of steps by their distance from half as many, (B,) [rad].
+        """Bound of the error of steps by their distance from pairs of them, (B,) [rad].
 
         `amplification` : of an error from one time to a later one, (B,): what grows most hides the rest of the distance
         """
-        cancelled = np.maximum(loops * self.half / np.maximum(distance, TINY), 1.0)
+        cancelled = np.maximum(loops * self.coarse / np.maximum(distance, TINY), 1.0)
         factor = BY_CHANCE * self.evenness**-POWER_OF_EVENNESS * np.sqrt(np.sqrt(np.sqrt(np.sqrt(cancelled))))
         factor = factor * np.sqrt(np.minimum(amplification, MOST_GROWTH_BY_CHANCE))
         return np.minimum(np.maximum(factor * self.remaining * distance, loops * self.unresolved), distance)
@@ -116,8 +129,10 @@ def defects(rates: Array, turns: Array, steps: Integers) -> Defects:
     ----------
     rates : (P, n) the size of each term [rad]
     turns : (P,) how far the body turns on each panel, which makes terms swing faster as seen from space [rad]
-    steps : (P,) even
+    steps : (P,) at least two
     """
+    odd = steps % 2
+    # Of an odd number the pairs have rows of their own.
     counts = np.stack([steps, steps // 2])
     # More steps than the table has: as in the most that it has, for the terms that swing as fast at the panel's ends.
     fewer = np.minimum(counts, DEFECT_STEPS)
@@ -125,14 +140,16 @@ def defects(rates: Array, turns: Array, steps: Integers) -> Defects:
     degrees = np.arange(float(rates.shape[1])) + (DEGREES_OF_TURN * turns)[:, None]
     degrees = np.minimum(degrees * slower, DEFECT_DEGREES - 1.001)
     below, table = degrees.astype(np.int64), defect_table()
-    place = fewer[..., None] * DEFECT_DEGREES + below
+    rows = fewer + np.stack([np.zeros_like(odd), odd * (DEFECT_STEPS + 1)])
+    place = rows[..., None] * DEFECT_DEGREES + below
     first, second = table.take(place), table.take(place + 1)
-    whole, half = rates * (slower * slower) * (first + (degrees - below) * (second - first))
-    of_panels = half.sum(axis=1)
+    whole, coarse = rates * (slower * slower) * (first + (degrees - below) * (second - first))
+    of_panels = coarse.sum(axis=1)
     total, squares = float(of_panels.sum()), float(of_panels @ of_panels)
     return Defects(
         whole=float(whole.sum()),
-        half=total,
-        unresolved=float(whole[whole > UNRESOLVED * half].sum()),
+        coarse=total,
+        unresolved=float(whole[whole > UNRESOLVED * coarse].sum()),
         evenness=total * total / (len(steps) * squares) if squares > 0.0 else 1.0,
+        paired=2.0 * float(counts[1].sum()) / float(counts[0].sum()),
     )

@@ -19,6 +19,7 @@ from .fast.estimate_constants import (
     FEW_STEPS,
     FORESEEN,
     LOOKS_AHEAD,
+    MOST_ODD,
     MOST_SHORTENED,
     MOST_TURN,
     ORDER,
@@ -91,7 +92,7 @@ class StepRequirements:
         least = np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step)
         planned = np.maximum(np.maximum(planned, least), 1.0)
         for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
-            found = self.defects(even_steps(planned))
+            found = self.defects(whole_steps(planned))
             excess = found.foreseen(self.loops) / (FORESEEN * tolerance)
             if not excess > 1.0:
                 break
@@ -107,7 +108,7 @@ class StepRequirements:
         return self._defects[key]
 
     def stepping_error(self, steps: Integers, distance: Array, amplification: Array | float = 1.0) -> Array:
-        """Bound of the error of steps (P,) from their distance from half as many: (B,) -> (B,) [rad].
+        """Bound of the error of steps (P,) from their distance from pairs of them: (B,) -> (B,) [rad].
 
         `amplification` : as of `Defects.error`
         """
@@ -129,6 +130,7 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
 
 
-def even_steps(planned: Array) -> Integers:
-    """Whole and even numbers of steps on each panel: (P,) -> (P,)."""
-    return 2 * np.ceil(0.5 * planned).astype(int)
+def whole_steps(planned: Array) -> Integers:
+    """Whole numbers of steps on each panel: at least two, so that pairs of them show errors; many are even: (P,) -> (P,)."""
+    whole = np.maximum(np.ceil(planned), 2.0).astype(int)
+    return whole + (whole > MOST_ODD) * (whole % 2)

@@ -1,6 +1,6 @@
 """The attitude equation stepped on an interpolant three times, so that the differences tell the errors.
 
-All steps; half as many; half as many on series with errors like those they probably have. Machine code
+All steps; two of them at a time; these pairs on series with errors like those they probably have. Machine code
 takes them where there is some (`fast.marches`). Without it each march of a few momenta is one CasADi call after
 another, and the steps of many are taken on whole arrays.
 """
@@ -22,7 +22,7 @@ from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
-from .step_record import CHECKPOINTS, StepRecord
+from .step_record import CHECKPOINTS, StepRecord, ends_of_pairs, pairs_of_steps
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
 BLOCK = 256
@@ -49,7 +49,7 @@ def integrate_steps(
     Parameters
     ----------
     perturbed : (P, n, 9) the interpolant's coefficients with errors like those they probably have; None: not marched on
-    steps : (P,) even, on each panel of one loop
+    steps : (P,) at least two, on each panel of one loop
     directions : (B, 3) Pi/|Pi| at the start
     magnitudes : (B,) of the momentum [kg m^2/s]
     with_propagators : whether to integrate the error propagators too
@@ -61,20 +61,21 @@ def integrate_steps(
     batch = len(magnitudes)
     whole = StepRecord.empty(batch, total, CHECKPOINTS if with_propagators else 0)
     channels = _channels_at_stages(interpolant, interpolant.coefficients, steps)
-    coarse = _channels_at_stages(interpolant, interpolant.coefficients, steps // 2)
-    cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps // 2)
+    ends = ends_of_pairs(steps, interpolant.loops)
+    coarse = _channels_at_stages(interpolant, interpolant.coefficients, steps, in_pairs=True)
+    cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps, in_pairs=True)
     record, attitudes = (_record_one, _attitudes_of_one) if batch <= FEW else (_record_many, _attitudes_of_many)
     at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
-    # All steps, half as many, and these again where series are perturbed.
+    # All steps, pairs of them, and these again where series are perturbed.
     run_progress.begin(run_progress.STEPPING, -(-batch // at_once) * total * (3 if perturbed is None else 4) // 2)
     for first in range(0, batch, at_once):
         rows = slice(first, first + at_once)
         starts = directions[rows], magnitudes[rows]
         record(whole, rows, channels, interpolant.loops, *starts)
-        half = attitudes(coarse, interpolant.loops, *starts)
-        whole.stepping[rows] = largest_angle(whole.quaternions[rows, ::2], half)
+        pairs = attitudes(coarse, interpolant.loops, *starts)
+        whole.stepping[rows] = largest_angle(whole.quaternions[rows][:, ends], pairs)
         if cut is not None:
-            whole.truncation[rows] = largest_angle(half, attitudes(cut, interpolant.loops, *starts))
+            whole.truncation[rows] = largest_angle(pairs, attitudes(cut, interpolant.loops, *starts))
     return whole
 
 
@@ -87,11 +88,10 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
     run_progress.begin(run_progress.STEPPING, int(steps.sum()) * (3 if perturbed is None else 4) // 2)
     coefficients = interpolant.coefficients
     whole = _quaternions_at_rest(interpolant, coefficients, steps)
-    half = _quaternions_at_rest(interpolant, coefficients, steps // 2)
+    pairs = _quaternions_at_rest(interpolant, coefficients, steps, in_pairs=True)
     truncation = 0.0
     if perturbed is not None:
-        cut = _quaternions_at_rest(interpolant, perturbed, steps // 2)
-        truncation = largest_angle(half, cut)
+        truncation = largest_angle(pairs, _quaternions_at_rest(interpolant, perturbed, steps, in_pairs=True))
     nothing = np.zeros((1, len(whole) - 1))
     return StepRecord(
         quaternions=whole[None],
@@ -99,7 +99,7 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
         turns=nothing,
         dynamics=nothing,
         propagators=np.empty((1, 0, 3, 3)),
-        stepping=np.array([largest_angle(whole[::2], half)]),
+        stepping=np.array([largest_angle(whole[ends_of_pairs(steps, interpolant.loops)], pairs)]),
         truncation=np.array([truncation]),
     )
 
@@ -142,30 +142,37 @@ def stage_channels(interpolant: Interpolant, steps: Integers) -> Array:
     return _channels_at_stages(interpolant, interpolant.coefficients, steps)
 
 
-def _channels_at_stages(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:
+def _channels_at_stages(
+    interpolant: Interpolant, coefficients: Array, steps: Integers, *, in_pairs: bool = False
+) -> Array:
     widths = np.diff(interpolant.edges[: len(steps) + 1])
     scaled = coefficients * widths[:, None, None]
     degrees = scaled.shape[1]
-    channels = np.empty((int(steps.sum()) * STAGES, 9))
+    taken = pairs_of_steps(steps) if in_pairs else steps
+    channels = np.empty((int(taken.sum()) * STAGES, 9))
     panel = row = 0
     for count, run in groupby(steps.tolist()):
         panels = len(list(run))
-        stop = row + panels * count * STAGES
-        out = channels[row:stop].reshape(panels, count * STAGES, 9)
-        np.matmul(_stage_matrix(degrees, count), scaled[panel : panel + panels], out=out)
+        matrix = _stage_matrix(degrees, count, in_pairs)
+        stop = row + panels * len(matrix)
+        out = channels[row:stop].reshape(panels, len(matrix), 9)
+        np.matmul(matrix, scaled[panel : panel + panels], out=out)
         panel, row = panel + panels, stop
     return channels.reshape(-1, 9 * STAGES)
 
 
 @lru_cache(maxsize=512)
-def _stage_matrix(degree_count: int, count: int) -> Array:
+def _stage_matrix(degree_count: int, count: int, in_pairs: bool) -> Array:
     """Chebyshev coefficients of a panel -> values at all stages of its steps, times the step's share of it.
 
-    (12 count, degrees)
+    (12 K, degrees), of `count` steps or of pairs of them.
     """
     _, _, c = tableau()
-    x = 2.0 * (np.arange(count)[:, None] + c) / count - 1.0
-    return chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(STAGES * count, degree_count) / count
+    ends = ends_of_pairs(np.array([count]), 1) if in_pairs else np.arange(count + 1)
+    lengths = np.diff(ends)[:, None]
+    x = 2.0 * (ends[:-1, None] + lengths * c) / count - 1.0
+    values = chebyshev(np.clip(x, -1.0, 1.0), degree_count).reshape(len(lengths), STAGES, degree_count)
+    return (values * (lengths / count)[..., None]).reshape(-1, degree_count)
 
 
 def largest_angle(a: Array, b: Array) -> Any:
@@ -288,13 +295,16 @@ def _by_kernel(
     )
 
 
-def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:
+def _quaternions_at_rest(
+    interpolant: Interpolant, coefficients: Array, steps: Integers, *, in_pairs: bool = False
+) -> Array:
     """At the ends of all steps without momentum: (loops K + 1, 4)."""
     if engine.is_ready():
-        quaternions = quaternions_at_rest(interpolant.widths, coefficients, steps)
-        run_progress.advance(int(steps.sum()))
+        quaternions = quaternions_at_rest(interpolant.widths, coefficients, steps, in_pairs=in_pairs)
+        run_progress.advance(len(quaternions) - 1)
     else:
-        quaternions = _quaternions_of_one_loop(_channels_at_stages(interpolant, coefficients, steps))
+        channels = _channels_at_stages(interpolant, coefficients, steps, in_pairs=in_pairs)
+        quaternions = _quaternions_of_one_loop(channels)
     return _repeated(quaternions, interpolant.loops) if interpolant.loops > 1 else quaternions
 
 

@@ -1,8 +1,8 @@
 """From sampled I^-1 and I^-1 L_o to rotations: the one integrator of the library.
 
 The deformation is sampled first (`sampling`), without regard to the rotation; then the attitude equation is
-stepped on the interpolant, as finely as the rotation needs. Errors are measured: by half as many steps, and by half as
-many on series with errors like those they probably have. The linearised equation, integrated along with it, shows how
+stepped on the interpolant, as finely as the rotation needs. Errors are measured: by steps twice as long, and by these
+on series with errors like those they probably have. The linearised equation, integrated along with it, shows how
 rounding grows.
 """
 
@@ -19,7 +19,7 @@ from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
 from ._last_terms import Perturbed
-from ._step_control import StepRequirements, even_steps
+from ._step_control import StepRequirements, whole_steps
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .fast import engine
 from .fast.estimate_constants import (
@@ -108,9 +108,9 @@ class Errors(NamedTuple):
     stepping: float
     rounding: float
     amplification: float
-    distance: float  # of half as many steps
+    distance: float  # of pairs of steps
     order: float  # by which the error of steps falls
-    rounded_up: float  # how many more steps were taken than planned, since they are even
+    rounded_up: float  # how many more steps were taken than planned, since they are whole
 
     @property
     def are_informative(self) -> bool:
@@ -305,7 +305,7 @@ class Integration:
             growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
-        steps = even_steps(planned)
+        steps = whole_steps(planned)
         if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         return steps, float(planned.sum())
@@ -373,7 +373,7 @@ def _propagators_by_derivative(interpolant: Interpolant, momentum: Array, larges
     """
     magnitudes = norms(momentum)
     requirements = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE)
-    steps = even_steps(requirements.plan(LOOSEST_TOLERANCE))
+    steps = whole_steps(requirements.plan(LOOSEST_TOLERANCE))
     channels, directions = stage_channels(interpolant, steps), _directions(momentum, magnitudes)
     with np.errstate(all="ignore"):
         return exact_propagators(channels, directions, magnitudes, interpolant.loops)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 
 # Times between which the growth of errors is compared: 28 pairs.
 CHECKPOINTS = 8
@@ -24,8 +24,8 @@ class StepRecord:
     dynamics : (B, K) dynamic phase of each step [rad]
     propagators : (B, M, 3, 3) error propagators, the state transition matrices that carry a small turn of the start to
         even parts of the steps; (B, 0, 3, 3) without momentum or where they were not asked for
-    stepping : (B,) the largest angle between the steps and half as many, at the ends of the latter [rad]
-    truncation : (B,) the largest angle between half as many steps on the series and on the perturbed ones; zero without
+    stepping : (B,) the largest angle between the steps and pairs of them, at the ends of the pairs [rad]
+    truncation : (B,) the largest angle between pairs of steps on the series and on the perturbed ones; zero without
         these [rad]
     """
 
@@ -49,3 +49,25 @@ class StepRecord:
             stepping=np.empty(batch),
             truncation=np.zeros(batch),
         )
+
+
+def pairs_of_steps(steps: Integers) -> Integers:
+    """How many steps each panel takes where they are taken two at a time, one of an odd number alone: (P,).
+
+    A series swings fastest at the ends of its panel: it is the one in the middle, or next to it.
+    """
+    return (steps + 1) // 2
+
+
+def ends_of_pairs(steps: Integers, loops: int) -> Integers:
+    """After how many steps each pair of them ends, the start before all: (L + 1,)."""
+    each = np.tile(steps, loops)
+    pairs = pairs_of_steps(each)
+    within = np.arange(1, int(pairs.sum()) + 1) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    after_single = np.repeat(each % 2, pairs) * (within > np.repeat(pairs_before_single(each), pairs))
+    return np.append(0, np.repeat(np.cumsum(each) - each, pairs) + 2 * within - after_single)
+
+
+def pairs_before_single(steps: Integers) -> Integers:
+    """How many pairs of an odd number of steps come before the one that is alone: (P,)."""
+    return (steps + 1) // 4

@@ -81,6 +81,8 @@ NEGLIGIBLE = 0.005
 """Of the tolerance: what the samplers say, amplified, is not worth a march of its own below."""
 FORESEEN = 2.3
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
+MOST_ODD = 16
+"""Steps of a panel up to which their number may be odd; one more of many costs little and hides nothing from pairs."""
 LOOKS_AHEAD = 3
 """At what defects foretell of a plan, before any step is taken."""
 FEW_STEPS = 1000.0
@@ -106,7 +108,7 @@ LITTLE_ROUNDING = 0.01
 DENSE_SHARE = 5e-3
 """Of the error at the ends of the steps: what the polynomials between them may add."""
 
-# ---- The error of steps, from their distance from half as many -----------------------------------------------------
+# ---- The error of steps, from their distance from pairs ----- -----------------------------------------------------
 
 FULL_ORDER = 2.0**-8
 """The part of the distance that the error is where steps are so short that it falls by the order of the formula."""
@@ -129,7 +131,7 @@ more. A larger growth counts no more."""
 LEAST_ORDER = 2.0
 """By which errors fall at least when steps are made shorter."""
 UNRESOLVED = 0.125
-"""A term whose defect falls to no less than this part when steps are halved is not seen by them: it adds its own."""
+"""A term whose defect falls to no less than this part from pairs to steps is not seen by these: it adds its own."""
 
 # ---- Rounding along the motion -------------------------------------------------------------------------------------
 

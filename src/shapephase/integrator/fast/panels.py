@@ -135,7 +135,7 @@ def plan_of_steps(rates: Array, turns: Array, sizes: Array, loops: int, toleranc
 
 def defects_of_panels(rates: Array, turns: Array, steps: Integers) -> Defects:
     """What `defects` finds."""
-    found = np.empty(4)
+    found = np.empty(5)
     _plan_kernel().defects_of_panels(plain(rates), plain(turns), steps, plain(defect_table()), found)
     return Defects(*found.tolist())
 

@@ -28,7 +28,7 @@ class Round(NamedTuple):
 
     steps: Integers  # (P,)
     record: StepRecord
-    distances: Array  # (B,) of half as many steps [rad]
+    distances: Array  # (B,) of pairs of steps [rad]
     amplification: Array  # (B,) the largest growth of an error from one time to a later one
     sampling: Array  # (B,) errors of the samples, of the steps, and by rounding [rad]
     stepping: Array
@@ -72,8 +72,8 @@ def rounds_of_one(
     done, steps, quaternions, ends, turns, dynamics, propagators, numbers = found
     if not done:
         return None
-    _, distance, truncation, growth, rounding, *_, stepping, sampling = numbers.reshape(12, 1)
-    *of_defects, rounded_up = numbers[5:10].tolist()
+    _, distance, truncation, growth, rounding, *_, stepping, sampling = numbers.reshape(13, 1)
+    *of_defects, rounded_up = numbers[5:11].tolist()
     errors = propagators.reshape(1, -1, 3, 3), distance, truncation
     record = StepRecord(quaternions, ends, turns, dynamics, *errors)
     return Round(steps, record, distance, growth, sampling, stepping, rounding, Defects(*of_defects), rounded_up)

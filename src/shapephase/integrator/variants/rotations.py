@@ -21,7 +21,7 @@ from ...errors import AccuracyNotReached, SingularInertiaError
 from .._error_propagator import growth_and_rounding
 from .._last_terms import Perturbed, perturbed_series
 from .._spectral_error import spectral_norms
-from .._step_control import StepRequirements, even_steps
+from .._step_control import StepRequirements, whole_steps
 from .._step_loop import checkpoint_steps, integrate_steps
 from ..fast import engine
 from ..fast.threads import processors
@@ -271,7 +271,7 @@ class _Plan:
             needed = self.requirements(turning)
             planned = needed.plan(self.tolerance, short=self.ceiling > 0.0 and needed.far)
             many = needed.very_far or needed.loops * float(planned.sum()) > _MANY_STEPS
-            self._steps[turning] = None if many else even_steps(planned)
+            self._steps[turning] = None if many else whole_steps(planned)
         return self._steps[turning]
 
 

@@ -17,7 +17,9 @@ from .stage_series import (
     SIZE,
     basis_at,
     channels_at,
+    pairs_before_single,
     room_for_basis,
+    shorten_single,
     terms_that_count,
     terms_that_differ,
     with_few_others,
@@ -121,12 +123,12 @@ def _march_lanes(table, lengths, s, lanes, record, grows, done, marks, kept):
 
 
 @part
-def _apart(count, skip, a, b, lane, worst):
-    """The largest square of a distance of quaternions, every `skip`-th of a from b; NaN stays NaN."""
+def _apart(count, ends, a, b, lane, worst):
+    """The largest square of a distance of quaternions, of rows of a from `count` of b; NaN stays NaN."""
     for k in range(count):
         minus = plus = 0.0
         for i in range(5, 9):
-            x, y = a[skip * (k + 1) - 1, i * LANES + lane], b[k, i * LANES + lane]
+            x, y = a[ends[k], i * LANES + lane], b[k, i * LANES + lane]
             minus += (x - y) * (x - y)
             plus += (x + y) * (x + y)
         # A quaternion and its negative are one attitude.
@@ -134,6 +136,19 @@ def _apart(count, skip, a, b, lane, worst):
         if not square <= worst:
             worst = square
     return worst
+
+
+@part
+def _find_ends(lengths, ends):
+    """The last steps of all pairs of a chunk, of segments with so many steps; how many pairs there are."""
+    first = count = 0
+    for segment in range(len(lengths)):
+        before = pairs_before_single(lengths[segment])
+        for pair in range((lengths[segment] + 1) // 2):
+            ends[count] = first + 2 * pair + (1 if pair < before else 0)
+            count += 1
+        first += lengths[segment]
+    return count
 
 
 @part
@@ -153,20 +168,20 @@ def _begin(states, directions, magnitudes, lanes):
 
 @part
 def _tabulate(first, last, panels, starts, widths, series, perturbed, steps, basis, scaled, tables, lengths):
-    """The channels of segments `first` to `last`: of the steps, of half as many, of these on perturbed series."""
+    """The channels of segments `first` to `last`: of the steps, of pairs of them, of these on perturbed series."""
     for segment in range(first, last):
         panel, place = panels[segment], segment - first
         count = min(SEGMENT, steps[panel] - starts[segment])
-        lengths[0, place], lengths[1, place] = count, count // 2
+        lengths[0, place], lengths[1, place] = count, (count + 1) // 2
         c, factor = series[panel], widths[panel] / steps[panel]
         terms = terms_that_count(c)
         few = True
         if len(perturbed):
             few = terms_that_differ(c, perturbed[panel]) <= _FEW_TERMS
             terms = max(terms, terms_that_count(perturbed[panel]))
-        used = basis_at(starts[segment], count, steps[panel], terms, basis)
+        used = basis_at(starts[segment], count, steps[panel], 1, terms, basis)
         channels_at(c, terms, factor, basis, used, 0, scaled, tables[0, place])
-        used = basis_at(starts[segment] // 2, count // 2, steps[panel] // 2, terms, basis)
+        used = basis_at(starts[segment], count, steps[panel], 2, terms, basis)
         channels_at(c, terms, 2.0 * factor, basis, used, 0, scaled, tables[1, place])
         if len(perturbed):
             other, out = perturbed[panel], tables[2, place]
@@ -174,6 +189,8 @@ def _tabulate(first, last, panels, starts, widths, series, perturbed, steps, bas
                 with_few_others(c, other, terms, 2.0 * factor, basis, used, 0, tables[1, place], out)
             else:
                 channels_at(other, terms, 2.0 * factor, basis, used, 0, scaled, out)
+            shorten_single(count, 0, out)
+        shorten_single(count, 0, tables[1, place])
 
 
 @part
@@ -193,11 +210,11 @@ def march_momenta(
     widths, series, perturbed, steps, loops, directions, magnitudes, marks, lanes, most_segments,
     quaternions, ends, turns, dynamics, propagators, stepping, truncation,
 ):  # fmt: skip
-    """All steps of all loops, half as many, and these on the perturbed series; arguments after `lanes` are filled.
+    """All steps of all loops, pairs of them, and these on the perturbed series; what is after `most_segments` is filled.
 
     widths: (P,) [s]
     series, perturbed: (P, n * 9) times one second; no rows of the latter: not marched on
-    steps: (P,) even
+    steps: (P,) at least two; odd numbers are no larger than a segment
     marks: after how many steps propagators are kept, (M,)
     lanes: 1 or LANES
     most_segments: of a chunk
@@ -213,7 +230,8 @@ def march_momenta(
     basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * _CHANNELS)
     tables, lengths = np.empty((3, room, SIZE)), np.empty((2, room), np.int64)
     record = np.empty((room * SEGMENT, _RECORD))
-    half, cut = np.empty((room * SEGMENT // 2, _RECORD)), np.empty((room * SEGMENT // 2, _RECORD))
+    in_pairs, cut = np.empty((room * SEGMENT // 2, _RECORD)), np.empty((room * SEGMENT // 2, _RECORD))
+    ends_of_pairs, each = np.empty(room * SEGMENT // 2, np.int64), np.arange(room * SEGMENT // 2)
     kept, none = np.empty((len(marks), 9 * LANES)), np.empty(0, np.int64)
     states = np.empty(((rows + lanes - 1) // lanes, 3, _STATE))
     _begin(states, directions, magnitudes, lanes)
@@ -232,21 +250,22 @@ def march_momenta(
             last = min(first + room, total)
             if loop == 0 or total > room:
                 _tabulate(first, last, panels, starts, widths, series, perturbed, steps, basis, scaled, tables, lengths)
-            counts, halves = lengths[0, : last - first], lengths[1, : last - first]
+            counts, pairs = lengths[0, : last - first], lengths[1, : last - first]
+            found = _find_ends(counts, ends_of_pairs)
             count = 0
             for segment in range(last - first):
                 count += counts[segment]
             for group in range(len(states)):
                 state = states[group]
                 _march_lanes(tables[0], counts, state[0], lanes, record, grows, done, marks, kept)
-                _march_lanes(tables[1], halves, state[1], lanes, half, False, 0, none, kept)
+                _march_lanes(tables[1], pairs, state[1], lanes, in_pairs, False, 0, none, kept)
                 if perturbs:
-                    _march_lanes(tables[2], halves, state[2], lanes, cut, False, 0, none, kept)
+                    _march_lanes(tables[2], pairs, state[2], lanes, cut, False, 0, none, kept)
                 for lane in range(min(lanes, rows - group * lanes)):
                     row = group * lanes + lane
-                    stepping[row] = _apart(count // 2, 2, record, half, lane, stepping[row])
+                    stepping[row] = _apart(found, ends_of_pairs, record, in_pairs, lane, stepping[row])
                     if perturbs:
-                        truncation[row] = _apart(count // 2, 1, half, cut, lane, truncation[row])
+                        truncation[row] = _apart(found, each, in_pairs, cut, lane, truncation[row])
                     for k in range(count):
                         for i in range(3):
                             ends[row, done + k + 1, i] = record[k, i * LANES + lane]
@@ -277,8 +296,11 @@ def _turn_on(c, count, at, quaternions):
 
 
 @kernel
-def march_at_rest(widths, series, steps, quaternions):
-    """The quaternions (K + 1, 4) after all steps of one loop without momentum; the other arguments as above."""
+def march_at_rest(widths, series, steps, together, quaternions):
+    """The quaternions (K + 1, 4) after all steps of one loop without momentum; the other arguments as above.
+
+    together: 1; 2: the steps are taken two at a time, one of an odd number alone
+    """
     terms = series.shape[1] // _CHANNELS
     basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * _CHANNELS)
     c, at = np.empty(SIZE), 0
@@ -287,8 +309,10 @@ def march_at_rest(widths, series, steps, quaternions):
     for panel in range(len(steps)):
         count, factor = terms_that_count(series[panel]), widths[panel] / steps[panel]
         for start in range(0, steps[panel], SEGMENT):
-            together = min(SEGMENT, steps[panel] - start)
-            used = basis_at(start, together, steps[panel], count, basis)
-            channels_at(series[panel], count, factor, basis, used, 6, scaled, c)
-            _turn_on(c, together, at, quaternions)
-            at += together
+            here = min(SEGMENT, steps[panel] - start)
+            used = basis_at(start, here, steps[panel], together, count, basis)
+            channels_at(series[panel], count, together * factor, basis, used, 6, scaled, c)
+            if together == 2:
+                shorten_single(here, 6, c)
+            _turn_on(c, (here + together - 1) // together, at, quaternions)
+            at += (here + together - 1) // together

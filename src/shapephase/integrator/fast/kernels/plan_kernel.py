@@ -19,6 +19,7 @@ from ..estimate_constants import (
     LEAST_ORDER,
     LOOKS_AHEAD,
     MOST_GROWTH_BY_CHANCE,
+    MOST_ODD,
     MOST_SHORTENED,
     MOST_TURN,
     ORDER,
@@ -50,10 +51,11 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
 
 
 @part
-def make_even(planned, steps):
-    """As `even_steps`; steps are filled."""
+def make_whole(planned, steps):
+    """As `whole_steps`; steps are filled."""
     for panel in range(len(planned)):
-        steps[panel] = 2 * int(math.ceil(0.5 * planned[panel]))  # noqa: RUF046 (a float in machine code)
+        whole = max(int(math.ceil(planned[panel])), 2)  # noqa: RUF046 (a float in machine code)
+        steps[panel] = whole + whole % 2 if whole > MOST_ODD else whole
 
 
 @kernel
@@ -70,15 +72,15 @@ def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, table, planne
         least = max(degree[panel] / DEGREES_A_STEP, turn[panel] / turn_a_step)
         planned[panel] = max(max(common * planned[panel], least), 1.0)
         count += planned[panel]
-    steps, found = np.empty(len(turn), np.int64), np.empty(4)
+    steps, found = np.empty(len(turn), np.int64), np.empty(5)
     for _ in range(LOOKS_AHEAD if loops * count <= FEW_STEPS else 0):
-        make_even(planned, steps)
+        make_whole(planned, steps)
         defects_of_panels(rates, turns, steps, table, found)
-        remaining = remaining_by_defects(found[0], found[1])
+        remaining = remaining_by_defects(found)
         excess = loops * remaining * found[1] / (FORESEEN * tolerance)
         if not excess > 1.0:
             break
-        shorter = min(excess ** (1.0 / order_by_defects(remaining)), MOST_SHORTENED)
+        shorter = min(excess ** (1.0 / order_by_defects(found)), MOST_SHORTENED)
         for panel in range(len(turn)):
             planned[panel] *= shorter
 
@@ -94,44 +96,51 @@ def _defect(degree, row, slower, table):
 
 @kernel
 def defects_of_panels(rates, turns, steps, table, found):
-    """As `defects`, with the table of defects: the four fields of the result in their order are filled."""
-    whole = half = unresolved = squares = 0.0
+    """As `defects`, with the table of defects: the five fields of the result in their order are filled."""
+    whole = coarse = unresolved = squares = 0.0
+    count, pairs, rows = 0, 0, len(table) // 2
     for panel in range(len(steps)):
-        row, half_row = min(steps[panel], len(table) - 1), min(steps[panel] // 2, len(table) - 1)
-        slower, half_slower = math.sqrt(row / steps[panel]), math.sqrt(half_row / (steps[panel] // 2))
-        here = 0.0
+        here, half = steps[panel], steps[panel] // 2
+        row, row_of_pairs = min(here, rows - 1), min(half, rows - 1)
+        slower, slower_pairs = math.sqrt(row / here), math.sqrt(row_of_pairs / half)
+        # Of an odd number the pairs have rows of their own.
+        row_of_pairs += rows * (here % 2)
+        of_panel = 0.0
         for k in range(rates.shape[1]):
             degree = k + DEGREES_OF_TURN * turns[panel]
             one = rates[panel, k] * _defect(degree, row, slower, table)
-            other = rates[panel, k] * _defect(degree, half_row, half_slower, table)
+            other = rates[panel, k] * _defect(degree, row_of_pairs, slower_pairs, table)
             whole += one
-            here += other
+            of_panel += other
             if one > UNRESOLVED * other:
                 unresolved += one
-        half += here
-        squares += here * here
-    found[0], found[1], found[2] = whole, half, unresolved
-    found[3] = half * half / (len(steps) * squares) if squares > 0.0 else 1.0
+        coarse += of_panel
+        squares += of_panel * of_panel
+        count += here
+        pairs += half
+    found[0], found[1], found[2] = whole, coarse, unresolved
+    found[3] = coarse * coarse / (len(steps) * squares) if squares > 0.0 else 1.0
+    found[4] = 2.0 * pairs / count
 
 
 @part
-def remaining_by_defects(whole, half):
+def remaining_by_defects(found):
     """As `Defects.remaining`."""
-    return min(max(whole / half, FULL_ORDER), 1.0) if half > 0.0 else FULL_ORDER
+    least = FULL_ORDER / found[4]
+    return min(max(found[0] / found[1], least), 1.0) if found[1] > 0.0 else least
 
 
 @part
-def order_by_defects(remaining):
+def order_by_defects(found):
     """As `Defects.order`."""
-    return min(max(-math.log2(remaining), LEAST_ORDER), ORDER)
+    return min(max(-math.log2(remaining_by_defects(found)), LEAST_ORDER), ORDER)
 
 
 @part
 def error_by_defects(found, distance, loops, amplification):
     """As `Defects.error`."""
-    whole, half, unresolved, evenness = found[0], found[1], found[2], found[3]
-    remaining = remaining_by_defects(whole, half)
-    cancelled = max(loops * half / max(distance, TINY), 1.0)
+    coarse, unresolved, evenness = found[1], found[2], found[3]
+    cancelled = max(loops * coarse / max(distance, TINY), 1.0)
     factor = BY_CHANCE * evenness**-POWER_OF_EVENNESS * math.sqrt(math.sqrt(math.sqrt(math.sqrt(cancelled))))
     factor *= math.sqrt(min(amplification, MOST_GROWTH_BY_CHANCE))
-    return min(max(factor * remaining * distance, loops * unresolved), distance)
+    return min(max(factor * remaining_by_defects(found) * distance, loops * unresolved), distance)

@@ -29,45 +29,47 @@ from .march_kernel import march_at_rest, march_momenta
 from .plan_kernel import (
     defects_of_panels,
     error_by_defects,
-    make_even,
+    make_whole,
     order_by_defects,
     plan_steps,
-    remaining_by_defects,
     sizes_of_terms,
 )
+from .stage_series import pairs_before_single
 
 _ONE_LANE = 1
 _MOST_ROUNDS = 4
 
 
 @part
-def _largest_square(a, b, skip):
-    """Of the distances of every `skip`-th quaternion of a from those of b; a quaternion and its negative are one."""
-    worst = 0.0
-    for k in range(len(b)):
-        minus = plus = 0.0
-        for i in range(4):
-            x, y = a[skip * k, i], b[k, i]
-            minus += (x - y) * (x - y)
-            plus += (x + y) * (x + y)
-        square = min(minus, plus)
-        if not square <= worst:
-            worst = square
-    return worst
+def _square_apart(a, b, worst):
+    """The larger one of a square and that of the distance of two quaternions; a quaternion and its negative are one."""
+    minus = plus = 0.0
+    for i in range(4):
+        minus += (a[i] - b[i]) * (a[i] - b[i])
+        plus += (a[i] + b[i]) * (a[i] + b[i])
+    square = min(minus, plus)
+    return worst if square <= worst else square
 
 
 @part
 def _march_at_rest(widths, series, perturbed, steps, quaternions, stepping, truncation):
     """As `march_momenta` for one loop without momentum."""
-    march_at_rest(widths, series, steps, quaternions[0])
-    half = np.empty((quaternions.shape[1] // 2 + 1, 4))
-    march_at_rest(widths, series, steps // 2, half)
-    stepping[0] = 2.0 * math.sqrt(_largest_square(quaternions[0], half, 2))
-    truncation[0] = 0.0
+    march_at_rest(widths, series, steps, 1, quaternions[0])
+    pairs, worst, at, place = np.empty((1 + ((steps + 1) // 2).sum(), 4)), 0.0, 0, 0
+    march_at_rest(widths, series, steps, 2, pairs)
+    for panel in range(len(steps)):
+        before = pairs_before_single(steps[panel])
+        for pair in range(1, (steps[panel] + 1) // 2 + 1):
+            place += 1
+            worst = _square_apart(quaternions[0, at + 2 * pair - (1 if pair > before else 0)], pairs[place], worst)
+        at += steps[panel]
+    stepping[0], worst = 2.0 * math.sqrt(worst), 0.0
     if len(perturbed):
-        other = np.empty((len(half), 4))
-        march_at_rest(widths, perturbed, steps // 2, other)
-        truncation[0] = 2.0 * math.sqrt(_largest_square(half, other, 1))
+        other = np.empty((len(pairs), 4))
+        march_at_rest(widths, perturbed, steps, 2, other)
+        for k in range(len(pairs)):
+            worst = _square_apart(pairs[k], other[k], worst)
+    truncation[0] = 2.0 * math.sqrt(worst)
 
 
 @part
@@ -83,7 +85,7 @@ def _up(number, marks):
 @part
 def _too_coarse(found, tolerance):
     """The error of the steps, if they alone are why the estimate is above the tolerance and finer ones help; else 0."""
-    distance, growth, rounding, stepping, sampling = found[1], found[3], found[4], found[10], found[11]
+    distance, growth, rounding, stepping, sampling = found[1], found[3], found[4], found[11], found[12]
     if not (distance < INFORMATIVE_ERROR and math.isfinite(growth) and rounding <= LITTLE_ROUNDING * tolerance):
         return 0.0
     room = tolerance - rounding
@@ -110,9 +112,9 @@ def take_rounds(
     marks_of_finer, marks_of_growth: that refinements are rounded up to, of a factor of two
 
     Returns whether the motion is short enough to be done here, and if so steps, quaternions, ends, turns, dynamics,
-    propagators as of `march_momenta`, and twelve numbers: whether perturbed series count, distance of half as many
-    steps, of the perturbed series, growth, rounding, the four of `defects_of_panels`, how many more steps were taken
-    than planned, and the errors of steps and of samples.
+    propagators as of `march_momenta`, and thirteen numbers: whether perturbed series count, distance of pairs of steps,
+    of the perturbed series, growth, rounding, the five of `defects_of_panels`, how many more steps were taken than planned,
+    and the errors of steps and of samples.
     """
     panels, moving = len(widths), ceiling > 0.0
     rates, sizes, planned = np.empty((panels, series.shape[1] // 9)), np.empty((3, panels)), np.empty(panels)
@@ -121,12 +123,12 @@ def take_rounds(
     a_step = SHORT_TURN_A_STEP if moving and turn > FAR else TURN_A_STEP
     seen = sizes[0] if moving else np.zeros(panels)
     plan_steps(rates, seen, sizes, loops, tolerance, a_step, table, planned)
-    steps, found, rounds = np.empty(panels, np.int64), np.zeros(12), 0
+    steps, found, rounds = np.empty(panels, np.int64), np.zeros(13), 0
     while True:
         finer, amplified = refinement[0], refinement[1]
         is_short = loops * finer * planned.sum() <= MANY_STEPS and not (moving and turn > VERY_FAR)
         if is_short:
-            make_even(finer * planned, steps)
+            make_whole(finer * planned, steps)
         total = loops * steps.sum() if is_short else 0
         quaternions, ends = np.empty((1, total + 1, 4)), np.empty((1, total + 1 if moving else 0, 3))
         turns, dynamics = np.zeros((1, total)), np.zeros((1, total))
@@ -147,19 +149,19 @@ def take_rounds(
         else:
             _march_at_rest(widths, series, other, steps, quaternions, found[1:2], found[2:3])
         growths_and_rounding(propagators, quaternions, found[3:4], found[4:5])
-        defects_of_panels(rates, seen, steps, table, found[5:9])
-        found[9] = steps.sum() / (finer * planned.sum())
+        defects_of_panels(rates, seen, steps, table, found[5:10])
+        found[10] = steps.sum() / (finer * planned.sum())
         if not math.isfinite(found[1]):
             found[1] = math.pi
-        found[10], found[11] = error_by_defects(found[5:9], found[1], loops, found[3]), found[3] * expected
+        found[11], found[12] = error_by_defects(found[5:10], found[1], loops, found[3]), found[3] * expected
         if found[0] > 0.0:
             measured = found[2] + found[3] * hidden
-            found[11] = measured if math.isnan(found[11]) or measured < found[11] else found[11]
+            found[12] = measured if math.isnan(found[12]) or measured < found[12] else found[12]
         rounds += 1
         excess = _too_coarse(found, tolerance)
         if rounds == _MOST_ROUNDS or excess == 0.0:
             return True, steps, quaternions, ends, turns, dynamics, propagators, found
-        order = order_by_defects(remaining_by_defects(found[5], found[6]))
-        finer *= min(max((excess / REFINED) ** (1.0 / order), 1.1, 1.02 * found[9]), 4.0)
+        order = order_by_defects(found[5:10])
+        finer *= min(max((excess / REFINED) ** (1.0 / order), 1.1, 1.02 * found[10]), 4.0)
         refinement[0] = _up(finer, marks_of_finer)
         refinement[1] = _up(found[3], marks_of_growth)

@@ -68,15 +68,36 @@ def basis_between(used, terms, basis):
     return used
 
 
+@inline
+def pairs_before_single(count):
+    """As of `step_record`; of an even number all pairs."""
+    return (count + 1) // 4 if count % 2 else count // 2
+
+
 @part
-def basis_at(first, count, steps, terms, basis):
-    """T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel -> numbers in a row."""
-    used = 0
-    for k in range(first, first + count):
+def basis_at(first, count, steps, together, terms, basis):
+    """T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel -> numbers in a row.
+
+    together: 1; 2: they are taken two at a time, one of an odd number alone, which `shorten_single` makes half as long
+    """
+    used, k, single = 0, 0, 2 * pairs_before_single(count)
+    while k < count:
+        length = 1 if k == single else together
         for i in range(STAGES):
-            basis[STRIDE + used] = 2.0 * (k + NODES[i]) / steps - 1.0
+            basis[STRIDE + used] = 2.0 * (first + k + length * NODES[i]) / steps - 1.0
             used += 1
+        k += length
     return basis_between(used, terms, basis)
+
+
+@part
+def shorten_single(count, first_channel, out):
+    """Of `count` steps that were taken two at a time the one that is alone, if there is one, made half as long."""
+    if count % 2:
+        for j in range(first_channel, CHANNELS):
+            o = np.uint32(j * STRIDE + pairs_before_single(count) * STAGES)
+            for i in range(STAGES):
+                out[o + i] = 0.5 * out[o + i]
 
 
 @part
