@@ -10,7 +10,7 @@ from numpy.polynomial import chebyshev
 
 from shapephase.chebyshev import end_margin, widest_margin
 from shapephase.integrator._last_terms import perturbed_series
-from shapephase.integrator._step_control import StepRequirements, whole_steps
+from shapephase.integrator._step_control import StepRequirements
 from shapephase.integrator.fast.panels import Demand, PanelsToSample, sampled_round
 from shapephase.integrator.interpolant import Interpolant
 from shapephase.integrator.panels.finer_panels import FinerPanels, refining_factors
@@ -164,7 +164,7 @@ def test_kernels_and_arrays_are_one_formula(monkeypatch: pytest.MonkeyPatch, see
         errors = panel_errors(series, hidden, momentum)
         interpolant = Interpolant(EDGES, series.coefficients, 1, 0)
         needed = StepRequirements.from_interpolant(interpolant, momentum, tolerance)
-        steps = whole_steps(needed.plan(tolerance, short=seed % 2 == 0))
+        steps = needed.whole_steps(needed.plan(tolerance, short=seed % 2 == 0))
         distances = 10.0 ** np.arange(-14.0, 0.0)
         return SimpleNamespace(
             coefficients=series.coefficients,

@@ -16,10 +16,13 @@ import numpy as np
 from ..arrays import Array, Integers, read_only
 from ._rotation_step import tableau
 from .fast.estimate_constants import (
+    AT_REST,
     BY_CHANCE,
     DEFECT_DEGREES,
     DEFECT_STEPS,
     DEGREES_OF_TURN,
+    FORESEEN,
+    FORESEEN_AT_REST,
     FULL_ORDER,
     LEAST_ORDER,
     MOST_GROWTH_BY_CHANCE,
@@ -84,7 +87,7 @@ class Defects(NamedTuple):
 
     Attributes
     ----------
-    whole, coarse : of the steps and of pairs of them [rad]
+    whole, coarse : of the steps and of pairs of them; without momentum, of twice as many steps and of the steps [rad]
     unresolved : of the steps, by terms that these do little about [rad]
     evenness : of the panels' part in `coarse`, one over their number where all comes from one panel
     paired : how many of the steps belong to a pair, of one
@@ -107,9 +110,10 @@ class Defects(NamedTuple):
         """By which power of the steps' length errors fall."""
         return min(max(-log2(self.remaining), LEAST_ORDER), ORDER)
 
-    def foreseen(self, loops: int) -> float:
-        """What all steps would be off by, were nothing to cancel [rad]."""
-        return loops * self.remaining * self.coarse
+    def excess(self, loops: int, tolerance: float, *, moving: bool) -> float:
+        """What all steps would be off by, were nothing to cancel, of what may be foreseen for a tolerance [rad]."""
+        foreseen = loops * (self.remaining * self.coarse if moving else self.coarse)
+        return foreseen / ((FORESEEN if moving else FORESEEN_AT_REST) * tolerance)
 
     def error(self, distance: Array, loops: int, amplification: Array | float = 1.0) -> Array:
         """Bound of the error of steps by their distance from pairs of them, (B,) [rad].
@@ -120,6 +124,11 @@ class Defects(NamedTuple):
         factor = BY_CHANCE * self.evenness**-POWER_OF_EVENNESS * np.sqrt(np.sqrt(np.sqrt(np.sqrt(cancelled))))
         factor = factor * np.sqrt(np.minimum(amplification, MOST_GROWTH_BY_CHANCE))
         return np.minimum(np.maximum(factor * self.remaining * distance, loops * self.unresolved), distance)
+
+    def error_at_rest(self, distance: Array, loops: int) -> Array:
+        """Bound of the error of steps without momentum by their distance from twice as many, (B,) [rad]."""
+        nearer = min(self.remaining, 0.5)
+        return AT_REST * distance / (1.0 - nearer) + loops * self.unresolved
 
 
 def defects(rates: Array, turns: Array, steps: Integers) -> Defects:

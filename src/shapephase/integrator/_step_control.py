@@ -17,7 +17,6 @@ from .fast.estimate_constants import (
     DISTANCE,
     FAR,
     FEW_STEPS,
-    FORESEEN,
     LOOKS_AHEAD,
     MOST_ODD,
     MOST_SHORTENED,
@@ -44,6 +43,7 @@ class StepRequirements:
     turns : (P,) how far the body turns on each panel as seen from space, by the bound; zero without momentum [rad]
     whole_turn : the bound for all panels and loops [rad]
     loops : how often the panels are repeated
+    moving : whether there may be momentum
     """
 
     sizes: Array
@@ -51,6 +51,7 @@ class StepRequirements:
     turns: Array
     whole_turn: float
     loops: int
+    moving: bool
     _defects: dict[bytes, Defects] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -64,6 +65,7 @@ class StepRequirements:
             turns=sizes[0] if magnitude else np.zeros(len(rates)),
             whole_turn=interpolant.loops * float(sizes[0].sum()),
             loops=interpolant.loops,
+            moving=magnitude > 0.0,
         )
 
     @property
@@ -83,7 +85,8 @@ class StepRequirements:
         """
         turn_a_step = SHORT_TURN_A_STEP if short else TURN_A_STEP
         if engine.is_ready():
-            return plan_of_steps(self.rates, self.turns, self.sizes, self.loops, tolerance, turn_a_step)
+            bounds = self.rates, self.turns, self.sizes
+            return plan_of_steps(*bounds, self.loops, tolerance, turn_a_step, moving=self.moving)
         turn, swing, degree = self.sizes
         # As many on each panel as make the sum of all the least.
         each = swing ** (1.0 / (ORDER + 1.0))
@@ -92,27 +95,38 @@ class StepRequirements:
         least = np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step)
         planned = np.maximum(np.maximum(planned, least), 1.0)
         for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
-            found = self.defects(whole_steps(planned))
-            excess = found.foreseen(self.loops) / (FORESEEN * tolerance)
+            found = self.defects(self.whole_steps(planned))
+            excess = found.excess(self.loops, tolerance, moving=self.moving)
             if not excess > 1.0:
                 break
             planned *= min(excess ** (1.0 / found.order), MOST_SHORTENED)
         return planned
 
+    def whole_steps(self, planned: Array) -> Integers:
+        """Whole numbers of steps on each panel: (P,) -> (P,).
+
+        With momentum at least two, so that pairs of them show errors, and where they are many even.
+        """
+        whole = np.maximum(np.ceil(planned), 2.0 if self.moving else 1.0).astype(int)
+        return whole + (whole > MOST_ODD) * (whole % 2) if self.moving else whole
+
     def defects(self, steps: Integers) -> Defects:
-        """What the formula misses in so many steps (P,)."""
+        """What the formula misses in so many steps (P,) and in those beside them."""
         key = steps.tobytes()
         if key not in self._defects:
             find = defects_of_panels if engine.is_ready() else defects
-            self._defects[key] = find(self.rates, self.turns, steps)
+            self._defects[key] = find(self.rates, self.turns, steps if self.moving else 2 * steps)
         return self._defects[key]
 
     def stepping_error(self, steps: Integers, distance: Array, amplification: Array | float = 1.0) -> Array:
-        """Bound of the error of steps (P,) from their distance from pairs of them: (B,) -> (B,) [rad].
+        """Bound of the error of steps (P,) from their distance from those beside them: (B,) -> (B,) [rad].
 
         `amplification` : as of `Defects.error`
         """
-        return self.defects(steps).error(distance, self.loops, amplification)
+        found = self.defects(steps)
+        if not self.moving:
+            return found.error_at_rest(distance, self.loops)
+        return found.error(distance, self.loops, amplification)
 
 
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
@@ -129,8 +143,3 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     seen = degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None] if magnitude else degree
     return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
 
-
-def whole_steps(planned: Array) -> Integers:
-    """Whole numbers of steps on each panel: at least two, so that pairs of them show errors; many are even: (P,) -> (P,)."""
-    whole = np.maximum(np.ceil(planned), 2.0).astype(int)
-    return whole + (whole > MOST_ODD) * (whole % 2)

@@ -1,6 +1,7 @@
 """The attitude equation stepped on an interpolant three times, so that the differences tell the errors.
 
-All steps; two of them at a time; these pairs on series with errors like those they probably have. Machine code
+All steps; two of them at a time; these pairs on series with errors like those they probably have. Without momentum, where
+steps cost little: all steps; twice as many; all steps on these other series. Machine code
 takes them where there is some (`fast.marches`). Without it each march of a few momenta is one CasADi call after
 another, and the steps of many are taken on whole arrays.
 """
@@ -85,13 +86,13 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
     The equation is linear, so steps do not depend on each other, and a further loop repeats the rotation of the first:
     it costs no steps.
     """
-    run_progress.begin(run_progress.STEPPING, int(steps.sum()) * (3 if perturbed is None else 4) // 2)
+    run_progress.begin(run_progress.STEPPING, int(steps.sum()) * (3 if perturbed is None else 4))
     coefficients = interpolant.coefficients
     whole = _quaternions_at_rest(interpolant, coefficients, steps)
-    pairs = _quaternions_at_rest(interpolant, coefficients, steps, in_pairs=True)
+    finer = _quaternions_at_rest(interpolant, coefficients, 2 * steps)
     truncation = 0.0
     if perturbed is not None:
-        truncation = largest_angle(pairs, _quaternions_at_rest(interpolant, perturbed, steps, in_pairs=True))
+        truncation = largest_angle(whole, _quaternions_at_rest(interpolant, perturbed, steps))
     nothing = np.zeros((1, len(whole) - 1))
     return StepRecord(
         quaternions=whole[None],
@@ -99,7 +100,7 @@ def integrate_steps_at_rest(interpolant: Interpolant, perturbed: Array | None, s
         turns=nothing,
         dynamics=nothing,
         propagators=np.empty((1, 0, 3, 3)),
-        stepping=np.array([largest_angle(whole[ends_of_pairs(steps, interpolant.loops)], pairs)]),
+        stepping=np.array([largest_angle(whole, finer[::2])]),
         truncation=np.array([truncation]),
     )
 
@@ -295,16 +296,13 @@ def _by_kernel(
     )
 
 
-def _quaternions_at_rest(
-    interpolant: Interpolant, coefficients: Array, steps: Integers, *, in_pairs: bool = False
-) -> Array:
+def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: Integers) -> Array:
     """At the ends of all steps without momentum: (loops K + 1, 4)."""
     if engine.is_ready():
-        quaternions = quaternions_at_rest(interpolant.widths, coefficients, steps, in_pairs=in_pairs)
+        quaternions = quaternions_at_rest(interpolant.widths, coefficients, steps)
         run_progress.advance(len(quaternions) - 1)
     else:
-        channels = _channels_at_stages(interpolant, coefficients, steps, in_pairs=in_pairs)
-        quaternions = _quaternions_of_one_loop(channels)
+        quaternions = _quaternions_of_one_loop(_channels_at_stages(interpolant, coefficients, steps))
     return _repeated(quaternions, interpolant.loops) if interpolant.loops > 1 else quaternions
 
 

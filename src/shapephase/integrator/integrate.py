@@ -1,8 +1,8 @@
 """From sampled I^-1 and I^-1 L_o to rotations: the one integrator of the library.
 
 The deformation is sampled first (`sampling`), without regard to the rotation; then the attitude equation is
-stepped on the interpolant, as finely as the rotation needs. Errors are measured: by steps twice as long, and by these
-on series with errors like those they probably have. The linearised equation, integrated along with it, shows how
+stepped on the interpolant, as finely as the rotation needs. Errors are measured: by steps twice as long, without
+momentum half as long, and by steps on series with errors like those they probably have. The linearised equation, integrated along with it, shows how
 rounding grows.
 """
 
@@ -19,7 +19,7 @@ from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
 from ._last_terms import Perturbed
-from ._step_control import StepRequirements, whole_steps
+from ._step_control import StepRequirements
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .fast import engine
 from .fast.estimate_constants import (
@@ -108,7 +108,7 @@ class Errors(NamedTuple):
     stepping: float
     rounding: float
     amplification: float
-    distance: float  # of pairs of steps
+    distance: float  # of the steps from those beside them
     order: float  # by which the error of steps falls
     rounded_up: float  # how many more steps were taken than planned, since they are whole
 
@@ -283,7 +283,7 @@ class Integration:
             distances=distances,
             amplification=amplification,
             sampling=sampling,
-            stepping=defects.error(distances, interpolant.loops, amplification),
+            stepping=requirements.stepping_error(steps, distances, amplification),
             rounding=rounding,
             defects=defects,
             rounded_up=float(steps.sum()) / planned,
@@ -305,7 +305,7 @@ class Integration:
             growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
-        steps = whole_steps(planned)
+        steps = requirements.whole_steps(planned)
         if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         return steps, float(planned.sum())
@@ -373,7 +373,7 @@ def _propagators_by_derivative(interpolant: Interpolant, momentum: Array, larges
     """
     magnitudes = norms(momentum)
     requirements = StepRequirements.from_interpolant(interpolant, largest, LOOSEST_TOLERANCE)
-    steps = whole_steps(requirements.plan(LOOSEST_TOLERANCE))
+    steps = requirements.whole_steps(requirements.plan(LOOSEST_TOLERANCE))
     channels, directions = stage_channels(interpolant, steps), _directions(momentum, magnitudes)
     with np.errstate(all="ignore"):
         return exact_propagators(channels, directions, magnitudes, interpolant.loops)

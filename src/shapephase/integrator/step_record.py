@@ -24,9 +24,10 @@ class StepRecord:
     dynamics : (B, K) dynamic phase of each step [rad]
     propagators : (B, M, 3, 3) error propagators, the state transition matrices that carry a small turn of the start to
         even parts of the steps; (B, 0, 3, 3) without momentum or where they were not asked for
-    stepping : (B,) the largest angle between the steps and pairs of them, at the ends of the pairs [rad]
-    truncation : (B,) the largest angle between pairs of steps on the series and on the perturbed ones; zero without
-        these [rad]
+    stepping : (B,) the largest angle between the steps and those beside them, at the ends that both have: pairs of them,
+        without momentum twice as many [rad]
+    truncation : (B,) the largest angle between pairs of steps, without momentum all steps, on the series and on the
+        perturbed ones; zero without these [rad]
     """
 
     quaternions: Array

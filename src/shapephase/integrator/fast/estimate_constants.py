@@ -83,6 +83,8 @@ FORESEEN = 2.3
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
 MOST_ODD = 16
 """Steps of a panel up to which their number may be odd; one more of many costs little and hides nothing from pairs."""
+FORESEEN_AT_REST = 10.0
+"""The same without momentum."""
 LOOKS_AHEAD = 3
 """At what defects foretell of a plan, before any step is taken."""
 FEW_STEPS = 1000.0
@@ -128,6 +130,9 @@ POWER_OF_EVENNESS = 0.375
 MOST_GROWTH_BY_CHANCE = 20.0
 """Of errors along the motion, whose root counts: where they grow, fewer steps make the distance, and chance counts
 more. A larger growth counts no more."""
+AT_REST = 2.5
+"""Without momentum steps are compared with twice as many, which are so much nearer that the distance is the error: how
+many times the error of all times may be larger than that of the steps' ends."""
 LEAST_ORDER = 2.0
 """By which errors fall at least when steps are made shorter."""
 UNRESOLVED = 0.125

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import run_progress
 from ...arrays import Array, Integers
-from ..step_record import StepRecord, pairs_of_steps
+from ..step_record import StepRecord
 from ._plain import plain
 from .threads import in_threads
 
@@ -72,11 +72,11 @@ def march_in_threads(
     return whole
 
 
-def quaternions_at_rest(widths: Array, coefficients: Array, steps: Integers, *, in_pairs: bool = False) -> Array:
-    """At the ends of all steps of one loop, or pairs of them, without momentum, from the identity: (K + 1, 4)."""
-    quaternions = np.empty((int((pairs_of_steps(steps) if in_pairs else steps).sum()) + 1, 4))
-    series, together = plain(coefficients).reshape(len(widths), -1), 2 if in_pairs else 1
-    _kernels().march_at_rest(plain(widths), series, np.array(steps, dtype=np.int64), together, quaternions)
+def quaternions_at_rest(widths: Array, coefficients: Array, steps: Integers) -> Array:
+    """At the ends of all steps of one loop without momentum, from the identity: (K + 1, 4)."""
+    quaternions = np.empty((int(steps.sum()) + 1, 4))
+    series = plain(coefficients).reshape(len(widths), -1)
+    _kernels().march_at_rest(plain(widths), series, np.array(steps, dtype=np.int64), quaternions)
     return quaternions
 
 

@@ -126,10 +126,12 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
     return rates, found
 
 
-def plan_of_steps(rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float) -> Array:
+def plan_of_steps(
+    rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float, *, moving: bool
+) -> Array:
     """What `StepRequirements.plan` finds: (P,)."""
     planned, arrays = np.empty(len(turns)), (plain(rates), plain(turns), plain(sizes))
-    _plan_kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, plain(defect_table()), planned)
+    _plan_kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, moving, plain(defect_table()), planned)
     return planned
 
 
@@ -151,7 +153,7 @@ def warm() -> None:
     errors_of_panels(degree, one, table, None, 1.0)
     series_with_changed_ends(coefficients, degree, one, 1.0)
     rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
-    plan_of_steps(rates, one, sizes, 1, 1.0, 1.0)
+    plan_of_steps(rates, one, sizes, 1, 1.0, 1.0, moving=True)
     defects_of_panels(rates, one, np.array([2]))
 
 

@@ -28,7 +28,7 @@ class Round(NamedTuple):
 
     steps: Integers  # (P,)
     record: StepRecord
-    distances: Array  # (B,) of pairs of steps [rad]
+    distances: Array  # (B,) of the steps from those beside them [rad]
     amplification: Array  # (B,) the largest growth of an error from one time to a later one
     sampling: Array  # (B,) errors of the samples, of the steps, and by rounding [rad]
     stepping: Array

@@ -21,7 +21,7 @@ from ...errors import AccuracyNotReached, SingularInertiaError
 from .._error_propagator import growth_and_rounding
 from .._last_terms import Perturbed, perturbed_series
 from .._spectral_error import spectral_norms
-from .._step_control import StepRequirements, whole_steps
+from .._step_control import StepRequirements
 from .._step_loop import checkpoint_steps, integrate_steps
 from ..fast import engine
 from ..fast.threads import processors
@@ -263,7 +263,8 @@ class _Plan:
     def requirements(self, turning: float) -> StepRequirements:
         """Of the model, were it to turn so many times as far."""
         model = Interpolant(self.model.edges, turning * self.model.coefficients, self.model.loops, 0)
-        return StepRequirements.from_interpolant(model, self.ceiling, self.tolerance)
+        # Deformations at rest are stepped as those with momentum.
+        return replace(StepRequirements.from_interpolant(model, self.ceiling, self.tolerance), moving=True)
 
     def steps(self, turning: float) -> Integers | None:
         """Steps on each panel (P,) of those that turn so many times as far; None: too many to be planned together."""
@@ -271,7 +272,7 @@ class _Plan:
             needed = self.requirements(turning)
             planned = needed.plan(self.tolerance, short=self.ceiling > 0.0 and needed.far)
             many = needed.very_far or needed.loops * float(planned.sum()) > _MANY_STEPS
-            self._steps[turning] = None if many else whole_steps(planned)
+            self._steps[turning] = None if many else needed.whole_steps(planned)
         return self._steps[turning]
 
 

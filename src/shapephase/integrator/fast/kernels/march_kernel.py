@@ -189,8 +189,8 @@ def _tabulate(first, last, panels, starts, widths, series, perturbed, steps, bas
                 with_few_others(c, other, terms, 2.0 * factor, basis, used, 0, tables[1, place], out)
             else:
                 channels_at(other, terms, 2.0 * factor, basis, used, 0, scaled, out)
-            shorten_single(count, 0, out)
-        shorten_single(count, 0, tables[1, place])
+            shorten_single(count, out)
+        shorten_single(count, tables[1, place])
 
 
 @part
@@ -210,7 +210,7 @@ def march_momenta(
     widths, series, perturbed, steps, loops, directions, magnitudes, marks, lanes, most_segments,
     quaternions, ends, turns, dynamics, propagators, stepping, truncation,
 ):  # fmt: skip
-    """All steps of all loops, pairs of them, and these on the perturbed series; what is after `most_segments` is filled.
+    """All steps of all loops, pairs of them, and these on perturbed series; what is after `most_segments` is filled.
 
     widths: (P,) [s]
     series, perturbed: (P, n * 9) times one second; no rows of the latter: not marched on
@@ -296,11 +296,8 @@ def _turn_on(c, count, at, quaternions):
 
 
 @kernel
-def march_at_rest(widths, series, steps, together, quaternions):
-    """The quaternions (K + 1, 4) after all steps of one loop without momentum; the other arguments as above.
-
-    together: 1; 2: the steps are taken two at a time, one of an odd number alone
-    """
+def march_at_rest(widths, series, steps, quaternions):
+    """The quaternions (K + 1, 4) after all steps of one loop without momentum; the other arguments as above."""
     terms = series.shape[1] // _CHANNELS
     basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * _CHANNELS)
     c, at = np.empty(SIZE), 0
@@ -309,10 +306,8 @@ def march_at_rest(widths, series, steps, together, quaternions):
     for panel in range(len(steps)):
         count, factor = terms_that_count(series[panel]), widths[panel] / steps[panel]
         for start in range(0, steps[panel], SEGMENT):
-            here = min(SEGMENT, steps[panel] - start)
-            used = basis_at(start, here, steps[panel], together, count, basis)
-            channels_at(series[panel], count, together * factor, basis, used, 6, scaled, c)
-            if together == 2:
-                shorten_single(here, 6, c)
-            _turn_on(c, (here + together - 1) // together, at, quaternions)
-            at += (here + together - 1) // together
+            together = min(SEGMENT, steps[panel] - start)
+            used = basis_at(start, together, steps[panel], 1, count, basis)
+            channels_at(series[panel], count, factor, basis, used, 6, scaled, c)
+            _turn_on(c, together, at, quaternions)
+            at += together

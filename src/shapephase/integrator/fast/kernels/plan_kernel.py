@@ -8,6 +8,7 @@ import numpy as np
 
 from ..estimate_constants import (
     AIM,
+    AT_REST,
     BY_CHANCE,
     DEGREES_A_RADIAN,
     DEGREES_A_STEP,
@@ -15,6 +16,7 @@ from ..estimate_constants import (
     DISTANCE,
     FEW_STEPS,
     FORESEEN,
+    FORESEEN_AT_REST,
     FULL_ORDER,
     LEAST_ORDER,
     LOOKS_AHEAD,
@@ -51,15 +53,15 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
 
 
 @part
-def make_whole(planned, steps):
-    """As `whole_steps`; steps are filled."""
+def make_whole(planned, moving, steps):
+    """As `StepRequirements.whole_steps`; steps are filled."""
     for panel in range(len(planned)):
-        whole = max(int(math.ceil(planned[panel])), 2)  # noqa: RUF046 (a float in machine code)
-        steps[panel] = whole + whole % 2 if whole > MOST_ODD else whole
+        whole = max(int(math.ceil(planned[panel])), 2 if moving else 1)  # noqa: RUF046 (a float in machine code)
+        steps[panel] = whole + whole % 2 if moving and whole > MOST_ODD else whole
 
 
 @kernel
-def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, table, planned):
+def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, moving, table, planned):
     """As `StepRequirements.plan`, with the table of defects; planned (P,) is filled."""
     turn, swing, degree = sizes[0], sizes[1], sizes[2]
     total = count = 0.0
@@ -74,10 +76,12 @@ def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, table, planne
         count += planned[panel]
     steps, found = np.empty(len(turn), np.int64), np.empty(5)
     for _ in range(LOOKS_AHEAD if loops * count <= FEW_STEPS else 0):
-        make_whole(planned, steps)
-        defects_of_panels(rates, turns, steps, table, found)
-        remaining = remaining_by_defects(found)
-        excess = loops * remaining * found[1] / (FORESEEN * tolerance)
+        make_whole(planned, moving, steps)
+        defects_of_panels(rates, turns, steps if moving else 2 * steps, table, found)
+        if moving:
+            excess = loops * remaining_by_defects(found) * found[1] / (FORESEEN * tolerance)
+        else:
+            excess = loops * found[1] / (FORESEEN_AT_REST * tolerance)
         if not excess > 1.0:
             break
         shorter = min(excess ** (1.0 / order_by_defects(found)), MOST_SHORTENED)
@@ -144,3 +148,9 @@ def error_by_defects(found, distance, loops, amplification):
     factor = BY_CHANCE * evenness**-POWER_OF_EVENNESS * math.sqrt(math.sqrt(math.sqrt(math.sqrt(cancelled))))
     factor *= math.sqrt(min(amplification, MOST_GROWTH_BY_CHANCE))
     return min(max(factor * remaining_by_defects(found) * distance, loops * unresolved), distance)
+
+
+@part
+def error_at_rest_by_defects(found, distance, loops):
+    """As `Defects.error_at_rest`."""
+    return AT_REST * distance / (1.0 - min(remaining_by_defects(found), 0.5)) + loops * found[2]

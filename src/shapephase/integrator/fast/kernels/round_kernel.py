@@ -28,48 +28,45 @@ from .jit import kernel, part
 from .march_kernel import march_at_rest, march_momenta
 from .plan_kernel import (
     defects_of_panels,
+    error_at_rest_by_defects,
     error_by_defects,
     make_whole,
     order_by_defects,
     plan_steps,
     sizes_of_terms,
 )
-from .stage_series import pairs_before_single
 
 _ONE_LANE = 1
 _MOST_ROUNDS = 4
 
 
 @part
-def _square_apart(a, b, worst):
-    """The larger one of a square and that of the distance of two quaternions; a quaternion and its negative are one."""
-    minus = plus = 0.0
-    for i in range(4):
-        minus += (a[i] - b[i]) * (a[i] - b[i])
-        plus += (a[i] + b[i]) * (a[i] + b[i])
-    square = min(minus, plus)
-    return worst if square <= worst else square
+def _largest_square(a, b, skip):
+    """Of the distances of every `skip`-th quaternion of a from those of b; a quaternion and its negative are one."""
+    worst = 0.0
+    for k in range(len(b)):
+        minus = plus = 0.0
+        for i in range(4):
+            x, y = a[skip * k, i], b[k, i]
+            minus += (x - y) * (x - y)
+            plus += (x + y) * (x + y)
+        square = min(minus, plus)
+        if not square <= worst:
+            worst = square
+    return worst
 
 
 @part
 def _march_at_rest(widths, series, perturbed, steps, quaternions, stepping, truncation):
     """As `march_momenta` for one loop without momentum."""
-    march_at_rest(widths, series, steps, 1, quaternions[0])
-    pairs, worst, at, place = np.empty((1 + ((steps + 1) // 2).sum(), 4)), 0.0, 0, 0
-    march_at_rest(widths, series, steps, 2, pairs)
-    for panel in range(len(steps)):
-        before = pairs_before_single(steps[panel])
-        for pair in range(1, (steps[panel] + 1) // 2 + 1):
-            place += 1
-            worst = _square_apart(quaternions[0, at + 2 * pair - (1 if pair > before else 0)], pairs[place], worst)
-        at += steps[panel]
-    stepping[0], worst = 2.0 * math.sqrt(worst), 0.0
+    whole, count = quaternions[0], quaternions.shape[1]
+    march_at_rest(widths, series, steps, whole)
+    other = np.empty((2 * count - 1, 4))
+    march_at_rest(widths, series, 2 * steps, other)
+    stepping[0], truncation[0] = 2.0 * math.sqrt(_largest_square(other, whole, 2)), 0.0
     if len(perturbed):
-        other = np.empty((len(pairs), 4))
-        march_at_rest(widths, perturbed, steps, 2, other)
-        for k in range(len(pairs)):
-            worst = _square_apart(pairs[k], other[k], worst)
-    truncation[0] = 2.0 * math.sqrt(worst)
+        march_at_rest(widths, perturbed, steps, other)
+        truncation[0] = 2.0 * math.sqrt(_largest_square(other, whole, 1))
 
 
 @part
@@ -112,9 +109,9 @@ def take_rounds(
     marks_of_finer, marks_of_growth: that refinements are rounded up to, of a factor of two
 
     Returns whether the motion is short enough to be done here, and if so steps, quaternions, ends, turns, dynamics,
-    propagators as of `march_momenta`, and thirteen numbers: whether perturbed series count, distance of pairs of steps,
-    of the perturbed series, growth, rounding, the five of `defects_of_panels`, how many more steps were taken than planned,
-    and the errors of steps and of samples.
+    propagators as of `march_momenta`, and thirteen numbers: whether perturbed series count, distance from the steps
+    beside them, of the perturbed series, growth, rounding, the five of `defects_of_panels`, how many more steps were
+    taken than planned, and the errors of steps and of samples.
     """
     panels, moving = len(widths), ceiling > 0.0
     rates, sizes, planned = np.empty((panels, series.shape[1] // 9)), np.empty((3, panels)), np.empty(panels)
@@ -122,13 +119,13 @@ def take_rounds(
     turn = loops * sizes[0].sum()
     a_step = SHORT_TURN_A_STEP if moving and turn > FAR else TURN_A_STEP
     seen = sizes[0] if moving else np.zeros(panels)
-    plan_steps(rates, seen, sizes, loops, tolerance, a_step, table, planned)
+    plan_steps(rates, seen, sizes, loops, tolerance, a_step, moving, table, planned)
     steps, found, rounds = np.empty(panels, np.int64), np.zeros(13), 0
     while True:
         finer, amplified = refinement[0], refinement[1]
         is_short = loops * finer * planned.sum() <= MANY_STEPS and not (moving and turn > VERY_FAR)
         if is_short:
-            make_whole(finer * planned, steps)
+            make_whole(finer * planned, moving, steps)
         total = loops * steps.sum() if is_short else 0
         quaternions, ends = np.empty((1, total + 1, 4)), np.empty((1, total + 1 if moving else 0, 3))
         turns, dynamics = np.zeros((1, total)), np.zeros((1, total))
@@ -149,11 +146,15 @@ def take_rounds(
         else:
             _march_at_rest(widths, series, other, steps, quaternions, found[1:2], found[2:3])
         growths_and_rounding(propagators, quaternions, found[3:4], found[4:5])
-        defects_of_panels(rates, seen, steps, table, found[5:10])
+        defects_of_panels(rates, seen, steps if moving else 2 * steps, table, found[5:10])
         found[10] = steps.sum() / (finer * planned.sum())
         if not math.isfinite(found[1]):
             found[1] = math.pi
-        found[11], found[12] = error_by_defects(found[5:10], found[1], loops, found[3]), found[3] * expected
+        if moving:
+            found[11] = error_by_defects(found[5:10], found[1], loops, found[3])
+        else:
+            found[11] = error_at_rest_by_defects(found[5:10], found[1], loops)
+        found[12] = found[3] * expected
         if found[0] > 0.0:
             measured = found[2] + found[3] * hidden
             found[12] = measured if math.isnan(found[12]) or measured < found[12] else found[12]

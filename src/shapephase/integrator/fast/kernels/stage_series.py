@@ -91,10 +91,10 @@ def basis_at(first, count, steps, together, terms, basis):
 
 
 @part
-def shorten_single(count, first_channel, out):
+def shorten_single(count, out):
     """Of `count` steps that were taken two at a time the one that is alone, if there is one, made half as long."""
     if count % 2:
-        for j in range(first_channel, CHANNELS):
+        for j in range(CHANNELS):
             o = np.uint32(j * STRIDE + pairs_before_single(count) * STAGES)
             for i in range(STAGES):
                 out[o + i] = 0.5 * out[o + i]
