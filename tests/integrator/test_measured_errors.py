@@ -85,7 +85,7 @@ def test_the_error_of_steps_is_within_its_estimate_and_not_far_below(tolerance: 
 def test_steps_at_rest_are_as_far_from_twice_as_many_as_their_difference_says(
     monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, steps: list[int], fast: str
 ):
-    """About one axis an angle is a sum by the formula's weights: the record's number is the largest difference of two."""
+    """About one axis an angle is a sum by the formula's weights; the number is the largest difference of two."""
     if fast == "1":
         request.getfixturevalue("fast")
     else:

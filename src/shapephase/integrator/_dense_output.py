@@ -146,12 +146,12 @@ class DenseOutput:
             if not at_rest:
                 directions[..., side] = np.moveaxis(self.directions[:, index], -1, 0)
         dynamics[..., -1] = self.dynamics[:, which]
-        if count > 1:
-            fractions = np.tile(np.arange(1, count) / count, steps)
-            inner = self._stepped(np.repeat(which, count - 1), fractions)
-            for whole, parts in zip((quaternions, directions, dynamics[None]), inner, strict=True):
-                for part, row in zip(parts, whole, strict=True):
-                    row[..., 1:-1] = np.reshape(part, (-1, steps, count - 1))
+        # From one inner end to the next: a step over part of another may err by more than the whole of it.
+        for inner in range(1, count):
+            start = quaternions[..., inner - 1], directions[..., inner - 1], dynamics[..., inner - 1]
+            found = self._stepped(which, (inner - 1) / count, inner / count, *start)
+            for whole, part in zip((quaternions, directions, dynamics[None]), found, strict=True):
+                whole[..., inner] = part
 
         def both(ends: Array) -> Array:
             cut = np.stack([ends[..., :-1], ends[..., 1:]], axis=-3)
@@ -159,21 +159,26 @@ class DenseOutput:
 
         return both(quaternions), None if at_rest else both(directions), both(dynamics)
 
-    def _stepped(self, step: Integers, fraction: Array) -> tuple[list[Array], list[Array], list[Array]]:
-        """A step of the same formula over fractions of given steps: (N,), (N,) -> quaternion, direction, dynamics."""
-        lengths = fraction * (self.times[step + 1] - self.times[step])
+    def _stepped(
+        self, which: Integers, begin: float, end: float, quaternions: Array, directions: Array, dynamics: Array
+    ) -> tuple[Array, Array, Array]:
+        """A step of the same formula over a part of given steps, from what is at its beginning to what is at its end.
+
+        (4, B, W), (3, B, W), (B, W) -> the same
+        """
+        starts, lengths = self.times[which], self.times[which + 1] - self.times[which]
         _, _, c = tableau()
-        panel = self.interpolant.panel_of(0.5 * (self.times[step] + self.times[step + 1]))
-        channels = self.interpolant.channels(self.times[step, None] + c * lengths[:, None], panel)
-        stages = np.moveaxis(channels * lengths[:, None, None], 0, -1)
-        before = list(np.moveaxis(self.quaternions[:, step], -1, 0))
+        panel = self.interpolant.panel_of(starts + 0.5 * lengths)
+        times, shares = (starts + begin * lengths)[:, None], ((end - begin) * lengths)[:, None]
+        channels = self.interpolant.channels(times + c * shares, panel)
+        stages = np.moveaxis(channels * shares[:, :, None], 0, -1)
+        before = list(quaternions)
         if not self.directions.shape[1]:
-            turn = rest_step(stages[:, 6:])
-            nothing = np.zeros((len(self.magnitude), len(step)))
-            return product(before, turn), [nothing] * 3, [nothing]
-        start = list(np.moveaxis(self.directions[:, step], -1, 0))
-        end, turn, dynamic = momentum_step(start, self.magnitude[:, None], stages)
-        return turned(before, start, end, (np.sin(0.5 * turn), np.cos(0.5 * turn))), end, [dynamic]
+            return np.array(product(before, rest_step(stages[:, 6:]))), directions, dynamics
+        start = list(directions)
+        following, turn, dynamic = momentum_step(start, self.magnitude[:, None], stages)
+        attitude = turned(before, start, following, (np.sin(0.5 * turn), np.cos(0.5 * turn)))
+        return np.array(attitude), np.array(following), dynamics + dynamic
 
 
 def _at_places(polynomials: Array, components: int, x: Array, place: Integers) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._rotation_step import STAGES, attitude_step
-from ._step_loop import BLOCK, CHECKPOINTS, checkpoint_steps, momentum_step_function
-from .casadi_calls import call_casadi
+from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
+from .casadi_calls import call_casadi, map_rows
 from .fast import engine
 from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
 from .fast.marches import derivatives, growths_and_rounding
@@ -68,10 +68,25 @@ def largest_growth(propagators: Array) -> Array:
     """Of an error from one time to a later one: (B, CHECKPOINTS, 3, 3) -> (B,), infinite where it is not known."""
     if propagators.shape[1] == 0:
         return np.ones(len(propagators))
-    with np.errstate(over="ignore", invalid="ignore"):
-        largest = np.tril(_growth_between(propagators)).max(axis=(1, 2))
+    numbers = propagators.reshape(len(propagators), -1)
+    found = map_rows(growth_of_propagators, numbers.shape[1], numbers)
     # Where steps were so long that they overflowed, the growth is unknown.
-    return np.where(np.isfinite(propagators.sum(axis=(1, 2, 3)) + largest), largest, np.inf)
+    return np.where(np.isfinite(found).all(axis=1), found[:, 0], np.inf)
+
+
+def growth_of_propagators(entries: list[Any]) -> list[Any]:
+    """From propagators in a row: the growth, and a sum that is finite where they all are."""
+    import casadi
+
+    matrices = [[entries[first + 3 * i : first + 3 * i + 3] for i in range(3)] for first in range(0, len(entries), 9)]
+    adjugates = [adjugate_of(matrix) for matrix in matrices]
+    largest = 1.0
+    for later in range(1, len(matrices)):
+        for earlier in range(later):
+            between = matrix_product(matrices[later], adjugates[earlier])
+            squares = sum(entry * entry for row in between for entry in row)
+            largest = casadi.fmax(largest, 0.5 * (squares - 1.0))
+    return [casadi.sqrt(largest + casadi.sqrt(largest * largest - 1.0)), sum(entries)]
 
 
 def _growths_and_rounding(propagators: Array, quaternions: Array) -> tuple[Array, Array]:

@@ -140,19 +140,15 @@ def defects(rates: Array, turns: Array, steps: Integers) -> Defects:
     turns : (P,) how far the body turns on each panel, which makes terms swing faster as seen from space [rad]
     steps : (P,) at least two
     """
-    odd = steps % 2
+    halves, further = steps // 2, DEGREES_OF_TURN * turns
     # Of an odd number the pairs have rows of their own.
-    counts = np.stack([steps, steps // 2])
-    # More steps than the table has: as in the most that it has, for the terms that swing as fast at the panel's ends.
-    fewer = np.minimum(counts, DEFECT_STEPS)
-    slower = np.sqrt(fewer / counts)[..., None]
-    degrees = np.arange(float(rates.shape[1])) + (DEGREES_OF_TURN * turns)[:, None]
-    degrees = np.minimum(degrees * slower, DEFECT_DEGREES - 1.001)
-    below, table = degrees.astype(np.int64), defect_table()
-    rows = fewer + np.stack([np.zeros_like(odd), odd * (DEFECT_STEPS + 1)])
-    place = rows[..., None] * DEFECT_DEGREES + below
-    first, second = table.take(place), table.take(place + 1)
-    whole, coarse = rates * (slower * slower) * (first + (degrees - below) * (second - first))
+    rows = np.array([steps, halves + (DEFECT_STEPS + 1) * (steps % 2)])
+    # Every term at once where no degree is beyond the table.
+    if steps.max() <= DEFECT_STEPS and rates.shape[1] + further.max() < DEFECT_DEGREES - 1.0:
+        found = _by_windows(rows, rates.shape[1], further)
+    else:
+        found = _term_by_term(rows, np.array([steps, halves]), rates.shape[1], further)
+    whole, coarse = rates * found
     of_panels = coarse.sum(axis=1)
     total, squares = float(of_panels.sum()), float(of_panels @ of_panels)
     return Defects(
@@ -160,5 +156,33 @@ def defects(rates: Array, turns: Array, steps: Integers) -> Defects:
         coarse=total,
         unresolved=float(whole[whole > UNRESOLVED * coarse].sum()),
         evenness=total * total / (len(steps) * squares) if squares > 0.0 else 1.0,
-        paired=2.0 * float(counts[1].sum()) / float(counts[0].sum()),
+        paired=2.0 * float(halves.sum()) / float(steps.sum()),
     )
+
+
+@lru_cache(maxsize=64)
+def _windows(terms: int) -> Array:
+    """The table from each degree on: (rows, degrees, terms)."""
+    return np.lib.stride_tricks.sliding_window_view(defect_table(), terms, axis=1)
+
+
+def _by_windows(rows: Integers, terms: int, further: Array) -> Array:
+    """Of T_0, T_1 ... by rows of the table, each panel's so many degrees further: (2, P), (P,) -> (2, P, terms)."""
+    below = further.astype(np.int64)
+    windows = _windows(terms + 1)[rows, below]
+    share = (further - below)[:, None]
+    return (1.0 - share) * windows[..., :-1] + share * windows[..., 1:]
+
+
+def _term_by_term(rows: Integers, counts: Integers, terms: int, further: Array) -> Array:
+    """The same of more steps than the table has, and beyond its degrees; counts are those of the steps, (2, P).
+
+    As in the most steps that it has, for the terms that swing as fast at the panel's ends.
+    """
+    fewer = np.minimum(counts, DEFECT_STEPS)
+    slower = np.sqrt(fewer / counts)[..., None]
+    degrees = np.minimum((np.arange(float(terms)) + further[:, None]) * slower, DEFECT_DEGREES - 1.001)
+    below, table = degrees.astype(np.int64), defect_table()
+    place = (rows - counts + fewer)[..., None] * DEFECT_DEGREES + below
+    first, second = table.take(place), table.take(place + 1)
+    return slower * slower * (first + (degrees - below) * (second - first))

@@ -108,7 +108,9 @@ class StepRequirements:
         With momentum at least two, so that pairs of them show errors, and where they are many even.
         """
         whole = np.maximum(np.ceil(planned), 2.0 if self.moving else 1.0).astype(int)
-        return whole + (whole > MOST_ODD) * (whole % 2) if self.moving else whole
+        if not self.moving or whole.max() <= MOST_ODD:
+            return whole
+        return whole + (whole > MOST_ODD) * (whole % 2)
 
     def defects(self, steps: Integers) -> Defects:
         """What the formula misses in so many steps (P,) and in those beside them."""
@@ -141,5 +143,4 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
         swinging[:, 0] = 0.0
     # More turns than can be stepped are refused, and their powers would overflow.
     seen = degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None] if magnitude else degree
-    return rates, np.stack([turn, (swinging * seen**ORDER).sum(axis=1), last])
-
+    return rates, np.array([turn, (swinging * seen**ORDER).sum(axis=1), last])

@@ -1,9 +1,9 @@
 """The attitude equation stepped on an interpolant three times, so that the differences tell the errors.
 
-All steps; two of them at a time; these pairs on series with errors like those they probably have. Without momentum, where
-steps cost little: all steps; twice as many; all steps on these other series. Machine code
-takes them where there is some (`fast.marches`). Without it each march of a few momenta is one CasADi call after
-another, and the steps of many are taken on whole arrays.
+All steps; two of them at a time; these pairs on series with errors like those they probably have. Without momentum,
+where steps cost little: all steps; twice as many; all steps on these other series. Machine code takes them where there
+is some (`fast.marches`). Without it each march of a few momenta is one CasADi call after another, and the steps of many
+are taken on whole arrays.
 """
 
 from __future__ import annotations

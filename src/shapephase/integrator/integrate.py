@@ -2,8 +2,8 @@
 
 The deformation is sampled first (`sampling`), without regard to the rotation; then the attitude equation is
 stepped on the interpolant, as finely as the rotation needs. Errors are measured: by steps twice as long, without
-momentum half as long, and by steps on series with errors like those they probably have. The linearised equation, integrated along with it, shows how
-rounding grows.
+momentum half as long, and by steps on series with errors like those they probably have. The linearised equation,
+integrated along with it, shows how rounding grows.
 """
 
 from __future__ import annotations

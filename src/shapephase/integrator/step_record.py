@@ -24,8 +24,8 @@ class StepRecord:
     dynamics : (B, K) dynamic phase of each step [rad]
     propagators : (B, M, 3, 3) error propagators, the state transition matrices that carry a small turn of the start to
         even parts of the steps; (B, 0, 3, 3) without momentum or where they were not asked for
-    stepping : (B,) the largest angle between the steps and those beside them, at the ends that both have: pairs of them,
-        without momentum twice as many [rad]
+    stepping : (B,) the largest angle between the steps and those beside them, at the ends that both have: pairs of
+        steps, without momentum twice as many [rad]
     truncation : (B,) the largest angle between pairs of steps, without momentum all steps, on the series and on the
         perturbed ones; zero without these [rad]
     """
@@ -62,13 +62,12 @@ def pairs_of_steps(steps: Integers) -> Integers:
 
 def ends_of_pairs(steps: Integers, loops: int) -> Integers:
     """After how many steps each pair of them ends, the start before all: (L + 1,)."""
-    each = np.tile(steps, loops)
-    pairs = pairs_of_steps(each)
-    within = np.arange(1, int(pairs.sum()) + 1) - np.repeat(np.cumsum(pairs) - pairs, pairs)
-    after_single = np.repeat(each % 2, pairs) * (within > np.repeat(pairs_before_single(each), pairs))
-    return np.append(0, np.repeat(np.cumsum(each) - each, pairs) + 2 * within - after_single)
-
-
-def pairs_before_single(steps: Integers) -> Integers:
-    """How many pairs of an odd number of steps come before the one that is alone: (P,)."""
-    return (steps + 1) // 4
+    ends, start = [0], 0
+    for count in steps.tolist():
+        before = 2 * ((count + 1) // 4 if count % 2 else count // 2)
+        ends.extend(range(start + 2, start + before + 1, 2))
+        ends.extend(range(start + before + 1, start + count + 1, 2))
+        start += count
+    if loops == 1:
+        return np.array(ends)
+    return np.append(0, (np.array(ends[1:]) + start * np.arange(loops)[:, None]).ravel())

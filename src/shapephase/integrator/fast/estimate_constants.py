@@ -130,7 +130,7 @@ POWER_OF_EVENNESS = 0.375
 MOST_GROWTH_BY_CHANCE = 20.0
 """Of errors along the motion, whose root counts: where they grow, fewer steps make the distance, and chance counts
 more. A larger growth counts no more."""
-AT_REST = 2.5
+AT_REST = 1.5
 """Without momentum steps are compared with twice as many, which are so much nearer that the distance is the error: how
 many times the error of all times may be larger than that of the steps' ends."""
 LEAST_ORDER = 2.0
