@@ -77,8 +77,8 @@ VERY_FAR = 100.0
 """[rad] the same of short steps; they were right to 3 % in turns of half as much, and to 30 % in the double."""
 MANY_STEPS = 4000.0
 """Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
-NEGLIGIBLE = 0.005
-"""Of the tolerance: what the samplers say, amplified, is not worth a march of its own below."""
+NEGLIGIBLE = 0.1
+"""Of the tolerance: what the samplers say, amplified, is not worth a march of its own below, far too much though it is."""
 FORESEEN = 2.3
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
 MOST_ODD = 16
