@@ -32,7 +32,7 @@ _STRAIGHT_FACTORS = (0.5, 1.0)
 # Random loops tried for each one that is needed: some cannot be reconstructed.
 _ATTEMPTS = 10
 # Accuracy of the reconstruction [rad]: guesses are off by far more.
-_RECONSTRUCTION_TOLERANCE = 1e-4
+_RECONSTRUCTION_TOLERANCE = 1e-6
 # A guess that turns the body by less than this share of the way is ranked as if by this share: its price diverges.
 _LEAST_SHARE = 1e-3
 # Curvature in units of the metric below which loops turn the body by less than rounding.
