@@ -19,6 +19,7 @@ from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
 from ._last_terms import Perturbed
+from ._measured_rounding import measured_rounding
 from ._step_control import StepRequirements
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .fast import engine
@@ -257,7 +258,7 @@ class Integration:
         little = LITTLE_ROUNDING * self._tolerance
         record = found.record
         closely = looked_at_closely(found.rounding, record.propagators, record.quaternions, little)
-        return found._replace(rounding=closely)
+        return found._replace(rounding=self._measured_rounding(closely, interpolant, found.steps, record))
 
     def _round(self, interpolant: Interpolant, perturbed: Perturbed, expected: float) -> Round:
         """Plan the steps and take them; how errors grow, and whether those of the samples were measured."""
@@ -271,7 +272,8 @@ class Integration:
         record = self._take_steps(interpolant, perturbed.coefficients if counts and perturbed.differ else None, steps)
         propagators = record.propagators if self._propagators is None else self._propagators
         little = LITTLE_ROUNDING * self._tolerance
-        amplification, rounding = growth_and_rounding(propagators, record.quaternions, little, self._threads)
+        amplification, bound = growth_and_rounding(propagators, record.quaternions, little, self._threads)
+        rounding = self._measured_rounding(bound, interpolant, steps, record)
         sampling = amplification * expected
         if counts:
             sampling = np.fmin(sampling, record.truncation + amplification * perturbed.hidden)
@@ -288,6 +290,9 @@ class Integration:
             defects=defects,
             rounded_up=float(steps.sum()) / planned,
         )
+
+    def _measured_rounding(self, bound: Array, interpolant: Interpolant, steps: Integers, record: StepRecord) -> Array:
+        return measured_rounding(bound, interpolant, steps, record, self._magnitudes, self._tolerance)
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> tuple[Integers, float]:
         """Steps on each panel (P,), and how many were planned.

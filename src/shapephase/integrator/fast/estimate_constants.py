@@ -78,7 +78,7 @@ VERY_FAR = 100.0
 MANY_STEPS = 4000.0
 """Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
 NEGLIGIBLE = 0.1
-"""Of the tolerance: what the samplers say, amplified, is not worth a march of its own below, far too much though it is."""
+"""Of the tolerance: below, what the samplers say, amplified, is not worth a march of its own, though it is too much."""
 FORESEEN = 2.3
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
 MOST_ODD = 16
@@ -146,6 +146,17 @@ ROUNDING_OF_STEP = 2.0
 """Units: of a step, at random."""
 ROUNDING_OF_RADIAN = 1.0
 """Units: of each radian turned."""
+MEASURED_ROUNDING = 0.5
+"""Of the tolerance: a bound above it is not believed before other marches have been looked at."""
+OTHER_ROUNDINGS = 4
+"""Of these marches, each on series with other errors."""
+NOISE_OF_SERIES = 2.0
+"""Units, of a series' largest coefficient: these errors."""
+ROUNDING_BY_CHANCE = 3.0
+"""How many times the largest of their distances the error due to rounding may be. Of 112 motions whose bound is near
+the tolerance one was above, which is above its bound, too."""
+LEAST_OF_BOUND = 1.0 / 30.0
+"""Of the bound, that distances are believed."""
 
 # ---- Polynomials of the dense output -------------------------------------------------------------------------------
 

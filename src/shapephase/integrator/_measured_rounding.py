@@ -1,0 +1,69 @@
+"""Error due to rounding where its bound is too large: what a motion becomes when it is rounded otherwise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Array, Integers
+from ._step_loop import largest_angle, quaternions_alone
+from .fast.estimate_constants import (
+    EPS,
+    LEAST_OF_BOUND,
+    MEASURED_ROUNDING,
+    NOISE_OF_SERIES,
+    OTHER_ROUNDINGS,
+    ROUNDING_BY_CHANCE,
+)
+from .interpolant import Interpolant
+from .step_record import StepRecord
+
+# Numbers of quaternions at once: eight megabytes.
+_MOST_NUMBERS = 1_000_000
+
+
+def measured_rounding(
+    bound: Array,
+    interpolant: Interpolant,
+    steps: Integers,
+    record: StepRecord,
+    magnitudes: Array,
+    tolerance: float,
+) -> Array:
+    """The bound (B,) [rad], and where it takes up most of the tolerance what it is by marches that round otherwise.
+
+    The bound supposes that all rounding meets the growth of errors at its worst. Series that differ by units of
+    rounding show what it does meet: each of some marches on such series is off by rounding of its own.
+
+    Parameters
+    ----------
+    steps : (P,) on each panel of one loop
+    record : of these steps
+    magnitudes : (B,) of the momentum [kg m^2/s]
+    """
+    rows = np.flatnonzero((bound > MEASURED_ROUNDING * tolerance) & np.isfinite(bound))
+    if not len(rows):
+        return bound
+    apart = np.zeros(len(rows))
+    at_once = max(1, _MOST_NUMBERS // record.quaternions[0].size)
+    for number in range(OTHER_ROUNDINGS):
+        series = _rounded_otherwise(interpolant.coefficients, number)
+        for first in range(0, len(rows), at_once):
+            part = slice(first, first + at_once)
+            these = rows[part]
+            start = (record.directions[these, 0], magnitudes[these]) if record.directions.shape[1] else ()
+            other = quaternions_alone(interpolant, series, steps, *start)
+            apart[part] = np.maximum(apart[part], largest_angle(record.quaternions[these], other))
+    measured = np.array(bound)
+    # Overflown marches tell nothing.
+    found = np.where(np.isfinite(apart), ROUNDING_BY_CHANCE * apart, np.inf)
+    measured[rows] = np.minimum(bound[rows], np.maximum(found, LEAST_OF_BOUND * bound[rows]))
+    return measured
+
+
+def _rounded_otherwise(coefficients: Array, number: int) -> Array:
+    """Series (P, n, 9) with errors of some units of rounding, the same for the same number."""
+    noise = np.random.default_rng(number).uniform(-NOISE_OF_SERIES * EPS, NOISE_OF_SERIES * EPS, coefficients.shape)
+    sizes = np.abs(coefficients).max(axis=1)
+    noise[..., :6] *= sizes[:, :6].max(axis=1)[:, None, None]
+    noise[..., 6:] *= sizes[:, 6:].max(axis=1)[:, None, None]
+    return coefficients + noise

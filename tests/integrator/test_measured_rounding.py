@@ -1,0 +1,75 @@
+"""Rounding measured by marches that round otherwise, where its bound would have the tolerance refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from benchmarks.estimates import judged
+from benchmarks.random_motions import mixed
+
+import shapephase as sp
+from shapephase.errors import AccuracyNotReached
+from shapephase.integrator import integrate
+from shapephase.integrator._measured_rounding import measured_rounding
+from shapephase.integrator._step_loop import integrate_steps
+from shapephase.integrator.fast.estimate_constants import LEAST_OF_BOUND, MEASURED_ROUNDING
+from shapephase.integrator.interpolant import Interpolant
+from support.compiler import needs_compiler
+
+MOMENTS = np.array([1.0, 2.0, 3.5])
+# Beside the unstable axis.
+MOMENTUM = np.array([0.02, 2.0, 0.01])
+
+
+def rigid(duration: float) -> Interpolant:
+    """Of constant inertia, in panels of half a second."""
+    panels = int(2.0 * duration)
+    series = np.zeros((panels, 1, 9))
+    series[:, 0, :3] = 1.0 / MOMENTS
+    return Interpolant(np.linspace(0.0, duration, panels + 1), series, 1, 0)
+
+
+@needs_compiler
+@pytest.mark.parametrize("fast", ["0", "1"])
+@pytest.mark.parametrize("number", [8980, 9445])
+def test_a_tolerance_that_the_bound_would_refuse_is_reached(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, fast: str, number: int
+):
+    """Of loops whose errors grow some hundred and some thousand times, in extended precision."""
+    if fast == "1":
+        request.getfixturevalue("fast")
+    else:
+        monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+    run = judged("mixed", 301, 60.0, number)
+    assert run.outcome == "done"
+    assert run.error <= run.estimate + run.bound <= run.tolerance + run.bound
+    monkeypatch.setattr(integrate, "measured_rounding", lambda bound, *_: bound)
+    trial = mixed(number, np.random.default_rng((301, number)))
+    with pytest.raises(AccuracyNotReached, match="rounding"):
+        sp.reconstruct(sp.articulated(trial.body, trial.path), trial.momentum, tolerance=trial.tolerance)
+
+
+def test_a_bound_far_below_the_tolerance_is_believed_and_no_measure_is_far_below_it():
+    interpolant, steps = rigid(4.0), np.full(8, 4)
+    size = np.array([np.linalg.norm(MOMENTUM)])
+    record = integrate_steps(interpolant, None, steps, MOMENTUM[None] / size, size)
+    bound = np.array([1e-3])
+    assert measured_rounding(bound, interpolant, steps, record, size, 1.01e-3 / MEASURED_ROUNDING) is bound
+    (found,) = measured_rounding(bound, interpolant, steps, record, size, 1e-3)
+    assert found == LEAST_OF_BOUND * bound[0]
+    unknown = np.array([np.inf])
+    assert measured_rounding(unknown, interpolant, steps, record, size, 1e-3) is unknown
+
+
+def test_rows_are_measured_each_for_itself():
+    """Of two momenta the one whose bound is large, as if it were alone."""
+    interpolant, steps = rigid(8.0), np.full(16, 4)
+    momenta = np.stack([MOMENTUM, [0.0, 0.0, 1.0]])
+    sizes = np.linalg.norm(momenta, axis=1)
+    both = integrate_steps(interpolant, None, steps, momenta / sizes[:, None], sizes)
+    one = integrate_steps(interpolant, None, steps, momenta[:1] / sizes[:1, None], sizes[:1])
+    tolerance = 1e-12
+    found = measured_rounding(np.array([1e-12, 1e-14]), interpolant, steps, both, sizes, tolerance)
+    (alone,) = measured_rounding(np.array([1e-12]), interpolant, steps, one, sizes[:1], tolerance)
+    assert found[0] == alone < 1e-12
+    assert found[1] == 1e-14
