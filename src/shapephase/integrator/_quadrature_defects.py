@@ -8,7 +8,7 @@ does.
 from __future__ import annotations
 
 from functools import lru_cache
-from math import log2
+from math import inf, log2
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,9 @@ from .fast.estimate_constants import (
     FORESEEN_AT_REST,
     FULL_ORDER,
     LEAST_ORDER,
+    LITTLE_TURN,
     MOST_GROWTH_BY_CHANCE,
+    NEARLY_AT_REST,
     ORDER,
     POWER_OF_EVENNESS,
     TINY,
@@ -115,14 +117,19 @@ class Defects(NamedTuple):
         foreseen = loops * (self.remaining * self.coarse if moving else self.coarse)
         return foreseen / ((FORESEEN if moving else FORESEEN_AT_REST) * tolerance)
 
-    def error(self, distance: Array, loops: int, amplification: Array | float = 1.0) -> Array:
+    def error(
+        self, distance: Array, loops: int, amplification: Array | float = 1.0, turn_by_momentum: float = inf
+    ) -> Array:
         """Bound of the error of steps by their distance from pairs of them, (B,) [rad].
 
         `amplification` : of an error from one time to a later one, (B,): what grows most hides the rest of the distance
+        `turn_by_momentum` : how far the body turns by its momentum alone [rad]
         """
         cancelled = np.maximum(loops * self.coarse / np.maximum(distance, TINY), 1.0)
         factor = BY_CHANCE * self.evenness**-POWER_OF_EVENNESS * np.sqrt(np.sqrt(np.sqrt(np.sqrt(cancelled))))
+        share = turn_by_momentum / LITTLE_TURN
         factor = factor * np.sqrt(np.minimum(amplification, MOST_GROWTH_BY_CHANCE))
+        factor = factor * (1.0 + NEARLY_AT_REST / (1.0 + share * share))
         return np.minimum(np.maximum(factor * self.remaining * distance, loops * self.unresolved), distance)
 
     def error_at_rest(self, distance: Array, loops: int) -> Array:

@@ -37,8 +37,8 @@ class StepRequirements:
 
     Attributes
     ----------
-    sizes : (3, P) of each panel a bound of how far the body turns there, the error of a single step but for a factor
-        common to all [rad], and the last significant degree
+    sizes : (4, P) of each panel a bound of how far the body turns there, the error of a single step but for a factor
+        common to all [rad], the last significant degree, and how far the body turns by its momentum alone [rad]
     rates : (P, n) the size of each term of the rate of turning, times the panel's width [rad]
     turns : (P,) how far the body turns on each panel as seen from space, by the bound; zero without momentum [rad]
     whole_turn : the bound for all panels and loops [rad]
@@ -87,7 +87,7 @@ class StepRequirements:
         if engine.is_ready():
             bounds = self.rates, self.turns, self.sizes
             return plan_of_steps(*bounds, self.loops, tolerance, turn_a_step, moving=self.moving)
-        turn, swing, degree = self.sizes
+        turn, swing, degree, _ = self.sizes
         # As many on each panel as make the sum of all the least.
         each = swing ** (1.0 / (ORDER + 1.0))
         common = self.loops * DISTANCE * float(np.sqrt((each * each).sum())) / (AIM * tolerance)
@@ -128,12 +128,13 @@ class StepRequirements:
         found = self.defects(steps)
         if not self.moving:
             return found.error_at_rest(distance, self.loops)
-        return found.error(distance, self.loops, amplification)
+        return found.error(distance, self.loops, amplification, self.loops * float(self.sizes[3].sum()))
 
 
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
     """As `fast.panels.sizes_of_terms`."""
-    rates = (spectral_norms(coefficients) @ np.array([magnitude, 1.0])) * widths[:, None]
+    norms = spectral_norms(coefficients)
+    rates = (norms @ np.array([magnitude, 1.0])) * widths[:, None]
     degree, turn = np.arange(float(rates.shape[1])), rates.sum(axis=1)
     last = ((rates > least) * degree).max(axis=1)
     swinging = rates
@@ -143,4 +144,5 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
         swinging[:, 0] = 0.0
     # More turns than can be stepped are refused, and their powers would overflow.
     seen = degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None] if magnitude else degree
-    return rates, np.array([turn, (swinging * seen**ORDER).sum(axis=1), last])
+    by_momentum = magnitude * norms[:, 0, 0] * widths
+    return rates, np.array([turn, (swinging * seen**ORDER).sum(axis=1), last, by_momentum])

@@ -115,12 +115,12 @@ def series_with_changed_ends(coefficients: Array, degree: Integers, widths: Arra
 
 
 def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
-    """Rates of `StepRequirements` (P, n), and of each panel turn, swing and last significant degree (3, P).
+    """Rates of `StepRequirements` (P, n), and its sizes (4, P).
 
     `least` : of what is significant [rad]
     """
     count, terms = coefficients.shape[:2]
-    rates, found = np.empty((count, terms)), np.empty((3, count))
+    rates, found = np.empty((count, terms)), np.empty((4, count))
     series = plain(coefficients).reshape(count, -1)
     _plan_kernel().sizes_of_terms(series, plain(widths), float(magnitude), float(least), rates, found)
     return rates, found

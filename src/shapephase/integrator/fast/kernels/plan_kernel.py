@@ -19,11 +19,13 @@ from ..estimate_constants import (
     FORESEEN_AT_REST,
     FULL_ORDER,
     LEAST_ORDER,
+    LITTLE_TURN,
     LOOKS_AHEAD,
     MOST_GROWTH_BY_CHANCE,
     MOST_ODD,
     MOST_SHORTENED,
     MOST_TURN,
+    NEARLY_AT_REST,
     ORDER,
     POWER_OF_EVENNESS,
     TINY,
@@ -50,6 +52,7 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
         for k in range(0 if magnitude else 1, rates.shape[1]):
             swing += rates[panel, k] * (k + radians) ** ORDER
         found[0, panel], found[1, panel], found[2, panel] = turn, swing, last
+        found[3, panel] = magnitude * norm_of_term(series[panel], 0, 0) * width[panel]
 
 
 @part
@@ -141,12 +144,14 @@ def order_by_defects(found):
 
 
 @part
-def error_by_defects(found, distance, loops, amplification):
+def error_by_defects(found, distance, loops, amplification, turn_by_momentum):
     """As `Defects.error`."""
     coarse, unresolved, evenness = found[1], found[2], found[3]
     cancelled = max(loops * coarse / max(distance, TINY), 1.0)
     factor = BY_CHANCE * evenness**-POWER_OF_EVENNESS * math.sqrt(math.sqrt(math.sqrt(math.sqrt(cancelled))))
+    share = turn_by_momentum / LITTLE_TURN
     factor *= math.sqrt(min(amplification, MOST_GROWTH_BY_CHANCE))
+    factor *= 1.0 + NEARLY_AT_REST / (1.0 + share * share)
     return min(max(factor * remaining_by_defects(found) * distance, loops * unresolved), distance)
 
 

@@ -114,7 +114,7 @@ def take_rounds(
     taken than planned, and the errors of steps and of samples.
     """
     panels, moving = len(widths), ceiling > 0.0
-    rates, sizes, planned = np.empty((panels, series.shape[1] // 9)), np.empty((3, panels)), np.empty(panels)
+    rates, sizes, planned = np.empty((panels, series.shape[1] // 9)), np.empty((4, panels)), np.empty(panels)
     sizes_of_terms(series, widths, ceiling, SIGNIFICANT * tolerance, rates, sizes)
     turn = loops * sizes[0].sum()
     a_step = SHORT_TURN_A_STEP if moving and turn > FAR else TURN_A_STEP
@@ -151,7 +151,7 @@ def take_rounds(
         if not math.isfinite(found[1]):
             found[1] = math.pi
         if moving:
-            found[11] = error_by_defects(found[5:10], found[1], loops, found[3])
+            found[11] = error_by_defects(found[5:10], found[1], loops, found[3], loops * sizes[3].sum())
         else:
             found[11] = error_at_rest_by_defects(found[5:10], found[1], loops)
         found[12] = found[3] * expected
