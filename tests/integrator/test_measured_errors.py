@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks.random_motions import harmonics
 from scipy.integrate import DOP853
 
 import shapephase as sp
@@ -268,3 +269,15 @@ def test_what_is_above_the_tolerance_is_made_finer(rounding: float):
         )
         after = integration.refined(errors)
         assert after.finer > before.finer or after.sampling_target < _SaysOfItself().error(1.0)
+
+
+def test_a_loop_with_next_to_no_momentum_is_within_its_estimate():
+    """One harmonic, 22 times, whose errors cancel alike in steps and in pairs of them: against much finer steps."""
+    rng = np.random.default_rng((5, 32))
+    trial = harmonics(32, rng)
+    moment = float(np.trace(trial.body.locked_inertia(trial.path.shape(0.0)))) / 3.0
+    momentum = rng.normal(size=3) * 10.0 ** rng.uniform(-4.0, -1.0) * moment / trial.path.duration
+    loop = sp.articulated(trial.body, trial.path)
+    motion, finer = (sp.reconstruct(loop, momentum, tolerance=tolerance) for tolerance in (trial.tolerance, 1e-11))
+    error = so3.angle(so3.transpose(finer.final_attitude) @ motion.final_attitude)
+    assert error <= motion.error_estimate

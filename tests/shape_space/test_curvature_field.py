@@ -291,6 +291,7 @@ def test_stokes_round_sixty_degrees(name, first, second):
     want = sp.holonomy(body, path, 1e-12)
     assert np.linalg.norm(rotation_vector(want)) > 5e-5
     assert apart(stokes_holonomy(body, path), want) < 1e-9
+    assert apart(stokes_holonomy(body, path, 1e-10), want) < 1e-10
     assert apart(stokes_holonomy(body, path, 1e-12), want) < 3e-12
     small = ellipse(body, joints, (0.1, 0.15), **dict.fromkeys(joints, 0.2))
     assert apart(stokes_holonomy(body, small, 1e-13), sp.holonomy(body, small, 1e-13)) < 3e-13

@@ -113,7 +113,7 @@ class Defects(NamedTuple):
         return min(max(-log2(self.remaining), LEAST_ORDER), ORDER)
 
     def excess(self, loops: int, tolerance: float, *, moving: bool) -> float:
-        """What all steps would be off by, were nothing to cancel, of what may be foreseen for a tolerance [rad]."""
+        """What all steps would be off by, were nothing to cancel, as a multiple of what a tolerance [rad] allows."""
         foreseen = loops * (self.remaining * self.coarse if moving else self.coarse)
         return foreseen / ((FORESEEN if moving else FORESEEN_AT_REST) * tolerance)
 

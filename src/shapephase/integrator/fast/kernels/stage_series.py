@@ -70,7 +70,7 @@ def basis_between(used, terms, basis):
 
 @inline
 def pairs_before_single(count):
-    """As of `step_record`; of an even number all pairs."""
+    """Of an odd number of steps those before the one that is alone, as in `ends_of_pairs`; of an even number all."""
     return (count + 1) // 4 if count % 2 else count // 2
 
 
