@@ -19,7 +19,7 @@ def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) 
     centroidal_map = pin.computeCentroidalMap
     # Each call returns a copy: all at once are put together sooner than one by one.
     maps = [centroidal_map(model, data, q) for q in joints.configurations(shapes)]
-    return np.array(maps).reshape(-1, 6, model.nv)[:, 3:, 3:]
+    return np.concatenate(maps).reshape(-1, 6, model.nv)[:, 3:, 3:] if maps else np.empty((0, 3, model.nv - 3))
 
 
 def angular_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
@@ -59,7 +59,7 @@ def momentum_gradients(
 
 def internal_momenta(whole: Array, joints: JointMap, shapes: Array, rates: Array) -> Array:
     """L_o from full maps: (N, 3, 3 + joints), (N, n), (N, n) -> (N, 3)."""
-    return (whole[:, :, 3:] @ joints.velocities(shapes, rates)[:, _BASE:, None])[..., 0]
+    return np.einsum("nij,nj->ni", whole[:, :, 3:], joints.velocities(shapes, rates)[:, _BASE:])
 
 
 def kinetic_energies(

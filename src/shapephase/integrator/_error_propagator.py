@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from math import isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -58,8 +59,9 @@ def growth_and_rounding(
 
 def looked_at_closely(rounding: Array, propagators: Array, quaternions: Array, least: float) -> Array:
     """Rounding by the largest growth (B,), where it is above `least` time by time; arguments as above [rad]."""
-    large = (rounding > least) & np.isfinite(rounding)
+    large = rounding > least
     if propagators.shape[1] and large.any():
+        large &= np.isfinite(rounding)
         rounding[large] = _rounding_at_worst(propagators[large], _turns(quaternions[large]))
     return rounding
 
@@ -70,6 +72,8 @@ def largest_growth(propagators: Array) -> Array:
         return np.ones(len(propagators))
     numbers = propagators.reshape(len(propagators), -1)
     found = map_rows(growth_of_propagators, numbers.shape[1], numbers)
+    if isfinite(found.sum()):
+        return found[:, 0]
     # Where steps were so long that they overflowed, the growth is unknown.
     return np.where(np.isfinite(found).all(axis=1), found[:, 0], np.inf)
 
@@ -92,7 +96,7 @@ def growth_of_propagators(entries: list[Any]) -> list[Any]:
 def _growths_and_rounding(propagators: Array, quaternions: Array) -> tuple[Array, Array]:
     """As `fast.marches.growths_and_rounding`."""
     growth, sums, count = largest_growth(propagators), _turns(quaternions).sum(axis=1), quaternions.shape[1] - 1
-    committed = ROUNDING_OF_START + ROUNDING_OF_STEP * np.sqrt(count) + ROUNDING_OF_RADIAN * sums
+    committed = (ROUNDING_OF_START + ROUNDING_OF_STEP * sqrt(count)) + ROUNDING_OF_RADIAN * sums
     return growth, EPS * growth * committed
 
 

@@ -40,8 +40,8 @@ def measured_rounding(
     record : of these steps
     magnitudes : (B,) of the momentum [kg m^2/s]
     """
-    rows = np.flatnonzero((bound > MEASURED_ROUNDING * tolerance) & np.isfinite(bound))
-    if not len(rows):
+    large = bound > MEASURED_ROUNDING * tolerance
+    if not large.any() or not len(rows := np.flatnonzero(large & np.isfinite(bound))):
         return bound
     apart = np.zeros(len(rows))
     at_once = max(1, _MOST_NUMBERS // record.quaternions[0].size)

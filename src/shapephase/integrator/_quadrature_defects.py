@@ -7,7 +7,7 @@ does.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import inf, log2
 from typing import NamedTuple
 
@@ -138,33 +138,77 @@ class Defects(NamedTuple):
         return AT_REST * distance / (1.0 - nearer) + loops * self.unresolved
 
 
-def defects(rates: Array, turns: Array, steps: Integers) -> Defects:
-    """What the formula misses on all panels.
+class PanelDefects:
+    """What the formula misses on panels, in numbers of steps that are still looked for.
 
     Parameters
     ----------
     rates : (P, n) the size of each term [rad]
     turns : (P,) how far the body turns on each panel, which makes terms swing faster as seen from space [rad]
-    steps : (P,) at least two
     """
-    halves, further = steps // 2, DEGREES_OF_TURN * turns
-    # Of an odd number the pairs have rows of their own.
-    rows = np.array([steps, halves + (DEFECT_STEPS + 1) * (steps % 2)])
-    # Every term at once where no degree is beyond the table.
-    if steps.max() <= DEFECT_STEPS and rates.shape[1] + further.max() < DEFECT_DEGREES - 1.0:
-        found = _by_windows(rows, rates.shape[1], further)
-    else:
-        found = _term_by_term(rows, np.array([steps, halves]), rates.shape[1], further)
-    whole, coarse = rates * found
-    of_panels = coarse.sum(axis=1)
-    total, squares = float(of_panels.sum()), float(of_panels @ of_panels)
+
+    def __init__(self, rates: Array, turns: Array) -> None:
+        self._rates, self._further = rates, DEGREES_OF_TURN * turns
+        # Every term at once where no degree is beyond the table.
+        self._within_table = rates.shape[1] + float(self._further.max()) < DEFECT_DEGREES - 1.0
+        self._below = self._further.astype(np.int64)
+        self._share = (self._further - self._below)[:, None]
+
+    def found(self, steps: Integers) -> Defects:
+        """In so many steps on each panel: (P,), at least two."""
+        count, terms = self._rates.shape
+        if self._is_tabulated(steps):
+            windows = self._windows(steps)
+            found = windows[..., :-1] + self._share * (windows[..., 1:] - windows[..., :-1])
+        else:
+            found = _term_by_term(steps, terms, self._further)
+        found *= self._rates
+        whole, coarse = found
+        sums = found.reshape(2 * count, terms) @ _ones(terms)
+        return _summed_up(steps, sums, float(whole[whole > UNRESOLVED * coarse].sum()))
+
+    def foreseen(self, steps: Integers) -> Defects:
+        """The same at less cost, without a look at what these steps do little about."""
+        if not self._is_tabulated(steps):
+            return self.found(steps)
+        return _summed_up(steps, (self._windows(steps)[:, :, None] @ self._weights).ravel(), 0.0)
+
+    def _is_tabulated(self, steps: Integers) -> bool:
+        return self._within_table and max(steps.tolist()) <= DEFECT_STEPS
+
+    def _windows(self, steps: Integers) -> Array:
+        """Of T_0, T_1 ... and one more, in so many steps and in pairs of them, at each panel: (2, P, n + 1)."""
+        return _windows(self._rates.shape[1] + 1)[_tabulated_rows().take(steps, axis=1), self._below]
+
+    @cached_property
+    def _weights(self) -> Array:
+        """By which a window's terms count, between two degrees of the table: (P, n + 1, 1)."""
+        count, terms = self._rates.shape
+        weights = np.zeros((count, terms + 1, 1))
+        above = self._share * self._rates
+        weights[:, 1:, 0] = above
+        weights[:, :-1, 0] += self._rates - above
+        return weights
+
+
+def _summed_up(steps: Integers, of_panels: Array, unresolved: float) -> Defects:
+    """From the sums of each panel's defects, of its steps and then of pairs of them: (2 P,)."""
+    # Few numbers are added sooner one by one.
+    counts, sums = steps.tolist(), of_panels.tolist()
+    coarse = sums[len(counts) :]
+    total, squares = sum(coarse), sum(part * part for part in coarse)
     return Defects(
-        whole=float(whole.sum()),
+        whole=sum(sums[: len(counts)]),
         coarse=total,
-        unresolved=float(whole[whole > UNRESOLVED * coarse].sum()),
-        evenness=total * total / (len(steps) * squares) if squares > 0.0 else 1.0,
-        paired=2.0 * float(halves.sum()) / float(steps.sum()),
+        unresolved=unresolved,
+        evenness=total * total / (len(counts) * squares) if squares > 0.0 else 1.0,
+        paired=sum(count - count % 2 for count in counts) / sum(counts),
     )
+
+
+@lru_cache(maxsize=64)
+def _ones(count: int) -> Array:
+    return np.ones(count)
 
 
 @lru_cache(maxsize=64)
@@ -173,23 +217,28 @@ def _windows(terms: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(defect_table(), terms, axis=1)
 
 
-def _by_windows(rows: Integers, terms: int, further: Array) -> Array:
-    """Of T_0, T_1 ... by rows of the table, each panel's so many degrees further: (2, P), (P,) -> (2, P, terms)."""
-    below = further.astype(np.int64)
-    windows = _windows(terms + 1)[rows, below]
-    share = (further - below)[:, None]
-    return (1.0 - share) * windows[..., :-1] + share * windows[..., 1:]
+@lru_cache(maxsize=1)
+def _tabulated_rows() -> Integers:
+    """The rows of the table for numbers of steps and for pairs of them: (2, DEFECT_STEPS + 1)."""
+    return _rows(np.arange(DEFECT_STEPS + 1))
 
 
-def _term_by_term(rows: Integers, counts: Integers, terms: int, further: Array) -> Array:
-    """The same of more steps than the table has, and beyond its degrees; counts are those of the steps, (2, P).
+def _rows(steps: Integers) -> Integers:
+    """(N,) -> (2, N); beyond the table they go on as if it did."""
+    # Of an odd number the pairs have rows of their own.
+    return np.array([steps, steps // 2 + (DEFECT_STEPS + 1) * (steps % 2)])
+
+
+def _term_by_term(steps: Integers, terms: int, further: Array) -> Array:
+    """Of T_0, T_1 ... in steps and in pairs of them, beyond the table's steps and degrees: (P,) -> (2, P, terms).
 
     As in the most steps that it has, for the terms that swing as fast at the panel's ends.
     """
+    counts = np.array([steps, steps // 2])
     fewer = np.minimum(counts, DEFECT_STEPS)
     slower = np.sqrt(fewer / counts)[..., None]
     degrees = np.minimum((np.arange(float(terms)) + further[:, None]) * slower, DEFECT_DEGREES - 1.001)
     below, table = degrees.astype(np.int64), defect_table()
-    place = (rows - counts + fewer)[..., None] * DEFECT_DEGREES + below
+    place = (_rows(steps) - counts + fewer)[..., None] * DEFECT_DEGREES + below
     first, second = table.take(place), table.take(place + 1)
     return slower * slower * (first + (degrees - below) * (second - first))

@@ -89,9 +89,9 @@ def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
         inverse = inverse_inertia(inertia, times)
         channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
         channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
-    if not isfinite(channels[:, :9].sum()):
-        row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
-        raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
+        if not isfinite(channels[:, :9].sum()):
+            row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
+            raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
     return channels[:, :9]
 
 
@@ -218,12 +218,13 @@ def estimate_spectra(norms: Array, degree: Integers, time_rounding: Array) -> Sp
     `time_rounding` (G,) is the rounding of the sample times in units of half a panel: it limits the
     accuracy of samples of a fast motion.
     """
-    terms, ends, most = np.arange(norms.shape[1]), degree[:, None], np.maximum(degree, 1)[:, None]
-    is_tail = terms > ends - np.maximum(2, ends // 10)
-    is_middle = np.abs(terms - ends // 2) <= 1
-    largest = norms.max(axis=1)
-    tail, middle = ((norms * part[:, :, None]).max(axis=1) for part in (is_tail, is_middle))
-    floor = ROUNDING * largest + (4.0 * time_rounding)[:, None] * (terms.astype(np.float64) @ norms)
+    terms, most = np.arange(float(norms.shape[1])), np.maximum(degree, 1)[:, None]
+    largest, tail, middle = norms.max(axis=1), np.empty((len(norms), 2)), np.empty((len(norms), 2))
+    for one in set(degree.tolist()):
+        rows = degree == one
+        tail[rows] = norms[rows, max(one + 1 - tail_length(one), 0) :].max(axis=1)
+        middle[rows] = norms[rows, max(one // 2 - 1, 0) : one // 2 + 2].max(axis=1)
+    floor = ROUNDING * largest + (4.0 * time_rounding)[:, None] * (terms @ norms)
     decay = np.log(np.maximum(middle, TINY) / np.maximum(tail, TINY)) * (2.0 / most)
     # The rest of a geometric series with this decay beyond its last term; twice, for aliasing.
     beyond_tail = 2.0 * tail / np.expm1(np.maximum(decay, TINY))

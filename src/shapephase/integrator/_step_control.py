@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from math import sqrt
 
 import numpy as np
 
 from ..arrays import Array, Integers
-from ._quadrature_defects import Defects, defects
+from ._quadrature_defects import Defects, PanelDefects
 from ._spectral_error import spectral_norms
 from .fast import engine
 from .fast.estimate_constants import (
@@ -54,6 +56,10 @@ class StepRequirements:
     moving: bool
     _defects: dict[bytes, Defects] = field(default_factory=dict, init=False, repr=False)
 
+    @cached_property
+    def _of_panels(self) -> PanelDefects:
+        return PanelDefects(self.rates, self.turns)
+
     @classmethod
     def from_interpolant(cls, interpolant: Interpolant, magnitude: float, tolerance: float) -> StepRequirements:
         """For momenta up to a magnitude [kg m^2/s] and a tolerance [rad]."""
@@ -90,12 +96,13 @@ class StepRequirements:
         turn, swing, degree, _ = self.sizes
         # As many on each panel as make the sum of all the least.
         each = swing ** (1.0 / (ORDER + 1.0))
-        common = self.loops * DISTANCE * float(np.sqrt((each * each).sum())) / (AIM * tolerance)
+        common = self.loops * DISTANCE * sqrt(float(each @ each)) / (AIM * tolerance)
         planned = 2.0 * common ** (1.0 / ORDER) * each
-        least = np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step)
-        planned = np.maximum(np.maximum(planned, least), 1.0)
+        least = np.maximum(np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step), 1.0)
+        planned = np.maximum(planned, least)
         for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
-            found = self.defects(self.whole_steps(planned))
+            steps = self.whole_steps(planned)
+            found = self._of_panels.foreseen(steps if self.moving else 2 * steps)
             excess = found.excess(self.loops, tolerance, moving=self.moving)
             if not excess > 1.0:
                 break
@@ -108,7 +115,7 @@ class StepRequirements:
         With momentum at least two, so that pairs of them show errors, and where they are many even.
         """
         whole = np.maximum(np.ceil(planned), 2.0 if self.moving else 1.0).astype(int)
-        if not self.moving or whole.max() <= MOST_ODD:
+        if not self.moving or max(whole.tolist()) <= MOST_ODD:
             return whole
         return whole + (whole > MOST_ODD) * (whole % 2)
 
@@ -116,8 +123,11 @@ class StepRequirements:
         """What the formula misses in so many steps (P,) and in those beside them."""
         key = steps.tobytes()
         if key not in self._defects:
-            find = defects_of_panels if engine.is_ready() else defects
-            self._defects[key] = find(self.rates, self.turns, steps if self.moving else 2 * steps)
+            taken = steps if self.moving else 2 * steps
+            by_kernel = engine.is_ready()
+            self._defects[key] = (
+                defects_of_panels(self.rates, self.turns, taken) if by_kernel else self._of_panels.found(taken)
+            )
         return self._defects[key]
 
     def stepping_error(self, steps: Integers, distance: Array, amplification: Array | float = 1.0) -> Array:
@@ -134,15 +144,15 @@ class StepRequirements:
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
     """As `fast.panels.sizes_of_terms`."""
     norms = spectral_norms(coefficients)
-    rates = (norms @ np.array([magnitude, 1.0])) * widths[:, None]
-    degree, turn = np.arange(float(rates.shape[1])), rates.sum(axis=1)
-    last = ((rates > least) * degree).max(axis=1)
-    swinging = rates
-    if not magnitude:
-        # Without momentum a steady turn is exact.
-        swinging = rates.copy()
-        swinging[:, 0] = 0.0
-    # More turns than can be stepped are refused, and their powers would overflow.
-    seen = degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None] if magnitude else degree
-    by_momentum = magnitude * norms[:, 0, 0] * widths
-    return rates, np.array([turn, (swinging * seen**ORDER).sum(axis=1), last, by_momentum])
+    rates = (magnitude * norms[..., 0] + norms[..., 1] if magnitude else norms[..., 1]) * widths[:, None]
+    degree, sizes = np.arange(float(rates.shape[1])), np.empty((4, len(rates)))
+    turn = sizes[0] = rates.sum(axis=1)
+    sizes[2] = ((rates > least) * degree).max(axis=1)
+    if magnitude:
+        # More turns than can be stepped are refused, and their powers would overflow.
+        sizes[1] = (rates * (degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None]) ** ORDER).sum(axis=1)
+        sizes[3] = magnitude * norms[:, 0, 0] * widths
+    else:
+        # Without momentum a steady turn is exact: the first term counts for nothing.
+        sizes[1], sizes[3] = rates @ degree**ORDER, 0.0
+    return rates, sizes

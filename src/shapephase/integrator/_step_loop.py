@@ -8,6 +8,7 @@ are taken on whole arrays.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import groupby
@@ -23,7 +24,7 @@ from .casadi_calls import call_casadi
 from .fast import engine
 from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
-from .step_record import CHECKPOINTS, StepRecord, ends_of_pairs, pairs_of_steps
+from .step_record import CHECKPOINTS, StepRecord, ends_of_pairs
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
 BLOCK = 256
@@ -33,6 +34,7 @@ FEW = 24
 _ROWS_AT_ONCE = 2048
 # The stages at 1/3 and 0.65 of a step: the mean of their variations stands for that of the whole step.
 _INNER_STAGES = (5, 8)
+_IDENTITY = np.eye(3)
 
 
 def integrate_steps(
@@ -61,9 +63,10 @@ def integrate_steps(
     total = interpolant.loops * int(steps.sum())
     batch = len(magnitudes)
     whole = StepRecord.empty(batch, total, CHECKPOINTS if with_propagators else 0)
-    channels = _channels_at_stages(interpolant, interpolant.coefficients, steps)
+    series = interpolant.coefficients * interpolant.widths[:, None, None]
+    channels = _channels_of_series(series, steps)
     ends = ends_of_pairs(steps, interpolant.loops)
-    coarse = _channels_at_stages(interpolant, interpolant.coefficients, steps, in_pairs=True)
+    coarse = _channels_of_series(series, steps, in_pairs=True)
     cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps, in_pairs=True)
     record, attitudes = (_record_one, _attitudes_of_one) if batch <= FEW else (_record_many, _attitudes_of_many)
     at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
@@ -146,15 +149,17 @@ def stage_channels(interpolant: Interpolant, steps: Integers) -> Array:
 def _channels_at_stages(
     interpolant: Interpolant, coefficients: Array, steps: Integers, *, in_pairs: bool = False
 ) -> Array:
-    widths = np.diff(interpolant.edges[: len(steps) + 1])
-    scaled = coefficients * widths[:, None, None]
-    degrees = scaled.shape[1]
-    taken = pairs_of_steps(steps) if in_pairs else steps
-    channels = np.empty((int(taken.sum()) * STAGES, 9))
+    return _channels_of_series(coefficients * interpolant.widths[:, None, None], steps, in_pairs=in_pairs)
+
+
+def _channels_of_series(scaled: Array, steps: Integers, *, in_pairs: bool = False) -> Array:
+    """The same of series times the widths of their panels: (P, n, 9)."""
+    runs = [(count, len(list(run))) for count, run in groupby(steps.tolist())]
+    matrices = [_stage_matrix(scaled.shape[1], count, in_pairs) for count, _ in runs]
+    rows = sum(panels * len(matrix) for matrix, (_, panels) in zip(matrices, runs, strict=True))
+    channels = np.empty((rows, 9))
     panel = row = 0
-    for count, run in groupby(steps.tolist()):
-        panels = len(list(run))
-        matrix = _stage_matrix(degrees, count, in_pairs)
+    for matrix, (_, panels) in zip(matrices, runs, strict=True):
         stop = row + panels * len(matrix)
         out = channels[row:stop].reshape(panels, len(matrix), 9)
         np.matmul(matrix, scaled[panel : panel + panels], out=out)
@@ -178,10 +183,14 @@ def _stage_matrix(degree_count: int, count: int, in_pairs: bool) -> Array:
 
 def largest_angle(a: Array, b: Array) -> Any:
     """The largest angle between attitudes that are near each other: (..., K, 4) quaternions -> (...) [rad]."""
-    apart, opposite = a - b, a + b
-    # A quaternion and its negative are one attitude.
-    squares = np.minimum(np.einsum("...i,...i", apart, apart), np.einsum("...i,...i", opposite, opposite))
-    return 2.0 * np.sqrt(squares.max(axis=-1))
+    apart = a - b
+    largest = np.einsum("...i,...i", apart, apart).max(axis=-1)
+    if not largest.max(initial=0.0) <= 1.0:
+        # A quaternion and its negative are one attitude.
+        opposite = a + b
+        nearer = np.minimum(np.einsum("...i,...i", apart, apart), np.einsum("...i,...i", opposite, opposite))
+        largest = nearer.max(axis=-1)
+    return 2.0 * np.sqrt(largest)
 
 
 def _record_one(
@@ -190,17 +199,18 @@ def _record_one(
     """All steps of one momentum into its row."""
     with_propagators = bool(record.propagators.shape[1])
     row, done, total = rows.start, 0, loops * len(channels)
-    marks = checkpoint_steps(total)
+    marks = checkpoint_steps(total).tolist()
     state = _first_state(directions[0], magnitudes[0], with_propagators)
     record.directions[row, 0], record.quaternions[row, 0] = state[:3], state[3:7]
-    record.propagators[row] = np.eye(3)
+    record.propagators[row] = _IDENTITY
     for states, sides in _blocks(channels, loops, state):
         after = slice(done + 1, done + len(states) + 1)
         record.directions[row, after], record.quaternions[row, after] = states[:, :3], states[:, 3:7]
         record.turns[row, done : after.stop - 1], record.dynamics[row, done : after.stop - 1] = sides.T
         if with_propagators:
-            reached = np.flatnonzero((marks > done) & (marks < after.stop))
-            record.propagators[row, reached] = states[marks[reached] - done - 1, 8:].reshape(-1, 3, 3)
+            first, last = bisect_right(marks, done), bisect_left(marks, after.stop)
+            there = [mark - done - 1 for mark in marks[first:last]]
+            record.propagators[row, first:last] = states[there, 8:].reshape(-1, 3, 3)
         done = after.stop - 1
 
 
@@ -237,7 +247,7 @@ def _record_many(
     with_propagators = bool(record.propagators.shape[1])
     marks = checkpoint_steps(loops * len(channels)).tolist()
     record.directions[rows, 0], record.quaternions[rows, 0] = directions, [0.0, 0.0, 0.0, 1.0]
-    record.propagators[rows] = np.eye(3)
+    record.propagators[rows] = _IDENTITY
     propagator: Any = np.eye(3).tolist()
     start = list(directions.T)
     steps = _steps_of_many(channels, loops, directions, magnitudes)

@@ -268,7 +268,7 @@ class Integration:
             turn = requirements.whole_turn if self._largest else 0.0
             growth = min(1.0 + EXPECTED_GROWTH * turn, MOST_EXPECTED_GROWTH)
         counts = expected * growth > NEGLIGIBLE * self._tolerance
-        steps, planned = self._plan(interpolant, requirements)
+        steps, rounded_up = self._plan(interpolant, requirements)
         record = self._take_steps(interpolant, perturbed.coefficients if counts and perturbed.differ else None, steps)
         propagators = record.propagators if self._propagators is None else self._propagators
         little = LITTLE_ROUNDING * self._tolerance
@@ -288,19 +288,20 @@ class Integration:
             stepping=requirements.stepping_error(steps, distances, amplification),
             rounding=rounding,
             defects=defects,
-            rounded_up=float(steps.sum()) / planned,
+            rounded_up=rounded_up,
         )
 
     def _measured_rounding(self, bound: Array, interpolant: Interpolant, steps: Integers, record: StepRecord) -> Array:
         return measured_rounding(bound, interpolant, steps, record, self._magnitudes, self._tolerance)
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> tuple[Integers, float]:
-        """Steps on each panel (P,), and how many were planned.
+        """Steps on each panel (P,), and how many more they are than planned, since they are whole.
 
         Finds the growth of errors first where the steps themselves will not show it.
         """
         planned = self._planned(requirements)
-        count = interpolant.loops * float(planned.sum())
+        total = float(planned.sum())
+        count = interpolant.loops * total
         if count > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         if self._is_long(requirements, count):
@@ -310,10 +311,12 @@ class Integration:
             growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
+            total = float(planned.sum())
         steps = requirements.whole_steps(planned)
-        if (count := interpolant.loops * float(steps.sum())) > _MOST_STEPS:
+        taken = int(steps.sum())
+        if (count := interpolant.loops * taken) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
-        return steps, float(planned.sum())
+        return steps, taken / total
 
     def _planned(self, requirements: StepRequirements, *, amplified: float | None = None) -> Array:
         """Steps per panel, not yet whole, short enough for the growth of errors unless that is known: (P,)."""

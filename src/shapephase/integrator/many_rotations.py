@@ -142,7 +142,7 @@ def rotations_of_each(
     ceilings = rounded_up(norms(momentum), _CLASSES)
     parts: list[RotationPart] = []
     for ceiling in sorted(set(ceilings.tolist())) or (0.0,):
-        rows = np.flatnonzero(ceilings == ceiling)
+        rows = (ceilings == ceiling).nonzero()[0]
         first = Refinement.at_first(tolerance)
         waiting = [_Group(rows, np.full(max(len(rows), 1), np.inf), ceiling, (first,), None)]
         while waiting:

@@ -52,16 +52,11 @@ class StepRecord:
         )
 
 
-def pairs_of_steps(steps: Integers) -> Integers:
-    """How many steps each panel takes where they are taken two at a time, one of an odd number alone: (P,).
+def ends_of_pairs(steps: Integers, loops: int) -> Integers:
+    """After how many steps each pair of them ends, the start before all: (L + 1,); one of an odd number is left alone.
 
     A series swings fastest at the ends of its panel: it is the one in the middle, or next to it.
     """
-    return (steps + 1) // 2
-
-
-def ends_of_pairs(steps: Integers, loops: int) -> Integers:
-    """After how many steps each pair of them ends, the start before all: (L + 1,)."""
     ends, start = [0], 0
     for count in steps.tolist():
         before = 2 * ((count + 1) // 4 if count % 2 else count // 2)

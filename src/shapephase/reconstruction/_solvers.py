@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from .. import so3
-from ..arrays import Array
+from ..arrays import Array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
@@ -73,6 +73,8 @@ class RigidRotation:
     turn: float
     error_estimate: Array
 
+    __post_init__ = lock_arrays
+
     @property
     def times(self) -> Array:
         """(K + 1,) between which no body turns by more than 0.3 rad [s]. Raises AccuracyNotReached for 1e7 or more."""
@@ -124,6 +126,8 @@ class Dop853Rotation:
     times: Array
     error_estimate: Array
     evaluations: int
+
+    __post_init__ = lock_arrays
 
     def rotation(self, t: Array) -> Array:
         return np.stack([so3.matrix_from_quat(one(t)) for one in self.dense])

@@ -101,10 +101,7 @@ class Motion(MotionViews):
     evaluations: int
     solution: Solution
 
-    def __post_init__(self) -> None:
-        """What is shown of a motion cannot be written to, or is a copy."""
-        lock_arrays(self)
-        lock_arrays(self.solution)
+    __post_init__ = lock_arrays
 
     @property
     def duration(self) -> float:

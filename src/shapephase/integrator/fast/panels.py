@@ -136,7 +136,7 @@ def plan_of_steps(
 
 
 def defects_of_panels(rates: Array, turns: Array, steps: Integers) -> Defects:
-    """What `defects` finds."""
+    """What `PanelDefects.found` finds."""
     found = np.empty(5)
     _plan_kernel().defects_of_panels(plain(rates), plain(turns), steps, plain(defect_table()), found)
     return Defects(*found.tolist())

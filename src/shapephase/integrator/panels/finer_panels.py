@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -68,7 +69,7 @@ class FinerPanels:
         values[~is_fresh] = old.values[np.repeat(old.starts[self.origin[known]], counts) + within]
         return values
 
-    @property
+    @cached_property
     def _is_fresh(self) -> Mask:
         """Of all samples, one panel after another."""
         starts, counts = sample_starts(self.degree)[:-1], self.degree + 1

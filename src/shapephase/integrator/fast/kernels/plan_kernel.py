@@ -103,7 +103,7 @@ def _defect(degree, row, slower, table):
 
 @kernel
 def defects_of_panels(rates, turns, steps, table, found):
-    """As `defects`, with the table of defects: the five fields of the result in their order are filled."""
+    """As `PanelDefects.found`, with the table of defects: the five fields of the result in their order are filled."""
     whole = coarse = unresolved = squares = 0.0
     count, pairs, rows = 0, 0, len(table) // 2
     for panel in range(len(steps)):
