@@ -44,7 +44,7 @@ def test_sums_are_those_of_arrays(body, rng):
 def test_attitudes_within_steps(momentum, rng):
     """The polynomials between the ends of steps are another way to them."""
     body = sp.load_body("cat")
-    motion = sp.reconstruct(sp.articulated(body, random_loop(body, rng)), momentum, tolerance=1e-11)
+    motion = sp.reconstruct(sp.articulated(body, random_loop(body, rng)), momentum, tolerance=1e-12)
     stepped = one_rotation(motion)
     times = np.sort(np.append(rng.uniform(0.0, motion.duration, 40), stepped.times[[0, 3, -1]]))
     np.testing.assert_allclose(rotations(stepped, times), stepped.rotation(times)[0], rtol=0, atol=1e-12)

@@ -7,14 +7,17 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
+from numpy.polynomial import Chebyshev
 from scipy.integrate import DOP853
 
 from shapephase.integrator._quadrature_defects import Defects, PanelDefects, defect_table
 from shapephase.integrator._step_control import StepRequirements
+from shapephase.integrator._step_loop import integrate_steps_at_rest
 from shapephase.integrator.fast.estimate_constants import (
     BY_CHANCE,
     DEFECT_STEPS,
     FEW_STEPS,
+    FORESEEN_AT_REST,
     FULL_ORDER,
 )
 from shapephase.integrator.interpolant import Interpolant
@@ -150,7 +153,7 @@ def test_where_errors_grow_a_distance_counts_more():
 def test_a_plan_looks_ahead(
     monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, fast: str, magnitude: float, seed: int
 ):
-    """What the defects of the planned steps come to is what the plan allows for, or nearly that."""
+    """What the planned steps are foreseen to be off by is what the plan allows for, or nearly that."""
     if fast == "1":
         request.getfixturevalue("fast")
     else:
@@ -161,7 +164,30 @@ def test_a_plan_looks_ahead(
     needed = StepRequirements.from_interpolant(interpolant, magnitude, tolerance)
     steps = needed.whole_steps(needed.plan(tolerance))
     assert steps.sum() <= FEW_STEPS
-    assert needed.defects(steps).excess(1, tolerance, moving=magnitude > 0.0) <= 1.5
+    if magnitude:
+        assert needed.defects(steps).excess(1, tolerance) <= 1.5
+    else:
+        assert needed.foreseen_error_at_rest(steps) <= 1.5 * FORESEEN_AT_REST * tolerance
+
+
+@pytest.mark.parametrize("steps", [2, 3, 6])
+def test_without_momentum_the_error_is_foreseen_before_a_step_is_taken(steps: int):
+    """Beside the integral of a turn about one axis: the worse of what a panel's middle and its end are off by."""
+    rng, middle = np.random.default_rng(steps), (steps + 1) // 2
+    series = np.zeros((1, 30, 9))
+    series[0, :, 8] = 0.01 * rng.normal(size=30) * 10.0 ** -np.linspace(0.0, 4.0, 30)
+    still = Interpolant(np.array([0.0, 0.5]), series, 1, 0)
+    quaternions = integrate_steps_at_rest(still, None, np.array([steps])).quaternions[0]
+    integral = Chebyshev(series[0, :, 8]).integ(lbnd=-1.0)
+    exact = -0.25 * integral(2.0 * np.array([middle / steps, 1.0]) - 1.0)
+    missed = float(np.abs(2.0 * np.arcsin(quaternions[[middle, steps], 2]) - exact).max())
+    assert missed > 1e-8
+    foreseen = StepRequirements.from_interpolant(still, 0.0, 1e-9).foreseen_error_at_rest(np.array([steps]))
+    assert foreseen == pytest.approx(missed, rel=1e-3)
+    # Of two panels they may add up.
+    both_panels = Interpolant(np.array([0.0, 0.5, 1.0]), np.concatenate([series, -series]), 1, 0)
+    of_both = StepRequirements.from_interpolant(both_panels, 0.0, 1e-9).foreseen_error_at_rest(np.full(2, steps))
+    assert of_both == pytest.approx(2.0 * foreseen)
 
 
 def test_next_to_no_momentum_leaves_more_to_chance():

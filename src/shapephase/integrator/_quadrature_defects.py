@@ -7,6 +7,7 @@ does.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from math import inf, log2
 from typing import NamedTuple
@@ -22,7 +23,6 @@ from .fast.estimate_constants import (
     DEFECT_STEPS,
     DEGREES_OF_TURN,
     FORESEEN,
-    FORESEEN_AT_REST,
     FULL_ORDER,
     LEAST_ORDER,
     LITTLE_TURN,
@@ -39,49 +39,64 @@ from .step_record import ends_of_pairs
 _ROUNDING = 1e-14
 
 
-@lru_cache(maxsize=1)
 def defect_table() -> Array:
     """Of the term T_k on a panel of width one the largest at any end of a step: [m, k].
 
     In m equal steps; in row DEFECT_STEPS + 1 + m, in m that are twice as long as one more among them. Rows of m = 0 are
     zero. (2 (DEFECT_STEPS + 1), DEFECT_DEGREES).
     """
-    table = np.zeros((2 * (DEFECT_STEPS + 1), DEFECT_DEGREES))
-    for steps in range(1, DEFECT_STEPS + 1):
-        table[steps] = _largest_defects(np.arange(steps + 1.0) / steps)
-        pairs = ends_of_pairs(np.array([2 * steps + 1]), 1)
-        table[DEFECT_STEPS + 1 + steps] = _largest_defects(pairs / float(pairs[-1]))
+    return _tables()[0]
+
+
+def signed_defects() -> Array:
+    """Of the term T_k on a panel of width one in m equal steps, in its middle and at its end: [m, ., k].
+
+    Those of a series are sums of them, in which most of the high terms cancels. Rows of m = 0 are zero.
+    (DEFECT_STEPS + 1, 2, DEFECT_DEGREES).
+    """
+    return _tables()[1]
+
+
+@lru_cache(maxsize=1)
+def _tables() -> tuple[Array, Array]:
+    equal = [np.arange(steps + 1.0) / steps for steps in range(1, DEFECT_STEPS + 1)]
+    odd = [2 * steps + 1 for steps in range(1, DEFECT_STEPS + 1)]
+    found = _defects_along([*equal, *(ends_of_pairs(np.array([steps]), 1) / float(steps) for steps in odd)])
     # Low terms are integrated exactly: what is left of them is rounding.
-    return read_only(np.where(table > _ROUNDING, table, 0.0))
+    found = [np.where(np.abs(one) > _ROUNDING, one, 0.0) for one in found]
+    table = np.zeros((2 * (DEFECT_STEPS + 1), DEFECT_DEGREES))
+    signed = np.zeros((DEFECT_STEPS + 1, 2, DEFECT_DEGREES))
+    for steps, (of_equal, of_odd) in enumerate(zip(found[:DEFECT_STEPS], found[DEFECT_STEPS:], strict=True), 1):
+        table[steps], table[DEFECT_STEPS + 1 + steps] = (np.abs(one).max(axis=0) for one in (of_equal, of_odd))
+        signed[steps] = of_equal[[(steps - 1) // 2, -1]]
+    return read_only(table), read_only(signed)
 
 
-def _largest_defects(ends: Array) -> Array:
-    """Of every term in steps with these ends, of [0, 1]: (DEFECT_DEGREES,)."""
+def _defects_along(every: list[Array]) -> list[Array]:
+    """Of every term up to the ends of steps, but the first, with these ends of [0, 1]: (L, DEFECT_DEGREES) each."""
     _, weights, nodes = tableau()
-    widths = np.diff(ends)
-    stages = 2.0 * (ends[:-1, None] + widths[:, None] * nodes) - 1.0
-    taken = (_polynomials(stages, DEFECT_DEGREES) @ weights) * widths
-    exact = 0.5 * np.diff(_integrals(2.0 * ends - 1.0), axis=1)
-    return np.abs(np.cumsum(taken - exact, axis=1)).max(axis=1)
+    first, last = (np.concatenate([ends[part] for ends in every]) for part in (slice(-1), slice(1, None)))
+    widths = last - first
+    stages = _terms(2.0 * (first[:, None] + widths[:, None] * nodes) - 1.0)
+    ends = [_terms(2.0 * end - 1.0) for end in (first, last)]
+    defects = np.empty((len(widths), DEFECT_DEGREES))
+    before, here = np.zeros((2, len(widths))), np.array([next(terms) for terms in ends])
+    for k in range(DEFECT_DEGREES):
+        after = np.array([next(terms) for terms in ends])
+        # But for a constant.
+        twice_integral = after / (k + 1) - before / (k - 1) if k > 1 else here * here if k else 2.0 * after
+        defects[:, k] = (next(stages) @ weights) * widths - 0.25 * (twice_integral[1] - twice_integral[0])
+        before, here = here, after
+    counts = np.cumsum([len(ends) - 1 for ends in every])
+    return [np.cumsum(part, axis=0) for part in np.split(defects, counts[:-1])]
 
 
-def _polynomials(x: Array, count: int) -> Array:
-    """T_0 ... T_(count-1): (...) -> (count, ...)."""
-    found = np.empty((count, *x.shape))
-    found[0], found[1] = 1.0, x
-    for k in range(2, count):
-        found[k] = 2.0 * x * found[k - 1] - found[k - 2]
-    return found
-
-
-def _integrals(x: Array) -> Array:
-    """Of T_0 ... T_(DEFECT_DEGREES-1) up to x, but for constants: (...) -> (DEFECT_DEGREES, ...)."""
-    terms = _polynomials(x, DEFECT_DEGREES + 1)
-    found = np.empty((DEFECT_DEGREES, *x.shape))
-    found[0], found[1] = x, 0.5 * x * x
-    for k in range(2, DEFECT_DEGREES):
-        found[k] = 0.5 * (terms[k + 1] / (k + 1) - terms[k - 1] / (k - 1))
-    return found
+def _terms(x: Array) -> Iterator[Array]:
+    """T_0, T_1 ... of numbers."""
+    term, following = np.ones_like(x), x
+    while True:
+        yield term
+        term, following = following, 2.0 * x * following - term
 
 
 class Defects(NamedTuple):
@@ -112,10 +127,9 @@ class Defects(NamedTuple):
         """By which power of the steps' length errors fall."""
         return min(max(-log2(self.remaining), LEAST_ORDER), ORDER)
 
-    def excess(self, loops: int, tolerance: float, *, moving: bool) -> float:
+    def excess(self, loops: int, tolerance: float) -> float:
         """What all steps would be off by, were nothing to cancel, as a multiple of what a tolerance [rad] allows."""
-        foreseen = loops * (self.remaining * self.coarse if moving else self.coarse)
-        return foreseen / ((FORESEEN if moving else FORESEEN_AT_REST) * tolerance)
+        return loops * self.remaining * self.coarse / (FORESEEN * tolerance)
 
     def error(
         self, distance: Array, loops: int, amplification: Array | float = 1.0, turn_by_momentum: float = inf

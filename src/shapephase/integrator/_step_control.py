@@ -9,20 +9,24 @@ from math import sqrt
 import numpy as np
 
 from ..arrays import Array, Integers
-from ._quadrature_defects import Defects, PanelDefects
+from ._quadrature_defects import Defects, PanelDefects, signed_defects
 from ._spectral_error import spectral_norms
 from .fast import engine
 from .fast.estimate_constants import (
     AIM,
+    DEFECT_DEGREES,
+    DEFECT_STEPS,
     DEGREES_A_RADIAN,
     DEGREES_A_STEP,
     DISTANCE,
     FAR,
     FEW_STEPS,
+    FORESEEN_AT_REST,
     LOOKS_AHEAD,
     MOST_ODD,
     MOST_SHORTENED,
     MOST_TURN,
+    NEAR,
     ORDER,
     SHORT_TURN_A_STEP,
     SIGNIFICANT,
@@ -44,7 +48,7 @@ class StepRequirements:
     rates : (P, n) the size of each term of the rate of turning, times the panel's width [rad]
     turns : (P,) how far the body turns on each panel as seen from space, by the bound; zero without momentum [rad]
     whole_turn : the bound for all panels and loops [rad]
-    loops : how often the panels are repeated
+    interpolant : with these panels
     moving : whether there may be momentum
     """
 
@@ -52,7 +56,7 @@ class StepRequirements:
     rates: Array
     turns: Array
     whole_turn: float
-    loops: int
+    interpolant: Interpolant
     moving: bool
     _defects: dict[bytes, Defects] = field(default_factory=dict, init=False, repr=False)
 
@@ -70,9 +74,14 @@ class StepRequirements:
             rates=rates,
             turns=sizes[0] if magnitude else np.zeros(len(rates)),
             whole_turn=interpolant.loops * float(sizes[0].sum()),
-            loops=interpolant.loops,
+            interpolant=interpolant,
             moving=magnitude > 0.0,
         )
+
+    @property
+    def loops(self) -> int:
+        """How often the panels are repeated."""
+        return self.interpolant.loops
 
     @property
     def far(self) -> bool:
@@ -91,8 +100,8 @@ class StepRequirements:
         """
         turn_a_step = SHORT_TURN_A_STEP if short else TURN_A_STEP
         if engine.is_ready():
-            bounds = self.rates, self.turns, self.sizes
-            return plan_of_steps(*bounds, self.loops, tolerance, turn_a_step, moving=self.moving)
+            motion = self.interpolant.coefficients, self.interpolant.widths, self.rates, self.turns, self.sizes
+            return plan_of_steps(*motion, self.loops, tolerance, turn_a_step, moving=self.moving)
         turn, swing, degree, _ = self.sizes
         # As many on each panel as make the sum of all the least.
         each = swing ** (1.0 / (ORDER + 1.0))
@@ -102,12 +111,26 @@ class StepRequirements:
         planned = np.maximum(planned, least)
         for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
             steps = self.whole_steps(planned)
-            found = self._of_panels.foreseen(steps if self.moving else 2 * steps)
-            excess = found.excess(self.loops, tolerance, moving=self.moving)
-            if not excess > 1.0:
+            if self.moving:
+                found = self._of_panels.foreseen(steps)
+                excess, order = found.excess(self.loops, tolerance), found.order
+                is_near = not excess > 1.0
+            else:
+                excess, order = self.foreseen_error_at_rest(steps) / (FORESEEN_AT_REST * tolerance), ORDER
+                is_near = NEAR <= excess <= 1.0
+            if is_near:
                 break
-            planned *= min(excess ** (1.0 / found.order), MOST_SHORTENED)
+            planned = np.maximum(planned * min(excess ** (1.0 / order), MOST_SHORTENED), least)
         return planned
+
+    def foreseen_error_at_rest(self, steps: Integers) -> float:
+        """What so many steps (P,) miss of the rates of turning themselves, as vectors: in these most cancels [rad]."""
+        table, series = signed_defects(), self.interpolant.coefficients[:, :DEFECT_DEGREES, 6:]
+        counts = np.minimum(steps, DEFECT_STEPS)
+        missed = table.take(counts, axis=0)[..., : series.shape[1]] @ series
+        of_panels = np.sqrt((missed * missed).sum(axis=2).max(axis=1)) * self.interpolant.widths
+        # More steps than the table has miss less by the order of the formula.
+        return self.loops * float(of_panels @ (counts / steps) ** ORDER)
 
     def whole_steps(self, planned: Array) -> Integers:
         """Whole numbers of steps on each panel: (P,) -> (P,).

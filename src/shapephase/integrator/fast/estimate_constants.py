@@ -83,8 +83,10 @@ FORESEEN = 2.3
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
 MOST_ODD = 16
 """Steps of a panel up to which their number may be odd; one more of many costs little and hides nothing from pairs."""
-FORESEEN_AT_REST = 10.0
-"""The same without momentum."""
+FORESEEN_AT_REST = 0.6
+"""The same without momentum, where the defects of the series themselves foretell the error."""
+NEAR = 0.5
+"""Of what is allowed for: steps that are foreseen to make so much of it are not made longer."""
 LOOKS_AHEAD = 3
 """At what defects foretell of a plan, before any step is taken."""
 FEW_STEPS = 1000.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Integers
 from ...chebyshev import MARGIN_OF_WIDTH, unit_nodes, values_to_coefficients
-from .._quadrature_defects import Defects, defect_table
+from .._quadrature_defects import Defects, defect_table, signed_defects
 from ._plain import plain
 from .estimate_constants import HIGHEST_DEGREE
 
@@ -127,11 +127,15 @@ def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: 
 
 
 def plan_of_steps(
-    rates: Array, turns: Array, sizes: Array, loops: int, tolerance: float, turn_a_step: float, *, moving: bool
-) -> Array:
+    coefficients: Array, widths: Array, rates: Array, turns: Array, sizes: Array,
+    loops: int, tolerance: float, turn_a_step: float, *, moving: bool,
+) -> Array:  # fmt: skip
     """What `StepRequirements.plan` finds: (P,)."""
-    planned, arrays = np.empty(len(turns)), (plain(rates), plain(turns), plain(sizes))
-    _plan_kernel().plan_steps(*arrays, loops, float(tolerance), turn_a_step, moving, plain(defect_table()), planned)
+    planned, series = np.empty(len(turns)), plain(coefficients).reshape(len(widths), -1)
+    arrays, tables = (plain(rates), plain(turns), plain(sizes)), (plain(defect_table()), plain(signed_defects()))
+    _plan_kernel().plan_steps(
+        series, plain(widths), *arrays, loops, float(tolerance), turn_a_step, moving, *tables, planned
+    )
     return planned
 
 
@@ -153,7 +157,7 @@ def warm() -> None:
     errors_of_panels(degree, one, table, None, 1.0)
     series_with_changed_ends(coefficients, degree, one, 1.0)
     rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
-    plan_of_steps(rates, one, sizes, 1, 1.0, 1.0, moving=True)
+    plan_of_steps(coefficients, one, rates, one, sizes, 1, 1.0, 1.0, moving=True)
     defects_of_panels(rates, one, np.array([2]))
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...arrays import Array, Integers
-from .._quadrature_defects import Defects, defect_table
+from .._quadrature_defects import Defects, defect_table, signed_defects
 from ..interpolant import Interpolant
 from ..step_record import CHECKPOINTS, StepRecord
 from ._plain import plain
@@ -67,7 +67,7 @@ def rounds_of_one(
         _NO_SERIES if perturbed is None else plain(perturbed).reshape(len(series), -1), loops,
         _NO_SERIES if directions is None else directions, magnitudes, ceiling, tolerance,
         refinement, expected, inf if hidden is None else hidden, segments_of(1, loops), CHECKPOINTS,
-        plain(defect_table()), marks_between(STEPS_OF_FINER), marks_between(STEPS_OF_OTHERS),
+        plain(defect_table()), plain(signed_defects()), marks_between(STEPS_OF_FINER), marks_between(STEPS_OF_OTHERS),
     )  # fmt: skip
     done, steps, quaternions, ends, turns, dynamics, propagators, numbers = found
     if not done:

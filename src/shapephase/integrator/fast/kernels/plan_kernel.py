@@ -25,6 +25,7 @@ from ..estimate_constants import (
     MOST_ODD,
     MOST_SHORTENED,
     MOST_TURN,
+    NEAR,
     NEARLY_AT_REST,
     ORDER,
     POWER_OF_EVENNESS,
@@ -64,8 +65,10 @@ def make_whole(planned, moving, steps):
 
 
 @kernel
-def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, moving, table, planned):
-    """As `StepRequirements.plan`, with the table of defects; planned (P,) is filled."""
+def plan_steps(
+    series, width, rates, turns, sizes, loops, tolerance, turn_a_step, moving, table, signed, planned
+):  # fmt: skip
+    """As `StepRequirements.plan`, with the tables of defects; planned (P,) is filled."""
     turn, swing, degree = sizes[0], sizes[1], sizes[2]
     total = count = 0.0
     for panel in range(len(turn)):
@@ -73,23 +76,48 @@ def plan_steps(rates, turns, sizes, loops, tolerance, turn_a_step, moving, table
         planned[panel] = each
         total += each * each
     common = 2.0 * (loops * DISTANCE * math.sqrt(total) / (AIM * tolerance)) ** (1.0 / ORDER)
+    least = np.empty(len(turn))
     for panel in range(len(turn)):
-        least = max(degree[panel] / DEGREES_A_STEP, turn[panel] / turn_a_step)
-        planned[panel] = max(max(common * planned[panel], least), 1.0)
+        least[panel] = max(max(degree[panel] / DEGREES_A_STEP, turn[panel] / turn_a_step), 1.0)
+        planned[panel] = max(common * planned[panel], least[panel])
         count += planned[panel]
     steps, found = np.empty(len(turn), np.int64), np.empty(5)
     for _ in range(LOOKS_AHEAD if loops * count <= FEW_STEPS else 0):
         make_whole(planned, moving, steps)
-        defects_of_panels(rates, turns, steps if moving else 2 * steps, table, found)
         if moving:
-            excess = loops * remaining_by_defects(found) * found[1] / (FORESEEN * tolerance)
+            defects_of_panels(rates, turns, steps, table, found)
+            excess, order = (
+                loops * remaining_by_defects(found) * found[1] / (FORESEEN * tolerance),
+                order_by_defects(found),
+            )
+            is_near = not excess > 1.0
         else:
-            excess = loops * found[1] / (FORESEEN_AT_REST * tolerance)
-        if not excess > 1.0:
+            excess = loops * _foreseen_error_at_rest(series, width, steps, signed) / (FORESEEN_AT_REST * tolerance)
+            order = ORDER
+            is_near = NEAR <= excess <= 1.0
+        if is_near:
             break
-        shorter = min(excess ** (1.0 / order_by_defects(found)), MOST_SHORTENED)
+        shorter = min(excess ** (1.0 / order), MOST_SHORTENED)
         for panel in range(len(turn)):
-            planned[panel] *= shorter
+            planned[panel] = max(shorter * planned[panel], least[panel])
+
+
+@part
+def _foreseen_error_at_rest(series, width, steps, signed):
+    """As `StepRequirements.foreseen_error_at_rest`, of one loop."""
+    total, terms = 0.0, min(series.shape[1] // 9, signed.shape[2])
+    for panel in range(len(steps)):
+        count, worst = min(steps[panel], len(signed) - 1), 0.0
+        for end in range(2):
+            x = y = z = 0.0
+            for k in range(terms):
+                defect = signed[count, end, k]
+                x += defect * series[panel, 9 * k + 6]
+                y += defect * series[panel, 9 * k + 7]
+                z += defect * series[panel, 9 * k + 8]
+            worst = max(worst, x * x + y * y + z * z)
+        total += math.sqrt(worst) * width[panel] * (count / steps[panel]) ** ORDER
+    return total
 
 
 @part

@@ -94,7 +94,7 @@ def _too_coarse(found, tolerance):
 @kernel
 def take_rounds(
     widths, series, perturbed, loops, directions, magnitudes, ceiling, tolerance, refinement, expected, hidden,
-    segments, checkpoints, table, marks_of_finer, marks_of_growth,
+    segments, checkpoints, table, signed, marks_of_finer, marks_of_growth,
 ):  # fmt: skip
     """Rounds of one momentum, or at rest of one loop, as long as nothing but shorter steps is needed.
 
@@ -105,7 +105,7 @@ def take_rounds(
     expected: what the samplers say of themselves [rad]
     hidden: its part that perturbed series do not show [rad]; infinite: these are not looked at
     checkpoints: at how many times propagators are kept
-    table: of defects
+    table, signed: of defects
     marks_of_finer, marks_of_growth: that refinements are rounded up to, of a factor of two
 
     Returns whether the motion is short enough to be done here, and if so steps, quaternions, ends, turns, dynamics,
@@ -119,7 +119,7 @@ def take_rounds(
     turn = loops * sizes[0].sum()
     a_step = SHORT_TURN_A_STEP if moving and turn > FAR else TURN_A_STEP
     seen = sizes[0] if moving else np.zeros(panels)
-    plan_steps(rates, seen, sizes, loops, tolerance, a_step, moving, table, planned)
+    plan_steps(series, widths, rates, seen, sizes, loops, tolerance, a_step, moving, table, signed, planned)
     steps, found, rounds = np.empty(panels, np.int64), np.zeros(13), 0
     while True:
         finer, amplified = refinement[0], refinement[1]
