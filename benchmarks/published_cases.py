@@ -219,7 +219,7 @@ def ant_on_a_disc(disc: float) -> float:
     masses = [*np.full(4, disc / 4.0), 1.0]
     body = sp.particle_body(masses, places, ["angle"], continuous=["angle"])
     path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0], [2.0 * np.pi]], joint_names=["angle"])
-    return float(np.degrees(sp.so3.angle_about(sp.holonomy(body, path), np.array([0.0, 0.0, 1.0]))))
+    return float(np.degrees(sp.so3.angle_about(sp.holonomy(body, path, tolerance=1e-11), np.array([0.0, 0.0, 1.0]))))
 
 
 def euler_days() -> float:
