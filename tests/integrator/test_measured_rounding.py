@@ -10,9 +10,16 @@ from benchmarks.random_motions import mixed
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached
 from shapephase.integrator import integrate
-from shapephase.integrator._measured_rounding import measured_rounding
+from shapephase.integrator._measured_rounding import measured_rounding, noise_of_series
 from shapephase.integrator._step_loop import integrate_steps
-from shapephase.integrator.fast.estimate_constants import LEAST_OF_BOUND, MEASURED_ROUNDING
+from shapephase.integrator.fast.estimate_constants import (
+    EPS,
+    LEAST_NOISE,
+    LEAST_OF_BOUND,
+    MEASURED_ROUNDING,
+    NOISE_OF_SERIES,
+    NOISE_OF_TAIL,
+)
 from shapephase.integrator.interpolant import Interpolant
 from support.compiler import needs_compiler
 
@@ -31,11 +38,14 @@ def rigid(duration: float) -> Interpolant:
 
 @needs_compiler
 @pytest.mark.parametrize("fast", ["0", "1"])
-@pytest.mark.parametrize("number", [8980, 9445])
+@pytest.mark.parametrize("number", [432, 3217, 8980, 9445])
 def test_a_tolerance_that_the_bound_would_refuse_is_reached(
     monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, fast: str, number: int
 ):
-    """Of loops whose errors grow some hundred and some thousand times, in extended precision."""
+    """Of motions whose errors grow some hundred and some thousand times, in extended precision.
+
+    In the second rounding is all that counts once it is sampled densely, and not before.
+    """
     if fast == "1":
         request.getfixturevalue("fast")
     else:
@@ -59,6 +69,18 @@ def test_a_bound_far_below_the_tolerance_is_believed_and_no_measure_is_far_below
     assert found == LEAST_OF_BOUND * bound[0]
     unknown = np.array([np.inf])
     assert measured_rounding(unknown, interpolant, steps, record, size, 1e-3) is unknown
+
+
+def test_the_last_terms_tell_how_large_errors_due_to_rounding_may_be():
+    """Of series of 30 terms: that fall to noise, that fall to nothing, that do not fall so far, and of a constant."""
+    rng, terms = np.random.default_rng(3), 10.0 ** -np.arange(30.0)[:, None]
+    unit = 3.0 * EPS
+    series = 3.0 * np.stack([terms, np.where(terms > 1e-22, terms, 0.0), terms**0.4, terms == 1.0]) * [1.0, 0.5]
+    series[0] += 0.4 * unit * rng.choice([-1.0, 1.0], (30, 2))
+    to_noise, to_nothing, not_so_far, constant = noise_of_series(series) / unit
+    assert to_noise == pytest.approx(0.4 * NOISE_OF_TAIL, rel=0.05)
+    assert to_nothing == pytest.approx(LEAST_NOISE)
+    assert not_so_far == constant == pytest.approx(NOISE_OF_SERIES)
 
 
 def test_rows_are_measured_each_for_itself():

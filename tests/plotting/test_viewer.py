@@ -35,7 +35,9 @@ UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 @pytest.fixture(scope="module")
 def righting():
     """The cat falls upside down without momentum."""
-    return sp.reconstruct(sp.articulated(sp.load_body("cat"), cat_righting()), np.zeros(3), UPSIDE_DOWN, tolerance=1e-10)
+    return sp.reconstruct(
+        sp.articulated(sp.load_body("cat"), cat_righting()), np.zeros(3), UPSIDE_DOWN, tolerance=1e-10
+    )
 
 
 @pytest.fixture(scope="module")

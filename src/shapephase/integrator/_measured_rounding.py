@@ -8,9 +8,11 @@ from ..arrays import Array, Integers
 from ._step_loop import largest_angle, quaternions_alone
 from .fast.estimate_constants import (
     EPS,
+    LEAST_NOISE,
     LEAST_OF_BOUND,
     MEASURED_ROUNDING,
     NOISE_OF_SERIES,
+    NOISE_OF_TAIL,
     OTHER_ROUNDINGS,
     ROUNDING_BY_CHANCE,
 )
@@ -19,6 +21,8 @@ from .step_record import StepRecord
 
 # Numbers of quaternions at once: eight megabytes.
 _MOST_NUMBERS = 1_000_000
+# Terms of a series that tell its noise.
+_LAST = 5
 
 
 def measured_rounding(
@@ -61,9 +65,24 @@ def measured_rounding(
 
 
 def _rounded_otherwise(coefficients: Array, number: int) -> Array:
-    """Series (P, n, 9) with errors of some units of rounding, the same for the same number."""
-    noise = np.random.default_rng(number).uniform(-NOISE_OF_SERIES * EPS, NOISE_OF_SERIES * EPS, coefficients.shape)
-    sizes = np.abs(coefficients).max(axis=1)
-    noise[..., :6] *= sizes[:, :6].max(axis=1)[:, None, None]
-    noise[..., 6:] *= sizes[:, 6:].max(axis=1)[:, None, None]
+    """Series (P, n, 9) with errors like those due to rounding, the same for the same number."""
+    noise = np.random.default_rng(number).uniform(-1.0, 1.0, coefficients.shape)
+    noise[..., :6] *= noise_of_series(coefficients[..., :6])[:, None, None]
+    noise[..., 6:] *= noise_of_series(coefficients[..., 6:])[:, None, None]
     return coefficients + noise
+
+
+def noise_of_series(coefficients: Array) -> Array:
+    """How large errors due to rounding may be in the series of each panel: (P, n, k) -> (P,).
+
+    Rounding of samples is alike in all terms, and the last ones are hardly anything else.
+    """
+    sizes = np.abs(coefficients).max(axis=2)
+    count = sizes.shape[1]
+    last = count - 1 - np.argmax(sizes[:, ::-1] > 0.0, axis=1)
+    ends = np.clip(last[:, None] - np.arange(_LAST), 0, None)
+    tail = np.sqrt((np.take_along_axis(coefficients, ends[..., None], axis=1) ** 2).mean(axis=(1, 2)))
+    unit = EPS * sizes.max(axis=1)
+    # Of few terms the last ones are more than noise.
+    tail[last < 2 * _LAST] = np.inf
+    return np.clip(NOISE_OF_TAIL * tail, LEAST_NOISE * unit, NOISE_OF_SERIES * unit)

@@ -190,8 +190,8 @@ class Integration:
         """Raise AccuracyNotReached after so many rounds, of which the best had this estimate, if more will not help."""
         # Finer steps and samples that bring nothing: what is left is rounding. At first they may still be too long to.
         stuck = number > 4 and errors.estimate > 0.9 * best
-        # Or rounding alone takes up the tolerance.
-        hopeless = errors.rounding > _MOST_ROUNDING * self._tolerance
+        # Or rounding alone takes up the tolerance, by samples so dense that they show it.
+        hopeless = errors.rounding > max(_MOST_ROUNDING * self._tolerance, errors.sampling)
         if number == _MOST_ROUNDS or (errors.are_informative and (stuck or hopeless)):
             raise _not_reached(self._tolerance, errors)
 

@@ -79,7 +79,7 @@ MANY_STEPS = 4000.0
 """Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
 NEGLIGIBLE = 0.1
 """Of the tolerance: below, what the samplers say, amplified, is not worth a march of its own, though it is too much."""
-FORESEEN = 2.3
+FORESEEN = 1.7
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
 MOST_ODD = 16
 """Steps of a panel up to which their number may be odd; one more of many costs little and hides nothing from pairs."""
@@ -157,12 +157,15 @@ MEASURED_ROUNDING = 0.5
 """Of the tolerance: a bound above it is not believed before other marches have been looked at."""
 OTHER_ROUNDINGS = 4
 """Of these marches, each on series with other errors."""
+NOISE_OF_TAIL = 3.0
+"""Times the last coefficients of a series: these errors of all of them."""
 NOISE_OF_SERIES = 2.0
-"""Units, of a series' largest coefficient: these errors."""
+"""Units, of a series' largest coefficient: what they are at most, where the last ones are more than noise."""
+LEAST_NOISE = 0.25
+"""The same, at least: samples have half a unit, which averages out, and the last terms of a loop's panels have less."""
 ROUNDING_BY_CHANCE = 3.0
-"""How many times the largest of their distances the error due to rounding may be. Of 112 motions whose bound is near
-the tolerance one was above, which is above its bound, too."""
-LEAST_OF_BOUND = 1.0 / 30.0
+"""How many times the largest of their distances the error due to rounding may be."""
+LEAST_OF_BOUND = 1.0 / 6.0
 """Of the bound, that distances are believed."""
 
 # ---- Polynomials of the dense output -------------------------------------------------------------------------------
