@@ -117,7 +117,8 @@ class StepRequirements:
                 is_near = not excess > 1.0
             else:
                 excess, order = self.foreseen_error_at_rest(steps) / (FORESEEN_AT_REST * tolerance), ORDER
-                is_near = NEAR <= excess <= 1.0
+                # Fewer steps than the least there are none.
+                is_near = excess <= 1.0 and (excess >= NEAR or not (planned > least).any())
             if is_near:
                 break
             planned = np.maximum(planned * min(excess ** (1.0 / order), MOST_SHORTENED), least)
