@@ -192,12 +192,20 @@ def _on_panels(trial: Trial, closure: np.ndarray, panels: int, most: float) -> E
         closure=closure,
         uncertainty=first + second,
     )
-    # The phase by its formula against the same angle read off the exact attitudes.
-    found = exact_split(curve, "base")
-    turn = attitude[-1] @ found.tilt.T
+    return replace(curve, uncertainty=first + second + max(_disagreement(curve, gauge) for gauge in ("base", "given")))
+
+
+def _disagreement(curve: ExactCurve, gauge: str) -> float:
+    """Between the phase by its formula and the same angle read off the exact attitudes [rad]."""
+    found = exact_split(curve, gauge)
+    turn = curve.attitude[-1]
+    if gauge == "given":
+        frame, _ = swinging(float(curve.times[-1]))(curve.times[[0, -1]].astype(np.longdouble))
+        turn = turn @ frame[1].T @ frame[0]
+    turn = turn @ found.tilt.T
     vector = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     angle = np.arctan2(curve.direction[0] @ vector, (np.trace(turn) - 1) / 2)
-    return replace(curve, uncertainty=first + second + distance(found.montgomery_phase, angle, 2.0))
+    return distance(found.montgomery_phase, angle, 2.0)
 
 
 def exact_split(curve: ExactCurve, gauge: str | Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> ExactSplit:
