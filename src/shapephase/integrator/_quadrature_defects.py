@@ -182,9 +182,9 @@ class PanelDefects:
         return _summed_up(steps, sums, float(whole[whole > UNRESOLVED * coarse].sum()))
 
     def foreseen(self, steps: Integers) -> Defects:
-        """The same at less cost, without a look at what these steps do little about."""
+        """The same at less cost, without a look at what these steps do little about, which is left at zero."""
         if not self._is_tabulated(steps):
-            return self.found(steps)
+            return self.found(steps)._replace(unresolved=0.0)
         return _summed_up(steps, (self._windows(steps)[:, :, None] @ self._weights).ravel(), 0.0)
 
     def _is_tabulated(self, steps: Integers) -> bool:

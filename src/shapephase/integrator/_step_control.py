@@ -148,10 +148,10 @@ class StepRequirements:
         key = steps.tobytes()
         if key not in self._defects:
             taken = steps if self.moving else 2 * steps
-            by_kernel = engine.is_ready()
-            self._defects[key] = (
-                defects_of_panels(self.rates, self.turns, taken) if by_kernel else self._of_panels.found(taken)
-            )
+            if engine.is_ready():
+                self._defects[key] = defects_of_panels(self.rates, self.turns, taken)
+            else:
+                self._defects[key] = self._of_panels.found(taken)
         return self._defects[key]
 
     def stepping_error(self, steps: Integers, distance: Array, amplification: Array | float = 1.0) -> Array:

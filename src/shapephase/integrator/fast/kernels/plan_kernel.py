@@ -94,7 +94,8 @@ def plan_steps(
         else:
             excess = loops * _foreseen_error_at_rest(series, width, steps, signed) / (FORESEEN_AT_REST * tolerance)
             order = ORDER
-            is_near = NEAR <= excess <= 1.0
+            # Fewer steps than the least there are none.
+            is_near = excess <= 1.0 and (excess >= NEAR or not (planned > least).any())
         if is_near:
             break
         shorter = min(excess ** (1.0 / order), MOST_SHORTENED)
