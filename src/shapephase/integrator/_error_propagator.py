@@ -125,7 +125,7 @@ def _adjugates(matrices: Array) -> Array:
 def _turns(quaternions: Array) -> Array:
     """How far each step turns: (B, K + 1, 4) -> (B, K) [rad]."""
     chords = quaternions[:, 1:] - quaternions[:, :-1]
-    return 2.0 * np.sqrt(np.einsum("bki,bki->bk", chords, chords))
+    return 2.0 * np.sqrt(np.vecdot(chords, chords))
 
 
 def _rounding_at_worst(propagators: Array, turned: Array) -> Array:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache, partial
-from math import ceil, inf, log, pi
+from math import ceil, inf, log, log10, pi
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..chebyshev import unit_nodes, values_to_coefficients
 from ._last_terms import Perturbed
 from ._spectral_error import (
     EPS,
@@ -26,31 +26,46 @@ from .interpolant import Interpolant
 
 # Samples of a loop, beyond which panels need fewer.
 _MOST_SAMPLES = 768
-# Tolerance [rad] from which on, and the samples to begin with for every `_HARMONICS` harmonics: what most bodies need,
-# since a second round costs as much as thirty samples more.
+# Tolerance [rad] from which on, and the samples to begin with for every `_HARMONICS` harmonics of a shape that swings
+# no one knows how far: what most bodies need, since a second round costs as much as thirty samples more.
 _FIRST_COUNTS = ((1e-8, 64), (1e-11, 96), (0.0, 128))
 _HARMONICS = 4
-# Samples of the loop on each panel of the interpolant.
-_SAMPLES_A_PANEL = 16
+# Else the multiple of this that is next to a sum of samples for any motion, for each harmonic and digit, and for each
+# radian of swing and digit, of which so many more count: enough for 97 of 100 random loops. (The spectrum of
+# cos(x sin t) ends a few harmonics beyond x.)
+_UNIT = 16
+_SAMPLES_OF_ANY = 20.0
+_SAMPLES_A_HARMONIC, _DIGITS_OF_HARMONICS = 1.03, -2.5
+_SAMPLES_A_RADIAN, _DIGITS_OF_SWING = 3.2, 1.0
+# Samples of the loop on each panel of the interpolant, and the degree of its series: on it even a harmonic that is only
+# just resolved is right to a twentieth. Narrow panels are for motions that take many steps, which are cut to measure
+# on them; the body turns by more than so much for each sample there [rad].
+_WIDE, _NARROW = (16, 32), (8, 22)
+_FAR_TURN = 0.1
 # Times, as shares of the loop, at which the series is compared with the deformation itself: never nodes, and spread.
 _TEST_SHARES = np.mod(0.2137 + 0.6180339887498949 * np.arange(3), 1.0)
+# Pi is more than its number by so much; and what counts as a node, in half turns of a loop.
+_BEYOND_PI = 1.2246467991473532e-16
+_AT_NODE = 1e-14
 # The error between the nodes may be this many times what those few times show.
 _UNSEEN_BETWEEN = 2.0
 # Rounding of a sample may be this many times the floor of the spectrum, where it averages out.
 _ROUNDING_OF_TESTS = 4.0
 # Of the times, in turns of the loop [rad].
 _TIME_ROUNDING = 2.0 * pi * EPS
-# Of the interpolant's panels: a Fourier series resolved by 16 samples is a Chebyshev series of this degree to rounding.
-_PANEL_DEGREE = 32
 
 
 class EvenSampler:
     """Samples a smooth loop at even times; each new count is two, three or four times the last."""
 
-    def __init__(self, channels: Channels, period: float, loops: int, oscillations: float) -> None:
-        self._channels, self._period, self._loops, self._oscillations = channels, period, loops, oscillations
+    def __init__(
+        self, channels: Channels, period: float, loops: int, oscillations: float, swing: float | None = None
+    ) -> None:
+        self._channels, self._period, self._loops = channels, period, loops
+        self._oscillations, self._swing = oscillations, swing
         self._values = np.empty((0, 9))
         self._tests = np.empty((0, 9))
+        self._panel = _WIDE
 
     def refine(self, momentum: float, tolerance: float) -> bool:
         """As `Sampler.refine`; False where that would take too many samples."""
@@ -73,36 +88,49 @@ class EvenSampler:
             values[::factor] = self._values
             values[fresh] = self._channels(self._times(fresh, factor * count))
             self._take(values)
+        self._panel = _NARROW if momentum and self._turn(momentum) > _FAR_TURN * len(self._values) else _WIDE
         return True
 
     def _first_count(self, tolerance: float) -> int:
         if not self._oscillations:
             return 1
+        if self._swing is not None:
+            digits = -log10(tolerance)
+            count = _SAMPLES_OF_ANY + _SAMPLES_A_RADIAN * (digits + _DIGITS_OF_SWING) * self._swing
+            count += _SAMPLES_A_HARMONIC * (digits + _DIGITS_OF_HARMONICS) * self._oscillations
+            return _UNIT * max(2, ceil(min(count, _MOST_SAMPLES) / _UNIT))
         each = next(count for least, count in _FIRST_COUNTS if tolerance > least)
         return each * max(1, ceil(self._oscillations / _HARMONICS))
 
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
         inverse, drift = self._tails
-        turn = self._period * (momentum * inverse.largest + drift.largest)
-        share = unaveraged_share(inverse.converging and drift.converging, pi * len(self._values), turn)
+        converging = inverse.converging and drift.converging
+        share = unaveraged_share(converging, pi * len(self._values), self._turn(momentum))
         by_tails = (momentum * inverse.error + drift.error) * share
         return self._loops * 0.5 * self._period * by_tails + self._hidden(momentum)
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`."""
-        panels = _panel_count(self._values)
+        panels = max(1, len(self._values) // self._panel[0])
         edges = (self._period / panels) * np.arange(panels * self._loops + 1, dtype=np.float64)
         edges[-1] = self._period * self._loops
-        return Interpolant(edges, _series(self._values), self._loops, self._channels.count)
+        # The highest harmonic turns by half of this much from the middle of a panel to its end.
+        band = int(0.5 * pi * self._panel[0])
+        return Interpolant(edges, _series(self._values, *self._panel), self._loops, self._channels.count, band)
 
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`: the harmonics that stand for those that are missing, changed by as much."""
         inverse, drift = self._tails
         missing, last = (momentum * inverse.error + drift.error, momentum * inverse.tail + drift.tail)
         # A copy: samples in work arrays are overwritten by the next motion.
-        make = partial(_series, self._values.copy(), missing / last if last > 0.0 else 0.0)
+        make = partial(_series, self._values.copy(), *self._panel, less=missing / last if last > 0.0 else 0.0)
         return Perturbed(make, self._hidden(momentum))
+
+    def _turn(self, momentum: float) -> float:
+        """A bound of how far the body turns in a loop, but for what averages out [rad]."""
+        inverse, drift = self._tails
+        return self._period * (momentum * inverse.largest + drift.largest)
 
     def _hidden(self, momentum: float) -> float:
         """What the tails cannot explain is no missing oscillation that averages out [rad]."""
@@ -150,14 +178,10 @@ def _errors_in_machine_code(values: Array, tests: Array) -> list[tuple[TailEstim
     ]
 
 
-def _panel_count(values: Array) -> int:
-    return max(1, len(values) // _SAMPLES_A_PANEL)
-
-
-def _series(values: Array, less: float = 0.0) -> Array:
+def _series(values: Array, samples_a_panel: int, degree: int, less: float = 0.0) -> Array:
     """Chebyshev coefficients (P, n, 9) of the Fourier series, with this share of its last terms taken off."""
-    count, panels = len(values), _panel_count(values)
-    degree = _PANEL_DEGREE if count > 1 else 0
+    count, panels = len(values), max(1, len(values) // samples_a_panel)
+    degree = degree if count > 1 else 0
     matrix = _even_to_panel(count, panels, degree, count // 2)
     if less:
         without = _even_to_panel(count, panels, degree, count // 2 - tail_length(count // 2))
@@ -177,19 +201,23 @@ def _unexplained(gap: float, tail: TailEstimate) -> float:
 @lru_cache(maxsize=32)
 def _even_to_shares(count: int) -> Array:
     """Samples at `count` even times of a period -> values at `_TEST_SHARES` of it: (3, count)."""
-    return _periodic_sinc(2.0 * np.pi * (_TEST_SHARES[:, None] - np.arange(count) / count), count)
+    return _periodic_sinc(_TEST_SHARES.astype(np.longdouble), count).astype(np.float64)
 
 
-def _periodic_sinc(angle: Array, count: int, highest: int | None = None) -> Array:
-    """The sum of cos(k angle) for |k| < count/2 plus half the last term, over `count` (even): the shape of angle.
+def _periodic_sinc(shares: Any, count: int, highest: int | None = None) -> Any:
+    """Samples at `count` even times of a period -> values at shares of it: (S,) -> (S, count), in extended precision.
 
-    `highest`: only up to this k.
+    The sums of cos(k x) for |k| < count/2 and half the last term (count even), or for |k| up to `highest`, over
+    `count`, in closed form: added up, they would be off by the rounding of every angle.
     """
-    half = count // 2
-    kernel = np.ones_like(angle)
-    for k in range(1, half if highest is None else min(half, highest + 1)):
-        kernel += 2.0 * np.cos(k * angle)
-    return (kernel + np.cos(half * angle) if highest is None or highest >= half else kernel) / count
+    half_turns = np.pi * (shares[:, None] - np.arange(count, dtype=np.longdouble) / count)
+    half_turns += _BEYOND_PI * (half_turns / np.pi)
+    is_node = np.abs(half_turns) < _AT_NODE
+    if highest is None or highest >= count // 2:
+        at_node, above = 1.0, np.sin(count * half_turns) * np.cos(half_turns)
+    else:
+        at_node, above = (2 * highest + 1) / count, np.sin((2 * highest + 1) * half_turns)
+    return np.where(is_node, at_node, above / (count * np.sin(np.where(is_node, 1.0, half_turns))))
 
 
 @lru_cache(maxsize=32)
@@ -200,11 +228,16 @@ def _even_to_panel(count: int, panels: int, degree: int, highest: int) -> Array:
     """
     if count == 1:
         return np.ones((1, 1))
-    phase = (2.0 * np.pi / panels) * (0.5 + 0.5 * unit_nodes(degree))
-    angle = phase[:, None] - 2.0 * np.pi / count * np.arange(count)
-    matrix = values_to_coefficients(degree) @ _periodic_sinc(angle, count, highest)
+    # As `values_to_coefficients`, in extended precision.
+    terms = np.arange(degree + 1, dtype=np.longdouble)
+    angles = (np.pi + np.longdouble(_BEYOND_PI)) / degree * terms
+    to_coefficients = np.cos((terms[:, None] * terms) % (2 * degree) * (angles[1])) * (2.0 / degree)
+    to_coefficients *= np.where(terms % 2 == 0.0, 1.0, -1.0)[:, None]
+    to_coefficients[:, [0, -1]] *= 0.5
+    to_coefficients[[0, -1], :] *= 0.5
+    matrix = to_coefficients @ _periodic_sinc((0.5 - 0.5 * np.cos(angles)) / panels, count, highest)
     # What does not swing is far larger than what does, and loops repeat its rounding: samples that are all alike make a
     # series of one term.
     share = matrix.sum(axis=1) / count
-    share[0] -= 1.0 / count
-    return matrix - share[:, None]
+    share[0] -= np.longdouble(1.0) / count
+    return (matrix - share[:, None]).astype(np.float64)

@@ -50,7 +50,7 @@ def measured_rounding(
     apart = np.zeros(len(rows))
     at_once = max(1, _MOST_NUMBERS // record.quaternions[0].size)
     for number in range(OTHER_ROUNDINGS):
-        series = _rounded_otherwise(interpolant.coefficients, number)
+        series = _rounded_otherwise(interpolant, number)
         for first in range(0, len(rows), at_once):
             part = slice(first, first + at_once)
             these = rows[part]
@@ -64,22 +64,25 @@ def measured_rounding(
     return measured
 
 
-def _rounded_otherwise(coefficients: Array, number: int) -> Array:
+def _rounded_otherwise(interpolant: Interpolant, number: int) -> Array:
     """Series (P, n, 9) with errors like those due to rounding, the same for the same number."""
+    coefficients, band = interpolant.coefficients, interpolant.band
     noise = np.random.default_rng(number).uniform(-1.0, 1.0, coefficients.shape)
-    noise[..., :6] *= noise_of_series(coefficients[..., :6])[:, None, None]
-    noise[..., 6:] *= noise_of_series(coefficients[..., 6:])[:, None, None]
+    noise[..., :6] *= noise_of_series(coefficients[..., :6], band)[:, None, None]
+    noise[..., 6:] *= noise_of_series(coefficients[..., 6:], band)[:, None, None]
     return coefficients + noise
 
 
-def noise_of_series(coefficients: Array) -> Array:
-    """How large errors due to rounding may be in the series of each panel: (P, n, k) -> (P,).
+def noise_of_series(coefficients: Array, band: int | None = None) -> Array:
+    """How large errors due to rounding may be in the series of each panel: (P, n, k) -> (P,); band: of an interpolant.
 
     Rounding of samples is alike in all terms, and the last ones are hardly anything else.
     """
     sizes = np.abs(coefficients).max(axis=2)
     count = sizes.shape[1]
     last = count - 1 - np.argmax(sizes[:, ::-1] > 0.0, axis=1)
+    if band is not None:
+        last = np.minimum(last, band)
     ends = np.clip(last[:, None] - np.arange(_LAST), 0, None)
     tail = np.sqrt((np.take_along_axis(coefficients, ends[..., None], axis=1) ** 2).mean(axis=(1, 2)))
     unit = EPS * sizes.max(axis=1)

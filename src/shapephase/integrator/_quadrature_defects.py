@@ -178,7 +178,7 @@ class PanelDefects:
             found = _term_by_term(steps, terms, self._further)
         found *= self._rates
         whole, coarse = found
-        sums = found.reshape(2 * count, terms) @ _ones(terms)
+        sums = found.reshape(2 * count, terms) @ ones(terms)
         return _summed_up(steps, sums, float(whole[whole > UNRESOLVED * coarse].sum()))
 
     def foreseen(self, steps: Integers) -> Defects:
@@ -221,7 +221,8 @@ def _summed_up(steps: Integers, of_panels: Array, unresolved: float) -> Defects:
 
 
 @lru_cache(maxsize=64)
-def _ones(count: int) -> Array:
+def ones(count: int) -> Array:
+    """(count,) that sum up rows by a product."""
     return np.ones(count)
 
 

@@ -38,6 +38,8 @@ Directly = Callable[[Array], Array | None]
 _AT_ONCE = 16_384
 # Numbers in spectra whose norms are computed together: their squares take ten megabytes.
 _NUMBERS_AT_ONCE = 1_000_000
+# [rad/s] of the body by its joints; what is faster, or no number, is looked at closely.
+_LARGEST_RATE = 1e150
 _VOIGT = np.array([0, 4, 8, 5, 2, 1])
 # Off-diagonal channels stand for two entries of I^-1.
 _SQUARES = np.array([[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T
@@ -85,7 +87,7 @@ def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
     flat = np.empty((len(times), 12))
     flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
     channels = map_rows(inverse_channels, 12, flat)
-    if not (channels[:, 9].min() > 0.0 and isfinite(channels.sum())):
+    if not channels[:, 9].min() > 0.0:
         inverse = inverse_inertia(inertia, times)
         channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
         channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
@@ -96,7 +98,7 @@ def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
 
 
 def inverse_channels(entries: list[Any]) -> list[Any]:
-    """I^-1, I^-1 L_o and a number above zero where the tensor is far from singular, from the nine of I and L_o.
+    """I^-1, I^-1 L_o and a number above zero where the tensor is far from singular and all is finite, from I and L_o.
 
     Far from singular: the condition number is at most some hundred, and so are the digits that the adjugate loses.
     """
@@ -108,7 +110,9 @@ def inverse_channels(entries: list[Any]) -> list[Any]:
     trace = a + b + c
     safe = casadi.fmin(determinant - 1e-3 * trace * trace * trace, casadi.fmin(adjugate[2], a))
     xx, yy, zz, yz, xz, xy = inverse = [entry / determinant for entry in adjugate]
-    return [*inverse, xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z, safe]
+    drift = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
+    # No comparison holds for what is not a number.
+    return [*inverse, *drift, safe * (casadi.fabs(sum(drift)) < _LARGEST_RATE)]
 
 
 class TailEstimate(NamedTuple):

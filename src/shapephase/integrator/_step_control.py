@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 
 from ..arrays import Array, Integers
-from ._quadrature_defects import Defects, PanelDefects, signed_defects
+from ._quadrature_defects import Defects, PanelDefects, ones, signed_defects
 from ._spectral_error import spectral_norms
 from .fast import engine
 from .fast.estimate_constants import (
@@ -22,12 +22,13 @@ from .fast.estimate_constants import (
     FAR,
     FEW_STEPS,
     FORESEEN_AT_REST,
-    LOOKS_AHEAD,
+    LOOKS_AT_REST,
     MOST_ODD,
     MOST_SHORTENED,
     MOST_TURN,
     NEAR,
     ORDER,
+    ROUNDED_DOWN,
     SHORT_TURN_A_STEP,
     SIGNIFICANT,
     TURN_A_STEP,
@@ -73,7 +74,7 @@ class StepRequirements:
             sizes=sizes,
             rates=rates,
             turns=sizes[0] if magnitude else np.zeros(len(rates)),
-            whole_turn=interpolant.loops * float(sizes[0].sum()),
+            whole_turn=interpolant.loops * sum(sizes[0].tolist()),
             interpolant=interpolant,
             moving=magnitude > 0.0,
         )
@@ -109,7 +110,8 @@ class StepRequirements:
         planned = 2.0 * common ** (1.0 / ORDER) * each
         least = np.maximum(np.maximum(degree / DEGREES_A_STEP, turn / turn_a_step), 1.0)
         planned = np.maximum(planned, least)
-        for _ in range(LOOKS_AHEAD if self.loops * float(planned.sum()) <= FEW_STEPS else 0):
+        looks = 1 if self.moving else LOOKS_AT_REST
+        for _ in range(looks if self.loops * sum(planned.tolist()) <= FEW_STEPS else 0):
             steps = self.whole_steps(planned)
             if self.moving:
                 found = self._of_panels.foreseen(steps)
@@ -138,8 +140,10 @@ class StepRequirements:
 
         With momentum at least two, so that pairs of them show errors, and where they are many even.
         """
-        whole = np.maximum(np.ceil(planned), 2.0 if self.moving else 1.0).astype(int)
-        if not self.moving or max(whole.tolist()) <= MOST_ODD:
+        if not self.moving:
+            return np.maximum(np.ceil(planned - ROUNDED_DOWN), 1.0).astype(int)
+        whole = np.maximum(np.ceil(planned), 2.0).astype(int)
+        if max(whole.tolist()) <= MOST_ODD:
             return whole
         return whole + (whole > MOST_ODD) * (whole % 2)
 
@@ -162,7 +166,7 @@ class StepRequirements:
         found = self.defects(steps)
         if not self.moving:
             return found.error_at_rest(distance, self.loops)
-        return found.error(distance, self.loops, amplification, self.loops * float(self.sizes[3].sum()))
+        return found.error(distance, self.loops, amplification, self.loops * sum(self.sizes[3].tolist()))
 
 
 def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
@@ -170,11 +174,11 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     norms = spectral_norms(coefficients)
     rates = (magnitude * norms[..., 0] + norms[..., 1] if magnitude else norms[..., 1]) * widths[:, None]
     degree, sizes = np.arange(float(rates.shape[1])), np.empty((4, len(rates)))
-    turn = sizes[0] = rates.sum(axis=1)
+    turn = sizes[0] = rates @ ones(len(degree))
     sizes[2] = ((rates > least) * degree).max(axis=1)
     if magnitude:
         # More turns than can be stepped are refused, and their powers would overflow.
-        sizes[1] = (rates * (degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None]) ** ORDER).sum(axis=1)
+        sizes[1] = np.vecdot(rates, (degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None]) ** ORDER)
         sizes[3] = magnitude * norms[:, 0, 0] * widths
     else:
         # Without momentum a steady turn is exact: the first term counts for nothing.

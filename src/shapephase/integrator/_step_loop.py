@@ -8,7 +8,6 @@ are taken on whole arrays.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import groupby
@@ -20,7 +19,7 @@ from .. import run_progress
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
-from .casadi_calls import call_casadi
+from .casadi_calls import call_casadi, call_casadi_into
 from .fast import engine
 from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
@@ -60,26 +59,32 @@ def integrate_steps(
     """
     if engine.is_ready():
         return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators, threads)
-    total = interpolant.loops * int(steps.sum())
-    batch = len(magnitudes)
-    whole = StepRecord.empty(batch, total, CHECKPOINTS if with_propagators else 0)
+    total, batch = interpolant.loops * sum(steps.tolist()), len(magnitudes)
     series = interpolant.coefficients * interpolant.widths[:, None, None]
     channels = _channels_of_series(series, steps)
-    ends = ends_of_pairs(steps, interpolant.loops)
     coarse = _channels_of_series(series, steps, in_pairs=True)
     cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps, in_pairs=True)
-    record, attitudes = (_record_one, _attitudes_of_one) if batch <= FEW else (_record_many, _attitudes_of_many)
-    at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
+    ends, loops = ends_of_pairs(steps, interpolant.loops), interpolant.loops
     # All steps, pairs of them, and these again where series are perturbed.
+    at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
     run_progress.begin(run_progress.STEPPING, -(-batch // at_once) * total * (3 if perturbed is None else 4) // 2)
+    if batch <= FEW:
+        states, sides = march_of_few(channels, loops, directions, magnitudes, with_propagators=with_propagators)
+        whole = _record_of_states(states, sides, with_propagators)
+        pairs = _quaternions_of_few(coarse, loops, directions, magnitudes)
+        whole.stepping[:] = largest_angle(whole.quaternions[:, ends], pairs)
+        if cut is not None:
+            whole.truncation[:] = largest_angle(pairs, _quaternions_of_few(cut, loops, directions, magnitudes))
+        return whole
+    whole = StepRecord.empty(batch, total, CHECKPOINTS if with_propagators else 0)
     for first in range(0, batch, at_once):
         rows = slice(first, first + at_once)
         starts = directions[rows], magnitudes[rows]
-        record(whole, rows, channels, interpolant.loops, *starts)
-        pairs = attitudes(coarse, interpolant.loops, *starts)
+        _record_many(whole, rows, channels, loops, *starts)
+        pairs = _quaternions_of_many(coarse, loops, *starts)
         whole.stepping[rows] = largest_angle(whole.quaternions[rows][:, ends], pairs)
         if cut is not None:
-            whole.truncation[rows] = largest_angle(pairs, attitudes(cut, interpolant.loops, *starts))
+            whole.truncation[rows] = largest_angle(pairs, _quaternions_of_many(cut, loops, *starts))
     return whole
 
 
@@ -128,12 +133,11 @@ def quaternions_alone(
             widths, coefficients, None, steps, interpolant.loops, directions, magnitudes, marks=none
         )
         return record.quaternions
-    channels, batch = _channels_at_stages(interpolant, coefficients, steps), len(magnitudes)
-    at_once, attitudes = (1, _attitudes_of_one) if batch <= FEW else (_ROWS_AT_ONCE, _attitudes_of_many)
-    parts = (slice(first, first + at_once) for first in range(0, batch, at_once))
-    return np.concatenate(
-        [attitudes(channels, interpolant.loops, directions[rows], magnitudes[rows]) for rows in parts]
-    )
+    channels, loops = _channels_at_stages(interpolant, coefficients, steps), interpolant.loops
+    if len(magnitudes) <= FEW:
+        return _quaternions_of_few(channels, loops, directions, magnitudes)
+    parts = (slice(first, first + _ROWS_AT_ONCE) for first in range(0, len(magnitudes), _ROWS_AT_ONCE))
+    return np.concatenate([_quaternions_of_many(channels, loops, directions[rows], magnitudes[rows]) for rows in parts])
 
 
 def checkpoint_steps(count: int) -> Integers:
@@ -184,60 +188,57 @@ def _stage_matrix(degree_count: int, count: int, in_pairs: bool) -> Array:
 def largest_angle(a: Array, b: Array) -> Any:
     """The largest angle between attitudes that are near each other: (..., K, 4) quaternions -> (...) [rad]."""
     apart = a - b
-    largest = np.einsum("...i,...i", apart, apart).max(axis=-1)
+    largest = np.vecdot(apart, apart).max(axis=-1)
     if not largest.max(initial=0.0) <= 1.0:
         # A quaternion and its negative are one attitude.
         opposite = a + b
-        nearer = np.minimum(np.einsum("...i,...i", apart, apart), np.einsum("...i,...i", opposite, opposite))
+        nearer = np.minimum(np.vecdot(apart, apart), np.vecdot(opposite, opposite))
         largest = nearer.max(axis=-1)
     return 2.0 * np.sqrt(largest)
 
 
-def _record_one(
-    record: StepRecord, rows: slice, channels: Array, loops: int, directions: Array, magnitudes: Array
-) -> None:
-    """All steps of one momentum into its row."""
-    with_propagators = bool(record.propagators.shape[1])
-    row, done, total = rows.start, 0, loops * len(channels)
-    marks = checkpoint_steps(total).tolist()
-    state = _first_state(directions[0], magnitudes[0], with_propagators)
-    record.directions[row, 0], record.quaternions[row, 0] = state[:3], state[3:7]
-    record.propagators[row] = _IDENTITY
-    for states, sides in _blocks(channels, loops, state):
-        after = slice(done + 1, done + len(states) + 1)
-        record.directions[row, after], record.quaternions[row, after] = states[:, :3], states[:, 3:7]
-        record.turns[row, done : after.stop - 1], record.dynamics[row, done : after.stop - 1] = sides.T
-        if with_propagators:
-            first, last = bisect_right(marks, done), bisect_left(marks, after.stop)
-            there = [mark - done - 1 for mark in marks[first:last]]
-            record.propagators[row, first:last] = states[there, 8:].reshape(-1, 3, 3)
-        done = after.stop - 1
+def march_of_few(
+    channels: Array, loops: int, directions: Array, magnitudes: Array, *, with_propagators: bool = False
+) -> tuple[Array, Array]:
+    """The states before and after all steps (B, K + 1, 8 or 17), and the steps' turns and dynamic phases (B, K, 2).
 
-
-def _attitudes_of_one(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
-    """The quaternions alone at the ends of all steps: (1, K + 1, 4)."""
-    state = _first_state(directions[0], magnitudes[0], with_propagators=False)
-    parts = [states[:, 3:7] for states, _ in _blocks(channels, loops, state)]
-    return np.concatenate([state[None, 3:7], *parts])[None]
-
-
-def _first_state(direction: Array, magnitude: float, with_propagators: bool) -> Array:
-    """Direction, quaternion, magnitude and propagator at the start: (8,) or (17,)."""
-    state = np.zeros(17 if with_propagators else 8)
-    state[:3], state[6], state[7] = direction, 1.0, magnitude
-    state[8::4] = 1.0
-    return state
-
-
-def _blocks(channels: Array, loops: int, state: Array) -> Iterator[tuple[Array, Array]]:
-    """The states after the steps of each block (n, 8 or 17), and their turns and dynamic phases (n, 2)."""
-    for _ in range(loops):
-        for first in range(0, len(channels), BLOCK):
-            block = channels[first : first + BLOCK]
-            states, sides = call_casadi(_momentum_function(len(block), len(state) > 8), len(block), state, block)
+    A state is direction, quaternion, magnitude and propagator.
+    """
+    count, batch = len(channels), len(magnitudes)
+    states = np.empty((batch, loops * count + 1, 17 if with_propagators else 8))
+    sides = np.empty((batch, loops * count, 2))
+    states[:, 0], states[:, 0, 6], states[:, 0, 7], states[:, 0, 8::4] = 0.0, 1.0, magnitudes, 1.0
+    states[:, 0, :3] = directions
+    blocks = [channels[first : first + BLOCK] for first in range(0, count, BLOCK)] * loops
+    for row in range(batch):
+        done = 0
+        for block in blocks:
+            after = done + len(block)
+            function = _momentum_function(len(block), with_propagators)
+            results = states[row, done + 1 : after + 1], sides[row, done:after]
+            call_casadi_into(function, (states[row, done], block), results)
             run_progress.advance(len(block))
-            yield states, sides
-            state = states[-1]
+            done = after
+    return states, sides
+
+
+def _record_of_states(states: Array, sides: Array, with_propagators: bool) -> StepRecord:
+    batch, ends, _ = states.shape
+    marks = checkpoint_steps(ends - 1) if with_propagators else []
+    return StepRecord(
+        quaternions=states[:, :, 3:7],
+        directions=states[:, :, :3],
+        turns=sides[:, :, 0],
+        dynamics=sides[:, :, 1],
+        propagators=states[:, marks, 8:].reshape(batch, -1, 3, 3),
+        stepping=np.empty(batch),
+        truncation=np.zeros(batch),
+    )
+
+
+def _quaternions_of_few(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
+    """The quaternions alone at the ends of all steps: (B, K + 1, 4)."""
+    return march_of_few(channels, loops, directions, magnitudes)[0][:, :, 3:7]
 
 
 def _record_many(
@@ -266,7 +267,7 @@ def _record_many(
         start = end
 
 
-def _attitudes_of_many(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
+def _quaternions_of_many(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
     """The quaternions alone at the ends of all steps: (B, K + 1, 4)."""
     quaternions = np.empty((len(magnitudes), loops * len(channels) + 1, 4))
     quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -42,15 +42,19 @@ def call_casadi(function: Any, rows: int, *arguments: Array) -> list[Array]:
 
     Arguments hold numbers in the order of the function's inputs (column-major); each result is (rows, entries / rows).
     """
-    buffer, evaluate, lengths = _buffers.for_function(function)
-    results = [np.empty((rows, length // rows)) for length in lengths]
-    kept = [np.ascontiguousarray(argument) for argument in arguments]
-    for place, argument in enumerate(kept):
+    results = [np.empty((rows, length // rows)) for length in _buffers.for_function(function)[2]]
+    call_casadi_into(function, [np.ascontiguousarray(argument) for argument in arguments], results)
+    return results
+
+
+def call_casadi_into(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> None:
+    """The same, all arrays being contiguous, with results where there is room for them."""
+    buffer, evaluate, _ = _buffers.for_function(function)
+    for place, argument in enumerate(arguments):
         buffer.set_arg(place, argument.data)
     for place, result in enumerate(results):
         buffer.set_res(place, result.data)
     evaluate()
-    return results
 
 
 def map_rows(formula: Formula, entries: int, values: Array) -> Array:

@@ -27,12 +27,14 @@ from .fast.estimate_constants import (
     DENSE_SHARE,
     EXPECTED_GROWTH,
     INFORMATIVE_ERROR,
+    LEAST_NOISE,
     LITTLE_ROUNDING,
     MANY_STEPS,
     MOST_EXPECTED_GROWTH,
     MOST_SAMPLING,
     MOST_STEPPING,
     NEGLIGIBLE,
+    NOISE_OF_SERIES,
     REFINED,
 )
 from .fast.rounds import Round, rounds_of_one
@@ -51,6 +53,10 @@ _SAMPLING_SHARE = 0.3
 _MOST_FORESEEN = 1e4
 # Of the tolerance: with more rounding than this no refinement reaches it.
 _MOST_ROUNDING = 0.9
+# Times the error of the samples: rounding that the last terms of their series show.
+_SHOWN_ROUNDING = 30.0
+# How many times it may be overrated before that: the most noise of series that is allowed for, over the least.
+_MOST_OVERRATED = NOISE_OF_SERIES / LEAST_NOISE
 
 
 def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> SteppedRotation:
@@ -172,6 +178,8 @@ class Integration:
         self._refinement = refinement or Refinement.at_first(tolerance)
         # How errors grow, where only the derivative of the steps shows it: (B, CHECKPOINTS, 3, 3).
         self._propagators: Array | None = None
+        # Why the samples are not as dense as they were to be.
+        self._too_rough: AccuracyNotReached | None = None
 
     def solution(self) -> SteppedRotation:
         """The first attempt whose error estimate is within the tolerance for every momentum."""
@@ -188,10 +196,14 @@ class Integration:
 
     def check_progress(self, errors: Errors, number: int, best: float) -> None:
         """Raise AccuracyNotReached after so many rounds, of which the best had this estimate, if more will not help."""
+        if self._too_rough is not None:
+            raise self._too_rough
         # Finer steps and samples that bring nothing: what is left is rounding. At first they may still be too long to.
         stuck = number > 4 and errors.estimate > 0.9 * best
         # Or rounding alone takes up the tolerance, by samples so dense that they show it.
-        hopeless = errors.rounding > max(_MOST_ROUNDING * self._tolerance, errors.sampling)
+        hopeless = errors.rounding > max(_MOST_ROUNDING * self._tolerance, errors.sampling) and (
+            errors.rounding > _SHOWN_ROUNDING * errors.sampling or errors.rounding > _MOST_OVERRATED * self._tolerance
+        )
         if number == _MOST_ROUNDS or (errors.are_informative and (stuck or hopeless)):
             raise _not_reached(self._tolerance, errors)
 
@@ -207,8 +219,16 @@ class Integration:
         return self._largest > 0.0 and (requirements.very_far or count > MANY_STEPS)
 
     def attempt(self) -> Attempt:
-        """Steps as planned, and the error estimates of the result."""
-        self._sampler.refine(self._largest, self._refinement.sampling_target)
+        """Steps as planned, and the error estimates of the result.
+
+        In a further round samples that cannot be as dense as they were to be are tried as they are.
+        """
+        try:
+            self._sampler.refine(self._largest, self._refinement.sampling_target)
+        except AccuracyNotReached as error:
+            if self._refinement.amplified is None:
+                raise
+            self._too_rough = error
         interpolant, perturbed = self._sampler.interpolant(), self._sampler.perturbed(self._largest)
         expected = self._sampler.error(self._largest)
         taken = self._rounds_of_one(interpolant, perturbed, expected) or self._round(interpolant, perturbed, expected)
@@ -300,7 +320,7 @@ class Integration:
         Finds the growth of errors first where the steps themselves will not show it.
         """
         planned = self._planned(requirements)
-        total = float(planned.sum())
+        total = sum(planned.tolist())
         count = interpolant.loops * total
         if count > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
@@ -311,9 +331,9 @@ class Integration:
             growth = largest_growth(self._propagators)
             worst = float(growth.max(where=np.isfinite(growth), initial=1.0))
             planned = self._planned(requirements, amplified=min(worst, _MOST_FORESEEN))
-            total = float(planned.sum())
+            total = sum(planned.tolist())
         steps = requirements.whole_steps(planned)
-        taken = int(steps.sum())
+        taken = sum(steps.tolist())
         if (count := interpolant.loops * taken) > _MOST_STEPS:
             raise _too_many_steps(count, requirements.whole_turn, interpolant)
         return steps, taken / total

@@ -25,6 +25,8 @@ class Interpolant:
         the P panels of the first loop serve every loop
     loops : how often the panels are repeated
     evaluations : how many times the deformation was evaluated
+    band : degree beyond which errors of the samples fade from the series, as those of a Fourier series do; None: they
+        do not
 
     Examples
     --------
@@ -37,6 +39,7 @@ class Interpolant:
     coefficients: Array
     loops: int
     evaluations: int
+    band: int | None = None
 
     __repr__ = short_repr
 

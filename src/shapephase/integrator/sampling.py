@@ -68,6 +68,7 @@ def sampler(
     loops: int = 1,
     smooth_loop: bool = False,
     sparse: bool = False,
+    swing: float | None = None,
     probe: Callable[[Array], Array] | None = None,
     resolved: ResolvedPath | None = None,
     directly: Directly | None = None,
@@ -86,6 +87,7 @@ def sampler(
     loops : the interval is its first part, repeated this many times
     smooth_loop : that part ends smoothly where it starts and has no breaks
     sparse : oscillations between none and the fastest are missing
+    swing : how far the shape of a smooth loop swings, from which its spectrum is foreseen [rad]; None: unknown
     probe : a cheap stand-in for the deformation to check a black box, times (N,) -> (N, 2 n), shapes and then their
         rates; None: the deformation itself is evaluated
     resolved : all of what the deformation depends on in the first loop, as series: nothing is checked between nodes
@@ -109,7 +111,7 @@ def sampler(
     channels = Channels(evaluate, directly)
     # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
     if smooth_loop and oscillations is not None and not sparse:
-        return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations)
+        return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations, swing)
     return _on_panels(
         channels,
         breaks,
@@ -171,7 +173,8 @@ class Samplers:
 
     def on_panels(self) -> PanelSampler:
         """One that knows nothing yet and samples on panels between breaks whatever the deformation is."""
-        smoothness = {name: value for name, value in self._smoothness.items() if name not in ("sparse", "knots")}
+        other = ("sparse", "swing", "knots")
+        smoothness = {name: value for name, value in self._smoothness.items() if name not in other}
         return _on_panels(Channels(self._evaluate, self._remembered), self._breaks, **smoothness)
 
     def _remembered(self, times: Array) -> Array:
@@ -185,9 +188,11 @@ class Samplers:
 class LoopSampler:
     """Samples a smooth loop at even times, and on panels where that would take too many."""
 
-    def __init__(self, channels: Channels, period: float, loops: int, oscillations: float) -> None:
+    def __init__(
+        self, channels: Channels, period: float, loops: int, oscillations: float, swing: float | None = None
+    ) -> None:
         self._channels, self._period, self._loops, self._oscillations = channels, period, loops, oscillations
-        self._sampler: EvenSampler | PanelSampler = EvenSampler(channels, period, loops, oscillations)
+        self._sampler: EvenSampler | PanelSampler = EvenSampler(channels, period, loops, oscillations, swing)
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""

@@ -69,6 +69,8 @@ class ShapePath:
     loops : the path is its first `duration / loops` seconds, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
     sparse : whether harmonics below the highest are missing in a smooth loop
+    swing : how far a joint swings in a smooth loop, an upper bound: the sum of the amplitudes of its harmonics, each
+        times its number [rad or m]; None: unknown
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
     scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
@@ -89,6 +91,7 @@ class ShapePath:
     loops: int = 1
     smooth_loop: bool = False
     sparse: bool = False
+    swing: float | None = None
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
@@ -129,6 +132,7 @@ class ShapePath:
         # Harmonics that are all multiples of one number make a shorter loop, repeated.
         loops = int(np.gcd.reduce(occupied)) if len(occupied) else 1
         highest = int(occupied[-1]) // loops if len(occupied) else 0
+        swings = np.hypot(a, b) @ (np.arange(1, a.shape[1] + 1) / loops)
         return ShapePath(
             Fourier(middle.copy(), a.copy(), b.copy(), period),
             period,
@@ -139,6 +143,7 @@ class ShapePath:
             loops=loops,
             smooth_loop=True,
             sparse=len(occupied) < highest,
+            swing=float(swings.max(initial=0.0)),
         )
 
     @staticmethod
@@ -265,6 +270,7 @@ class ShapePath:
             loops=self.loops,
             smooth_loop=self.smooth_loop,
             sparse=self.sparse,
+            swing=self.swing,
             probe=self._shapes_and_rates,
             resolved=scan.resolved if scan is not None else None,
         )

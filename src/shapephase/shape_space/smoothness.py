@@ -22,6 +22,7 @@ class Smoothness:
     loops : the interval is its first part, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
     sparse : whether harmonics below the highest are missing in a smooth loop
+    swing : of a smooth loop, the amplitudes of its harmonics, each times its number, added up [rad]; None: unknown
     probe : a cheap stand-in whose swings are those of the function, times (N,) -> (N, 2 n), shapes and then their
         rates; None: there is none
     resolved : the first loop of what it depends on as series, where that is all there is to know; None: unknown
@@ -35,6 +36,7 @@ class Smoothness:
     loops: int = 1
     smooth_loop: bool = False
     sparse: bool = False
+    swing: float | None = None
     probe: Callable[[Array], Array] | None = None
     resolved: ResolvedPath | None = None
     checked: bool = False

@@ -79,7 +79,7 @@ MANY_STEPS = 4000.0
 """Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
 NEGLIGIBLE = 0.1
 """Of the tolerance: below, what the samplers say, amplified, is not worth a march of its own, though it is too much."""
-FORESEEN = 1.7
+FORESEEN = 1.5
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
 MOST_ODD = 16
 """Steps of a panel up to which their number may be odd; one more of many costs little and hides nothing from pairs."""
@@ -87,8 +87,10 @@ FORESEEN_AT_REST = 0.6
 """The same without momentum, where the defects of the series themselves foretell the error."""
 NEAR = 0.5
 """Of what is allowed for: steps that are foreseen to make so much of it are not made longer."""
-LOOKS_AHEAD = 3
-"""At what defects foretell of a plan, before any step is taken."""
+ROUNDED_DOWN = 0.4
+"""Of a step on a panel: without momentum so much less than a whole one is left out, which on average costs nothing."""
+LOOKS_AT_REST = 3
+"""At what defects foretell of a plan without momentum, before any step is taken; with it one shows all there is."""
 FEW_STEPS = 1000.0
 """Of a motion, up to which a look ahead pays: of more a second round costs little but the steps themselves."""
 MOST_SHORTENED = 4.0

@@ -110,7 +110,13 @@ class PanelSampler:
                 self._keep(PanelSeries.of(here, left, right, found.values, found.coefficients, found.table))
                 self._errors = momentum, PanelErrors(*found.errors)
                 return
-            self._check_halves(found.further, left, right - left, tolerance, self._loops * float(found.errors[0].sum()))
+            try:
+                total = self._loops * float(found.errors[0].sum())
+                self._check_halves(found.further, left, right - left, tolerance, total)
+            except AccuracyNotReached:
+                # What there is may do all the same.
+                self._keep(PanelSeries.of(here, left, right, found.values, found.coefficients, found.table))
+                raise
             degree, values, panels = here, found.values, found.finer
 
     def _panels_so_far(self, tolerance: float) -> PanelsToSample:

@@ -20,7 +20,7 @@ from ..estimate_constants import (
     FULL_ORDER,
     LEAST_ORDER,
     LITTLE_TURN,
-    LOOKS_AHEAD,
+    LOOKS_AT_REST,
     MOST_GROWTH_BY_CHANCE,
     MOST_ODD,
     MOST_SHORTENED,
@@ -29,6 +29,7 @@ from ..estimate_constants import (
     NEARLY_AT_REST,
     ORDER,
     POWER_OF_EVENNESS,
+    ROUNDED_DOWN,
     TINY,
     UNRESOLVED,
 )
@@ -60,7 +61,8 @@ def sizes_of_terms(series, width, magnitude, least, rates, found):
 def make_whole(planned, moving, steps):
     """As `StepRequirements.whole_steps`; steps are filled."""
     for panel in range(len(planned)):
-        whole = max(int(math.ceil(planned[panel])), 2 if moving else 1)  # noqa: RUF046 (a float in machine code)
+        whole = int(math.ceil(planned[panel] - (0.0 if moving else ROUNDED_DOWN)))  # noqa: RUF046 (a float in machine code)
+        whole = max(whole, 2 if moving else 1)
         steps[panel] = whole + whole % 2 if moving and whole > MOST_ODD else whole
 
 
@@ -82,7 +84,8 @@ def plan_steps(
         planned[panel] = max(common * planned[panel], least[panel])
         count += planned[panel]
     steps, found = np.empty(len(turn), np.int64), np.empty(5)
-    for _ in range(LOOKS_AHEAD if loops * count <= FEW_STEPS else 0):
+    looks = 1 if moving else LOOKS_AT_REST
+    for _ in range(looks if loops * count <= FEW_STEPS else 0):
         make_whole(planned, moving, steps)
         if moving:
             defects_of_panels(rates, turns, steps, table, found)
