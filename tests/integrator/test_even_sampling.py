@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import mpmath
 import numpy as np
 import pytest
 
+import shapephase as sp
 from shapephase.arrays import Array
-from shapephase.integrator._even_sampling import EvenSampler
+from shapephase.integrator._even_sampling import EvenSampler, _even_to_panel
 from shapephase.integrator._spectral_error import Channels
 from shapephase.integrator.panels.panel_sampling import PanelSampler
 from support.both_engines import both
 
 pytestmark = pytest.mark.usefixtures("fast")
+
+EPS = float(np.finfo(float).eps)
 
 
 @pytest.mark.parametrize("decay", [0.2, 0.6, 3.0])
@@ -70,3 +74,40 @@ def test_the_first_panels_of_a_path_are_known_to_its_next_motion():
     assert one.degree[0] == two.degree[0] == 0 < one.degree[1]
     np.testing.assert_array_equal(one.coefficients, two.coefficients)
     assert three.degree[1] < one.degree[1]
+
+
+@pytest.mark.parametrize(
+    ("count", "panels", "degree", "highest"), [(96, 12, 22, 48), (96, 6, 32, 40), (448, 56, 22, 224)]
+)
+def test_the_transform_to_panels_is_right_to_rounding(count: int, panels: int, degree: int, highest: int):
+    """Beside sums of cosines in fifty digits; summed in doubles they were off by a hundred units of rounding."""
+    matrix = _even_to_panel(count, panels, degree, highest)
+    with mpmath.workdps(50):
+        for column in (0, 7, count // 2 + 1):
+            values = []
+            for node in range(degree + 1):
+                share = (1 - mpmath.cospi(mpmath.mpf(node) / degree)) / (2 * panels) - mpmath.mpf(column) / count
+                terms = [mpmath.cospi(2 * k * share) for k in range(1, highest + 1)]
+                last = 1 if highest == count // 2 else 2
+                values.append((1 + 2 * sum(terms[:-1]) + last * terms[-1]) / count)
+            for row in (0, 1, degree // 2, degree):
+                weights = [0.5 if node in (0, degree) else 1.0 for node in range(degree + 1)]
+                cosines = [mpmath.cospi(mpmath.mpf(row * (degree - node)) / degree) for node in range(degree + 1)]
+                exact = sum(a * b * c for a, b, c in zip(weights, cosines, values, strict=True)) * 2 / degree
+                exact *= 0.5 if row in (0, degree) else 1.0
+                assert abs(matrix[row, column] - float(exact)) < 4.0 * EPS / np.sqrt(count)
+
+
+def test_a_loop_is_sampled_as_its_swing_asks():
+    """A gentle loop takes few samples, a wide one as many as it needs at once."""
+    body = sp.load_body("cat")
+    counts = []
+    for size in (0.02, 0.3, 1.0, 2.5):
+        sines = np.zeros((body.n_shape, 2))
+        sines[body.joint_names.index("waist_yaw")] = size, 0.3 * size
+        path = sp.ShapePath.fourier(np.zeros(body.n_shape), 0.0 * sines, sines, 1.0)
+        assert path.swing == pytest.approx(1.6 * size, rel=1e-15)
+        assert path.stretched(2.0).reversed().repeated(3).swing == path.swing
+        counts.append(sp.reconstruct(sp.articulated(body, path), np.zeros(3)).evaluations)
+    assert counts == sorted(counts)
+    assert counts[0] < 0.5 * counts[-1]

@@ -59,6 +59,15 @@ def test_a_tolerance_that_the_bound_would_refuse_is_reached(
         sp.reconstruct(sp.articulated(trial.body, trial.path), trial.momentum, tolerance=trial.tolerance)
 
 
+@needs_compiler
+def test_rounding_that_sparse_samples_overrate_is_looked_at_again(monkeypatch: pytest.MonkeyPatch):
+    run = judged("mixed", 301, 60.0, 7816)
+    assert run.outcome == "done"
+    assert run.error <= run.estimate + run.bound <= run.tolerance + run.bound
+    monkeypatch.setattr(integrate, "_SHOWN_ROUNDING", 0.0)
+    assert judged("mixed", 301, 60.0, 7816).outcome == "refused"
+
+
 def test_a_bound_far_below_the_tolerance_is_believed_and_no_measure_is_far_below_it():
     interpolant, steps = rigid(4.0), np.full(8, 4)
     size = np.array([np.linalg.norm(MOMENTUM)])
