@@ -95,7 +95,8 @@ def check_object(value: object, kind: str, name: str, *, or_kind: str = "") -> N
 
     One of the class `or_kind` will also do.
     """
-    if any(parent.__name__ in (kind, or_kind) for parent in type(value).__mro__):
+    names = [parent.__name__ for parent in type(value).__mro__]
+    if kind in names or or_kind in names:
         return
     came = type(value).__name__
     shown = what_came(value) if isinstance(value, type) else f"{article(came)} {came}"

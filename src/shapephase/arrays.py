@@ -31,9 +31,10 @@ def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] =
         names the argument, the shape that came and the first bad entry.
     """
     array = real_array(value, name, unit)
-    if array.ndim < len(trailing) or any(
-        want is not None and have != want
-        for want, have in zip(trailing, array.shape[array.ndim - len(trailing) :], strict=False)
+    last = array.shape[max(0, array.ndim - len(trailing)) :]
+    if last != trailing and (
+        len(last) < len(trailing)
+        or any(want is not None and have != want for want, have in zip(trailing, last, strict=True))
     ):
         raise ShapeError(f"{name}: expected shape {_shape_text(trailing)}{_in(unit)}, got {array.shape}")
     check_finite(array, name)

@@ -82,8 +82,7 @@ class _Watcher:
 _WATCHER: ContextVar[_Watcher | None] = ContextVar("_WATCHER", default=None)
 
 
-@contextlib.contextmanager
-def watched(callback: Callable[[RunProgress], Any] | None) -> Iterator[None]:
+def watched(callback: Callable[[RunProgress], Any] | None) -> contextlib.AbstractContextManager[None]:
     """Pass on to a callback, if there is one, what is done within; something true that it returns stops the run.
 
     Raises
@@ -91,9 +90,14 @@ def watched(callback: Callable[[RunProgress], Any] | None) -> Iterator[None]:
     RunStopped
         If the callback asked for it.
     """
-    if callback is None:
-        yield
-        return
+    return _UNWATCHED if callback is None else _watched(callback)
+
+
+_UNWATCHED = contextlib.nullcontext()
+
+
+@contextlib.contextmanager
+def _watched(callback: Callable[[RunProgress], Any]) -> Iterator[None]:
     if not callable(callback) or isinstance(callback, type):
         raise WrongObjectError(f"progress: a function of a RunProgress is needed, got {what_came(callback)}")
     watcher = _Watcher(callback)

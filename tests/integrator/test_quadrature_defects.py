@@ -91,17 +91,6 @@ def defects(rates, turns, steps):
     return PanelDefects(rates, turns).found(steps)
 
 
-@pytest.mark.parametrize(("most_turn", "most_steps"), [(0.0, 20), (5.0, 64), (5.0, 200), (400.0, 20)])
-def test_a_look_ahead_foretells_what_is_found(most_turn, most_steps):
-    """To rounding, but for the terms that steps do little about: within the table, beyond its steps and its degrees."""
-    rng = np.random.default_rng(6)
-    for count in (1, 2, 7):
-        panels = PanelDefects(10.0 ** rng.uniform(-12.0, 0.0, (count, 30)), most_turn * rng.uniform(0.5, 1.0, count))
-        steps = rng.integers(2, most_steps + 1, count)
-        found, foreseen = panels.found(steps), panels.foreseen(steps)
-        np.testing.assert_allclose(foreseen._replace(unresolved=found.unresolved), found, rtol=1e-14)
-
-
 def test_evenness_is_the_share_of_panels_that_err():
     """Of four panels one alone swings; then all alike."""
     rates = np.zeros((4, 20))

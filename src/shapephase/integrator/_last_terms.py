@@ -24,7 +24,7 @@ from .fast.estimate_constants import (
 from .fast.panels import series_with_changed_ends
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Perturbed:
     """An interpolant's series with errors like those that they probably have.
 

@@ -8,7 +8,7 @@ does.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from math import inf, log2
 from typing import NamedTuple
 
@@ -164,7 +164,7 @@ class PanelDefects:
     def __init__(self, rates: Array, turns: Array) -> None:
         self._rates, self._further = rates, DEGREES_OF_TURN * turns
         # Every term at once where no degree is beyond the table.
-        self._within_table = rates.shape[1] + float(self._further.max()) < DEFECT_DEGREES - 1.0
+        self._within_table = rates.shape[1] + max(self._further.tolist()) < DEFECT_DEGREES - 1.0
         self._below = self._further.astype(np.int64)
         self._share = (self._further - self._below)[:, None]
 
@@ -181,28 +181,12 @@ class PanelDefects:
         sums = found.reshape(2 * count, terms) @ ones(terms)
         return _summed_up(steps, sums, float(whole[whole > UNRESOLVED * coarse].sum()))
 
-    def foreseen(self, steps: Integers) -> Defects:
-        """The same at less cost, without a look at what these steps do little about, which is left at zero."""
-        if not self._is_tabulated(steps):
-            return self.found(steps)._replace(unresolved=0.0)
-        return _summed_up(steps, (self._windows(steps)[:, :, None] @ self._weights).ravel(), 0.0)
-
     def _is_tabulated(self, steps: Integers) -> bool:
         return self._within_table and max(steps.tolist()) <= DEFECT_STEPS
 
     def _windows(self, steps: Integers) -> Array:
         """Of T_0, T_1 ... and one more, in so many steps and in pairs of them, at each panel: (2, P, n + 1)."""
         return _windows(self._rates.shape[1] + 1)[_tabulated_rows().take(steps, axis=1), self._below]
-
-    @cached_property
-    def _weights(self) -> Array:
-        """By which a window's terms count, between two degrees of the table: (P, n + 1, 1)."""
-        count, terms = self._rates.shape
-        weights = np.zeros((count, terms + 1, 1))
-        above = self._share * self._rates
-        weights[:, 1:, 0] = above
-        weights[:, :-1, 0] += self._rates - above
-        return weights
 
 
 def _summed_up(steps: Integers, of_panels: Array, unresolved: float) -> Defects:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from math import sqrt
 
 import numpy as np
@@ -38,7 +37,7 @@ from .fast.panels import defects_of_panels, plan_of_steps, sizes_of_terms
 from .interpolant import Interpolant
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class StepRequirements:
     """How finely the panels of an interpolant must be stepped.
 
@@ -51,6 +50,7 @@ class StepRequirements:
     whole_turn : the bound for all panels and loops [rad]
     interpolant : with these panels
     moving : whether there may be momentum
+    by_kernel : whether machine code finds the rest of it
     """
 
     sizes: Array
@@ -59,16 +59,15 @@ class StepRequirements:
     whole_turn: float
     interpolant: Interpolant
     moving: bool
+    by_kernel: bool
     _defects: dict[bytes, Defects] = field(default_factory=dict, init=False, repr=False)
-
-    @cached_property
-    def _of_panels(self) -> PanelDefects:
-        return PanelDefects(self.rates, self.turns)
+    _of_panels: PanelDefects | None = field(default=None, init=False, repr=False)
 
     @classmethod
     def from_interpolant(cls, interpolant: Interpolant, magnitude: float, tolerance: float) -> StepRequirements:
         """For momenta up to a magnitude [kg m^2/s] and a tolerance [rad]."""
-        find = sizes_of_terms if engine.is_ready() else _sizes_of_terms
+        by_kernel = engine.is_ready()
+        find = sizes_of_terms if by_kernel else _sizes_of_terms
         rates, sizes = find(interpolant.coefficients, interpolant.widths, magnitude, SIGNIFICANT * tolerance)
         return cls(
             sizes=sizes,
@@ -77,6 +76,7 @@ class StepRequirements:
             whole_turn=interpolant.loops * sum(sizes[0].tolist()),
             interpolant=interpolant,
             moving=magnitude > 0.0,
+            by_kernel=by_kernel,
         )
 
     @property
@@ -100,7 +100,7 @@ class StepRequirements:
         `short`: so many that the propagators are known without the steps' derivative however far the body turns.
         """
         turn_a_step = SHORT_TURN_A_STEP if short else TURN_A_STEP
-        if engine.is_ready():
+        if self.by_kernel:
             motion = self.interpolant.coefficients, self.interpolant.widths, self.rates, self.turns, self.sizes
             return plan_of_steps(*motion, self.loops, tolerance, turn_a_step, moving=self.moving)
         turn, swing, degree, _ = self.sizes
@@ -114,7 +114,7 @@ class StepRequirements:
         for _ in range(looks if self.loops * sum(planned.tolist()) <= FEW_STEPS else 0):
             steps = self.whole_steps(planned)
             if self.moving:
-                found = self._of_panels.foreseen(steps)
+                found = self.defects(steps)
                 excess, order = found.excess(self.loops, tolerance), found.order
                 is_near = not excess > 1.0
             else:
@@ -152,9 +152,10 @@ class StepRequirements:
         key = steps.tobytes()
         if key not in self._defects:
             taken = steps if self.moving else 2 * steps
-            if engine.is_ready():
+            if self.by_kernel:
                 self._defects[key] = defects_of_panels(self.rates, self.turns, taken)
             else:
+                self._of_panels = self._of_panels or PanelDefects(self.rates, self.turns)
                 self._defects[key] = self._of_panels.found(taken)
         return self._defects[key]
 

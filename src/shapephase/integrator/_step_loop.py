@@ -80,11 +80,13 @@ def integrate_steps(
     for first in range(0, batch, at_once):
         rows = slice(first, first + at_once)
         starts = directions[rows], magnitudes[rows]
-        _record_many(whole, rows, channels, loops, *starts)
-        pairs = _quaternions_of_many(coarse, loops, *starts)
-        whole.stepping[rows] = largest_angle(whole.quaternions[rows][:, ends], pairs)
-        if cut is not None:
-            whole.truncation[rows] = largest_angle(pairs, _quaternions_of_many(cut, loops, *starts))
+        # Steps that are far too long overflow.
+        with np.errstate(over="ignore", invalid="ignore"):
+            _record_many(whole, rows, channels, loops, *starts)
+            pairs = _quaternions_of_many(coarse, loops, *starts)
+            whole.stepping[rows] = largest_angle(whole.quaternions[rows][:, ends], pairs)
+            if cut is not None:
+                whole.truncation[rows] = largest_angle(pairs, _quaternions_of_many(cut, loops, *starts))
     return whole
 
 

@@ -42,14 +42,19 @@ def call_casadi(function: Any, rows: int, *arguments: Array) -> list[Array]:
 
     Arguments hold numbers in the order of the function's inputs (column-major); each result is (rows, entries / rows).
     """
-    results = [np.empty((rows, length // rows)) for length in _buffers.for_function(function)[2]]
-    call_casadi_into(function, [np.ascontiguousarray(argument) for argument in arguments], results)
+    known = _buffers.for_function(function)
+    results = [np.empty((rows, length // rows)) for length in known[2]]
+    _evaluate(known, [np.ascontiguousarray(argument) for argument in arguments], results)
     return results
 
 
 def call_casadi_into(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> None:
     """The same, all arrays being contiguous, with results where there is room for them."""
-    buffer, evaluate, _ = _buffers.for_function(function)
+    _evaluate(_buffers.for_function(function), arguments, results)
+
+
+def _evaluate(known: tuple[Any, Any, list[int]], arguments: Sequence[Array], results: Sequence[Array]) -> None:
+    buffer, evaluate, _ = known
     for place, argument in enumerate(arguments):
         buffer.set_arg(place, argument.data)
     for place, result in enumerate(results):

@@ -348,17 +348,15 @@ class Integration:
         if not self._magnitudes.any():
             return integrate_steps_at_rest(interpolant, perturbed, steps)
         directions = _directions(self._momentum, self._magnitudes)
-        with_propagators = self._propagators is None
-        with np.errstate(over="ignore", invalid="ignore"):
-            return integrate_steps(
-                interpolant,
-                perturbed,
-                steps,
-                directions,
-                self._magnitudes,
-                with_propagators=with_propagators,
-                threads=self._threads,
-            )
+        return integrate_steps(
+            interpolant,
+            perturbed,
+            steps,
+            directions,
+            self._magnitudes,
+            with_propagators=self._propagators is None,
+            threads=self._threads,
+        )
 
     def refined(self, errors: Errors) -> Refinement:
         """Finer steps and samples for the next round."""

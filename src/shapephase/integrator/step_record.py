@@ -12,7 +12,7 @@ from ..arrays import Array, Integers
 CHECKPOINTS = 8
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class StepRecord:
     """K steps for each momentum of a batch of B, and how far coarser marches come out from them.
 
