@@ -66,10 +66,12 @@ def measured_rounding(
 
 def _rounded_otherwise(interpolant: Interpolant, number: int) -> Array:
     """Series (P, n, 9) with errors like those due to rounding, the same for the same number."""
-    coefficients, band = interpolant.coefficients, interpolant.band
+    coefficients = interpolant.coefficients
+    sampled = coefficients if interpolant.sampled is None else interpolant.sampled
     noise = np.random.default_rng(number).uniform(-1.0, 1.0, coefficients.shape)
-    noise[..., :6] *= noise_of_series(coefficients[..., :6], band)[:, None, None]
-    noise[..., 6:] *= noise_of_series(coefficients[..., 6:], band)[:, None, None]
+    for channels in (slice(0, 6), slice(6, 9)):
+        sizes = noise_of_series(sampled[..., channels], interpolant.band)
+        noise[..., channels] *= np.repeat(sizes, len(coefficients) // len(sizes))[:, None, None]
     return coefficients + noise
 
 

@@ -27,6 +27,7 @@ class Interpolant:
     evaluations : how many times the deformation was evaluated
     band : degree beyond which errors of the samples fade from the series, as those of a Fourier series do; None: they
         do not
+    sampled : (P / 2, m, 9) the series whose panels are cut in halves here; None: they are as they were sampled
 
     Examples
     --------
@@ -40,6 +41,7 @@ class Interpolant:
     loops: int
     evaluations: int
     band: int | None = None
+    sampled: Array | None = None
 
     __repr__ = short_repr
 

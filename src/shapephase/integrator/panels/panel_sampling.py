@@ -18,6 +18,7 @@ from ..fast.panels import Demand, PanelsToSample, sampled_round
 from ..interpolant import Interpolant
 from ..resolved import Hidden, ResolvedPath
 from .finer_panels import FinerPanels, refining_factors
+from .halved_panels import halved_edges, halved_series, pays_to_halve
 from .panel_series import (
     PanelErrors,
     PanelSeries,
@@ -43,6 +44,11 @@ _LEAST_WIDTH = 1e-13
 _TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
 _NO_DEGREES = np.empty(0, dtype=np.int64)
 _NO_VALUES = np.empty((0, 9))
+
+
+def _perturbed(series: PanelSeries, momentum: float, is_halved: bool) -> Array:
+    found = perturbed_series(series.coefficients, series.degree, series.width, momentum)
+    return halved_series(found) if is_halved else found
 
 
 class PanelSampler:
@@ -74,6 +80,7 @@ class PanelSampler:
         self._series: PanelSeries | None = None
         self._errors: tuple[float, PanelErrors] | None = None
         self._interpolant: Interpolant | None = None
+        self._halves: bool | None = None
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
@@ -172,16 +179,28 @@ class PanelSampler:
         return self._loops * (float(errors.whole.sum()) + sum_of_noise(errors.noise))
 
     def interpolant(self) -> Interpolant:
-        """As `Sampler.interpolant`."""
+        """As `Sampler.interpolant`; its panels are halves of those that were sampled where these take many steps."""
         if self._interpolant is None:
-            series = self.series
-            edges = np.empty(len(series.left) + 1)
-            edges[:-1], edges[-1] = series.left, series.right[-1]
-            if self._loops > 1:
-                starts = edges[-1] * np.arange(self._loops)
-                edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
-            self._interpolant = Interpolant(edges, series.coefficients, self._loops, self._channels.count)
+            series, edges = self.series.coefficients, self._edges()
+            if self._is_halved:
+                halves = halved_edges(edges), halved_series(series)
+                self._interpolant = Interpolant(*halves, self._loops, self._channels.count, sampled=series)
+            else:
+                self._interpolant = Interpolant(edges, series, self._loops, self._channels.count)
         return self._interpolant
+
+    def as_sampled(self) -> Interpolant:
+        """The interpolant on the panels that were sampled."""
+        return Interpolant(self._edges(), self.series.coefficients, self._loops, self._channels.count)
+
+    def _edges(self) -> Array:
+        series = self.series
+        edges = np.empty(len(series.left) + 1)
+        edges[:-1], edges[-1] = series.left, series.right[-1]
+        if self._loops > 1:
+            starts = edges[-1] * np.arange(self._loops)
+            edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._loops * edges[-1])
+        return edges
 
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`."""
@@ -189,8 +208,18 @@ class PanelSampler:
         hidden = float(errors.hidden.sum()) + sum_of_noise(errors.noise)
         if not self._is_bandlimited:
             hidden += float((0.5 * series.width * (np.nan_to_num(series.gaps) @ np.array([momentum, 1.0]))).sum())
-        make = partial(perturbed_series, series.coefficients, series.degree, series.width, momentum)
+        make = partial(_perturbed, series, momentum, self._is_halved)
         return Perturbed(make, self._loops * hidden)
+
+    @property
+    def _is_halved(self) -> bool:
+        if self._halves is None:
+            momentum, series = self._errors[0] if self._errors else 0.0, self.series
+            estimate = series.estimate
+            turn = float(series.width @ (momentum * estimate.inverse_norm + estimate.drift_norm))
+            # Without momentum steps are cheap.
+            self._halves = bool(momentum) and pays_to_halve(len(series.degree), turn, sum(series.degree.tolist()))
+        return self._halves
 
     def _first_panels(self, tolerance: float) -> tuple[Integers, Array, Array]:
         """Degrees and ends."""
@@ -255,7 +284,7 @@ class PanelSampler:
             )
 
     def _keep(self, series: PanelSeries) -> None:
-        self._series, self._errors, self._interpolant = series, None, None
+        self._series, self._errors, self._interpolant, self._halves = series, None, None, None
 
     def _errors_at(self, momentum: float) -> PanelErrors:
         if self._errors is None or self._errors[0] != momentum:

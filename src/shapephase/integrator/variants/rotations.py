@@ -292,7 +292,7 @@ def _plan(variants: Variants, ceiling: float, tolerance: float) -> _Plan | None:
         sampler.refine(ceiling, _SAMPLING_SHARE * tolerance)
     except (AccuracyNotReached, SingularInertiaError):
         return None
-    model = sampler.interpolant()
+    model = sampler.as_sampled()
     # Without momentum further loops repeat the first, where a deformation is alone.
     if model.loops > 1 and not ceiling:
         return None

@@ -39,7 +39,7 @@ class SharedPanels:
     """The panels of a sampler as they are now."""
 
     def __init__(self, sampler: PanelSampler) -> None:
-        interpolant = sampler.interpolant()
+        interpolant = sampler.as_sampled()
         self._end, self._panels, self._hidden = sampler.end, sampler.series, sampler.hidden
         self.degrees, self.widths = self._panels.degree, self._panels.width
         self.edges, self.loops = interpolant.edges, interpolant.loops
