@@ -326,13 +326,15 @@ def nodes() -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("name", ["example:human", "cat", "satellite"])
 def test_the_horizontal_gauge_carries_no_momentum(name):
-    """I omega_U + L_o with U differentiated in the test, against the size of L_o in the base."""
+    """I omega_U + L_o with U differentiated in the test: an error of 1e-12 of U may swing 32 times along the motion."""
     loop = tumbling(name).deformation
     frame = sp.horizontal_gauge(loop).frame
     t = np.linspace(0.1, LENGTH - 0.1, 57)
     momentum = loop.internal_momentum(t)
-    left = applied(loop.inertia(t), rates_of(frame, t, step=5e-3)) + momentum
-    assert np.linalg.norm(left, axis=-1).max() < 1e-11 * np.linalg.norm(momentum, axis=-1).max()
+    inertia = loop.inertia(t)
+    left = applied(inertia, rates_of(frame, t, step=5e-3)) + momentum
+    largest = np.linalg.norm(inertia, 2, axis=(1, 2)).max()
+    assert np.linalg.norm(left, axis=-1).max() < 1e-12 * 2.0 * np.pi * 32.0 / LENGTH * largest
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

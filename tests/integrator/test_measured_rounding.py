@@ -20,7 +20,9 @@ from shapephase.integrator.fast.estimate_constants import (
     NOISE_OF_SERIES,
     NOISE_OF_TAIL,
 )
+from shapephase.integrator.integrate import Errors, Integration
 from shapephase.integrator.interpolant import Interpolant
+from shapephase.integrator.sampling import FinishedSampler
 from support.compiler import needs_compiler
 
 MOMENTS = np.array([1.0, 2.0, 3.5])
@@ -59,13 +61,15 @@ def test_a_tolerance_that_the_bound_would_refuse_is_reached(
         sp.reconstruct(sp.articulated(trial.body, trial.path), trial.momentum, tolerance=trial.tolerance)
 
 
-@needs_compiler
-def test_rounding_that_sparse_samples_overrate_is_looked_at_again(monkeypatch: pytest.MonkeyPatch):
-    run = judged("mixed", 301, 60.0, 7816)
-    assert run.outcome == "done"
-    assert run.error <= run.estimate + run.bound <= run.tolerance + run.bound
-    monkeypatch.setattr(integrate, "_SHOWN_ROUNDING", 0.0)
-    assert judged("mixed", 301, 60.0, 7816).outcome == "refused"
+def test_rounding_that_sparse_samples_overrate_is_looked_at_again():
+    """On denser ones, unless it is far too large, or samples are so dense already that they show it."""
+    integration = Integration(FinishedSampler(rigid(1.0)), np.array([[0.0, 0.0, 1.0]]), 1e-12, ceiling=1.0)
+    here = Errors(1.3e-12, 1e-13, 0.0, 1.2e-12, amplification=5.0, distance=1e-9, order=8.0, rounded_up=1.0)
+    integration.check_progress(here, 1, np.inf)
+    integration.check_progress(here._replace(sampling=1e-15, rounding=8e-13), 1, np.inf)
+    for hopeless in (here._replace(sampling=1e-14), here._replace(sampling=5e-11, rounding=1e-10)):
+        with pytest.raises(AccuracyNotReached, match="rounding"):
+            integration.check_progress(hopeless, 1, np.inf)
 
 
 def test_a_bound_far_below_the_tolerance_is_believed_and_no_measure_is_far_below_it():

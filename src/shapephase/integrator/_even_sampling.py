@@ -31,16 +31,21 @@ _MOST_SAMPLES = 768
 _FIRST_COUNTS = ((1e-8, 64), (1e-11, 96), (0.0, 128))
 _HARMONICS = 4
 # Else the multiple of this that is next to a sum of samples for any motion, for each harmonic and digit, and for each
-# radian of swing and digit, of which so many more count: enough for 97 of 100 random loops. (The spectrum of
-# cos(x sin t) ends a few harmonics beyond x.)
+# radian of swing and digit: enough for 97 of 100 random loops. (The spectrum of cos(x sin t) ends a few harmonics
+# beyond x.)
 _UNIT = 16
 _SAMPLES_OF_ANY = 20.0
-_SAMPLES_A_HARMONIC, _DIGITS_OF_HARMONICS = 1.03, -2.5
-_SAMPLES_A_RADIAN, _DIGITS_OF_SWING = 3.2, 1.0
+_SAMPLES_A_HARMONIC = 1.03
+_SAMPLES_A_RADIAN = 3.2
+# Digits of the tolerance that count, less than there are for harmonics and more for the swing.
+_DIGITS_OF_HARMONICS = -2.5
+_DIGITS_OF_SWING = 1.0
 # Samples of the loop on each panel of the interpolant, and the degree of its series: on it even a harmonic that is only
-# just resolved is right to a twentieth. Narrow panels are for motions that take many steps, which are cut to measure
-# on them; the body turns by more than so much for each sample there [rad].
-_WIDE, _NARROW = (16, 32), (8, 22)
+# just resolved is right to a twentieth.
+_WIDE = (16, 32)
+# The same of motions that take many steps, which are cut to measure on each panel.
+_NARROW = (8, 22)
+# The body turns by more than so much for each sample there [rad].
 _FAR_TURN = 0.1
 # Times, as shares of the loop, at which the series is compared with the deformation itself: never nodes, and spread.
 _TEST_SHARES = np.mod(0.2137 + 0.6180339887498949 * np.arange(3), 1.0)

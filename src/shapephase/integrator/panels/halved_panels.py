@@ -11,8 +11,10 @@ from ...arrays import Array
 
 # Of the terms of a series, those that its halves have: T_n swings at most n / sqrt(2) times as fast there.
 _SHARE_OF_TERMS = 0.8
-# A panel takes many steps where so many times the body's turn [rad] and the degree are more than this.
-_DEGREES_A_RADIAN, _MANY_DEGREES = 5.0, 40.0
+# What a radian of the body's turn counts beside the degree of a series.
+_DEGREES_A_RADIAN = 5.0
+# A panel with more of both takes many steps.
+_MANY_DEGREES = 40.0
 
 
 def pays_to_halve(panels: int, turn: float, degrees: float) -> bool:
