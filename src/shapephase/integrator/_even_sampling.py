@@ -37,7 +37,9 @@ _UNIT = 16
 _SAMPLES_OF_ANY = 20.0
 _SAMPLES_A_HARMONIC = 1.03
 _SAMPLES_A_RADIAN = 3.2
-# Digits of the tolerance that count, less than there are for harmonics and more for the swing.
+# Digits of the tolerance, at least: with fewer, samples would be too few for the highest harmonic itself.
+_FEWEST_DIGITS = 5.0
+# Those that count, less than there are for harmonics and more for the swing.
 _DIGITS_OF_HARMONICS = -2.5
 _DIGITS_OF_SWING = 1.0
 # Samples of the loop on each panel of the interpolant, and the degree of its series: on it even a harmonic that is only
@@ -100,7 +102,7 @@ class EvenSampler:
         if not self._oscillations:
             return 1
         if self._swing is not None:
-            digits = -log10(tolerance)
+            digits = max(-log10(tolerance), _FEWEST_DIGITS)
             count = _SAMPLES_OF_ANY + _SAMPLES_A_RADIAN * (digits + _DIGITS_OF_SWING) * self._swing
             count += _SAMPLES_A_HARMONIC * (digits + _DIGITS_OF_HARMONICS) * self._oscillations
             return _UNIT * max(2, ceil(min(count, _MOST_SAMPLES) / _UNIT))

@@ -210,25 +210,26 @@ class Integration:
     @cached_property
     def is_long(self) -> bool:
         """Whether it takes exact error propagators, and a plan of steps for each momentum by its own."""
-        self._sampler.refine(self._largest, self._refinement.sampling_target)
+        self._refine()
         requirements = StepRequirements.from_interpolant(self._sampler.interpolant(), self._largest, self._tolerance)
         return self._is_long(requirements, requirements.loops * float(self._planned(requirements).sum()))
 
-    def _is_long(self, requirements: StepRequirements, count: float) -> bool:
-        """Count : of the steps planned."""
-        return self._largest > 0.0 and (requirements.very_far or count > MANY_STEPS)
-
-    def attempt(self) -> Attempt:
-        """Steps as planned, and the error estimates of the result.
-
-        In a further round samples that cannot be as dense as they were to be are tried as they are.
-        """
+    def _refine(self) -> None:
+        """Sample as densely as wanted; in a further round samples that cannot be so dense are tried as they are."""
         try:
             self._sampler.refine(self._largest, self._refinement.sampling_target)
         except AccuracyNotReached as error:
             if self._refinement.amplified is None:
                 raise
             self._too_rough = error
+
+    def _is_long(self, requirements: StepRequirements, count: float) -> bool:
+        """Count : of the steps planned."""
+        return self._largest > 0.0 and (requirements.very_far or count > MANY_STEPS)
+
+    def attempt(self) -> Attempt:
+        """Steps as planned, and the error estimates of the result."""
+        self._refine()
         interpolant, perturbed = self._sampler.interpolant(), self._sampler.perturbed(self._largest)
         expected = self._sampler.error(self._largest)
         taken = self._rounds_of_one(interpolant, perturbed, expected) or self._round(interpolant, perturbed, expected)
