@@ -304,12 +304,13 @@ class KnotSampler:
     ) -> None:
         """Double the degree where the body's series falls, else part at the knots: at all of them, or halve."""
         parts: list[_ToSample] = []
+        changes: list[tuple[_Group, Mask, Mask, Mask]] = []
         panels = sum(len(g.left) for g in self._groups.values())
         highest = min(_HIGHEST_DEGREE, max(2 * DEGREES[0], _MOST_COEFFICIENTS // (9 * panels)))
         for degree, rows in rough.items():
             if not rows.any():
                 continue
-            group = self._groups.pop(degree)
+            group = self._groups[degree]
             grows = rows & ~errors[degree].hidden & (0 < 2 * degree <= highest)
             halves = rows & ~grows
             too_many = panels > _MOST_PANELS[0] * len(self._path.knots) + _MOST_PANELS[1]
@@ -319,6 +320,11 @@ class KnotSampler:
                     f"the shape motion is rough near t = {where:.12g} s: an error of {total:.3g} rad is left, "
                     f"{tolerance:.3g} was requested; smooth the data, or loosen the tolerance"
                 )
+            changes.append((group, rows, grows, halves))
+        # Nothing has changed yet where panels cannot be finer: what there is may do all the same.
+        for group, rows, grows, halves in changes:
+            degree = group.degree
+            del self._groups[degree]
             self._keep(group, ~rows)
             first, last = self._path.intervals(group.left, group.right)
             # Over several knots another degree means another polynomial in the place of the path.
@@ -336,9 +342,9 @@ class KnotSampler:
                     chosen = one[degrees == each]
                     ends = self._path.knots[chosen], self._path.knots[chosen + 1]
                     parts.append(_ToSample(int(each), *ends, None))
-            halves &= ~torn
-            if halves.any():
-                left, right = group.left[halves], group.right[halves]
+            cut = halves & ~torn
+            if cut.any():
+                left, right = group.left[cut], group.right[cut]
                 middle = self._path.middle(left, right)
                 half = next(d for d in DEGREES if d >= min(0.6 * degree, DEGREES[-1]))
                 parts.append(_ToSample(half, np.concatenate([left, middle]), np.concatenate([middle, right]), None))
