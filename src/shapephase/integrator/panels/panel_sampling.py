@@ -181,12 +181,12 @@ class PanelSampler:
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`; its panels are halves of those that were sampled where these take many steps."""
         if self._interpolant is None:
-            series, edges = self.series.coefficients, self._edges()
             if self._is_halved:
-                halves = halved_edges(edges), halved_series(series)
+                series = self.series.coefficients
+                halves = halved_edges(self._edges()), halved_series(series)
                 self._interpolant = Interpolant(*halves, self._loops, self._channels.count, sampled=series)
             else:
-                self._interpolant = Interpolant(edges, series, self._loops, self._channels.count)
+                self._interpolant = self.as_sampled()
         return self._interpolant
 
     def as_sampled(self) -> Interpolant:
