@@ -33,6 +33,16 @@ def test_a_numba_that_interprets_is_not_used(monkeypatch):
 
 
 @pytest.mark.usefixtures("fast")
+def test_it_does_not_change_within_one_computation(monkeypatch):
+    with engine.Decided():
+        monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+        assert engine.is_ready()
+        with engine.Decided():
+            assert engine.is_ready()
+    assert not engine.is_ready()
+
+
+@pytest.mark.usefixtures("fast")
 @pytest.mark.parametrize(("momenta", "samples", "enough"), [(1, 4000, False), (1000, 4000, True), (1, 400_000, True)])
 def test_the_command_line_waits_for_large_work(monkeypatch, momenta, samples, enough):
     monkeypatch.delenv("SHAPEPHASE_FAST")

@@ -16,6 +16,7 @@ from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
 from ..integrator.dop853 import dop853_rotation
+from ..integrator.fast import engine
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 
@@ -160,8 +161,9 @@ def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float)
 def _by_collocation(
     deformation: Deformation, at_start: Array, tolerance: float, threads: int | None
 ) -> tuple[Solution, int]:
-    samplers = deformation.samplers()
-    solution = rotations_of_each(samplers, at_start, tolerance, threads=threads)
+    with engine.Decided():
+        samplers = deformation.samplers()
+        solution = rotations_of_each(samplers, at_start, tolerance, threads=threads)
     return solution, samplers.evaluations
 
 

@@ -412,7 +412,10 @@ def reconstruct(
     -2.283185 = 4 - 2 pi
     """
     goal, workers = tolerance_argument(tolerance), threads_argument(threads)
-    if torque is not None or not isinstance(deformation, DeformationFamily):
+    # The class that takes less time to ask for comes first.
+    if not isinstance(deformation, Deformation) and (
+        torque is not None or not isinstance(deformation, DeformationFamily)
+    ):
         check_object(deformation, "Deformation", "deformation")
     if momentum is None:
         # It may be left out for this: what is no deformation is named first.
@@ -424,7 +427,7 @@ def reconstruct(
 
         assert isinstance(deformation, Deformation)
         return reconstruct_forced(deformation, momentum, attitude, torque, goal, method)
-    if isinstance(deformation, DeformationFamily):
+    if not isinstance(deformation, Deformation) and isinstance(deformation, DeformationFamily):
         from .motion_family import reconstruct_family
 
         with watched(progress):

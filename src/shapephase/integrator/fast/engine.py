@@ -10,6 +10,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -49,11 +50,27 @@ _NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)
 _lock = threading.Lock()
 _is_ready = False
 _is_broken = False
+_decided: ContextVar[bool | None] = ContextVar("_decided", default=None)
 
 
 def is_ready() -> bool:
     """Whether kernels are to be used now; they are imported, and compiled if they never were."""
+    decided = _decided.get()
+    if decided is not None:
+        return decided
     return is_wanted() if _is_ready else is_on() and not _is_broken and _load()
+
+
+class Decided:
+    """Within, whether kernels are used stays as it is at the start: nothing can change it half-way."""
+
+    def __enter__(self) -> None:
+        """Ask once."""
+        self._before = _decided.set(is_ready())
+
+    def __exit__(self, *_: object) -> None:
+        """As before."""
+        _decided.reset(self._before)
 
 
 def compile_steps() -> list[Path]:
