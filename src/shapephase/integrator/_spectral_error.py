@@ -76,6 +76,24 @@ class Channels:
         return inverted(*self._evaluate(times), times)
 
 
+class RememberedChannels(Channels):
+    """Other channels, whose whole calls are kept in `known`; a count of what was asked for, kept or not."""
+
+    def __init__(self, channels: Channels, known: dict[bytes, Array]) -> None:
+        self._channels, self._known = channels, known
+        self.count = 0
+
+    def __call__(self, times: Array) -> Array:
+        """As of `Channels`; not to be written to."""
+        self.count += len(times)
+        key = times.tobytes()
+        found = self._known.get(key)
+        if found is None:
+            # A copy: what is computed in work arrays is overwritten by the next call.
+            found = self._known[key] = self._channels(times).copy()
+        return found
+
+
 def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
     """The channels of I and L_o: (N, 3, 3), (N, 3) -> (N, 9); messages have the times (N,) [s].
 
@@ -223,11 +241,14 @@ def estimate_spectra(norms: Array, degree: Integers, time_rounding: Array) -> Sp
     accuracy of samples of a fast motion.
     """
     terms, most = np.arange(float(norms.shape[1])), np.maximum(degree, 1)[:, None]
-    largest, tail, middle = norms.max(axis=1), np.empty((len(norms), 2)), np.empty((len(norms), 2))
-    for one in set(degree.tolist()):
-        rows = degree == one
-        tail[rows] = norms[rows, max(one + 1 - tail_length(one), 0) :].max(axis=1)
-        middle[rows] = norms[rows, max(one // 2 - 1, 0) : one // 2 + 2].max(axis=1)
+    largest, degrees = norms.max(axis=1), set(degree.tolist())
+    if len(degrees) == 1:
+        tail, middle = _tail_and_middle(norms, *degrees)
+    else:
+        tail, middle = np.empty((2, len(norms), 2))
+        for one in degrees:
+            rows = degree == one
+            tail[rows], middle[rows] = _tail_and_middle(norms[rows], one)
     floor = ROUNDING * largest + (4.0 * time_rounding)[:, None] * (terms @ norms)
     decay = np.log(np.maximum(middle, TINY) / np.maximum(tail, TINY)) * (2.0 / most)
     # The rest of a geometric series with this decay beyond its last term; twice, for aliasing.
@@ -242,13 +263,19 @@ def estimate_spectra(norms: Array, degree: Integers, time_rounding: Array) -> Sp
     table[:, AT_ROUNDING] = at_noise_floor.all(axis=1)
     table[:, INVERSE_NORM:FLOOR] = largest
     table[:, FLOOR:] = floor
-    constant = degree == 0
-    if constant.any():
+    if 0 in degrees:
+        constant = degree == 0
         table[constant, :DECAY] = 0.0
         table[constant, DECAY] = np.inf
         table[constant, CONVERGING : AT_ROUNDING + 1] = 1.0
         table[constant, FLOOR:] = EPS * largest[constant]
     return SpectralEstimate(table)
+
+
+def _tail_and_middle(norms: Array, degree: int) -> tuple[Array, Array]:
+    """The largest of the last norms and of those half-way, of spectra of one degree: (G, n, 2) -> (G, 2) each."""
+    tail = norms[:, max(degree + 1 - tail_length(degree), 0) :].max(axis=1)
+    return tail, norms[:, max(degree // 2 - 1, 0) : degree // 2 + 2].max(axis=1)
 
 
 def spectral_norms(coefficients: Array) -> Array:

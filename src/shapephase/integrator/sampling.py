@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Array
 from ._even_sampling import EvenSampler
 from ._last_terms import Perturbed
-from ._spectral_error import Channels, Directly, Evaluate
+from ._spectral_error import Channels, Directly, Evaluate, RememberedChannels
 from .fast import engine
 from .interpolant import Interpolant
 from .panels.panel_sampling import PanelSampler
@@ -106,23 +106,41 @@ def sampler(
     >>> print(solution.error_estimate < 1e-9)
     [ True]
     """
-    if knots is not None:
-        return KnotSampler(knots, loops)
-    channels = Channels(evaluate, directly)
-    # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
-    if smooth_loop and oscillations is not None and not sparse:
-        return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations, swing)
-    return _on_panels(
-        channels,
+    return _sampler(
+        Channels(evaluate, directly),
         breaks,
+        knots=knots,
         oscillations=oscillations,
         loops=loops,
         smooth_loop=smooth_loop,
+        sparse=sparse,
+        swing=swing,
         probe=probe,
         resolved=resolved,
         checked=checked,
         known=known,
     )
+
+
+def _sampler(
+    channels: Channels,
+    breaks: Array,
+    *,
+    knots: KnotPath | None = None,
+    oscillations: float | None = None,
+    loops: int = 1,
+    smooth_loop: bool = False,
+    sparse: bool = False,
+    swing: float | None = None,
+    **further: Any,
+) -> Sampler:
+    """Arguments as of `sampler`."""
+    if knots is not None:
+        return KnotSampler(knots, loops)
+    # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
+    if smooth_loop and oscillations is not None and not sparse:
+        return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations, swing)
+    return _on_panels(channels, breaks, oscillations=oscillations, loops=loops, smooth_loop=smooth_loop, **further)
 
 
 def _on_panels(
@@ -154,7 +172,7 @@ class Samplers:
     def __init__(
         self, evaluate: Evaluate, breaks: Array, *, directly: Directly | None = None, **smoothness: Any
     ) -> None:
-        self._evaluate, self._breaks, self._smoothness = evaluate, breaks, smoothness
+        self._breaks, self._smoothness = breaks, smoothness
         self._channels = Channels(evaluate, directly if engine.is_ready() else None)
         self._known: dict[bytes, Array] = {}
         self._of_knots: list[KnotSampler] = []
@@ -166,7 +184,7 @@ class Samplers:
 
     def fresh(self) -> Sampler:
         """A sampler that knows nothing yet."""
-        made = sampler(self._evaluate, self._breaks, directly=self._remembered, **self._smoothness)
+        made = _sampler(self._remembered(), self._breaks, **self._smoothness)
         if isinstance(made, KnotSampler):
             self._of_knots.append(made)
         return made
@@ -175,14 +193,10 @@ class Samplers:
         """One that knows nothing yet and samples on panels between breaks whatever the deformation is."""
         other = ("sparse", "swing", "knots")
         smoothness = {name: value for name, value in self._smoothness.items() if name not in other}
-        return _on_panels(Channels(self._evaluate, self._remembered), self._breaks, **smoothness)
+        return _on_panels(self._remembered(), self._breaks, **smoothness)
 
-    def _remembered(self, times: Array) -> Array:
-        key = times.tobytes()
-        if key not in self._known:
-            # A copy: what is computed in work arrays is overwritten by the next call.
-            self._known[key] = self._channels(times).copy()
-        return self._known[key]
+    def _remembered(self) -> RememberedChannels:
+        return RememberedChannels(self._channels, self._known)
 
 
 class LoopSampler:
