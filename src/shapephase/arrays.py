@@ -112,7 +112,9 @@ def lock_arrays(result: Any) -> None:
     fields = result.__dict__
     for name, value in fields.items():
         if isinstance(value, np.ndarray) and value.flags.writeable:
-            fields[name] = read_only(value)
+            # As `read_only`: thousands of results are made in a second.
+            fields[name] = view = value.view()
+            view.setflags(write=False)
 
 
 class _CopiedField:

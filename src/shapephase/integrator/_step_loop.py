@@ -60,9 +60,8 @@ def integrate_steps(
     if engine.is_ready():
         return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators, threads)
     total, batch = interpolant.loops * sum(steps.tolist()), len(magnitudes)
-    series = interpolant.coefficients * interpolant.widths[:, None, None]
-    channels = _channels_of_series(series, steps)
-    coarse = _channels_of_series(series, steps, in_pairs=True)
+    series, runs = interpolant.coefficients * interpolant.widths[:, None, None], _runs(steps)
+    channels, coarse = _channels_of_runs(series, runs), _channels_of_runs(series, runs, in_pairs=True)
     cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps, in_pairs=True)
     ends, loops = ends_of_pairs(steps, interpolant.loops), interpolant.loops
     # All steps, pairs of them, and these again where series are perturbed.
@@ -155,15 +154,21 @@ def stage_channels(interpolant: Interpolant, steps: Integers) -> Array:
 def _channels_at_stages(
     interpolant: Interpolant, coefficients: Array, steps: Integers, *, in_pairs: bool = False
 ) -> Array:
-    return _channels_of_series(coefficients * interpolant.widths[:, None, None], steps, in_pairs=in_pairs)
+    return _channels_of_runs(coefficients * interpolant.widths[:, None, None], _runs(steps), in_pairs=in_pairs)
 
 
-def _channels_of_series(scaled: Array, steps: Integers, *, in_pairs: bool = False) -> Array:
-    """The same of series times the widths of their panels: (P, n, 9)."""
-    runs = [(count, len(list(run))) for count, run in groupby(steps.tolist())]
-    matrices = [_stage_matrix(scaled.shape[1], count, in_pairs) for count, _ in runs]
-    rows = sum(panels * len(matrix) for matrix, (_, panels) in zip(matrices, runs, strict=True))
-    channels = np.empty((rows, 9))
+def _runs(steps: Integers) -> list[tuple[int, int]]:
+    """Numbers of steps, and on how many panels one after another they are taken: (P,)."""
+    return [(count, len(list(run))) for count, run in groupby(steps.tolist())]
+
+
+def _channels_of_runs(scaled: Array, runs: list[tuple[int, int]], *, in_pairs: bool = False) -> Array:
+    """Of series times the widths of their panels: (P, n, 9) -> (K, 108)."""
+    terms = scaled.shape[1]
+    if len(runs) == 1:
+        return np.matmul(_stage_matrix(terms, runs[0][0], in_pairs), scaled).reshape(-1, 9 * STAGES)
+    matrices = [_stage_matrix(terms, count, in_pairs) for count, _ in runs]
+    channels = np.empty((sum(panels * len(matrix) for matrix, (_, panels) in zip(matrices, runs, strict=True)), 9))
     panel = row = 0
     for matrix, (_, panels) in zip(matrices, runs, strict=True):
         stop = row + panels * len(matrix)

@@ -279,7 +279,8 @@ class Integration:
         little = LITTLE_ROUNDING * self._tolerance
         record = found.record
         closely = looked_at_closely(found.rounding, record.propagators, record.quaternions, little)
-        return found._replace(rounding=self._measured_rounding(closely, interpolant, found.steps, record))
+        found.rounding = self._measured_rounding(closely, interpolant, found.steps, record)
+        return found
 
     def _round(self, interpolant: Interpolant, perturbed: Perturbed, expected: float) -> Round:
         """Plan the steps and take them; how errors grow, and whether those of the samples were measured."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Array, Integers, lock_arrays, read_only
+from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
 
@@ -28,6 +28,7 @@ class Interpolant:
     band : degree beyond which errors of the samples fade from the series, as those of a Fourier series do; None: they
         do not
     sampled : (P / 2, m, 9) the series whose panels are cut in halves here; None: they are as they were sampled
+    widths : (P,) of the panels of one loop [s]
 
     Examples
     --------
@@ -42,16 +43,15 @@ class Interpolant:
     evaluations: int
     band: int | None = None
     sampled: Array | None = None
+    widths: Array = field(init=False)
 
     __repr__ = short_repr
 
-    __post_init__ = lock_arrays
-
-    @cached_property
-    def widths(self) -> Array:
-        """(P,) of the panels of one loop [s]."""
+    def __post_init__(self) -> None:
+        """Find the widths, and let nobody write to the arrays."""
         ends = self.edges[: len(self.coefficients) + 1]
-        return read_only(ends[1:] - ends[:-1])
+        object.__setattr__(self, "widths", ends[1:] - ends[:-1])
+        lock_arrays(self)
 
     @cached_property
     def series(self) -> PiecewiseChebyshev:

@@ -7,8 +7,10 @@ above the tolerance, they go on with refinements of their own, which are rounded
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from math import frexp, ldexp
 from typing import NamedTuple
 
@@ -229,7 +231,13 @@ def _rounded(refinement: Refinement, last: Refinement) -> Refinement:
 def _up(number: float, steps: int) -> float:
     """As `rounded_up`, of one number."""
     mantissa, exponent = frexp(number)
-    return ldexp(next(mark for mark in marks_between(steps).tolist() if mantissa <= mark), exponent)
+    marks = _listed_marks(steps)
+    return ldexp(marks[bisect_left(marks, mantissa)], exponent)
+
+
+@lru_cache(maxsize=4)
+def _listed_marks(steps: int) -> list[float]:
+    return marks_between(steps).tolist()
 
 
 def rounded_up(numbers: Array, steps: int) -> Array:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,8 @@ STEPS_OF_OTHERS = 2
 _NO_SERIES = np.empty((0, 1))
 
 
-class Round(NamedTuple):
+@dataclass(eq=False)
+class Round:
     """Steps that were taken, and what tells how far they are off."""
 
     steps: Integers  # (P,)
@@ -67,7 +69,7 @@ def rounds_of_one(
         _NO_SERIES if perturbed is None else plain(perturbed).reshape(len(series), -1), loops,
         _NO_SERIES if directions is None else directions, magnitudes, ceiling, tolerance,
         refinement, expected, inf if hidden is None else hidden, segments_of(1, loops), CHECKPOINTS,
-        plain(defect_table()), plain(signed_defects()), marks_between(STEPS_OF_FINER), marks_between(STEPS_OF_OTHERS),
+        *_tables(),
     )  # fmt: skip
     done, steps, quaternions, ends, turns, dynamics, propagators, numbers = found
     if not done:
@@ -92,6 +94,13 @@ def warm() -> None:
 def marks_between(steps: int) -> Array:
     """The geometric steps from a half to one, both included: (steps + 1,)."""
     return 0.5 * 2.0 ** (np.arange(steps + 1) / steps)
+
+
+@lru_cache(maxsize=1)
+def _tables() -> tuple[Array, Array, Array, Array]:
+    """Of defects, and what refinements are rounded up to."""
+    defects = plain(defect_table()), plain(signed_defects())
+    return *defects, marks_between(STEPS_OF_FINER), marks_between(STEPS_OF_OTHERS)
 
 
 @lru_cache(maxsize=1)

@@ -33,14 +33,14 @@ def halved_series(coefficients: Array) -> Array:
     """Chebyshev series (P, n, 9) on both halves of their panels: (2 P, m, 9)."""
     panels, terms, channels = coefficients.shape
     # The mean, far larger than all else, is added at the end: it is rounded once, not with every term.
-    found = _on_halves(terms) @ coefficients[:, None, 1:]
+    found = (_on_halves(terms) @ coefficients[:, 1:]).reshape(panels, 2, -1, channels)
     found[:, :, 0] += coefficients[:, None, 0]
     return found.reshape(2 * panels, -1, channels)
 
 
 @lru_cache(maxsize=64)
 def _on_halves(terms: int) -> Array:
-    """Coefficients but the first -> those of the first and of the second half: (2, m, terms - 1).
+    """Coefficients but the first -> those of the first and then of the second half: (2 m, terms - 1).
 
     By 2 x T_k = T_(k-1) + T_(k+1), x being (y - 1)/2 or (y + 1)/2; in extended precision.
     """
@@ -55,4 +55,4 @@ def _on_halves(terms: int) -> Array:
             times_x[1:2] += 0.25 * last[:1]
             halves[half, k] = times_x if k == 1 else 2.0 * times_x - halves[half, k - 2]
     kept = min(terms, ceil(_SHARE_OF_TERMS * terms) + 1)
-    return np.ascontiguousarray(halves[:, 1:, :kept].transpose(0, 2, 1), dtype=np.float64)
+    return np.ascontiguousarray(halves[:, 1:, :kept].transpose(0, 2, 1), dtype=np.float64).reshape(2 * kept, terms - 1)

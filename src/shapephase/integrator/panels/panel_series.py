@@ -24,7 +24,7 @@ class PanelSeries:
 
     Attributes
     ----------
-    degree, left, right : (P,) their ends [s]
+    degree, left, right, width : (P,) the ends and what is between them [s]
     values : (S, 9) channels at the ascending Chebyshev points, panel after panel
     coefficients : (P, n, 9) of the Chebyshev series through them, padded with zeros
     estimate : of their errors
@@ -34,6 +34,7 @@ class PanelSeries:
     degree: Integers
     left: Array
     right: Array
+    width: Array
     values: Array
     coefficients: Array
     estimate: SpectralEstimate
@@ -44,13 +45,9 @@ class PanelSeries:
         cls, degree: Integers, left: Array, right: Array, values: Array, coefficients: Array, table: Array
     ) -> PanelSeries:
         """That nobody looked at between the nodes; `table` : of `estimate`."""
-        gaps = np.full((len(degree), 2), np.nan)
-        return cls(degree, left, right, values, coefficients, SpectralEstimate(table), gaps)
-
-    @cached_property
-    def width(self) -> Array:
-        """(P,) [s]."""
-        return self.right - self.left
+        gaps = np.empty((len(degree), 2))
+        gaps.fill(np.nan)
+        return cls(degree, left, right, right - left, values, coefficients, SpectralEstimate(table), gaps)
 
     @cached_property
     def starts(self) -> Integers:
@@ -107,21 +104,29 @@ def series_through(degree: Integers, left: Array, right: Array, values: Array, e
 
 def _coefficients(degree: Integers, values: Array, shift: Array) -> Array:
     """Of the series; the values at the ends are moved along their slopes by `shift` (P,) half widths."""
-    coefficients = np.zeros((len(degree), int(degree.max(initial=0)) + 1, 9))
+    degrees = sorted(set(degree.tolist()))
+    if len(degrees) == 1:
+        return _of_one_degree(degrees[0], values.reshape(len(degree), -1, 9), shift)
+    coefficients = np.zeros((len(degree), degrees[-1] + 1 if degrees else 1, 9))
     starts = sample_starts(degree)[:-1]
-    for one in np.unique(degree).tolist():
+    for one in degrees:
         rows = np.flatnonzero(degree == one)
-        alike = len(rows) == len(degree)
         places = starts[rows, None] + np.arange(one + 1)
-        there = values.reshape(len(rows), one + 1, 9) if alike else values[places]
-        matrix = values_to_coefficients(one)
-        series = matrix @ there
-        if one and shift[rows].any():
-            slopes = end_slopes(one) @ series * (shift[rows, None, None] * _OUTWARDS)
-            series += matrix[:, [0, -1]] @ slopes
-            values[places[:, [0, -1]]] += slopes
-        coefficients[rows, : one + 1] = series
+        there = values[places]
+        coefficients[rows, : one + 1] = _of_one_degree(one, there, shift[rows])
+        values[places] = there
     return coefficients
+
+
+def _of_one_degree(degree: int, values: Array, shift: Array) -> Array:
+    """The same of panels alike, with values (P, degree + 1, 9)."""
+    matrix = values_to_coefficients(degree)
+    series = matrix @ values
+    if degree and np.count_nonzero(shift):
+        slopes = end_slopes(degree) @ series * (shift[:, None, None] * _OUTWARDS)
+        series += matrix[:, [0, -1]] @ slopes
+        values[:, [0, -1]] += slopes
+    return series
 
 
 # From this side of an end to the end itself, on the left and on the right.
