@@ -39,8 +39,8 @@ from .page import RESULTS, circumstances
 from .peer import FLAGS, NoPeer, Peer
 from .workloads import TOLERANCE
 
-RUNS = 3
-"""At a turn, after one that does not count."""
+RUNS = 20
+"""At a turn, after one that does not count: what one of many costs, not the first after a process has slept."""
 _QUICK_CASES = (0, 2, 4, 7, 16)
 _PEER = "C++"
 _KINDS = ("loop", "move", "samples", "righting")
