@@ -153,14 +153,14 @@ def many_momenta(count: int, checked: int) -> dict[str, float]:
     rng = np.random.default_rng(0)
     found: dict[str, float] = {}
     # Two threads of one core would each take longer than one alone does.
-    alone: dict[str, Any] = {"threads": 1} if "threads" in inspect.signature(sp.reconstruct).parameters else {}
+    one_thread: dict[str, Any] = {"threads": 1} if "threads" in inspect.signature(sp.reconstruct).parameters else {}
     for speed in _SPEEDS:
         momenta = _momenta(case, speed, count, rng)
         name = f"{count} momenta of {speed:g} rad/s, each [us]"
         try:
             sp.reconstruct(deformation, momenta[:300], tolerance=TOLERANCE)
             began = time.process_time()
-            motion = sp.reconstruct(deformation, momenta, tolerance=TOLERANCE, **alone)
+            motion = sp.reconstruct(deformation, momenta, tolerance=TOLERANCE, **one_thread)
             found[name] = 1e6 * (time.process_time() - began) / count
         except sp.errors.AccuracyNotReached:
             found[name] = np.nan
