@@ -12,7 +12,7 @@ from ..arrays import Array, Integers
 from ._last_terms import Perturbed
 from ._spectral_error import (
     EPS,
-    Channels,
+    SampledChannels,
     TailEstimate,
     estimate_tail,
     fourier_norms,
@@ -66,7 +66,7 @@ class EvenSampler:
     """Samples a smooth loop at even times; each new count is two, three or four times the last."""
 
     def __init__(
-        self, channels: Channels, period: float, loops: int, oscillations: float, swing: float | None = None
+        self, channels: SampledChannels, period: float, loops: int, oscillations: float, swing: float | None = None
     ) -> None:
         self._channels, self._period, self._loops = channels, period, loops
         self._oscillations, self._swing = oscillations, swing

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import expm1, inf, isfinite, log
 from operator import mul
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -46,6 +46,21 @@ _SQUARES = np.array([[1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0
 _SQUARES_OF_PAIRS = np.repeat(_SQUARES, 2, axis=0)
 
 
+class SampledChannels(Protocol):
+    """A deformation as channels, wherever they come from.
+
+    Attributes
+    ----------
+    count : of the times that were asked for
+    """
+
+    count: int
+
+    def __call__(self, times: Array, /) -> Array:
+        """I^-1 (xx yy zz yz xz xy) and I^-1 L_o: (N,) -> (N, 9)."""
+        ...
+
+
 class Channels:
     """The deformation as channels, with a count of its evaluations."""
 
@@ -76,10 +91,10 @@ class Channels:
         return inverted(*self._evaluate(times), times)
 
 
-class RememberedChannels(Channels):
+class RememberedChannels:
     """Other channels, whose whole calls are kept in `known`; a count of what was asked for, kept or not."""
 
-    def __init__(self, channels: Channels, known: dict[bytes, Array]) -> None:
+    def __init__(self, channels: SampledChannels, known: dict[bytes, Array]) -> None:
         self._channels, self._known = channels, known
         self.count = 0
 

@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Array
 from ._even_sampling import EvenSampler
 from ._last_terms import Perturbed
-from ._spectral_error import Channels, Directly, Evaluate, RememberedChannels
+from ._spectral_error import Channels, Directly, Evaluate, RememberedChannels, SampledChannels
 from .fast import engine
 from .interpolant import Interpolant
 from .panels.panel_sampling import PanelSampler
@@ -123,7 +123,7 @@ def sampler(
 
 
 def _sampler(
-    channels: Channels,
+    channels: SampledChannels,
     breaks: Array,
     *,
     knots: KnotPath | None = None,
@@ -144,7 +144,7 @@ def _sampler(
 
 
 def _on_panels(
-    channels: Channels,
+    channels: SampledChannels,
     breaks: Array,
     *,
     oscillations: float | None = None,
@@ -203,7 +203,7 @@ class LoopSampler:
     """Samples a smooth loop at even times, and on panels where that would take too many."""
 
     def __init__(
-        self, channels: Channels, period: float, loops: int, oscillations: float, swing: float | None = None
+        self, channels: SampledChannels, period: float, loops: int, oscillations: float, swing: float | None = None
     ) -> None:
         self._channels, self._period, self._loops, self._oscillations = channels, period, loops, oscillations
         self._sampler: EvenSampler | PanelSampler = EvenSampler(channels, period, loops, oscillations, swing)

@@ -12,7 +12,7 @@ from ...arrays import Array, Integers, Mask
 from ...chebyshev import chebyshev, inside, nodes_on, values_to_coefficients, widest_margin
 from ...errors import AccuracyNotReached
 from .._last_terms import Perturbed, perturbed_series
-from .._spectral_error import Channels, spectral_norms
+from .._spectral_error import SampledChannels, spectral_norms
 from ..fast import engine
 from ..fast.panels import Demand, PanelsToSample, sampled_round
 from ..interpolant import Interpolant
@@ -61,7 +61,7 @@ class PanelSampler:
 
     def __init__(
         self,
-        channels: Channels,
+        channels: SampledChannels,
         breaks: Array,
         loops: int,
         oscillations: float | None,
