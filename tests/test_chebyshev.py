@@ -52,6 +52,22 @@ def test_basis_against_fifty_digits():
             assert np.all(np.abs(chebyshev(np.array(x), 33) - exact) <= EPS * (4.0 + np.arange(33) ** 2))
 
 
+@pytest.mark.parametrize("degree", [1, 2, 5, 30, 41, 80])
+def test_nodes_and_coefficients_against_fifty_digits(degree: int):
+    """Rounded once each, a unit more for sums of a row being zero; opposite nodes are so to the last bit."""
+    with mpmath.workdps(50):
+        angles = [mpmath.pi * (degree - k) / degree for k in range(degree + 1)]
+        nodes = np.array([float(mpmath.cos(angle)) for angle in angles])
+        weights = [mpmath.mpf(1 if 0 < k < degree else 0.5) for k in range(degree + 1)]
+        matrix = np.array(
+            [[float(2 * a * b * mpmath.cos(j * t) / degree) for b, t in zip(weights, angles, strict=True)]
+             for j, a in enumerate(weights)]
+        )  # fmt: skip
+    assert np.abs(unit_nodes(degree) - nodes).max() <= EPS
+    assert np.abs(values_to_coefficients(degree) - matrix).max() <= 3.0 * EPS / degree
+    assert (unit_nodes(degree) == -unit_nodes(degree)[::-1]).all()
+
+
 def test_values_against_numpy(series):
     times = np.concatenate([np.linspace(-0.5, 3.0, 71), EDGES])
     assert series(times) == pytest.approx(by_numpy(series, times), abs=1e-14)

@@ -125,7 +125,7 @@ def test_a_round_in_one_call_is_the_same_as_its_parts(
     errors = panel_errors(series, None if table is None else Hidden(table), momentum)
     assert np.allclose(found.values, series.values, rtol=4.0 * EPS, atol=4.0 * EPS)
     assert np.allclose(found.coefficients, series.coefficients, rtol=0.0, atol=1e-13)
-    assert np.allclose(found.errors, np.array(errors), rtol=1e-6, atol=1e-13)
+    assert np.allclose(found.errors, errors.table, rtol=1e-6, atol=1e-13)
     share = tolerance / (end * loops) * series.width
     is_rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
     if not is_rough.any() or loops * errors.whole.sum() <= tolerance:
@@ -169,8 +169,8 @@ def test_kernels_and_arrays_are_one_formula(monkeypatch: pytest.MonkeyPatch, see
         return SimpleNamespace(
             coefficients=series.coefficients,
             table=series.estimate.table,
-            errors=np.array(errors),
-            bare=np.array(panel_errors(series, None, 0.0)),
+            errors=errors.table,
+            bare=panel_errors(series, None, 0.0).table,
             factor=refining_factors(series, rough & (DEGREES > 0), errors.whole, share),
             changed=perturbed_series(series.coefficients, series.degree, series.width, momentum),
             sizes=needed.sizes,

@@ -60,7 +60,7 @@ def growth_and_rounding(
 def looked_at_closely(rounding: Array, propagators: Array, quaternions: Array, least: float) -> Array:
     """Rounding by the largest growth (B,), where it is above `least` time by time; arguments as above [rad]."""
     large = rounding > least
-    if propagators.shape[1] and large.any():
+    if propagators.shape[1] and np.count_nonzero(large):
         large &= np.isfinite(rounding)
         rounding[large] = _rounding_at_worst(propagators[large], _turns(quaternions[large]))
     return rounding

@@ -45,7 +45,7 @@ def measured_rounding(
     magnitudes : (B,) of the momentum [kg m^2/s]
     """
     large = bound > MEASURED_ROUNDING * tolerance
-    if not large.any() or not len(rows := np.flatnonzero(large & np.isfinite(bound))):
+    if not np.count_nonzero(large) or not len(rows := np.flatnonzero(large & np.isfinite(bound))):
         return bound
     apart = np.zeros(len(rows))
     at_once = max(1, _MOST_NUMBERS // record.quaternions[0].size)

@@ -409,7 +409,6 @@ def _propagators_by_derivative(interpolant: Interpolant, momentum: Array, larges
 
 def _directions(momentum: Array, magnitudes: Array) -> Array:
     """Pi/|Pi|; for a motion without momentum in a batch with it any direction shows the rotation."""
-    moving = magnitudes > 0.0
-    if len(momentum) == 1 or moving.all():
+    if len(momentum) == 1 or (moving := magnitudes > 0.0).all():
         return momentum / magnitudes[:, None]
     return np.where(moving[:, None], momentum, [0.0, 0.0, 1.0]) / np.where(moving, magnitudes, 1.0)[:, None]

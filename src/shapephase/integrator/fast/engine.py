@@ -38,6 +38,7 @@ _KERNELS = {
     "sample_round": ".kernels.panel_kernel",
     "errors_of_panels": ".kernels.panel_kernel",
     "change_ends": ".kernels.panel_kernel",
+    "halve_panels": ".kernels.panel_kernel",
     "errors_of_loop": ".kernels.loop_kernel",
     "sizes_of_terms": ".kernels.plan_kernel",
     "plan_steps": ".kernels.plan_kernel",

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...arrays import Array, Integers
-from ...chebyshev import MARGIN_OF_WIDTH, unit_nodes, values_to_coefficients
+from ...chebyshev import MARGIN_OF_WIDTH, on_halves, unit_nodes, values_to_coefficients
 from .._quadrature_defects import Defects, defect_table, signed_defects
 from ._plain import plain
 from .estimate_constants import HIGHEST_DEGREE
@@ -59,7 +59,7 @@ class SampledPanels(NamedTuple):
     values: Array  # (S, 9)
     coefficients: Array  # (P, n, 9)
     table: Array  # (P, 9) of the errors of the series
-    errors: Array  # (3, P) as of `PanelErrors` [rad]
+    errors: Array  # (4, P) as of `PanelErrors` [rad]
     further: Integers  # (P,) as `refining_factors` has them; of length zero: these panels do
     finer: PanelsToSample
 
@@ -97,14 +97,12 @@ def sampled_round(
     return SampledPanels(values, coefficients.reshape(len(degree), -1, 9), table, errors, further, finer)
 
 
-def errors_of_panels(
-    degree: Integers, width: Array, table: Array, hidden: Array | None, momentum: float
-) -> tuple[Array, Array, Array]:
-    """What `panel_errors` finds: (P,) each [rad]."""
-    found = np.empty((3, len(degree)))
+def errors_of_panels(degree: Integers, width: Array, table: Array, hidden: Array | None, momentum: float) -> Array:
+    """The table that `panel_errors` finds: (4, P) [rad]."""
+    found = np.empty((4, len(degree)))
     path = _NOTHING_HIDDEN if hidden is None else plain(hidden)
     _kernel().errors_of_panels(degree, plain(width), plain(table), path, float(momentum), found)
-    return found[0], found[1], found[2]
+    return found
 
 
 def series_with_changed_ends(coefficients: Array, degree: Integers, widths: Array, momentum: float) -> Array:
@@ -112,6 +110,15 @@ def series_with_changed_ends(coefficients: Array, degree: Integers, widths: Arra
     changed = np.array(coefficients, dtype=np.float64)
     _kernel().change_ends(degree, plain(widths), float(momentum), changed.reshape(len(widths), -1))
     return changed
+
+
+def halves_of_panels(coefficients: Array) -> Array:
+    """What `halved_series` finds: (P, n, 9) -> (2 P, m, 9)."""
+    panels, terms, channels = coefficients.shape
+    matrix, kept = _halving_matrix(terms)
+    found = np.empty((2 * panels, kept * channels))
+    _kernel().halve_panels(plain(coefficients).reshape(panels, -1), matrix, found)
+    return found.reshape(2 * panels, kept, channels)
 
 
 def sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least: float) -> tuple[Array, Array]:
@@ -155,16 +162,46 @@ def warm() -> None:
     panels = PanelsToSample(none, none, degree, np.zeros(1), one, np.zeros(5))
     sampled_round(degree[:0], np.zeros((0, 9)), panels, np.ones((5, 9)), None, demand)
     errors_of_panels(degree, one, table, None, 1.0)
+    halves_of_panels(coefficients)
     series_with_changed_ends(coefficients, degree, one, 1.0)
     rates, sizes = sizes_of_terms(coefficients, one, 1.0, 1.0)
     plan_of_steps(coefficients, one, rates, one, sizes, 1, 1.0, 1.0, moving=True)
     defects_of_panels(rates, one, np.array([2]))
 
 
+def halved_matrix(degree: int) -> Array:
+    """From sums and differences of the values at opposite nodes to even and odd coefficients, numbers in a row.
+
+    Column after column: the even ones filled up with zeros to a multiple of eight, then the odd ones; as many columns
+    of zeros follow as make a multiple of four.
+    """
+    whole, half = values_to_coefficients(degree), degree // 2 + 1
+    return _columns(whole[::2, :half].T, whole[1::2, :half].T)
+
+
+@lru_cache(maxsize=64)
+def _halving_matrix(terms: int) -> tuple[Array, int]:
+    """From even and odd coefficients to those of the second half of a series, as `halved_matrix`; how many these are.
+
+    Of the first half they are the same with other signs.
+    """
+    second = on_halves(terms)[1]
+    return _columns(second[:, 1::2].T, second[:, ::2].T), len(second)
+
+
+def _columns(even: Array, odd: Array) -> Array:
+    """Columns (k, n) of two matrices, each of one before that of the other, filled up with zeros."""
+    count, size = max(len(even), len(odd)), max(even.shape[1], odd.shape[1])
+    columns = np.zeros((-(-count // 4) * 4, 2, -(-size // 8) * 8))
+    columns[: len(even), 0, : even.shape[1]] = even
+    columns[: len(odd), 1, : odd.shape[1]] = odd
+    return columns.ravel()
+
+
 @lru_cache(maxsize=64)
 def _tables(degrees: tuple[int, ...]) -> tuple[Array, Integers, Array, Integers]:
-    """From values to coefficients, column after column, and nodes of some degrees; after both, where each's begin."""
-    matrices = [values_to_coefficients(degree).T.ravel() for degree in degrees]
+    """From values to coefficients, as of `halved_matrix`, and nodes of some degrees; after both, where each's begin."""
+    matrices = [halved_matrix(degree) for degree in degrees]
     nodes = [unit_nodes(degree) for degree in degrees]
     found: list[Any] = []
     for parts in (matrices, nodes):

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-from math import ceil
-
 import numpy as np
 
 from ...arrays import Array
+from ...chebyshev import on_halves
+from ..fast import engine
+from ..fast.panels import halves_of_panels
 
-# Of the terms of a series, those that its halves have: T_n swings at most n / sqrt(2) times as fast there.
-_SHARE_OF_TERMS = 0.8
 # What a radian of the body's turn counts beside the degree of a series.
 _DEGREES_A_RADIAN = 5.0
 # A panel with more of both takes many steps.
@@ -31,28 +29,12 @@ def halved_edges(edges: Array) -> Array:
 
 def halved_series(coefficients: Array) -> Array:
     """Chebyshev series (P, n, 9) on both halves of their panels: (2 P, m, 9)."""
+    if engine.is_ready():
+        return halves_of_panels(coefficients)
     panels, terms, channels = coefficients.shape
+    matrix = on_halves(terms)
+    kept = matrix.shape[1]
     # The mean, far larger than all else, is added at the end: it is rounded once, not with every term.
-    found = (_on_halves(terms) @ coefficients[:, 1:]).reshape(panels, 2, -1, channels)
+    found = (matrix.reshape(2 * kept, terms - 1) @ coefficients[:, 1:]).reshape(panels, 2, kept, channels)
     found[:, :, 0] += coefficients[:, None, 0]
-    return found.reshape(2 * panels, -1, channels)
-
-
-@lru_cache(maxsize=64)
-def _on_halves(terms: int) -> Array:
-    """Coefficients but the first -> those of the first and then of the second half: (2 m, terms - 1).
-
-    By 2 x T_k = T_(k-1) + T_(k+1), x being (y - 1)/2 or (y + 1)/2; in extended precision.
-    """
-    halves = np.zeros((2, terms, terms), dtype=np.longdouble)
-    halves[:, 0, 0] = 1.0
-    for half, middle in enumerate((-0.5, 0.5)):
-        for k in range(1, terms):
-            last = halves[half, k - 1]
-            times_x = middle * last
-            times_x[1:] += 0.25 * last[:-1]
-            times_x[:-1] += 0.25 * last[1:]
-            times_x[1:2] += 0.25 * last[:1]
-            halves[half, k] = times_x if k == 1 else 2.0 * times_x - halves[half, k - 2]
-    kept = min(terms, ceil(_SHARE_OF_TERMS * terms) + 1)
-    return np.ascontiguousarray(halves[:, 1:, :kept].transpose(0, 2, 1), dtype=np.float64).reshape(2 * kept, terms - 1)
+    return found.reshape(2 * panels, kept, channels)

@@ -25,7 +25,6 @@ from .panel_series import (
     panel_errors,
     sample_times,
     series_through,
-    sum_of_noise,
 )
 
 # Tolerance [rad] from which on, and the degree to begin with on many panels and on a few.
@@ -115,7 +114,7 @@ class PanelSampler:
             found = sampled_round(degree, values, panels, fresh, hidden, demand)
             if not len(found.further):
                 self._keep(PanelSeries.of(here, left, right, found.values, found.coefficients, found.table))
-                self._errors = momentum, PanelErrors(*found.errors)
+                self._errors = momentum, PanelErrors(found.errors)
                 return
             try:
                 total = self._loops * float(found.errors[0].sum())
@@ -176,7 +175,7 @@ class PanelSampler:
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
         errors = self._errors_at(momentum)
-        return self._loops * (float(errors.whole.sum()) + sum_of_noise(errors.noise))
+        return self._loops * (errors.sums[0] + errors.sum_of_noise)
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`; its panels are halves of those that were sampled where these take many steps."""
@@ -205,7 +204,7 @@ class PanelSampler:
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`."""
         series, errors = self.series, self._errors_at(momentum)
-        hidden = float(errors.hidden.sum()) + sum_of_noise(errors.noise)
+        hidden = errors.sums[1] + errors.sum_of_noise
         if not self._is_bandlimited:
             hidden += float((0.5 * series.width * (np.nan_to_num(series.gaps) @ np.array([momentum, 1.0]))).sum())
         make = partial(_perturbed, series, momentum, self._is_halved)
@@ -214,11 +213,10 @@ class PanelSampler:
     @property
     def _is_halved(self) -> bool:
         if self._halves is None:
-            momentum, series = self._errors[0] if self._errors else 0.0, self.series
-            estimate = series.estimate
-            turn = float(series.width @ (momentum * estimate.inverse_norm + estimate.drift_norm))
+            (momentum, errors), degree = self._errors or (0.0, None), self.series.degree
             # Without momentum steps are cheap.
-            self._halves = bool(momentum) and pays_to_halve(len(series.degree), turn, sum(series.degree.tolist()))
+            counts = errors is not None and momentum > 0.0
+            self._halves = counts and pays_to_halve(len(degree), errors.sums[2], sum(degree.tolist()))
         return self._halves
 
     def _first_panels(self, tolerance: float) -> tuple[Integers, Array, Array]:
@@ -249,7 +247,7 @@ class PanelSampler:
     def _rough(self, momentum: float, tolerance: float) -> tuple[float, Mask]:
         """The error of all panels [rad], and if it is above the tolerance which of them more samples help: (P,)."""
         series, errors, share = self.series, self._errors_at(momentum), self._share(tolerance)
-        total = self._loops * float(errors.whole.sum())
+        total = self._loops * errors.sums[0]
         rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
         return total, rough & (total > tolerance)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -61,12 +60,43 @@ class PanelSeries:
         return replace(self, estimate=self.estimate.raised_to(2.0 * gaps, rows), gaps=seen)
 
 
-class PanelErrors(NamedTuple):
-    """What panels are off by: (P,) each [rad]."""
+@dataclass(frozen=True, eq=False)
+class PanelErrors:
+    """What panels are off by, a row of `table` each: (P,) [rad].
 
-    whole: Array  # attitude error due to what lies between the samples
-    hidden: Array  # its part that a path which is resolved has beyond the nodes
-    noise: Array  # of that path
+    Attributes
+    ----------
+    table : (4, P) attitude error due to what lies between the samples; its part that a path which is resolved has
+        beyond the nodes; noise of that path; and last how far the body may turn
+    """
+
+    table: Array
+
+    @property
+    def whole(self) -> Array:
+        """The error of each panel."""
+        return self.table[0]
+
+    @property
+    def hidden(self) -> Array:
+        """Its part that the nodes do not show."""
+        return self.table[1]
+
+    @property
+    def noise(self) -> Array:
+        """Of the path."""
+        return self.table[2]
+
+    @cached_property
+    def sums(self) -> tuple[float, float, float]:
+        """Of all panels: errors, what is hidden, and turns; noise apart."""
+        whole, hidden, _, turn = np.add.reduce(self.table, axis=1).tolist()
+        return whole, hidden, turn
+
+    @cached_property
+    def sum_of_noise(self) -> float:
+        """Of panels whose noise is independent of one another."""
+        return sum_of_noise(self.noise)
 
 
 def sample_starts(degree: Integers) -> Integers:
@@ -145,17 +175,20 @@ def panel_errors(series: PanelSeries, hidden: Hidden | None, momentum: float) ->
     estimate, width = series.estimate, series.width
     if engine.is_ready():
         of_path = None if hidden is None else hidden.table
-        return PanelErrors(*errors_of_panels(series.degree, width, estimate.table, of_path, momentum))
+        return PanelErrors(errors_of_panels(series.degree, width, estimate.table, of_path, momentum))
     phase = np.asarray(2.0 * series.degree, dtype=np.float64)
-    of_series = estimate.error(momentum, width, phase)
-    if hidden is None:
-        return PanelErrors(of_series, np.zeros(len(width)), np.zeros(len(width)))
+    table = np.zeros((4, len(width)))
+    table[0] = estimate.error(momentum, width, phase)
     # A shape that is off turns the body by the inertia, for as long as the panel lasts.
     turn = momentum * estimate.inverse_norm * width
-    share = averaged_share(phase, turn + width * estimate.drift_norm)
-    of_path = (share * hidden.higher[:, 0] + hidden.misfit[:, 0]) * turn + share * hidden.higher[:, 1]
-    of_path += hidden.misfit[:, 1]
-    return PanelErrors(np.maximum(of_series, of_path), of_path, hidden.noise * (1.0 + turn))
+    table[3] = turn + width * estimate.drift_norm
+    if hidden is not None:
+        share = averaged_share(phase, table[3])
+        of_path = (share * hidden.higher[:, 0] + hidden.misfit[:, 0]) * turn + share * hidden.higher[:, 1]
+        table[1] = of_path + hidden.misfit[:, 1]
+        table[2] = hidden.noise * (1.0 + turn)
+        np.maximum(table[0], table[1], out=table[0])
+    return PanelErrors(table)
 
 
 def sum_of_noise(noise: Array) -> float:

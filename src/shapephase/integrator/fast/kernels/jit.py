@@ -26,6 +26,9 @@ inline: Callable[[Any], Any] = njit(forceinline=True, **_OPTIONS)
 """A part of kernels, put where it is called; not to be called from Python."""
 part: Callable[[Any], Any] = njit(**_OPTIONS)
 """A part of kernels that exists once, however often it is called."""
+fused: Callable[[Any], Any] = njit(fastmath={"contract"}, **_OPTIONS)
+"""The same with each product and the sum that it is added to in one operation, rounded once, where the processor has
+that: only for sums of products one after another, in which there is no choice what is fused with what."""
 
 
 def kernel(function: Any) -> Any:

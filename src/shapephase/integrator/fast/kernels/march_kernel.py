@@ -15,10 +15,10 @@ from .stage_series import CHANNELS as _CHANNELS
 from .stage_series import (
     SEGMENT,
     SIZE,
-    basis_at,
+    basis_of,
     channels_at,
     pairs_before_single,
-    room_for_basis,
+    room_for_bases,
     shorten_single,
     terms_that_count,
     terms_that_differ,
@@ -167,8 +167,11 @@ def _begin(states, directions, magnitudes, lanes):
 
 
 @part
-def _tabulate(first, last, panels, starts, widths, series, perturbed, steps, basis, scaled, tables, lengths):
+def _tabulate(
+    first, last, panels, starts, widths, series, perturbed, steps, bases, of_bases, scaled, tables, lengths
+):  # fmt: skip
     """The channels of segments `first` to `last`: of the steps, of pairs of them, of these on perturbed series."""
+    most_terms = series.shape[1] // _CHANNELS
     for segment in range(first, last):
         panel, place = panels[segment], segment - first
         count = min(SEGMENT, steps[panel] - starts[segment])
@@ -179,9 +182,10 @@ def _tabulate(first, last, panels, starts, widths, series, perturbed, steps, bas
         if len(perturbed):
             few = terms_that_differ(c, perturbed[panel]) <= _FEW_TERMS
             terms = max(terms, terms_that_count(perturbed[panel]))
-        used = basis_at(starts[segment], count, steps[panel], 1, terms, basis)
-        channels_at(c, terms, factor, basis, used, 0, scaled, tables[0, place])
-        used = basis_at(starts[segment], count, steps[panel], 2, terms, basis)
+        row = basis_of(starts[segment], count, steps[panel], 1, most_terms, bases, of_bases)
+        channels_at(c, terms, factor, bases[row], of_bases[row, 3], 0, scaled, tables[0, place])
+        row = basis_of(starts[segment], count, steps[panel], 2, most_terms, bases, of_bases)
+        basis, used = bases[row], of_bases[row, 3]
         channels_at(c, terms, 2.0 * factor, basis, used, 0, scaled, tables[1, place])
         if len(perturbed):
             other, out = perturbed[panel], tables[2, place]
@@ -227,7 +231,7 @@ def march_momenta(
     _segments(steps, panels, starts)
     room = min(total, most_segments)
     terms, grows, perturbs = series.shape[1] // _CHANNELS, propagators.shape[1] > 0, len(perturbed) > 0
-    basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * _CHANNELS)
+    (bases, of_bases), scaled = room_for_bases(terms), np.empty((terms + 4) * _CHANNELS)
     tables, lengths = np.empty((3, room, SIZE)), np.empty((2, room), np.int64)
     record = np.empty((room * SEGMENT, _RECORD))
     in_pairs, cut = np.empty((room * SEGMENT // 2, _RECORD)), np.empty((room * SEGMENT // 2, _RECORD))
@@ -249,7 +253,10 @@ def march_momenta(
         for first in range(0, total, room):
             last = min(first + room, total)
             if loop == 0 or total > room:
-                _tabulate(first, last, panels, starts, widths, series, perturbed, steps, basis, scaled, tables, lengths)
+                _tabulate(
+                    first, last, panels, starts, widths, series, perturbed, steps, bases, of_bases, scaled, tables,
+                    lengths,
+                )  # fmt: skip
             counts, pairs = lengths[0, : last - first], lengths[1, : last - first]
             found = _find_ends(counts, ends_of_pairs)
             count = 0
@@ -299,15 +306,15 @@ def _turn_on(c, count, at, quaternions):
 def march_at_rest(widths, series, steps, quaternions):
     """The quaternions (K + 1, 4) after all steps of one loop without momentum; the other arguments as above."""
     terms = series.shape[1] // _CHANNELS
-    basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * _CHANNELS)
+    (bases, of_bases), scaled = room_for_bases(terms), np.empty((terms + 4) * _CHANNELS)
     c, at = np.empty(SIZE), 0
     quaternions[0, 0] = quaternions[0, 1] = quaternions[0, 2] = 0.0
     quaternions[0, 3] = 1.0
     for panel in range(len(steps)):
         count, factor = terms_that_count(series[panel]), widths[panel] / steps[panel]
         for start in range(0, steps[panel], SEGMENT):
-            together = min(SEGMENT, steps[panel] - start)
-            used = basis_at(start, together, steps[panel], 1, count, basis)
-            channels_at(series[panel], count, factor, basis, used, 6, scaled, c)
-            _turn_on(c, together, at, quaternions)
-            at += together
+            here = min(SEGMENT, steps[panel] - start)
+            row = basis_of(start, here, steps[panel], 1, terms, bases, of_bases)
+            channels_at(series[panel], count, factor, bases[row], of_bases[row, 3], 6, scaled, c)
+            _turn_on(c, here, at, quaternions)
+            at += here

@@ -35,7 +35,7 @@ def rotations_within_steps(widths, series, steps, panels, within, fractions, sta
     directions: (N, 3) of the momentum there; no rows: without momentum
     """
     terms, moving = series.shape[1] // CHANNELS, len(directions) > 0
-    basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 3) * CHANNELS)
+    basis, scaled = np.empty(room_for_basis(terms)), np.empty((terms + 4) * CHANNELS)
     c, first, count = np.empty(SIZE), 0, len(panels)
     while first < count:
         panel, last = panels[first], first + 1

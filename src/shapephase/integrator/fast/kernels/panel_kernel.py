@@ -31,7 +31,7 @@ from ..estimate_constants import (
     TINY,
     UNAVERAGED_PHASE,
 )
-from .jit import kernel, part
+from .jit import fused, kernel, part
 
 _CHANNELS = 9
 _DRIFT = 6
@@ -55,23 +55,54 @@ def norm_of_term(series, k, which):
 
 
 @part
+def _columns(rows):
+    """Of a matrix of `panels.halved_matrix`, and numbers in each half of a column, for so many samples."""
+    half = (rows + 1) // 2
+    return (half + 3) // 4 * 4, (half + 7) // 8 * 8
+
+
+@fused
+def _multiply(matrix, first, columns, width, numbers, line):
+    """The numbers of a half of the line by those halves of the columns, four columns at a time."""
+    o = np.uint32(first)
+    for i in range(width):
+        line[o + i] = 0.0
+    for k in range(0, columns, 4):
+        b0, b1 = np.uint32(2 * k * width + first), np.uint32(2 * (k + 1) * width + first)
+        b2, b3 = np.uint32(2 * (k + 2) * width + first), np.uint32(2 * (k + 3) * width + first)
+        n0, n1, n2, n3 = numbers[k], numbers[k + 1], numbers[k + 2], numbers[k + 3]
+        for i in range(width):
+            line[o + i] = (
+                line[o + i] + matrix[b0 + i] * n0 + matrix[b1 + i] * n1 + matrix[b2 + i] * n2 + matrix[b3 + i] * n3
+            )
+
+
+@part
 def _transform(values, matrix, rows, room, out):
-    """Series (n * 9) through n values by a matrix that stands column after column; room: (9, n)."""
+    """Series (n * 9) through n values by a matrix of `panels.halved_matrix`.
+
+    Even polynomials see the sums of values at opposite nodes, odd ones the differences. room: (3, n + 16)
+    """
+    half, (columns, width) = rows // 2, _columns(rows)
+    sums, differences, line = room[0], room[1], room[2]
     for j in range(_CHANNELS):
-        line = room[j]
+        for k in range(half):
+            a, b = values[k, j], values[rows - 1 - k, j]
+            sums[k], differences[k] = a + b, a - b
+        for k in range(half, columns):
+            sums[k] = differences[k] = 0.0
+        if rows % 2:
+            sums[half] = values[half, j]
+        _multiply(matrix, 0, columns, width, sums, line)
+        _multiply(matrix, width, columns, width, differences, line)
         for i in range(rows):
-            line[i] = 0.0
-        for k in range(rows):
-            column, value = matrix[k * rows : (k + 1) * rows], values[k, j]
-            for i in range(rows):
-                line[i] += column[i] * value
-        for i in range(rows):
-            out[i * _CHANNELS + j] = line[i]
+            out[i * _CHANNELS + j] = line[i % 2 * width + i // 2]
 
 
 @part
 def _move_ends(values, matrix, rows, shift, out):
     """Values at the ends and the series through them, after these have moved along their slopes."""
+    _, width = _columns(rows)
     for j in range(_CHANNELS):
         left = right = 0.0
         for k in range(1, rows):
@@ -81,9 +112,9 @@ def _move_ends(values, matrix, rows, shift, out):
         left, right = -shift * left, shift * right
         values[0, j] += left
         values[rows - 1, j] += right
-        last = (rows - 1) * rows
         for i in range(rows):
-            out[i * _CHANNELS + j] += matrix[i] * left + matrix[last + i] * right
+            change = left - right if i % 2 else left + right
+            out[i * _CHANNELS + j] += matrix[i % 2 * width + i // 2] * change
 
 
 @part
@@ -148,9 +179,9 @@ def times_of_samples(degree, left, right, margin, nodes, places, times):
 def series_of_panels(degree, values, shift, rounding, matrices, places, coefficients, table):
     """Arguments as of `panels.series_of_panels`; the last two, (P, n * 9) and (P, 9), are filled.
 
-    matrices, places: from values to coefficients, column after column, and where those of a degree begin
+    matrices, places: from values to coefficients, as `panels.halved_matrix` has them, and where that of a degree begins
     """
-    room, first = np.empty((_CHANNELS, coefficients.shape[1] // _CHANNELS)), 0
+    room, first = np.empty((3, coefficients.shape[1] // _CHANNELS + 16)), 0
     for panel in range(len(degree)):
         rows, series = degree[panel] + 1, coefficients[panel]
         here, matrix = values[first : first + rows], matrices[places[degree[panel]] :]
@@ -241,11 +272,12 @@ def _share(phase, turn):
 
 @kernel
 def errors_of_panels(degree, width, table, hidden, momentum, found):
-    """Arguments as of `panels.errors_of_panels`; found (3, P) is filled."""
+    """Arguments as of `panels.errors_of_panels`; found (4, P) is filled."""
     for panel in range(len(degree)):
         row, wide = table[panel], width[panel]
         phase, turn = 2.0 * degree[panel], momentum * row[INVERSE_NORM] * wide
-        share = _share(phase, turn + wide * row[DRIFT_NORM])
+        whole_turn = turn + wide * row[DRIFT_NORM]
+        share = _share(phase, whole_turn)
         error = 0.5 * wide * (momentum * row[INVERSE] + row[INVERSE + 1]) * (share if row[CONVERGING] > 0.0 else 1.0)
         of_path = noise = 0.0
         if len(hidden):
@@ -253,6 +285,7 @@ def errors_of_panels(degree, width, table, hidden, momentum, found):
             of_path = (share * path[0] + path[2]) * turn + share * path[1] + path[3]
             noise = path[4] * (1.0 + turn)
         found[0, panel], found[1, panel], found[2, panel] = max(error, of_path), of_path, noise
+        found[3, panel] = whole_turn
 
 
 @part
@@ -279,7 +312,7 @@ def sample_round(
     matrices, places: as of `series_of_panels`
     nodes, node_places: as of `times_of_samples`, of all degrees
 
-    Returns values, coefficients, table and errors (3, P) as above; of the panels to go on with, origin, factor, degree,
+    Returns values, coefficients, table and errors (4, P) as above; of the panels to go on with, origin, factor, degree,
     ends (2, Q) and the times of fresh samples; no panels: the errors are within the tolerance, or rounding.
     """
     panels, width, rounding, shift = len(degree), right - left, np.empty(len(degree)), np.zeros(len(degree))
@@ -293,7 +326,7 @@ def sample_round(
     _merged_values(old_degree, old_values, origin, factor, degree, fresh, values)
     coefficients, table = np.empty((panels, (degree.max() + 1) * _CHANNELS)), np.empty((panels, 9))
     series_of_panels(degree, values, shift, rounding, matrices, places, coefficients, table)
-    errors = np.empty((3, panels))
+    errors = np.empty((4, panels))
     errors_of_panels(degree, width, table, hidden, momentum, errors)
     rough, share, count = np.zeros(panels, np.bool_), np.empty(panels), 0
     for panel in range(panels):
@@ -343,3 +376,28 @@ def change_ends(degree, width, momentum, series):
             missing = 1.0
         for i in range((last + 1 - LAST_TERMS) * _CHANNELS, (last + 1) * _CHANNELS):
             here[i] *= 1.0 - missing
+
+
+@kernel
+def halve_panels(series, matrix, halves):
+    """Arguments as of `panels.halves_of_panels`; halves (2 P, m * 9) are filled."""
+    terms, kept = series.shape[1] // _CHANNELS, halves.shape[1] // _CHANNELS
+    columns, width = (terms // 2 + 3) // 4 * 4, (kept + 7) // 8 * 8
+    even, odd, line = np.zeros(columns), np.zeros(columns), np.empty(2 * width)
+    for panel in range(len(series)):
+        whole, first, second = series[panel], halves[2 * panel], halves[2 * panel + 1]
+        for j in range(_CHANNELS):
+            for k in range(1, terms):
+                if k % 2:
+                    odd[k // 2] = whole[k * _CHANNELS + j]
+                else:
+                    even[k // 2 - 1] = whole[k * _CHANNELS + j]
+            _multiply(matrix, 0, columns, width, even, line)
+            _multiply(matrix, width, columns, width, odd, line)
+            # The mean, far larger than all else, is added at the end: it is rounded once, not with every term.
+            mean = whole[j]
+            for i in range(kept):
+                a, b = line[i], line[width + i]
+                second[i * _CHANNELS + j] = mean + (a + b)
+                first[i * _CHANNELS + j] = mean + (b - a if i % 2 else a - b)
+                mean = 0.0

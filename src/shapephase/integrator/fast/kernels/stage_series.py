@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .dormand_prince import NODES, STAGES
-from .jit import inline, part
+from .jit import fused, inline, part
 
 CHANNELS = 9
 SEGMENT = 16
@@ -20,6 +20,8 @@ SIZE = CHANNELS * STRIDE
 """Of the channels of a segment."""
 _VECTOR = 16
 """Stages are filled up to a multiple of this, so that vectors have no remainder."""
+_BASES = 4
+"""That are kept, since panels often take as many steps as others: of odd and even numbers, one or two at a time."""
 _ROUNDING = 3e-17
 """Of the largest coefficient: the last ones, as long as their sum is below, change nothing."""
 _DRIFT = 6
@@ -27,9 +29,15 @@ _DRIFT = 6
 
 
 @inline
+def rows_of(terms):
+    """Of the basis for so many terms: the first and a multiple of four."""
+    return 1 + (max(terms, 2) + 2) // 4 * 4
+
+
+@inline
 def room_for_basis(terms):
     """Numbers in the matrix of Chebyshev polynomials at stages of a segment."""
-    return (terms + 4) * STRIDE
+    return rows_of(terms) * STRIDE
 
 
 @part
@@ -53,15 +61,15 @@ def terms_that_count(series):
     return count
 
 
-@inline
+@part
 def basis_between(used, terms, basis):
-    """The same at `used` places in [-1, 1] that stand in its second row."""
+    """T_0, T_1 ... of so many terms at `used` places in [-1, 1], which stand in the second row; how many are filled."""
     while used % _VECTOR:
         basis[STRIDE + used] = 0.0
         used += 1
     for i in range(used):
         basis[i] = 1.0
-    for k in range(2, terms):
+    for k in range(2, rows_of(terms)):
         b, b1, b2 = np.uint32(k * STRIDE), np.uint32((k - 1) * STRIDE), np.uint32((k - 2) * STRIDE)
         for i in range(used):
             basis[b + i] = 2.0 * basis[STRIDE + i] * basis[b1 + i] - basis[b2 + i]
@@ -75,19 +83,31 @@ def pairs_before_single(count):
 
 
 @part
-def basis_at(first, count, steps, together, terms, basis):
-    """T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel -> numbers in a row.
+def room_for_bases(terms):
+    """For the bases that `basis_of` keeps, and what they are of."""
+    return np.empty((_BASES, room_for_basis(terms))), np.zeros((_BASES, 4), np.int64)
+
+
+@part
+def basis_of(first, count, steps, together, terms, bases, kept):
+    """The row of `bases` with T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel.
 
     together: 1; 2: they are taken two at a time, one of an odd number alone, which `shorten_single` makes half as long
+    bases, kept: as `room_for_bases` makes them for so many terms
     """
-    used, k, single = 0, 0, 2 * pairs_before_single(count)
+    row = 2 * (together - 1) + steps % 2
+    if kept[row, 0] == steps and kept[row, 1] == first and kept[row, 2] == count:
+        return row
+    basis, used, k, single = bases[row], 0, 0, 2 * pairs_before_single(count)
     while k < count:
         length = 1 if k == single else together
         for i in range(STAGES):
             basis[STRIDE + used] = 2.0 * (first + k + length * NODES[i]) / steps - 1.0
             used += 1
         k += length
-    return basis_between(used, terms, basis)
+    kept[row, 0], kept[row, 1], kept[row, 2] = steps, first, count
+    kept[row, 3] = basis_between(used, terms, basis)
+    return row
 
 
 @part
@@ -100,21 +120,18 @@ def shorten_single(count, out):
                 out[o + i] = 0.5 * out[o + i]
 
 
-@part
+@fused
 def channels_at(series, terms, factor, basis, used, first_channel, scaled, out):
     """Series (n * 9) times a factor at the stages of a segment; the channels from `first_channel` on, one of 0, 3, 6.
 
-    scaled: room for (terms + 3) * 9
+    scaled: room for (terms + 4) * 9
     """
     for k in range(terms * CHANNELS):
         scaled[k] = factor * series[k]
     # Four terms at a time after the first.
-    rows = 1 + (terms + 2) // 4 * 4
+    rows = rows_of(terms)
     for k in range(terms * CHANNELS, rows * CHANNELS):
         scaled[k] = 0.0
-    for k in range(terms, rows):
-        for i in range(used):
-            basis[k * STRIDE + i] = 0.0
     for j in range(first_channel, CHANNELS, 3):
         o0, o1, o2 = np.uint32(j * STRIDE), np.uint32((j + 1) * STRIDE), np.uint32((j + 2) * STRIDE)
         a0, a1, a2 = scaled[j], scaled[j + 1], scaled[j + 2]
