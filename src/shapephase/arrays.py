@@ -43,7 +43,7 @@ def finite_array(value: ArrayLike, name: str, trailing: tuple[int | None, ...] =
 
 def check_finite(array: Array, name: str) -> None:
     """Raise `ShapeError` naming the first entry that is NaN or infinite."""
-    if not np.isfinite(array).all():
+    if np.count_nonzero(np.isfinite(array)) < array.size:
         if not array.ndim:
             raise ShapeError(f"{name}: a finite number is needed, got {array}")
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
@@ -111,10 +111,10 @@ def lock_arrays(result: Any) -> None:
     """Show the arrays among the fields of a frozen dataclass as read-only views: what they mean would change else."""
     fields = result.__dict__
     for name, value in fields.items():
-        if isinstance(value, np.ndarray) and value.flags.writeable:
+        if type(value) is np.ndarray:
             # As `read_only`: thousands of results are made in a second.
             fields[name] = view = value.view()
-            view.setflags(write=False)
+            view.setflags(False)
 
 
 class _CopiedField:

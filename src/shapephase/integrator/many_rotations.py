@@ -179,7 +179,7 @@ def _integrated(
         raise _of_row(error, rows[:1], len(momentum)) from error
     estimates = attempt.rotation.error_estimate
     done = estimates <= tolerance
-    if done.all():
+    if np.count_nonzero(done) == len(done):
         return [RotationPart(rows, for_whole_batch(attempt.rotation, starts))], []
     failed, found = np.flatnonzero(~done), []
     if len(failed) < len(estimates):
