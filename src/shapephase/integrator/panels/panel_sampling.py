@@ -246,10 +246,12 @@ class PanelSampler:
 
     def _rough(self, momentum: float, tolerance: float) -> tuple[float, Mask]:
         """The error of all panels [rad], and if it is above the tolerance which of them more samples help: (P,)."""
-        series, errors, share = self.series, self._errors_at(momentum), self._share(tolerance)
+        series, errors = self.series, self._errors_at(momentum)
         total = self._loops * errors.sums[0]
-        rough = (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
-        return total, rough & (total > tolerance)
+        if total <= tolerance:
+            return total, np.zeros(len(series.degree), dtype=np.bool_)
+        share = self._share(tolerance)
+        return total, (errors.whole > share) & (~series.estimate.at_rounding | (errors.hidden > share))
 
     def _share(self, tolerance: float) -> Array:
         """What each panel may be off by: (P,) [rad]."""
