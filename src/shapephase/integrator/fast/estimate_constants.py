@@ -161,9 +161,8 @@ OTHER_ROUNDINGS = 4
 """Of these marches, each on series with other errors."""
 NOISE_OF_TAIL = 3.0
 """Times the last coefficients of a series: these errors of all of them."""
-NOISE_OF_SERIES = 1.0
-"""Units, of a series' largest coefficient: what they are at most, where the last ones are more than noise. Of 430
-motions whose estimates are rounding for the most part none was off by more than 0.4 of its estimate."""
+NOISE_OF_SERIES = 2.0
+"""Units, of a series' largest coefficient: what they are at most, where the last ones are more than noise."""
 LEAST_NOISE = 0.25
 """The same, at least: samples have half a unit, which averages out, and the last terms of a loop's panels have less."""
 ROUNDING_BY_CHANCE = 3.0
