@@ -114,7 +114,7 @@ def lock_arrays(result: Any) -> None:
         if type(value) is np.ndarray:
             # As `read_only`: thousands of results are made in a second.
             fields[name] = view = value.view()
-            view.setflags(False)
+            view.setflags(write=False)
 
 
 class _CopiedField:

@@ -179,9 +179,17 @@ def _sizes_of_terms(coefficients: Array, widths: Array, magnitude: float, least:
     sizes[2] = ((rates > least) * degree).max(axis=1)
     if magnitude:
         # More turns than can be stepped are refused, and their powers would overflow.
-        sizes[1] = np.vecdot(rates, (degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None]) ** ORDER)
+        sizes[1] = np.vecdot(rates, _powers(degree + (DEGREES_A_RADIAN * np.minimum(turn, MOST_TURN))[:, None]))
         sizes[3] = magnitude * norms[:, 0, 0] * widths
     else:
         # Without momentum a steady turn is exact: the first term counts for nothing.
-        sizes[1], sizes[3] = rates @ degree**ORDER, 0.0
+        sizes[1], sizes[3] = rates @ _powers(degree), 0.0
     return rates, sizes
+
+
+def _powers(degree: Array) -> Array:
+    """To the power ORDER, which is eight: squares take a fifth of the time."""
+    square = degree * degree
+    square *= square
+    square *= square
+    return square

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .. import run_progress
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, read_only
 from ..chebyshev import chebyshev
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
 from .casadi_calls import call_casadi, call_casadi_into
@@ -141,9 +141,10 @@ def quaternions_alone(
     return np.concatenate([_quaternions_of_many(channels, loops, directions[rows], magnitudes[rows]) for rows in parts])
 
 
+@lru_cache(maxsize=256)
 def checkpoint_steps(count: int) -> Integers:
     """After how many of so many steps the propagators are kept: (CHECKPOINTS,), the first none, the last all."""
-    return np.arange(CHECKPOINTS) * count // (CHECKPOINTS - 1)
+    return read_only(np.arange(CHECKPOINTS) * count // (CHECKPOINTS - 1))
 
 
 def stage_channels(interpolant: Interpolant, steps: Integers) -> Array:

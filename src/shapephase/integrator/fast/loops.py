@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
+from .._fourier import fourier_parts
 from ._plain import plain
 
 
@@ -23,8 +24,7 @@ def errors_of_loop(values: Array, tests: Array, shares: Array, time_rounding: fl
     time_rounding : as of `estimate_tail`
     """
     found = np.empty((2, 8))
-    spectrum = np.fft.rfft(values, axis=0).view(np.float64)
-    _kernel().errors_of_loop(spectrum, plain(values), plain(tests), plain(shares), time_rounding, found)
+    _kernel().errors_of_loop(fourier_parts(values), plain(values), plain(tests), plain(shares), time_rounding, found)
     return found.tolist()
 
 

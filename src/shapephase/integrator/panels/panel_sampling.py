@@ -213,10 +213,9 @@ class PanelSampler:
     @property
     def _is_halved(self) -> bool:
         if self._halves is None:
-            (momentum, errors), degree = self._errors or (0.0, None), self.series.degree
             # Without momentum steps are cheap.
-            counts = errors is not None and momentum > 0.0
-            self._halves = counts and pays_to_halve(len(degree), errors.sums[2], sum(degree.tolist()))
+            degree, turn = self.series.degree, self._errors[1].sums[2] if self._errors and self._errors[0] else 0.0
+            self._halves = turn > 0.0 and pays_to_halve(len(degree), turn, sum(degree.tolist()))
         return self._halves
 
     def _first_panels(self, tolerance: float) -> tuple[Integers, Array, Array]:

@@ -46,7 +46,7 @@ def errors_of_loop(spectrum, values, tests, shares, time_rounding, found):
     norms, scale = np.empty((2, len(spectrum))), 2.0 / len(values)
     for kind in range(2):
         for k in range(len(spectrum)):
-            real, imaginary = norm_of_term(spectrum[k, 0::2], 0, kind), norm_of_term(spectrum[k, 1::2], 0, kind)
+            real, imaginary = norm_of_term(spectrum[k], 0, kind), norm_of_term(spectrum[k], 1, kind)
             norms[kind, k] = scale * math.sqrt(real * real + imaginary * imaginary)
         _tail(norms[kind], time_rounding, found[kind])
         found[kind, 7] = 0.0
