@@ -35,7 +35,7 @@ def test_one_harmonic_has_one_term():
 
 
 def test_channels_against_fifty_digits():
-    """Of tensors of condition numbers up to 1e9: a Cholesky factorisation is off by a few units times that."""
+    """Of tensors of condition numbers up to 1e9, which magnify rounding by as much."""
     rng = np.random.default_rng(4)
     for power in range(10):
         axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import expm1, inf, isfinite, log
 from operator import mul
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..arrays import Array, Integers, Mask
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ._fourier import fourier_parts
+from .casadi_calls import map_rows
 from .fast.estimate_constants import (
     AT_ROUNDING,
     CONVERGED_TAIL,
@@ -25,7 +26,6 @@ from .fast.estimate_constants import (
     INVERSE,
     INVERSE_NORM,
     LEAST_OF_FLOOR,
-    MOST_CONDITION,
     ROUNDING,
     TINY,
     UNAVERAGED_PHASE,
@@ -118,41 +118,35 @@ def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
     SingularInertiaError, ShapeError
         If a tensor is singular, or a momentum not finite.
     """
-    with np.errstate(all="ignore"):
-        channels, is_reliable = _inverted_sooner(inertia, momentum)
-    if not is_reliable:
+    flat = np.empty((len(times), 12))
+    flat[:, :9], flat[:, 9:] = inertia.reshape(-1, 9), momentum
+    channels = map_rows(inverse_channels, 12, flat)
+    if not channels[:, 9].min() > 0.0:
         inverse = inverse_inertia(inertia, times)
         channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
-        channels[:, 6:] = (inverse @ momentum[:, :, None])[:, :, 0]
-        if not isfinite(channels.sum()):
-            row = int(np.argwhere(~np.isfinite(channels))[0, 0])
+        channels[:, 6:9] = (inverse @ momentum[:, :, None])[:, :, 0]
+        if not isfinite(channels[:, :9].sum()):
+            row = int(np.argwhere(~np.isfinite(channels[:, :9]))[0, 0])
             raise ShapeError(f"the internal momentum at t = {times[row]:.9g} s is not finite")
-    return channels
+    return channels[:, :9]
 
 
-def _inverted_sooner(inertia: Array, momentum: Array) -> tuple[Array, bool]:
-    """The same by square-root-free Cholesky, backward stable, entry by entry for all rows; whether all are reliable."""
-    xx, yy, zz = inertia[:, 0, 0], inertia[:, 1, 1], inertia[:, 2, 2]
-    yz, xz, xy = inertia[:, 1, 2], inertia[:, 0, 2], inertia[:, 0, 1]
-    a, b = xy / xx, xz / xx
-    first, t = yy - a * xy, yz - b * xy
-    c = t / first
-    second = zz - b * xz - c * t
-    e0, e1, e2, f = 1.0 / xx, 1.0 / first, 1.0 / second, a * c - b
-    ae, ce, fe = a * e1, c * e2, f * e2
-    i0, i1, i2, i3, i4, i5 = inverse = e0 + a * ae + f * fe, e1 + c * ce, e2, -ce, fe, -ae - f * ce
-    x, y, z = momentum.T
-    channels = np.empty((len(inertia), 9))
-    for column, entry in enumerate(inverse):
-        channels[:, column] = entry
-    channels[:, 6] = i0 * x + i5 * y + i4 * z
-    channels[:, 7] = i5 * x + i1 * y + i3 * z
-    channels[:, 8] = i4 * x + i3 * y + i2 * z
+def inverse_channels(entries: list[Any]) -> list[Any]:
+    """I^-1, I^-1 L_o and a number above zero where the tensor is far from singular and all is finite, from I and L_o.
+
+    Far from singular: the condition number is at most some hundred, and so are the digits that the adjugate loses.
+    """
+    import casadi
+
+    a, f, e, _, b, d, _, _, c, x, y, z = entries
+    adjugate = [b * c - d * d, a * c - e * e, a * b - f * f, e * f - a * d, f * d - b * e, d * e - c * f]
+    determinant = a * adjugate[0] + f * adjugate[5] + e * adjugate[4]
+    trace = a + b + c
+    safe = casadi.fmin(determinant - 1e-3 * trace * trace * trace, casadi.fmin(adjugate[2], a))
+    xx, yy, zz, yz, xz, xy = inverse = [entry / determinant for entry in adjugate]
+    drift = [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
     # No comparison holds for what is not a number.
-    condition = (xx + yy + zz) * (i0 + i1 + i2)
-    is_definite = np.minimum(np.minimum(xx, first), second).min(initial=np.inf) > 0.0
-    is_reliable = is_definite and condition.max(initial=0.0) < MOST_CONDITION
-    return channels, bool(is_reliable and np.abs(channels[:, 6:]).max(initial=0.0) < _LARGEST_RATE)
+    return [*inverse, *drift, safe * (casadi.fabs(sum(drift)) < _LARGEST_RATE)]
 
 
 class TailEstimate(NamedTuple):

@@ -6,9 +6,6 @@ EPS = 2.0**-52
 """Unit of rounding."""
 TINY = 1e-300
 """Keeps quotients and logarithms of coefficients defined where these are zero."""
-MOST_CONDITION = 1e10
-"""Product of the traces of I and I^-1, one to nine times the condition number; what is above it is left to slower code,
-which judges such tensors by their eigenvalues."""
 
 # ---- From the tails of spectra -------------------------------------------------------------------------------------
 

@@ -12,7 +12,6 @@ import math
 
 import numpy as np
 
-from ..estimate_constants import MOST_CONDITION
 from .jit import inline, kernel
 from .trigonometry import MOST_ANGLE, cos_sin
 
@@ -23,6 +22,9 @@ TOTAL = 15
 """Rows of the sums: mass times place (3), mass times velocity (3), inertia (6), momentum (3)."""
 NUMBERS = 22
 """Of a frame in the body, as `shapephase.body.link_rows` has them."""
+_CONDITION = 1e10
+"""Product of the traces of I and I^-1, one to nine times the condition number; what is above it is left to slower
+code, which judges such tensors by their eigenvalues."""
 
 
 @inline
@@ -155,7 +157,7 @@ def _write(total, lane, inverted, out):
     if inverted:
         xx, yy, zz, yz, xz, xy, condition = _inverse(xx, yy, zz, yz, xz, xy)
         u, v, w = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
-        fine = condition > 0.0 and condition < MOST_CONDITION
+        fine = condition > 0.0 and condition < _CONDITION
     out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8] = xx, yy, zz, yz, xz, xy, u, v, w
     return fine and math.isfinite(xx + yy + zz + u + v + w)
 
