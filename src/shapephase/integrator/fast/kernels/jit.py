@@ -1,7 +1,7 @@
 """How functions become machine code: the only place that imports Numba.
 
-Products and sums are never reordered, and contracted only where there is no choice of what is fused with what (`fused`),
-so that a result does not depend on what is computed beside it, on how many lanes the processor has, or on threads.
+Products and sums are never reordered, and contracted in `fused` only, where there is no choice of what is fused with
+what: a result does not depend on what is computed beside it, on how many lanes the processor has, or on threads.
 """
 
 from __future__ import annotations
