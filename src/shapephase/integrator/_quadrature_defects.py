@@ -140,7 +140,7 @@ class Defects(NamedTuple):
         `turn_by_momentum` : how far the body turns by its momentum alone [rad]
         """
         cancelled = np.maximum(loops * self.coarse / np.maximum(distance, TINY), 1.0)
-        factor = BY_CHANCE * self.evenness**-POWER_OF_EVENNESS * cancelled**0.0625
+        factor = BY_CHANCE * self.evenness**-POWER_OF_EVENNESS * np.sqrt(np.sqrt(np.sqrt(np.sqrt(cancelled))))
         share = turn_by_momentum / LITTLE_TURN
         factor = factor * np.sqrt(np.minimum(amplification, MOST_GROWTH_BY_CHANCE))
         factor = factor * (1.0 + NEARLY_AT_REST / (1.0 + share * share))
