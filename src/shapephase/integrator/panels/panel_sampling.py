@@ -175,7 +175,7 @@ class PanelSampler:
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
         errors = self._errors_at(momentum)
-        return self._loops * (errors.sums[0] + errors.sum_of_noise)
+        return self._loops * (errors.total + errors.sum_of_noise)
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`; its panels are halves of those that were sampled where these take many steps."""
@@ -204,7 +204,7 @@ class PanelSampler:
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`."""
         series, errors = self.series, self._errors_at(momentum)
-        hidden = errors.sums[1] + errors.sum_of_noise
+        hidden = errors.total_hidden + errors.sum_of_noise
         if not self._is_bandlimited:
             hidden += float((0.5 * series.width * (np.nan_to_num(series.gaps) @ np.array([momentum, 1.0]))).sum())
         make = partial(_perturbed, series, momentum, self._is_halved)
@@ -214,7 +214,7 @@ class PanelSampler:
     def _is_halved(self) -> bool:
         if self._halves is None:
             # Without momentum steps are cheap.
-            degree, turn = self.series.degree, self._errors[1].sums[2] if self._errors and self._errors[0] else 0.0
+            degree, turn = self.series.degree, self._errors[1].total_turn if self._errors and self._errors[0] else 0.0
             self._halves = turn > 0.0 and pays_to_halve(len(degree), turn, sum(degree.tolist()))
         return self._halves
 
@@ -246,7 +246,7 @@ class PanelSampler:
     def _rough(self, momentum: float, tolerance: float) -> tuple[float, Mask]:
         """The error of all panels [rad], and if it is above the tolerance which of them more samples help: (P,)."""
         series, errors = self.series, self._errors_at(momentum)
-        total = self._loops * errors.sums[0]
+        total = self._loops * errors.total
         if total <= tolerance:
             return total, np.zeros(len(series.degree), dtype=np.bool_)
         share = self._share(tolerance)

@@ -88,10 +88,23 @@ class PanelErrors:
         return self.table[2]
 
     @cached_property
-    def sums(self) -> tuple[float, float, float]:
-        """Of all panels: errors, what is hidden, and turns; noise apart."""
-        whole, hidden, _, turn = np.add.reduce(self.table, axis=1).tolist()
-        return whole, hidden, turn
+    def _sums(self) -> list[float]:
+        return np.add.reduce(self.table, axis=1).tolist()
+
+    @property
+    def total(self) -> float:
+        """The errors of all panels, noise apart."""
+        return self._sums[0]
+
+    @property
+    def total_hidden(self) -> float:
+        """Their parts that the nodes do not show."""
+        return self._sums[1]
+
+    @property
+    def total_turn(self) -> float:
+        """How far the body may turn on all of them."""
+        return self._sums[3]
 
     @cached_property
     def sum_of_noise(self) -> float:

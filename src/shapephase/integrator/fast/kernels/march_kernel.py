@@ -182,10 +182,10 @@ def _tabulate(
         if len(perturbed):
             few = terms_that_differ(c, perturbed[panel]) <= _FEW_TERMS
             terms = max(terms, terms_that_count(perturbed[panel]))
-        row = basis_of(starts[segment], count, steps[panel], 1, most_terms, bases, of_bases)
-        channels_at(c, terms, factor, bases[row], of_bases[row, 3], 0, scaled, tables[0, place])
-        row = basis_of(starts[segment], count, steps[panel], 2, most_terms, bases, of_bases)
-        basis, used = bases[row], of_bases[row, 3]
+        row, used = basis_of(starts[segment], count, steps[panel], 1, most_terms, bases, of_bases)
+        channels_at(c, terms, factor, bases[row], used, 0, scaled, tables[0, place])
+        row, used = basis_of(starts[segment], count, steps[panel], 2, most_terms, bases, of_bases)
+        basis = bases[row]
         channels_at(c, terms, 2.0 * factor, basis, used, 0, scaled, tables[1, place])
         if len(perturbed):
             other, out = perturbed[panel], tables[2, place]
@@ -314,7 +314,7 @@ def march_at_rest(widths, series, steps, quaternions):
         count, factor = terms_that_count(series[panel]), widths[panel] / steps[panel]
         for start in range(0, steps[panel], SEGMENT):
             here = min(SEGMENT, steps[panel] - start)
-            row = basis_of(start, here, steps[panel], 1, terms, bases, of_bases)
-            channels_at(series[panel], count, factor, bases[row], of_bases[row, 3], 6, scaled, c)
+            row, used = basis_of(start, here, steps[panel], 1, terms, bases, of_bases)
+            channels_at(series[panel], count, factor, bases[row], used, 6, scaled, c)
             _turn_on(c, here, at, quaternions)
             at += here

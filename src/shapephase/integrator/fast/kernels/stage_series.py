@@ -92,12 +92,14 @@ def room_for_bases(terms):
 def basis_of(first, count, steps, together, terms, bases, kept):
     """The row of `bases` with T_0, T_1 ... at the stages of `count` steps from `first` on, of `steps` on the panel.
 
+    And how many numbers of it are filled.
+
     together: 1; 2: they are taken two at a time, one of an odd number alone, which `shorten_single` makes half as long
     bases, kept: as `room_for_bases` makes them for so many terms
     """
     row = 2 * (together - 1) + steps % 2
     if kept[row, 0] == steps and kept[row, 1] == first and kept[row, 2] == count:
-        return row
+        return row, kept[row, 3]
     basis, used, k, single = bases[row], 0, 0, 2 * pairs_before_single(count)
     while k < count:
         length = 1 if k == single else together
@@ -107,7 +109,7 @@ def basis_of(first, count, steps, together, terms, bases, kept):
         k += length
     kept[row, 0], kept[row, 1], kept[row, 2] = steps, first, count
     kept[row, 3] = basis_between(used, terms, basis)
-    return row
+    return row, kept[row, 3]
 
 
 @part
