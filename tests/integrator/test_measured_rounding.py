@@ -11,6 +11,7 @@ import shapephase as sp
 from shapephase.errors import AccuracyNotReached
 from shapephase.integrator import integrate
 from shapephase.integrator._measured_rounding import measured_rounding, noise_of_series
+from shapephase.integrator._refinement import Errors
 from shapephase.integrator._step_loop import integrate_steps
 from shapephase.integrator.fast.estimate_constants import (
     EPS,
@@ -20,7 +21,7 @@ from shapephase.integrator.fast.estimate_constants import (
     NOISE_OF_SERIES,
     NOISE_OF_TAIL,
 )
-from shapephase.integrator.integrate import Errors, Integration
+from shapephase.integrator.integrate import Integration
 from shapephase.integrator.interpolant import Interpolant
 from shapephase.integrator.sampling import FinishedSampler
 from support.compiler import needs_compiler
@@ -64,12 +65,18 @@ def test_a_tolerance_that_the_bound_would_refuse_is_reached(
 def test_rounding_that_sparse_samples_overrate_is_looked_at_again():
     """On denser ones, unless it is far too large, or samples are so dense already that they show it."""
     integration = Integration(FinishedSampler(rigid(1.0)), np.array([[0.0, 0.0, 1.0]]), 1e-12, ceiling=1.0)
-    here = Errors(1.3e-12, 1e-13, 0.0, 1.2e-12, amplification=5.0, distance=1e-9, order=8.0, rounded_up=1.0)
-    integration.check_progress(here, 1, np.inf)
-    integration.check_progress(here._replace(sampling=1e-15, rounding=8e-13), 1, np.inf)
-    for hopeless in (here._replace(sampling=1e-14), here._replace(sampling=5e-11, rounding=1e-10)):
-        with pytest.raises(AccuracyNotReached, match="rounding"):
-            integration.check_progress(hopeless, 1, np.inf)
+    parts = [np.array([part]) for part in (1.3e-12, 1e-13, 0.0, 1.2e-12, 5.0, 1e-9)]
+    here, best = Errors(*parts, order=8.0, rounded_up=1.0), np.array([np.inf])
+    assert integration.first_lost(here, 1, best) is None
+    assert integration.first_lost(here._replace(sampling=parts[1] / 100.0, rounding=8.0 * parts[1]), 1, best) is None
+    for hopeless in (
+        here._replace(sampling=parts[1] / 10.0),
+        here._replace(sampling=500.0 * parts[1], rounding=1000.0 * parts[1]),
+    ):
+        lost = integration.first_lost(hopeless, 1, best)
+        assert lost is not None
+        assert lost[0] == 0
+        assert "rounding" in str(lost[1])
 
 
 def test_a_bound_far_below_the_tolerance_is_believed_and_no_measure_is_far_below_it():

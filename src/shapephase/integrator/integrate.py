@@ -20,22 +20,16 @@ from ..errors import AccuracyNotReached
 from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
 from ._last_terms import Perturbed
 from ._measured_rounding import measured_rounding
+from ._refinement import Errors, Refinement, Refinements
 from ._step_control import StepRequirements
 from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .fast import engine
 from .fast.estimate_constants import (
-    DENSE_SHARE,
     EXPECTED_GROWTH,
-    INFORMATIVE_ERROR,
-    LEAST_NOISE,
     LITTLE_ROUNDING,
     MANY_STEPS,
     MOST_EXPECTED_GROWTH,
-    MOST_SAMPLING,
-    MOST_STEPPING,
     NEGLIGIBLE,
-    NOISE_OF_SERIES,
-    REFINED,
 )
 from .fast.rounds import Round, rounds_of_one
 from .interpolant import Interpolant
@@ -45,18 +39,8 @@ from .stepped import SteppedRotation, for_whole_batch
 
 # Steps of one motion: some ten seconds, and a gigabyte of results.
 _MOST_STEPS = 4_000_000
-# Rounds of refinement; most motions need one.
-_MOST_ROUNDS = 12
-# Of the tolerance, for what the samplers say of themselves at first; it is ten to a hundred times the truth.
-_SAMPLING_SHARE = 0.3
 # Amplification that the first plan allows for; what grows more is seen when it is there.
 _MOST_FORESEEN = 1e4
-# Of the tolerance: with more rounding than this no refinement reaches it.
-_MOST_ROUNDING = 0.9
-# Times the error of the samples: rounding that the last terms of their series show.
-_SHOWN_ROUNDING = 30.0
-# How many times it may be overrated before that: the most noise of series that is allowed for, over the least.
-_MOST_OVERRATED = NOISE_OF_SERIES / LEAST_NOISE
 
 
 def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> SteppedRotation:
@@ -94,37 +78,6 @@ def norms(momentum: Array) -> Array:
     return np.sqrt(x * x + y * y + z * z)
 
 
-class Refinement(NamedTuple):
-    """What earlier rounds found out: how much finer samples and steps must be, and how errors grow."""
-
-    sampling_target: float  # for what the sampler says of itself [rad]
-    finer: float = 1.0  # steps, than they were planned at first
-    amplified: float | None = None  # errors; None: not known yet
-
-    @classmethod
-    def at_first(cls, tolerance: float) -> Refinement:
-        """Before the first round."""
-        return cls(_SAMPLING_SHARE * tolerance)
-
-
-class Errors(NamedTuple):
-    """What a round of steps came to, for one momentum or for the worst of several [rad]."""
-
-    estimate: float  # of all that follows
-    sampling: float
-    stepping: float
-    rounding: float
-    amplification: float
-    distance: float  # of the steps from those beside them
-    order: float  # by which the error of steps falls
-    rounded_up: float  # how many more steps were taken than planned, since they are whole
-
-    @property
-    def are_informative(self) -> bool:
-        """Whether they show how errors grow; steps that are still far too long do not."""
-        return self.distance < INFORMATIVE_ERROR and isfinite(self.amplification)
-
-
 class Attempt(NamedTuple):
     """One round of steps with its error estimates."""
 
@@ -132,24 +85,11 @@ class Attempt(NamedTuple):
     taken: Round
 
     @property
-    def _errors(self) -> list[Array]:
-        it = self.rotation
-        parts = [it.sampling_error, it.stepping_error, it.rounding_error, it.amplification]
-        return [it.error_estimate, *parts, self.taken.distances]
-
-    @property
-    def _of_all(self) -> dict[str, float]:
-        return {"order": self.taken.defects.order, "rounded_up": self.taken.rounded_up}
-
-    @property
-    def worst(self) -> Errors:
-        """The largest of all momenta."""
-        return Errors(*(float(part.max(initial=0.0)) for part in self._errors), **self._of_all)
-
-    def errors(self, rows: Integers) -> list[Errors]:
-        """Of some momenta."""
-        each = zip(*(part[rows].tolist() for part in self._errors), strict=True)
-        return [Errors(*row, **self._of_all) for row in each]
+    def errors(self) -> Errors:
+        """Of each momentum."""
+        it, taken = self.rotation, self.taken
+        parts = it.error_estimate, it.sampling_error, it.stepping_error, it.rounding_error, it.amplification
+        return Errors(*parts, taken.distances, order=taken.defects.order, rounded_up=taken.rounded_up)
 
 
 class Integration:
@@ -183,29 +123,30 @@ class Integration:
 
     def solution(self) -> SteppedRotation:
         """The first attempt whose error estimate is within the tolerance for every momentum."""
-        number, best = 0, np.inf
+        number, best = 0, np.array([np.inf])
         while True:
             attempt = self.attempt()
-            worst = attempt.worst
+            worst = attempt.errors.worst
             if worst.estimate <= self._tolerance:
                 return for_whole_batch(attempt.rotation, self._momentum)
             number += 1
-            self.check_progress(worst, number, best)
-            best = min(best, worst.estimate)
-            self._refinement = self.refined(worst)
+            if (lost := self.first_lost(worst, number, best)) is not None:
+                raise lost[1]
+            best = np.minimum(best, worst.estimate)
+            (self._refinement,) = self.refined(worst).each()
 
-    def check_progress(self, errors: Errors, number: int, best: float) -> None:
-        """Raise AccuracyNotReached after so many rounds, of which the best had this estimate, if more will not help."""
+    def first_lost(self, errors: Errors, number: int, best: Array) -> tuple[int, AccuracyNotReached] | None:
+        """The first row that more than so many rounds will not help, and its error; None: there is none.
+
+        `best`: the lowest estimates of all rounds before (n,) [rad]
+        """
         if self._too_rough is not None:
-            raise self._too_rough
-        # Finer steps and samples that bring nothing: what is left is rounding. At first they may still be too long to.
-        stuck = number > 4 and errors.estimate > 0.9 * best
-        # Or rounding alone takes up the tolerance, by samples so dense that they show it.
-        hopeless = errors.rounding > max(_MOST_ROUNDING * self._tolerance, errors.sampling) and (
-            errors.rounding > _SHOWN_ROUNDING * errors.sampling or errors.rounding > _MOST_OVERRATED * self._tolerance
-        )
-        if number == _MOST_ROUNDS or (errors.are_informative and (stuck or hopeless)):
-            raise _not_reached(self._tolerance, errors)
+            return 0, self._too_rough
+        lost = errors.are_the_last(self._tolerance, number, best)
+        if not np.count_nonzero(lost):
+            return None
+        row = int(np.argmax(lost))
+        return row, _not_reached(self._tolerance, errors, row)
 
     @cached_property
     def is_long(self) -> bool:
@@ -219,7 +160,7 @@ class Integration:
         try:
             self._sampler.refine(self._largest, self._refinement.sampling_target)
         except AccuracyNotReached as error:
-            if self._refinement.amplified is None:
+            if not isfinite(self._refinement.amplified):
                 raise
             self._too_rough = error
 
@@ -256,9 +197,11 @@ class Integration:
         if not alone or (self._largest == 0.0 and interpolant.loops > 1):
             return None
         # What is below by any growth that is foreseen is not looked at.
-        growth = self._refinement.amplified or MOST_EXPECTED_GROWTH
+        growth = self._refinement.amplified
+        if not isfinite(growth):
+            growth = MOST_EXPECTED_GROWTH
         counts = growth * expected > NEGLIGIBLE * self._tolerance
-        of_last = np.array([self._refinement.finer, self._refinement.amplified or np.inf])
+        of_last = np.array(self._refinement[1:])
         found = rounds_of_one(
             interpolant,
             perturbed.coefficients if counts and perturbed.differ else None,
@@ -272,10 +215,7 @@ class Integration:
         )
         if found is None:
             return None
-        finer, amplified = of_last.tolist()
-        self._refinement = Refinement(
-            self._refinement.sampling_target, finer, amplified if isfinite(amplified) else None
-        )
+        self._refinement = Refinement(self._refinement.sampling_target, *of_last.tolist())
         little = LITTLE_ROUNDING * self._tolerance
         record = found.record
         closely = looked_at_closely(found.rounding, record.propagators, record.quaternions, little)
@@ -286,7 +226,7 @@ class Integration:
         """Plan the steps and take them; how errors grow, and whether those of the samples were measured."""
         requirements = StepRequirements.from_interpolant(interpolant, self._largest, self._tolerance)
         growth = self._refinement.amplified
-        if growth is None:
+        if not isfinite(growth):
             turn = requirements.whole_turn if self._largest else 0.0
             growth = min(1.0 + EXPECTED_GROWTH * turn, MOST_EXPECTED_GROWTH)
         counts = expected * growth > NEGLIGIBLE * self._tolerance
@@ -360,20 +300,9 @@ class Integration:
             threads=self._threads,
         )
 
-    def refined(self, errors: Errors) -> Refinement:
+    def refined(self, errors: Errors) -> Refinements:
         """Finer steps and samples for the next round."""
-        target, finer, growth = self._refinement
-        # What the polynomials between the ends of steps may add is not theirs to take.
-        room = max(self._tolerance / (1.0 + DENSE_SHARE) - errors.rounding, 0.1 * self._tolerance)
-        if errors.stepping > MOST_STEPPING * room:
-            shorter = (errors.stepping / (REFINED * room)) ** (1.0 / errors.order)
-            # So much finer that steps are more, too.
-            finer *= min(max(shorter, 1.1, 1.02 * errors.rounded_up), 4.0)
-        if errors.are_informative:
-            growth = errors.amplification
-            if errors.sampling > MOST_SAMPLING * room:
-                target = min(target, self._sampler.error(self._largest) * REFINED * room / errors.sampling)
-        return Refinement(target, finer, growth)
+        return errors.refined(self._refinement, self._tolerance, self._sampler.error(self._largest))
 
 
 def _too_many_steps(count: float, turn: float, interpolant: Interpolant) -> AccuracyNotReached:
@@ -386,11 +315,12 @@ def _too_many_steps(count: float, turn: float, interpolant: Interpolant) -> Accu
     )
 
 
-def _not_reached(tolerance: float, last: Errors) -> AccuracyNotReached:
+def _not_reached(tolerance: float, errors: Errors, row: int) -> AccuracyNotReached:
+    estimate, sampling, stepping, rounding, amplification, *_ = (part[row] for part in errors[:6])
     return AccuracyNotReached(
-        f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {last.estimate:.3g} rad, of "
-        f"which sampling {last.sampling:.3g}, stepping {last.stepping:.3g} and rounding {last.rounding:.3g}, with "
-        f"errors amplified {last.amplification:.3g} times; loosen the tolerance or shorten the motion"
+        f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {estimate:.3g} rad, of "
+        f"which sampling {sampling:.3g}, stepping {stepping:.3g} and rounding {rounding:.3g}, with "
+        f"errors amplified {amplification:.3g} times; loosen the tolerance or shorten the motion"
     )
 
 

@@ -18,8 +18,9 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
+from ._refinement import Refinement, Refinements
 from .fast.rounds import STEPS_OF_FINER, STEPS_OF_OTHERS, marks_between
-from .integrate import Attempt, Integration, Refinement, norms
+from .integrate import Attempt, Integration, norms
 from .interpolant import Interpolant
 from .sampling import Sampler, Samplers
 from .stepped import SteppedRotation, for_whole_batch, of_rows
@@ -192,22 +193,20 @@ def _further(
     group: _Group, integration: Integration, sampler: Sampler, attempt: Attempt, failed: Integers, count: int
 ) -> Iterator[_Group]:
     """Rows that failed, by the refinements that they need."""
-    at_rest = not group.ceiling
-    together: dict[Refinement, list[tuple[int, float]]] = {}
-    for row, errors in zip(failed.tolist(), attempt.errors(failed), strict=True):
-        best = float(group.best[row])
-        try:
-            integration.check_progress(errors, len(group.history), best)
-        except AccuracyNotReached as error:
-            raise _of_row(error, group.rows[row : row + 1], count) from None
-        refinement = _rounded(integration.refined(errors), group.history[-1])
-        together.setdefault(refinement, []).append((row, min(best, errors.estimate)))
+    at_rest, errors, best = not group.ceiling, attempt.errors.of(failed), group.best[failed]
+    if (lost := integration.first_lost(errors, len(group.history), best)) is not None:
+        row, error = lost
+        raise _of_row(error, group.rows[failed[row : row + 1]], count) from None
+    together: dict[Refinement, list[int]] = {}
+    for place, refinement in enumerate(_rounded(integration.refined(errors), group.history[-1]).each()):
+        together.setdefault(refinement, []).append(place)
+    best = np.minimum(best, errors.estimate)
     for refinement, members in together.items():
-        rows = group.rows if at_rest else group.rows[[row for row, _ in members]]
-        best = np.full(max(len(rows), 1), members[0][1]) if at_rest else np.array([best for _, best in members])
+        rows = group.rows if at_rest else group.rows[failed[members]]
+        estimates = np.full(max(len(rows), 1), best[0]) if at_rest else best[members]
         history = (*group.history, refinement)
         # Where all go on together the sampler goes with them.
-        yield _Group(rows, best, group.ceiling, history, sampler if len(together) == 1 else None)
+        yield _Group(rows, estimates, group.ceiling, history, sampler if len(together) == 1 else None)
 
 
 def _after(samplers: Samplers, group: _Group) -> Sampler:
@@ -218,13 +217,13 @@ def _after(samplers: Samplers, group: _Group) -> Sampler:
     return sampler
 
 
-def _rounded(refinement: Refinement, last: Refinement) -> Refinement:
+def _rounded(refinements: Refinements, last: Refinement) -> Refinements:
     """What is stricter than in the last round is made stricter by little more, so that many are the same."""
-    target, finer, amplified = refinement
-    return Refinement(
-        sampling_target=target if target == last.sampling_target else 1.0 / _up(1.0 / target, STEPS_OF_OTHERS),
-        finer=_up(finer, STEPS_OF_FINER),
-        amplified=None if amplified is None else _up(min(amplified, _MOST_GROWTH), STEPS_OF_OTHERS),
+    target, finer, amplified = refinements
+    return Refinements(
+        np.where(target == last.sampling_target, target, 1.0 / rounded_up(1.0 / target, STEPS_OF_OTHERS)),
+        rounded_up(finer, STEPS_OF_FINER),
+        np.where(np.isinf(amplified), np.inf, rounded_up(np.minimum(amplified, _MOST_GROWTH), STEPS_OF_OTHERS)),
     )
 
 
