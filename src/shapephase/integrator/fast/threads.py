@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 
-# Momenta for a thread of its own: some milliseconds of work.
-_LEAST_FOR_A_THREAD = 128
+# Momenta for a thread of its own: some tenths of a millisecond of work.
+_LEAST_FOR_A_THREAD = 64
 # Momenta in one call: some tenths of a second, after which a run that is watched says so.
 _MOST_AT_ONCE = 8192
 
@@ -29,15 +29,25 @@ def in_threads(run: Callable[[slice], None], batch: int, lanes: int, threads: in
             run(rows)
             yield rows
         return
-    with ThreadPoolExecutor(workers) as pool:
-        for rows, _ in zip(parts, pool.map(run, parts), strict=True):
-            yield rows
+    for rows, _ in zip(parts, _pool(workers).map(run, parts), strict=True):
+        yield rows
 
 
 def _parts(batch: int, lanes: int, workers: int) -> list[slice]:
     """The rows for each call, whole groups of lanes: one call for each thread, or as many as show progress."""
     each = min(-(-batch // (workers * lanes)) * lanes, -(-_MOST_AT_ONCE // lanes) * lanes)
     return [slice(first, min(first + each, batch)) for first in range(0, max(batch, 1), each or 1)]
+
+
+@lru_cache(maxsize=4)
+def _pool(workers: int) -> ThreadPoolExecutor:
+    """Threads that wait for the next call: to start them takes as long as a hundred momenta."""
+    return ThreadPoolExecutor(workers)
+
+
+if hasattr(os, "register_at_fork"):
+    # A child of this process has none of its threads.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 @lru_cache(maxsize=1)
