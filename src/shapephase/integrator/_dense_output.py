@@ -174,7 +174,7 @@ class DenseOutput:
         stages = np.moveaxis(channels * shares[:, :, None], 0, -1)
         before = list(quaternions)
         if not self.directions.shape[1]:
-            return np.array(product(before, rest_step(stages[:, 6:]))), directions, dynamics
+            return np.array(product(before, rest_step(-0.5 * stages[:, 6:]))), directions, dynamics
         start = list(directions)
         following, turn, dynamic = momentum_step(start, self.magnitude[:, None], stages)
         attitude = turned(before, start, following, (np.sin(0.5 * turn), np.cos(0.5 * turn)))

@@ -11,7 +11,15 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ._rotation_step import STAGES, attitude_step
-from ._step_loop import BLOCK, CHECKPOINTS, adjugate_of, checkpoint_steps, matrix_product, momentum_step_function
+from ._step_loop import (
+    BLOCK,
+    CHECKPOINTS,
+    adjugate_of,
+    attitude_step_function,
+    channel_scale,
+    checkpoint_steps,
+    matrix_product,
+)
 from .casadi_calls import call_casadi, map_rows
 from .fast import engine
 from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
@@ -158,7 +166,7 @@ def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loo
     for row, (direction, magnitude) in enumerate(zip(directions, magnitudes, strict=True)):
         first = so3.perpendicular(direction)
         basis = np.stack([first, np.cross(direction, first)])
-        seeds = np.zeros((2, 8))
+        seeds = np.zeros((2, 7))
         seeds[:, :3] = np.cross(direction, basis)
         if engine.is_ready():
             ends, changes = derivatives(channels, loops, direction, seeds[:, :3], float(magnitude), marks)
@@ -195,17 +203,18 @@ def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
 def _derivatives(channels: Array, direction: Array, magnitude: float, loops: int, seeds: Array) -> Any:
     """Block by block: the steps before it, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after each.
 
-    `seeds` (s, 8) are changes of direction, quaternion and magnitude at the start.
+    `seeds` (s, 7) are changes of direction and quaternion at the start.
     """
     count, columns = len(channels), len(seeds)
-    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0, magnitude], seeds.ravel()])
+    channels = (channels.reshape(-1, 9) * channel_scale(magnitude)).reshape(count, -1)
+    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0], seeds.ravel()])
     done = 0
     for _ in range(loops):
         for first in range(0, count, BLOCK):
             block = channels[first : first + BLOCK]
             (states,) = call_casadi(_derivative_function(len(block), columns), len(block), state, block)
             quaternions = states[:, 3:7]
-            slopes = so3.turn_of(quaternions[:, None], states[:, 8:].reshape(-1, columns, 8)[:, :, 3:7])
+            slopes = so3.turn_of(quaternions[:, None], states[:, 7:].reshape(-1, columns, 7)[:, :, 3:7])
             yield done, quaternions, slopes
             state, done = states[-1], done + len(block)
 
@@ -243,9 +252,9 @@ def derivative_step_function(columns: int) -> Any:
     """One step as a CasADi function of the state with its derivatives, and the channels."""
     import casadi
 
-    state, slopes = casadi.SX.sym("state", 8), casadi.SX.sym("slopes", 8, columns)
+    state, slopes = casadi.SX.sym("state", 7), casadi.SX.sym("slopes", 7, columns)
     data = casadi.SX.sym("channels", 9 * STAGES)
-    following, _ = momentum_step_function(False)(state, data)
-    further = casadi.reshape(casadi.jtimes(following, state, slopes), 8 * columns, 1)
-    whole = casadi.vertcat(state, casadi.reshape(slopes, 8 * columns, 1))
+    following = attitude_step_function()(state, data)
+    further = casadi.reshape(casadi.jtimes(following, state, slopes), 7 * columns, 1)
+    whole = casadi.vertcat(state, casadi.reshape(slopes, 7 * columns, 1))
     return casadi.Function(f"derivative_step_{columns}", [whole, data], [casadi.vertcat(following, further)])

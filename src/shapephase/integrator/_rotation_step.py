@@ -27,7 +27,9 @@ def tableau() -> tuple[Array, Array, Array]:
     return DOP853.A[:STAGES, :STAGES], DOP853.B[:STAGES], DOP853.C[:STAGES]
 
 
-def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tuple[list[Any], Any, Any]:
+def momentum_step(
+    direction: Scalars, magnitude: Any, channels: Scalars, *, with_dynamic: bool = True
+) -> tuple[list[Any], Any, Any]:
     """A step with momentum.
 
     Parameters
@@ -36,12 +38,13 @@ def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tupl
     magnitude : of the momentum [kg m^2/s]
     channels : for each of the 12 stage times the step length times (I^-1: xx yy zz yz xz xy, I^-1 L_o), nine
         entries
+    with_dynamic : whether the dynamic phase is wanted; without it the turn takes fewer operations
 
     Returns
     -------
     direction : at the end of the step, of length one
     turn : angle about the starting direction, to be followed by the shortest rotation between the directions [rad]
-    dynamic : the step's dynamic phase, the integral of omega . Pi/|Pi| [rad]
+    dynamic : the step's dynamic phase, the integral of omega . Pi/|Pi| [rad]; zero if it is not wanted
     """
     a, b, _ = tableau()
     slopes: list[list[Any]] = []
@@ -55,26 +58,30 @@ def momentum_step(direction: Scalars, magnitude: Any, channels: Scalars) -> tupl
             turns.append([0.0])
             dynamics.append([0.0])
             continue
-        along = _dot(p, omega)
-        turns.append([(along + _dot(direction, omega)) / (1.0 + _dot(direction, p))])
+        if with_dynamic:
+            along = _dot(p, omega)
+            twice = along + _dot(direction, omega)
+        else:
+            along, twice = 0.0, _dot([d + component for d, component in zip(direction, p, strict=True)], omega)
+        turns.append([twice / (1.0 + _dot(direction, p))])
         dynamics.append([along])
     end = unit(_combination(direction, b, slopes))
     (turn,), (dynamic,) = _combination([0.0], b, turns), _combination([0.0], b, dynamics)
     return end, turn, dynamic
 
 
-def rest_step(drifts: Scalars) -> list[Any]:
+def rest_step(half_rates: Scalars) -> list[Any]:
     """A step without momentum: the quaternion of its rotation.
 
     Parameters
     ----------
-    drifts : for each of the 12 stage times the step length times I^-1 L_o, three entries
+    half_rates : for each of the 12 stages half the step length times the rate of turning -I^-1 L_o, three entries
     """
     a, b, _ = tableau()
     slopes: list[list[Any]] = []
     for stage in range(STAGES):
         x, y, z, w = _combination([0.0, 0.0, 0.0, 1.0], a[stage, :stage], slopes)
-        p, q, r = (-0.5 * drift for drift in drifts[stage])
+        p, q, r = half_rates[stage]
         slopes.append([w * p + y * r - z * q, w * q + z * p - x * r, w * r + x * q - y * p, -(x * p + y * q + z * r)])
     return unit(_combination([0.0, 0.0, 0.0, 1.0], b, slopes))
 
@@ -101,10 +108,9 @@ def turned(quat_xyzw: Scalars, start: Scalars, end: Scalars, half_turn: tuple[An
     `start` and `end` are the momentum's directions seen from the body, `half_turn` sine and cosine of half the turn.
     """
     sine, cosine = half_turn
-    scalar = 1.0 + _dot(start, end)
-    shortest = [*_cross(end, start), scalar]
-    about = [sine * component for component in start] + [cosine]
-    return unit(product(quat_xyzw, product(about, shortest)))
+    # The product of both turns; the axis of the second is at a right angle to the first.
+    vector = [cosine * across + sine * (s + e) for across, s, e in zip(_cross(end, start), start, end, strict=True)]
+    return unit(product(quat_xyzw, [*vector, cosine * (1.0 + _dot(start, end))]))
 
 
 def product(first: Scalars, second: Scalars) -> list[Any]:

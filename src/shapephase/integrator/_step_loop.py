@@ -8,7 +8,7 @@ are taken on whole arrays.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from itertools import groupby
 from typing import Any
@@ -19,7 +19,7 @@ from .. import run_progress
 from ..arrays import Array, Integers, read_only
 from ..chebyshev import chebyshev
 from ._rotation_step import STAGES, momentum_step, product, rest_step, tableau, turned, unit, variation
-from .casadi_calls import call_casadi, call_casadi_into
+from .casadi_calls import call_casadi_into
 from .fast import engine
 from .fast.marches import march_in_threads, quaternions_at_rest
 from .interpolant import Interpolant
@@ -60,20 +60,23 @@ def integrate_steps(
     if engine.is_ready():
         return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators, threads)
     total, batch = interpolant.loops * sum(steps.tolist()), len(magnitudes)
-    series, runs = interpolant.coefficients * interpolant.widths[:, None, None], _runs(steps)
+    # What channels of one momentum are multiplied by costs the least on series.
+    folded = float(magnitudes[0]) if batch == 1 else 1.0
+    scale, runs = interpolant.widths[:, None, None] * channel_scale(folded), _runs(steps)
+    series = interpolant.coefficients * scale
     channels, coarse = _channels_of_runs(series, runs), _channels_of_runs(series, runs, in_pairs=True)
-    cut = None if perturbed is None else _channels_at_stages(interpolant, perturbed, steps, in_pairs=True)
+    cut = None if perturbed is None else _channels_of_runs(perturbed * scale, runs, in_pairs=True)
     ends, loops = ends_of_pairs(steps, interpolant.loops), interpolant.loops
     # All steps, pairs of them, and these again where series are perturbed.
     at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
     run_progress.begin(run_progress.STEPPING, -(-batch // at_once) * total * (3 if perturbed is None else 4) // 2)
     if batch <= FEW:
-        states, sides = march_of_few(channels, loops, directions, magnitudes, with_propagators=with_propagators)
-        whole = _record_of_states(states, sides, with_propagators)
-        pairs = _quaternions_of_few(coarse, loops, directions, magnitudes)
+        starts = directions, magnitudes / folded
+        whole = _record_of_few(channels, loops, *starts, with_propagators=with_propagators)
+        pairs = _quaternions_of_few(coarse, loops, *starts)
         whole.stepping[:] = largest_angle(whole.quaternions[:, ends], pairs)
         if cut is not None:
-            whole.truncation[:] = largest_angle(pairs, _quaternions_of_few(cut, loops, directions, magnitudes))
+            whole.truncation[:] = largest_angle(pairs, _quaternions_of_few(cut, loops, *starts))
         return whole
     whole = StepRecord.empty(batch, total, CHECKPOINTS if with_propagators else 0)
     for first in range(0, batch, at_once):
@@ -164,19 +167,19 @@ def _runs(steps: Integers) -> list[tuple[int, int]]:
 
 
 def _channels_of_runs(scaled: Array, runs: list[tuple[int, int]], *, in_pairs: bool = False) -> Array:
-    """Of series times the widths of their panels: (P, n, 9) -> (K, 108)."""
-    terms = scaled.shape[1]
+    """Of series times the widths of their panels: (P, n, k) -> (K, 12 k)."""
+    _, terms, each = scaled.shape
     if len(runs) == 1:
-        return np.matmul(_stage_matrix(terms, runs[0][0], in_pairs), scaled).reshape(-1, 9 * STAGES)
+        return np.matmul(_stage_matrix(terms, runs[0][0], in_pairs), scaled).reshape(-1, each * STAGES)
     matrices = [_stage_matrix(terms, count, in_pairs) for count, _ in runs]
-    channels = np.empty((sum(panels * len(matrix) for matrix, (_, panels) in zip(matrices, runs, strict=True)), 9))
+    channels = np.empty((sum(panels * len(matrix) for matrix, (_, panels) in zip(matrices, runs, strict=True)), each))
     panel = row = 0
     for matrix, (_, panels) in zip(matrices, runs, strict=True):
         stop = row + panels * len(matrix)
-        out = channels[row:stop].reshape(panels, len(matrix), 9)
+        out = channels[row:stop].reshape(panels, len(matrix), each)
         np.matmul(matrix, scaled[panel : panel + panels], out=out)
         panel, row = panel + panels, stop
-    return channels.reshape(-1, 9 * STAGES)
+    return channels.reshape(-1, each * STAGES)
 
 
 @lru_cache(maxsize=512)
@@ -205,40 +208,22 @@ def largest_angle(a: Array, b: Array) -> Any:
     return 2.0 * np.sqrt(largest)
 
 
-def march_of_few(
-    channels: Array, loops: int, directions: Array, magnitudes: Array, *, with_propagators: bool = False
-) -> tuple[Array, Array]:
-    """The states before and after all steps (B, K + 1, 8 or 17), and the steps' turns and dynamic phases (B, K, 2).
-
-    A state is direction, quaternion, magnitude and propagator.
-    """
-    count, batch = len(channels), len(magnitudes)
-    states = np.empty((batch, loops * count + 1, 17 if with_propagators else 8))
-    sides = np.empty((batch, loops * count, 2))
-    states[:, 0], states[:, 0, 6], states[:, 0, 7], states[:, 0, 8::4] = 0.0, 1.0, magnitudes, 1.0
-    states[:, 0, :3] = directions
-    blocks = [channels[first : first + BLOCK] for first in range(0, count, BLOCK)] * loops
+def _record_of_few(
+    channels: Array, loops: int, directions: Array, magnitudes: Array, *, with_propagators: bool
+) -> StepRecord:
+    """All steps of a few momenta; what is no step's own is left empty."""
+    width, (batch, _) = 16 if with_propagators else 7, directions.shape
+    count = loops * len(channels)
+    states, sides = np.empty((batch, count + 1, width)), np.empty((batch, count, 2))
     for row in range(batch):
-        done = 0
-        for block in blocks:
-            after = done + len(block)
-            function = _momentum_function(len(block), with_propagators)
-            results = states[row, done + 1 : after + 1], sides[row, done:after]
-            call_casadi_into(function, (states[row, done], block), results)
-            run_progress.advance(len(block))
-            done = after
-    return states, sides
-
-
-def _record_of_states(states: Array, sides: Array, with_propagators: bool) -> StepRecord:
-    batch, ends, _ = states.shape
-    marks = checkpoint_steps(ends - 1) if with_propagators else []
+        _march(_momentum_function, channels, loops, directions[row], magnitudes[row], states[row], sides[row])
+    marks = checkpoint_steps(count) if with_propagators else []
     return StepRecord(
         quaternions=states[:, :, 3:7],
         directions=states[:, :, :3],
         turns=sides[:, :, 0],
         dynamics=sides[:, :, 1],
-        propagators=states[:, marks, 8:].reshape(batch, -1, 3, 3),
+        propagators=states[:, marks, 7:].reshape(batch, -1, 3, 3),
         stepping=np.empty(batch),
         truncation=np.zeros(batch),
     )
@@ -246,7 +231,37 @@ def _record_of_states(states: Array, sides: Array, with_propagators: bool) -> St
 
 def _quaternions_of_few(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
     """The quaternions alone at the ends of all steps: (B, K + 1, 4)."""
-    return march_of_few(channels, loops, directions, magnitudes)[0][:, :, 3:7]
+    states = np.empty((len(magnitudes), loops * len(channels) + 1, 7))
+    for row in range(len(magnitudes)):
+        _march(_attitude_function, channels, loops, directions[row], magnitudes[row], states[row])
+    return states[:, :, 3:7]
+
+
+def _march(
+    function_of: Callable[[int, int], Any], channels: Array, loops: int, direction: Array, magnitude: float,
+    states: Array, *sides: Array,
+) -> None:  # fmt: skip
+    """One momentum after another from the identity, by functions of so many steps: states (K + 1, n), sides (K, 2).
+
+    A state is direction, quaternion and propagator.
+    """
+    first, count, done = states[0], len(channels), 0
+    first[:], first[:3], first[6], first[7::4] = 0.0, direction, 1.0, 1.0
+    if magnitude != 1.0:
+        channels = (channels.reshape(-1, 9) * channel_scale(magnitude)).reshape(count, -1)
+    for _ in range(loops):
+        for start in range(0, count, BLOCK):
+            block = channels[start : start + BLOCK]
+            after = done + len(block)
+            results = [states[done + 1 : after + 1], *(side[done:after] for side in sides)]
+            call_casadi_into(function_of(len(block), states.shape[1]), (states[done], block), results)
+            run_progress.advance(len(block))
+            done = after
+
+
+def channel_scale(magnitude: float) -> Array:
+    """What channels are multiplied by where the momentum is a direction: (9,)."""
+    return np.array([magnitude] * 6 + [1.0] * 3)
 
 
 def _record_many(
@@ -321,19 +336,21 @@ def _quaternions_at_rest(interpolant: Interpolant, coefficients: Array, steps: I
         quaternions = quaternions_at_rest(interpolant.widths, coefficients, steps)
         run_progress.advance(len(quaternions) - 1)
     else:
-        quaternions = _quaternions_of_one_loop(_channels_at_stages(interpolant, coefficients, steps))
+        half_rates = coefficients[:, :, 6:] * (-0.5 * interpolant.widths)[:, None, None]
+        quaternions = _quaternions_of_one_loop(_channels_of_runs(half_rates, _runs(steps)))
     return _repeated(quaternions, interpolant.loops) if interpolant.loops > 1 else quaternions
 
 
-def _quaternions_of_one_loop(channels: Array) -> Array:
-    count = len(channels)
+def _quaternions_of_one_loop(half_rates: Array) -> Array:
+    """From half the rates at all stages, times the steps' lengths: (K, 36) -> (K + 1, 4)."""
+    count = len(half_rates)
     quaternions = np.empty((count + 1, 4))
     quaternions[0] = [0.0, 0.0, 0.0, 1.0]
-    drifts = np.ascontiguousarray(channels.reshape(count, STAGES, 9)[:, :, 6:]).reshape(count, -1)
     for first in range(0, count, BLOCK):
-        block = drifts[first : first + BLOCK]
-        (states,) = call_casadi(_rest_function(len(block)), len(block), quaternions[first], block)
-        quaternions[first + 1 : first + BLOCK + 1] = states
+        block = half_rates[first : first + BLOCK]
+        call_casadi_into(
+            _rest_function(len(block)), (quaternions[first], block), [quaternions[first + 1 : first + BLOCK + 1]]
+        )
         run_progress.advance(len(block))
     return quaternions
 
@@ -368,12 +385,11 @@ def _next_propagator(propagator: Any, start: Any, end: Any, magnitude: Any, chan
     first, second = (channels[stage] for stage in _INNER_STAGES)
     inner = [0.5 * (a + b) for a, b in zip(first[:6], second[:6], strict=True)]
     quarter = variation(middle, [*inner, *(0.125 * (a + b) for a, b in zip(first[6:], second[6:], strict=True))])
-    onward, back = (
-        [[float(i == j) + sign * quarter[i][j] for j in range(3)] for i in range(3)] for sign in (1.0, -1.0)
-    )
+    back = [[float(i == j) - quarter[i][j] for j in range(3)] for i in range(3)]
     adjugate = adjugate_of(back)
-    scale = 1.0 / (back[0][0] * adjugate[0][0] + back[0][1] * adjugate[1][0] + back[0][2] * adjugate[2][0])
-    half = matrix_product([[scale * entry for entry in row] for row in adjugate], onward)
+    twice = 2.0 / (back[0][0] * adjugate[0][0] + back[0][1] * adjugate[1][0] + back[0][2] * adjugate[2][0])
+    # Of a matrix M the Cayley transform is 2 / (1 - M) - 1.
+    half = [[twice * adjugate[i][j] - float(i == j) for j in range(3)] for i in range(3)]
     return matrix_product(half, matrix_product(half, propagator))
 
 
@@ -383,42 +399,77 @@ def matrix_product(a: Any, b: Any) -> list[list[Any]]:
 
 
 @lru_cache(maxsize=1024)
-def _momentum_function(length: int, with_propagators: bool) -> Any:
-    """`length` steps as one CasADi function of the state (direction, quaternion, magnitude, propagator)."""
-    return momentum_step_function(with_propagators).mapaccum("steps", length)
+def _momentum_function(length: int, width: int) -> Any:
+    """`length` steps as one CasADi function of the state of so many numbers, and of channels."""
+    return momentum_step_function(with_propagators=width > 7).mapaccum("steps", length)
+
+
+@lru_cache(maxsize=1024)
+def _attitude_function(length: int, _width: int) -> Any:
+    """The same without turns and dynamic phases."""
+    return attitude_step_function().mapaccum("steps", length)
 
 
 @lru_cache(maxsize=512)
 def _rest_function(length: int) -> Any:
-    """`length` steps without momentum as one CasADi function of the quaternion and the drifts."""
+    """`length` steps without momentum as one CasADi function of the quaternion and half the rates."""
     return rest_step_function().mapaccum("steps", length)
 
 
 @lru_cache(maxsize=2)
-def momentum_step_function(with_propagators: bool) -> Any:
-    """One step as a CasADi function: state and channels -> the next state; turn and dynamic phase."""
+def momentum_step_function(*, with_propagators: bool) -> Any:
+    """One step as a CasADi function: state and channels, I^-1 times the magnitude -> next state; turn, dynamic phase.
+
+    The state is direction, quaternion and propagator.
+    """
     import casadi
 
-    state, data = casadi.SX.sym("state", 17 if with_propagators else 8), casadi.SX.sym("channels", 9 * STAGES)
-    parts, components = casadi.vertsplit(state), casadi.vertsplit(data)
-    channels = [components[9 * s : 9 * s + 9] for s in range(STAGES)]
-    direction, quaternion, magnitude = parts[:3], parts[3:7], parts[7]
-    end, turn, dynamic = momentum_step(direction, magnitude, channels)
-    attitude = turned(quaternion, direction, end, (casadi.sin(0.5 * turn), casadi.cos(0.5 * turn)))
-    following = [*end, *attitude, magnitude]
+    state, data, channels = _symbols(16 if with_propagators else 7)
+    parts = casadi.vertsplit(state)
+    end, attitude, sides = _following(parts, channels, with_dynamic=True)
+    following = [*end, *attitude]
     if with_propagators:
-        propagator = [parts[8 + 3 * i : 11 + 3 * i] for i in range(3)]
-        following += [part for row in _next_propagator(propagator, direction, end, magnitude, channels) for part in row]
+        propagator = [parts[7 + 3 * i : 10 + 3 * i] for i in range(3)]
+        following += [part for row in _next_propagator(propagator, parts[:3], end, 1.0, channels) for part in row]
     name = "momentum_step_with_propagator" if with_propagators else "momentum_step"
-    return casadi.Function(name, [state, data], [casadi.vertcat(*following), casadi.vertcat(turn, dynamic)])
+    return casadi.Function(name, [state, data], [casadi.vertcat(*following), casadi.vertcat(*sides)])
+
+
+@lru_cache(maxsize=1)
+def attitude_step_function() -> Any:
+    """The same of direction and quaternion alone."""
+    import casadi
+
+    state, data, channels = _symbols(7)
+    end, attitude, _ = _following(casadi.vertsplit(state), channels, with_dynamic=False)
+    return casadi.Function("attitude_step", [state, data], [casadi.vertcat(*end, *attitude)])
+
+
+def _symbols(width: int) -> tuple[Any, Any, list[list[Any]]]:
+    """A state of so many numbers, the channels of a step, and these by stages."""
+    import casadi
+
+    state, data = casadi.SX.sym("state", width), casadi.SX.sym("channels", 9 * STAGES)
+    components = casadi.vertsplit(data)
+    return state, data, [components[9 * s : 9 * s + 9] for s in range(STAGES)]
+
+
+def _following(parts: list[Any], channels: list[list[Any]], *, with_dynamic: bool) -> tuple[Any, Any, tuple[Any, Any]]:
+    """Direction, quaternion, turn and dynamic phase after a step."""
+    import casadi
+
+    direction, quaternion = parts[:3], parts[3:7]
+    end, turn, dynamic = momentum_step(direction, 1.0, channels, with_dynamic=with_dynamic)
+    half_turn = casadi.sin(0.5 * turn), casadi.cos(0.5 * turn)
+    return end, turned(quaternion, direction, end, half_turn), (turn, dynamic)
 
 
 @lru_cache(maxsize=1)
 def rest_step_function() -> Any:
-    """One step without momentum as a CasADi function: quaternion and drifts -> the next one."""
+    """One step without momentum as a CasADi function: quaternion and half the rates of turning -> the next one."""
     import casadi
 
-    state, data = casadi.SX.sym("state", 4), casadi.SX.sym("drifts", 3 * STAGES)
+    state, data = casadi.SX.sym("state", 4), casadi.SX.sym("half_rates", 3 * STAGES)
     components = casadi.vertsplit(data)
     turn = rest_step([components[3 * s : 3 * s + 3] for s in range(STAGES)])
     following = casadi.vertcat(*unit(product(casadi.vertsplit(state), turn)))

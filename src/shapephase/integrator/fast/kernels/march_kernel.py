@@ -62,10 +62,11 @@ def _turn(s, lanes):
         x, y, z = s[_START + i], s[_START + LANES + i], s[_START + 2 * LANES + i]
         u, v, w = s[_END + i], s[_END + LANES + i], s[_END + 2 * LANES + i]
         cosine, sine = cos_sin(0.5 * s[_TURN + i])
-        b0, b1, b2, b3 = product(
-            sine * x, sine * y, sine * z, cosine,
-            v * z - w * y, w * x - u * z, u * y - v * x, 1.0 + (x * u + y * v + z * w),
-        )  # fmt: skip
+        # The axis of the second turn is at a right angle to that of the first.
+        b0 = cosine * (v * z - w * y) + sine * (x + u)
+        b1 = cosine * (w * x - u * z) + sine * (y + v)
+        b2 = cosine * (u * y - v * x) + sine * (z + w)
+        b3 = cosine * (1.0 + (x * u + y * v + z * w))
         a0, a1, a2, a3 = product(
             s[_QUATERNION + i], s[_QUATERNION + LANES + i], s[_QUATERNION + 2 * LANES + i],
             s[_QUATERNION + 3 * LANES + i], b0, b1, b2, b3,

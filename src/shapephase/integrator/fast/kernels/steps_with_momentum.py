@@ -132,10 +132,10 @@ def grown(c, b, x, y, z, g0, g1, g2, g3, g4, g5, g6, g7, g8):
     f0, f1, f2 = a4 * a8 - m5 * m7, m2 * m7 + m1 * a8, m1 * m5 + m2 * a4
     f3, f4, f5 = m5 * m6 + m3 * a8, a0 * a8 - m2 * m6, m2 * m3 + a0 * m5
     f6, f7, f8 = m3 * m7 + a4 * m6, m1 * m6 + a0 * m7, a0 * a4 - m1 * m3
-    scale = 1.0 / (a0 * f0 - m1 * f3 - m2 * f6)
-    h0, h1, h2, h3, h4, h5, h6, h7, h8 = _times(
-        scale * f0, scale * f1, scale * f2, scale * f3, scale * f4, scale * f5, scale * f6, scale * f7, scale * f8,
-        1.0 + m0, m1, m2, m3, 1.0 + m4, m5, m6, m7, 1.0 + m8,
-    )  # fmt: skip
+    twice = 2.0 / (a0 * f0 - m1 * f3 - m2 * f6)
+    # Of a matrix M the Cayley transform is 2 / (1 - M) - 1.
+    h0, h1, h2 = twice * f0 - 1.0, twice * f1, twice * f2
+    h3, h4, h5 = twice * f3, twice * f4 - 1.0, twice * f5
+    h6, h7, h8 = twice * f6, twice * f7, twice * f8 - 1.0
     g0, g1, g2, g3, g4, g5, g6, g7, g8 = _times(h0, h1, h2, h3, h4, h5, h6, h7, h8, g0, g1, g2, g3, g4, g5, g6, g7, g8)
     return _times(h0, h1, h2, h3, h4, h5, h6, h7, h8, g0, g1, g2, g3, g4, g5, g6, g7, g8)
