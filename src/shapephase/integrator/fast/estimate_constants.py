@@ -77,7 +77,7 @@ VERY_FAR = 100.0
 """[rad] the same of short steps; they were right to 3 % in turns of half as much, and to 30 % in the double."""
 MANY_STEPS = 4000.0
 """Steps of one motion from which on propagators are not integrated along: the derivative of coarser ones costs less."""
-NEGLIGIBLE = 0.1
+NEGLIGIBLE = 0.15
 """Of the tolerance: below, what the samplers say, amplified, is not worth a march of its own, though it is too much."""
 FORESEEN = 1.5
 """Of the tolerance: what defects would come to if they added up may be this large; most of it cancels along the way."""
@@ -95,7 +95,7 @@ FEW_STEPS = 1000.0
 """Of a motion, up to which a look ahead pays: of more a second round costs little but the steps themselves."""
 MOST_SHORTENED = 4.0
 """How many times the steps become more at once."""
-EXPECTED_GROWTH = 0.5
+EXPECTED_GROWTH = 0.2
 """What errors are expected to grow by for each radian turned, before it is known."""
 MOST_EXPECTED_GROWTH = 30.0
 
