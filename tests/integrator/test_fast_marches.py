@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import fields
 from itertools import pairwise
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -229,6 +231,20 @@ def test_momenta_do_not_see_each_other_nor_threads(path, rng, loops):
         alone = path.march(directions[row : row + 1], magnitudes[row : row + 1], **options)
         for field in fields(StepRecord):
             assert np.array_equal(getattr(together, field.name)[row], getattr(alone, field.name)[0])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_child_of_a_process_with_waiting_threads_has_its_own(path, rng):
+    """Those that wait for the next call are not copied by a fork."""
+    directions, magnitudes = momenta(rng, 300)
+    path.march(directions, magnitudes, threads=2)
+    with get_context("fork").Pool(1) as pool:
+        found = pool.apply_async(_marched, (path, directions, magnitudes)).get(timeout=60.0)
+    assert np.array_equal(found, _marched(path, directions, magnitudes))
+
+
+def _marched(path, directions, magnitudes):
+    return path.march(directions, magnitudes, threads=2).quaternions
 
 
 def test_without_momentum_a_constant_drift_is_one_rotation():

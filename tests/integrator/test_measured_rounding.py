@@ -79,6 +79,18 @@ def test_rounding_that_sparse_samples_overrate_is_looked_at_again():
         assert "rounding" in str(lost[1])
 
 
+@pytest.mark.usefixtures("fast")
+def test_what_no_further_round_would_change_is_refused_at_once(monkeypatch: pytest.MonkeyPatch):
+    """Samples and steps that are asked for once more in the same way give the same."""
+    asked = []
+    attempt = Integration.attempt
+    monkeypatch.setattr(Integration, "attempt", lambda self: asked.append(self._refinement) or attempt(self))
+    trial = mixed(8401, np.random.default_rng((301, 8401)))
+    with pytest.raises(AccuracyNotReached, match="rounding"):
+        sp.reconstruct(sp.articulated(trial.body, trial.path), trial.momentum, tolerance=trial.tolerance)
+    assert len(asked) == len(set(asked)) < 4
+
+
 def test_a_bound_far_below_the_tolerance_is_believed_and_no_measure_is_far_below_it():
     interpolant, steps = rigid(4.0), np.full(8, 4)
     size = np.array([np.linalg.norm(MOMENTUM)])

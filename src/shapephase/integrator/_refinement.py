@@ -75,11 +75,16 @@ class Errors(NamedTuple):
     @property
     def worst(self) -> Errors:
         """The largest of each: (1,)."""
-        return Errors(*(part.max(initial=0.0, keepdims=True) for part in self[:6]), *self[6:])
+        return self._replace(**{name: part.max(initial=0.0, keepdims=True) for name, part in self._of_momenta})
 
     def of(self, rows: Integers) -> Errors:
         """Of some of the momenta."""
-        return Errors(*(part[rows] for part in self[:6]), *self[6:])
+        return self._replace(**{name: part[rows] for name, part in self._of_momenta})
+
+    @property
+    def _of_momenta(self) -> list[tuple[str, Array]]:
+        """All but the last two, with their names."""
+        return list(zip(self._fields, self[:6], strict=False))
 
     def are_the_last(self, tolerance: float, number: int, best: Array) -> Mask:
         """Whether more than so many rounds, of which the best had estimates (n,), will not help: (n,)."""

@@ -146,7 +146,11 @@ class Integration:
         if not np.count_nonzero(lost):
             return None
         row = int(np.argmax(lost))
-        return row, _not_reached(self._tolerance, errors, row)
+        return row, self.not_reached(errors, row)
+
+    def not_reached(self, errors: Errors, row: int) -> AccuracyNotReached:
+        """The error of a row that no further round will help."""
+        return _not_reached(self._tolerance, errors, row)
 
     @cached_property
     def is_long(self) -> bool:

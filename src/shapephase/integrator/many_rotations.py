@@ -199,6 +199,9 @@ def _further(
         raise _of_row(error, group.rows[failed[row : row + 1]], count) from None
     together: dict[Refinement, list[int]] = {}
     for place, refinement in enumerate(_rounded(integration.refined(errors), group.history[-1]).each()):
+        if refinement == group.history[-1]:
+            # The next round would be the same.
+            raise _of_row(integration.not_reached(errors, place), group.rows[failed[place : place + 1]], count)
         together.setdefault(refinement, []).append(place)
     best = np.minimum(best, errors.estimate)
     for refinement, members in together.items():
