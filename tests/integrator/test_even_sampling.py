@@ -8,8 +8,8 @@ import pytest
 
 import shapephase as sp
 from shapephase.arrays import Array
-from shapephase.integrator._even_sampling import EvenSampler, _even_to_panel
 from shapephase.integrator._spectral_error import Channels
+from shapephase.integrator.even.even_sampling import EvenSampler, _even_to_panel
 from shapephase.integrator.panels.panel_sampling import PanelSampler
 from support.both_engines import both
 

@@ -15,8 +15,6 @@ from scipy.integrate import DOP853, solve_ivp
 import shapephase as sp
 from shapephase import so3
 from shapephase.arrays import read_only
-from shapephase.integrator._error_propagator import _growths_and_rounding
-from shapephase.integrator._rotation_step import STAGES, momentum_step, turned, variation
 from shapephase.integrator.fast._plain import plain
 from shapephase.integrator.fast.marches import (
     derivatives,
@@ -24,7 +22,9 @@ from shapephase.integrator.fast.marches import (
     march_in_threads,
     quaternions_at_rest,
 )
-from shapephase.integrator.step_record import StepRecord
+from shapephase.integrator.steps.error_propagator import _growths_and_rounding
+from shapephase.integrator.steps.rotation_step import STAGES, momentum_step, turned, variation
+from shapephase.integrator.steps.step_record import StepRecord
 from support.independent import cross
 
 pytestmark = pytest.mark.usefixtures("fast")

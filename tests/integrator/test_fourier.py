@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shapephase.integrator._fourier import fourier_parts
+from shapephase.integrator.even.fourier import fourier_parts
 
 EPS = np.finfo(float).eps
 

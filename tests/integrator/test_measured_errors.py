@@ -10,16 +10,16 @@ from scipy.integrate import DOP853
 import shapephase as sp
 from shapephase import so3
 from shapephase.chebyshev import nodes_on, values_to_coefficients
-from shapephase.integrator import _step_loop as step_loop
-from shapephase.integrator._error_propagator import growth_and_rounding, largest_growth
-from shapephase.integrator._even_sampling import EvenSampler
 from shapephase.integrator._last_terms import perturbed_series
 from shapephase.integrator._refinement import Errors, Refinement
 from shapephase.integrator._spectral_error import Channels
-from shapephase.integrator._step_control import StepRequirements
+from shapephase.integrator.even.even_sampling import EvenSampler
 from shapephase.integrator.fast.estimate_constants import DENSE_SHARE
 from shapephase.integrator.integrate import Integration
 from shapephase.integrator.interpolant import Interpolant
+from shapephase.integrator.steps import step_loop
+from shapephase.integrator.steps.error_propagator import growth_and_rounding, largest_growth
+from shapephase.integrator.steps.step_control import StepRequirements
 from support.compiler import needs_compiler
 from support.independent import random_rotation
 from support.long_runs import full_but

@@ -10,9 +10,7 @@ from benchmarks.random_motions import mixed
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached
 from shapephase.integrator import integrate
-from shapephase.integrator._measured_rounding import measured_rounding, noise_of_series
 from shapephase.integrator._refinement import Errors
-from shapephase.integrator._step_loop import integrate_steps
 from shapephase.integrator.fast.estimate_constants import (
     EPS,
     LEAST_NOISE,
@@ -24,6 +22,8 @@ from shapephase.integrator.fast.estimate_constants import (
 from shapephase.integrator.integrate import Integration
 from shapephase.integrator.interpolant import Interpolant
 from shapephase.integrator.sampling import FinishedSampler
+from shapephase.integrator.steps.measured_rounding import measured_rounding, noise_of_series
+from shapephase.integrator.steps.step_loop import integrate_steps
 from support.compiler import needs_compiler
 
 MOMENTS = np.array([1.0, 2.0, 3.5])

@@ -10,12 +10,12 @@ from numpy.polynomial import chebyshev
 
 from shapephase.chebyshev import end_margin, widest_margin
 from shapephase.integrator._last_terms import perturbed_series
-from shapephase.integrator._step_control import StepRequirements
 from shapephase.integrator.fast.panels import Demand, PanelsToSample, sampled_round
 from shapephase.integrator.interpolant import Interpolant
 from shapephase.integrator.panels.finer_panels import FinerPanels, refining_factors
 from shapephase.integrator.panels.panel_series import PanelSeries, panel_errors, sample_times, series_through
 from shapephase.integrator.resolved import Hidden
+from shapephase.integrator.steps.step_control import StepRequirements
 from support.both_engines import both
 
 EPS = np.finfo(float).eps

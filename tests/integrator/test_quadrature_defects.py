@@ -10,9 +10,6 @@ import pytest
 from numpy.polynomial import Chebyshev
 from scipy.integrate import DOP853
 
-from shapephase.integrator._quadrature_defects import Defects, PanelDefects, defect_table
-from shapephase.integrator._step_control import StepRequirements
-from shapephase.integrator._step_loop import integrate_steps_at_rest
 from shapephase.integrator.fast.estimate_constants import (
     BY_CHANCE,
     DEFECT_STEPS,
@@ -21,6 +18,9 @@ from shapephase.integrator.fast.estimate_constants import (
     FULL_ORDER,
 )
 from shapephase.integrator.interpolant import Interpolant
+from shapephase.integrator.steps.quadrature_defects import Defects, PanelDefects, defect_table
+from shapephase.integrator.steps.step_control import StepRequirements
+from shapephase.integrator.steps.step_loop import integrate_steps_at_rest
 from support.both_engines import both
 
 

@@ -17,9 +17,9 @@ import numpy as np
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev, derivative_matrix
 from ..display import short_repr
-from ._rotation_step import momentum_step, product, rest_step, tableau, turned
 from .fast.estimate_constants import TERMS
 from .interpolant import Interpolant
+from .steps.rotation_step import momentum_step, product, rest_step, tableau, turned
 
 # From the first neglected Chebyshev coefficient to the largest error of a Hermite polynomial: x (1 - x) is at most a
 # fourth, and the leading coefficient of that Chebyshev polynomial is 2^(4 TERMS - 1).

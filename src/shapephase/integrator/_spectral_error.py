@@ -13,8 +13,8 @@ from .. import run_progress
 from ..arrays import Array, Integers, Mask
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
-from ._fourier import fourier_parts
 from .casadi_calls import map_rows
+from .even.fourier import fourier_parts
 from .fast.estimate_constants import (
     AT_ROUNDING,
     CONVERGED_TAIL,

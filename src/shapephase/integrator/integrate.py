@@ -17,12 +17,8 @@ import numpy as np
 from ..arguments import LOOSEST_TOLERANCE
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from ._error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
 from ._last_terms import Perturbed
-from ._measured_rounding import measured_rounding
 from ._refinement import Errors, Refinement, Refinements
-from ._step_control import StepRequirements
-from ._step_loop import integrate_steps, integrate_steps_at_rest, stage_channels
 from .fast import engine
 from .fast.estimate_constants import (
     EXPECTED_GROWTH,
@@ -34,8 +30,13 @@ from .fast.estimate_constants import (
 from .fast.rounds import Round, rounds_of_one
 from .interpolant import Interpolant
 from .sampling import Sampler
-from .step_record import StepRecord
 from .stepped import SteppedRotation, for_whole_batch
+from .steps.error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
+from .steps.measured_rounding import measured_rounding
+from .steps.stage_channels import stage_channels
+from .steps.step_control import StepRequirements
+from .steps.step_loop import integrate_steps, integrate_steps_at_rest
+from .steps.step_record import StepRecord
 
 # Steps of one motion: some ten seconds, and a gigabyte of results.
 _MOST_STEPS = 4_000_000

@@ -10,9 +10,9 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..display import short_repr
-from ._error_propagator import growth_and_rounding
-from ._step_loop import largest_angle, quaternions_alone
 from .stepped import SteppedRotation
+from .steps.error_propagator import growth_and_rounding
+from .steps.step_loop import largest_angle, quaternions_alone
 
 # Of the motion's error estimate: what the steps of its lift are to err by at most.
 _SHARE = 0.1

@@ -13,9 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..arrays import Array
-from ._even_sampling import EvenSampler
 from ._last_terms import Perturbed
 from ._spectral_error import Channels, Directly, Evaluate, RememberedChannels, SampledChannels
+from .even.even_sampling import EvenSampler
 from .fast import engine
 from .interpolant import Interpolant
 from .panels.panel_sampling import PanelSampler

@@ -11,12 +11,12 @@ from .. import so3, sphere
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..display import short_repr
 from ._dense_output import DenseOutput
-from ._error_propagator import momentum_slope
 from ._last_terms import Perturbed
-from ._step_loop import stage_channels
 from .fast.estimate_constants import DENSE_SHARE
 from .fast.threads import in_threads
 from .interpolant import Interpolant
+from .steps.error_propagator import momentum_slope
+from .steps.stage_channels import stage_channels
 
 _BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
-from .._fourier import fourier_parts
+from ..even.fourier import fourier_parts
 from ._plain import plain
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import run_progress
 from ...arrays import Array, Integers
-from ..step_record import StepRecord
+from ..steps.step_record import StepRecord
 from ._plain import plain
 from .threads import in_threads
 

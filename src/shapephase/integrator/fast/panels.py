@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Integers
 from ...chebyshev import MARGIN_OF_WIDTH, on_halves, unit_nodes, values_to_coefficients
-from .._quadrature_defects import Defects, defect_table, signed_defects
+from ..steps.quadrature_defects import Defects, defect_table, signed_defects
 from ._plain import plain
 from .estimate_constants import HIGHEST_DEGREE
 

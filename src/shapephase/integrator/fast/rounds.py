@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array, Integers
-from .._quadrature_defects import Defects, defect_table, signed_defects
 from ..interpolant import Interpolant
-from ..step_record import CHECKPOINTS, StepRecord
+from ..steps.quadrature_defects import Defects, defect_table, signed_defects
+from ..steps.step_record import CHECKPOINTS, StepRecord
 from ._plain import plain
 from .marches import segments_of
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array, Integers
-from ..step_record import StepRecord
+from ..steps.step_record import StepRecord
 from ._plain import plain
 from .marches import segments_of
 

@@ -18,11 +18,8 @@ import numpy as np
 from ... import run_progress, so3
 from ...arrays import Array, Integers, Mask
 from ...errors import AccuracyNotReached, SingularInertiaError
-from .._error_propagator import growth_and_rounding
 from .._last_terms import Perturbed, perturbed_series
 from .._spectral_error import spectral_norms
-from .._step_control import StepRequirements
-from .._step_loop import checkpoint_steps, integrate_steps
 from ..fast import engine
 from ..fast.threads import processors
 from ..fast.variants import march_variants
@@ -30,8 +27,11 @@ from ..integrate import norms
 from ..interpolant import Interpolant
 from ..many_rotations import GroupedRotations, rotations_of_each, rounded_up
 from ..sampling import Samplers
-from ..step_record import StepRecord
 from ..stepped import SteppedRotation, estimate_from_ends
+from ..steps.error_propagator import growth_and_rounding
+from ..steps.step_control import StepRequirements
+from ..steps.step_loop import integrate_steps
+from ..steps.step_record import StepRecord, checkpoint_steps
 from .shared_panels import ManySeries, SharedPanels
 
 # Of the tolerance: what the panels of the model may leave, so that deformations like it stay below a third of it.

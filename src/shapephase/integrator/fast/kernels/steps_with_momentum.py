@@ -1,6 +1,6 @@
 """One step of the momentum's direction with its turn and dynamic phase, and of how a small turn of the start grows.
 
-The formulas are those of `shapephase.integrator._rotation_step`, for the numbers of one lane: everything is a local
+The formulas are those of `shapephase.integrator.steps.rotation_step`, for the numbers of one lane: all is a local
 variable, so that a loop over lanes around it becomes vectors. Channels stand as `_stage_series` has them.
 """
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Array, Integers
+from ...arrays import Array, Integers, read_only
 
 # Times between which the growth of errors is compared: 28 pairs.
 CHECKPOINTS = 8
@@ -50,6 +51,12 @@ class StepRecord:
             stepping=np.empty(batch),
             truncation=np.zeros(batch),
         )
+
+
+@lru_cache(maxsize=256)
+def checkpoint_steps(count: int) -> Integers:
+    """After how many of so many steps the propagators are kept: (CHECKPOINTS,), the first none, the last all."""
+    return read_only(np.arange(CHECKPOINTS) * count // (CHECKPOINTS - 1))
 
 
 def ends_of_pairs(steps: Integers, loops: int) -> Integers:

@@ -14,9 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Array, Integers, read_only
-from ._rotation_step import tableau
-from .fast.estimate_constants import (
+from ...arrays import Array, Integers, read_only
+from ..fast.estimate_constants import (
     AT_REST,
     BY_CHANCE,
     DEFECT_DEGREES,
@@ -33,6 +32,7 @@ from .fast.estimate_constants import (
     TINY,
     UNRESOLVED,
 )
+from .rotation_step import tableau
 from .step_record import ends_of_pairs
 
 # Of sums of stages by weights up to six.

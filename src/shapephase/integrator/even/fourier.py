@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..arrays import Array
+from ...arrays import Array
 
 # Samples: for so many a product of matrices takes less time than a fast transform, which prime numbers delay most.
 _FEW_SAMPLES = 170

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Integers
-from ._last_terms import Perturbed
-from ._spectral_error import (
+from ...arrays import Array, Integers
+from .._last_terms import Perturbed
+from .._spectral_error import (
     EPS,
     SampledChannels,
     TailEstimate,
@@ -20,9 +20,9 @@ from ._spectral_error import (
     tail_length,
     unaveraged_share,
 )
-from .fast import engine
-from .fast.loops import errors_of_loop
-from .interpolant import Interpolant
+from ..fast import engine
+from ..fast.loops import errors_of_loop
+from ..interpolant import Interpolant
 
 # Samples of a loop, beyond which panels need fewer.
 _MOST_SAMPLES = 768

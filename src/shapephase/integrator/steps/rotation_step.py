@@ -13,7 +13,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-from ..arrays import Array
+from ...arrays import Array
 
 Scalars = Any  # numbers, arrays or symbols, one for each component
 STAGES = 12

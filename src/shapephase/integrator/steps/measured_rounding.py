@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Array, Integers
-from ._step_loop import largest_angle, quaternions_alone
-from .fast.estimate_constants import (
+from ...arrays import Array, Integers
+from ..fast.estimate_constants import (
     EPS,
     LEAST_NOISE,
     LEAST_OF_BOUND,
@@ -16,7 +15,8 @@ from .fast.estimate_constants import (
     OTHER_ROUNDINGS,
     ROUNDING_BY_CHANCE,
 )
-from .interpolant import Interpolant
+from ..interpolant import Interpolant
+from .step_loop import largest_angle, quaternions_alone
 from .step_record import StepRecord
 
 # Numbers of quaternions at once: eight megabytes.

@@ -8,22 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import so3
-from ..arrays import Array
-from ._rotation_step import STAGES, attitude_step
-from ._step_loop import (
-    BLOCK,
-    CHECKPOINTS,
-    adjugate_of,
-    attitude_step_function,
-    channel_scale,
-    checkpoint_steps,
-    matrix_product,
-)
-from .casadi_calls import call_casadi, map_rows
-from .fast import engine
-from .fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
-from .fast.marches import derivatives, growths_and_rounding
+from ... import so3
+from ...arrays import Array
+from ..casadi_calls import call_casadi, map_rows
+from ..fast import engine
+from ..fast.estimate_constants import EPS, ROUNDING_OF_RADIAN, ROUNDING_OF_START, ROUNDING_OF_STEP
+from ..fast.marches import derivatives, growths_and_rounding
+from .casadi_marches import BLOCK, attitude_step_function
+from .propagator_step import adjugate_of, matrix_product
+from .rotation_step import STAGES, attitude_step
+from .stage_channels import channel_scale
+from .step_record import CHECKPOINTS, checkpoint_steps
 
 # Of each entry of an adjugate, row by row: first times second less third times fourth of these entries.
 _COFACTORS = np.array(

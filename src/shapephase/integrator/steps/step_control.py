@@ -7,11 +7,10 @@ from math import sqrt
 
 import numpy as np
 
-from ..arrays import Array, Integers
-from ._quadrature_defects import Defects, PanelDefects, ones, signed_defects
-from ._spectral_error import spectral_norms
-from .fast import engine
-from .fast.estimate_constants import (
+from ...arrays import Array, Integers
+from .._spectral_error import spectral_norms
+from ..fast import engine
+from ..fast.estimate_constants import (
     AIM,
     DEFECT_DEGREES,
     DEFECT_STEPS,
@@ -33,8 +32,9 @@ from .fast.estimate_constants import (
     TURN_A_STEP,
     VERY_FAR,
 )
-from .fast.panels import defects_of_panels, plan_of_steps, sizes_of_terms
-from .interpolant import Interpolant
+from ..fast.panels import defects_of_panels, plan_of_steps, sizes_of_terms
+from ..interpolant import Interpolant
+from .quadrature_defects import Defects, PanelDefects, ones, signed_defects
 
 
 @dataclass(eq=False)

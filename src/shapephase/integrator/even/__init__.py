@@ -1,0 +1,1 @@
+"""Loops sampled at even times."""
