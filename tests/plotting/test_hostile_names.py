@@ -151,11 +151,14 @@ def check_in_browser(page, said, asked):
         "connect-src": "fetch('http://example.invalid/').catch(() => 0)",
         "img-src": "new Image().src = 'http://example.invalid/x.png'",
         "script-src-elem": "document.head.append(Object.assign(document.createElement('script'), {text: 'owned = 1'}))",
-        "script-src-attr": "document.body.insertAdjacentHTML('beforeend', '<b onclick=0>')",
+        # Some browsers look at a handler when it is set, some when it is to run.
+        "script-src-attr": "document.body.insertAdjacentHTML('beforeend', '<b onclick=0>'); "
+        "document.body.lastElementChild.click()",
         "frame-src": "document.body.append(Object.assign(document.createElement('iframe'), {src: 'http://a.invalid'}))",
     }
     for directive, deed in tries.items():
         listening = "document.addEventListener('securitypolicyviolation', e => done(e.effectiveDirective)"
-        refused = page.evaluate(f"() => new Promise(done => {{ {listening}, {{once: true}}); {deed}; }})")
+        at_last = "setTimeout(() => done('nothing'), 60000)"
+        refused = page.evaluate(f"() => new Promise(done => {{ {listening}, {{once: true}}); {at_last}; {deed}; }})")
         assert refused == directive
     assert page.evaluate(MARK) is None

@@ -13,7 +13,6 @@ from ...arrays import Array
 from ..casadi_calls import call_casadi_into
 from .propagator_step import next_propagator
 from .rotation_step import STAGES, momentum_step, product, rest_step, turned, unit
-from .stage_channels import channel_scale
 from .step_record import StepRecord, checkpoint_steps
 
 # Steps in one CasADi call: enough for the cost of a call not to show, and few different lengths to build.
@@ -24,18 +23,18 @@ def record_of_few(
     channels: Array, loops: int, directions: Array, magnitudes: Array, *, with_propagators: bool
 ) -> StepRecord:
     """All steps of a few momenta; what is no step's own is left empty."""
-    width, (batch, _) = 16 if with_propagators else 7, directions.shape
+    width, (batch, _) = 17 if with_propagators else 8, directions.shape
     count = loops * len(channels)
     states, sides = np.empty((batch, count + 1, width)), np.empty((batch, count, 2))
     for row in range(batch):
-        _march(_momentum_function, channels, loops, directions[row], magnitudes[row], states[row], sides[row])
+        _take_steps(_momentum_function, channels, loops, directions[row], magnitudes[row], states[row], sides[row])
     marks = checkpoint_steps(count) if with_propagators else []
     return StepRecord(
         quaternions=states[:, :, 3:7],
         directions=states[:, :, :3],
         turns=sides[:, :, 0],
         dynamics=sides[:, :, 1],
-        propagators=states[:, marks, 7:].reshape(batch, -1, 3, 3),
+        propagators=states[:, marks, 8:].reshape(batch, -1, 3, 3),
         stepping=np.empty(batch),
         truncation=np.zeros(batch),
     )
@@ -43,24 +42,22 @@ def record_of_few(
 
 def quaternions_of_few(channels: Array, loops: int, directions: Array, magnitudes: Array) -> Array:
     """The quaternions alone at the ends of all steps: (B, K + 1, 4)."""
-    states = np.empty((len(magnitudes), loops * len(channels) + 1, 7))
+    states = np.empty((len(magnitudes), loops * len(channels) + 1, 8))
     for row in range(len(magnitudes)):
-        _march(_attitude_function, channels, loops, directions[row], magnitudes[row], states[row])
+        _take_steps(_attitude_function, channels, loops, directions[row], magnitudes[row], states[row])
     return states[:, :, 3:7]
 
 
-def _march(
+def _take_steps(
     function_of: Callable[[int, int], Any], channels: Array, loops: int, direction: Array, magnitude: float,
     states: Array, *sides: Array,
 ) -> None:  # fmt: skip
     """One momentum after another from the identity, by functions of so many steps: states (K + 1, n), sides (K, 2).
 
-    A state is direction, quaternion and propagator.
+    A state is direction, quaternion, magnitude and propagator.
     """
     first, count, done = states[0], len(channels), 0
-    first[:], first[:3], first[6], first[7::4] = 0.0, direction, 1.0, 1.0
-    if magnitude != 1.0:
-        channels = (channels.reshape(-1, 9) * channel_scale(magnitude)).reshape(count, -1)
+    first[:], first[:3], first[6], first[7], first[8::4] = 0.0, direction, 1.0, magnitude, 1.0
     for _ in range(loops):
         for start in range(0, count, BLOCK):
             block = channels[start : start + BLOCK]
@@ -88,7 +85,7 @@ def quaternions_of_one_loop(half_rates: Array) -> Array:
 @lru_cache(maxsize=1024)
 def _momentum_function(length: int, width: int) -> Any:
     """`length` steps as one CasADi function of the state of so many numbers, and of channels."""
-    return momentum_step_function(with_propagators=width > 7).mapaccum("steps", length)
+    return momentum_step_function(with_propagators=width > 8).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1024)
@@ -105,31 +102,32 @@ def _rest_function(length: int) -> Any:
 
 @lru_cache(maxsize=2)
 def momentum_step_function(*, with_propagators: bool) -> Any:
-    """One step as a CasADi function: state and channels, I^-1 times the magnitude -> next state; turn, dynamic phase.
+    """One step as a CasADi function: state and channels -> the next state; turn and dynamic phase.
 
-    The state is direction, quaternion and propagator.
+    The state is direction, quaternion, magnitude and propagator.
     """
     import casadi
 
-    state, data, channels = _symbols(16 if with_propagators else 7)
+    state, data, channels = _symbols(17 if with_propagators else 8)
     parts = casadi.vertsplit(state)
     end, attitude, sides = _following(parts, channels, with_dynamic=True)
-    following = [*end, *attitude]
+    following = [*end, *attitude, parts[7]]
     if with_propagators:
-        propagator = [parts[7 + 3 * i : 10 + 3 * i] for i in range(3)]
-        following += [part for row in next_propagator(propagator, parts[:3], end, 1.0, channels) for part in row]
+        propagator = [parts[8 + 3 * i : 11 + 3 * i] for i in range(3)]
+        following += [part for row in next_propagator(propagator, parts[:3], end, parts[7], channels) for part in row]
     name = "momentum_step_with_propagator" if with_propagators else "momentum_step"
     return casadi.Function(name, [state, data], [casadi.vertcat(*following), casadi.vertcat(*sides)])
 
 
 @lru_cache(maxsize=1)
 def attitude_step_function() -> Any:
-    """The same of direction and quaternion alone."""
+    """The same of direction, quaternion and magnitude alone."""
     import casadi
 
-    state, data, channels = _symbols(7)
-    end, attitude, _ = _following(casadi.vertsplit(state), channels, with_dynamic=False)
-    return casadi.Function("attitude_step", [state, data], [casadi.vertcat(*end, *attitude)])
+    state, data, channels = _symbols(8)
+    parts = casadi.vertsplit(state)
+    end, attitude, _ = _following(parts, channels, with_dynamic=False)
+    return casadi.Function("attitude_step", [state, data], [casadi.vertcat(*end, *attitude, parts[7])])
 
 
 def _symbols(width: int) -> tuple[Any, Any, list[list[Any]]]:
@@ -145,8 +143,8 @@ def _following(parts: list[Any], channels: list[list[Any]], *, with_dynamic: boo
     """Direction, quaternion, turn and dynamic phase after a step."""
     import casadi
 
-    direction, quaternion = parts[:3], parts[3:7]
-    end, turn, dynamic = momentum_step(direction, 1.0, channels, with_dynamic=with_dynamic)
+    direction, quaternion, magnitude = parts[:3], parts[3:7], parts[7]
+    end, turn, dynamic = momentum_step(direction, magnitude, channels, with_dynamic=with_dynamic)
     half_turn = casadi.sin(0.5 * turn), casadi.cos(0.5 * turn)
     return end, turned(quaternion, direction, end, half_turn), (turn, dynamic)
 

@@ -17,7 +17,6 @@ from ..fast.marches import derivatives, growths_and_rounding
 from .casadi_marches import BLOCK, attitude_step_function
 from .propagator_step import adjugate_of, matrix_product
 from .rotation_step import STAGES, attitude_step
-from .stage_channels import channel_scale
 from .step_record import CHECKPOINTS, checkpoint_steps
 
 # Of each entry of an adjugate, row by row: first times second less third times fourth of these entries.
@@ -161,7 +160,7 @@ def exact_propagators(channels: Array, directions: Array, magnitudes: Array, loo
     for row, (direction, magnitude) in enumerate(zip(directions, magnitudes, strict=True)):
         first = so3.perpendicular(direction)
         basis = np.stack([first, np.cross(direction, first)])
-        seeds = np.zeros((2, 7))
+        seeds = np.zeros((2, 8))
         seeds[:, :3] = np.cross(direction, basis)
         if engine.is_ready():
             ends, changes = derivatives(channels, loops, direction, seeds[:, :3], float(magnitude), marks)
@@ -198,18 +197,17 @@ def momentum_slope(channels: Array, momenta: Array, loops: int) -> Array:
 def _derivatives(channels: Array, direction: Array, magnitude: float, loops: int, seeds: Array) -> Any:
     """Block by block: the steps before it, the quaternions (n, 4) and the turns by each seed (n, seeds, 3) after each.
 
-    `seeds` (s, 7) are changes of direction and quaternion at the start.
+    `seeds` (s, 8) are changes of direction, quaternion and magnitude at the start.
     """
     count, columns = len(channels), len(seeds)
-    channels = (channels.reshape(-1, 9) * channel_scale(magnitude)).reshape(count, -1)
-    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0], seeds.ravel()])
+    state = np.concatenate([direction, [0.0, 0.0, 0.0, 1.0, magnitude], seeds.ravel()])
     done = 0
     for _ in range(loops):
         for first in range(0, count, BLOCK):
             block = channels[first : first + BLOCK]
             (states,) = call_casadi(_derivative_function(len(block), columns), len(block), state, block)
             quaternions = states[:, 3:7]
-            slopes = so3.turn_of(quaternions[:, None], states[:, 7:].reshape(-1, columns, 7)[:, :, 3:7])
+            slopes = so3.turn_of(quaternions[:, None], states[:, 8:].reshape(-1, columns, 8)[:, :, 3:7])
             yield done, quaternions, slopes
             state, done = states[-1], done + len(block)
 
@@ -247,9 +245,9 @@ def derivative_step_function(columns: int) -> Any:
     """One step as a CasADi function of the state with its derivatives, and the channels."""
     import casadi
 
-    state, slopes = casadi.SX.sym("state", 7), casadi.SX.sym("slopes", 7, columns)
+    state, slopes = casadi.SX.sym("state", 8), casadi.SX.sym("slopes", 8, columns)
     data = casadi.SX.sym("channels", 9 * STAGES)
     following = attitude_step_function()(state, data)
-    further = casadi.reshape(casadi.jtimes(following, state, slopes), 7 * columns, 1)
-    whole = casadi.vertcat(state, casadi.reshape(slopes, 7 * columns, 1))
+    further = casadi.reshape(casadi.jtimes(following, state, slopes), 8 * columns, 1)
+    whole = casadi.vertcat(state, casadi.reshape(slopes, 8 * columns, 1))
     return casadi.Function(f"derivative_step_{columns}", [whole, data], [casadi.vertcat(following, further)])

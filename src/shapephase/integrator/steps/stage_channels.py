@@ -47,11 +47,6 @@ def channels_of_runs(scaled: Array, runs: list[tuple[int, int]], *, in_pairs: bo
     return channels.reshape(-1, each * STAGES)
 
 
-def channel_scale(magnitude: float) -> Array:
-    """What channels are multiplied by where the momentum is a direction: (9,)."""
-    return np.array([magnitude] * 6 + [1.0] * 3)
-
-
 @lru_cache(maxsize=512)
 def _stage_matrix(degree_count: int, count: int, in_pairs: bool) -> Array:
     """Chebyshev coefficients of a panel -> values at all stages of its steps, times the step's share of it.

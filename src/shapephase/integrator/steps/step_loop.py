@@ -20,7 +20,7 @@ from ..interpolant import Interpolant
 from .array_marches import quaternions_of_many, record_many
 from .casadi_marches import quaternions_of_few, quaternions_of_one_loop, record_of_few
 from .rotation_step import product
-from .stage_channels import channel_scale, channels_at_stages, channels_of_runs, runs_of_panels
+from .stage_channels import channels_at_stages, channels_of_runs, runs_of_panels
 from .step_record import CHECKPOINTS, StepRecord, checkpoint_steps, ends_of_pairs
 
 # Momenta: up to so many, one after another in CasADi is faster than all at once on NumPy's arrays.
@@ -53,18 +53,15 @@ def integrate_steps(
     if engine.is_ready():
         return _by_kernel(interpolant, perturbed, steps, directions, magnitudes, with_propagators, threads)
     total, batch = interpolant.loops * sum(steps.tolist()), len(magnitudes)
-    # What channels of one momentum are multiplied by costs the least on series.
-    folded, others = (float(magnitudes[0]), np.ones(1)) if batch == 1 else (1.0, magnitudes)
-    scale, runs = interpolant.widths[:, None, None] * channel_scale(folded), runs_of_panels(steps)
-    series = interpolant.coefficients * scale
+    series, runs = interpolant.coefficients * interpolant.widths[:, None, None], runs_of_panels(steps)
     channels, coarse = channels_of_runs(series, runs), channels_of_runs(series, runs, in_pairs=True)
-    cut = None if perturbed is None else channels_of_runs(perturbed * scale, runs, in_pairs=True)
+    cut = None if perturbed is None else channels_at_stages(interpolant, perturbed, steps, in_pairs=True)
     ends, loops = ends_of_pairs(steps, interpolant.loops), interpolant.loops
     # All steps, pairs of them, and these again where series are perturbed.
     at_once = 1 if batch <= FEW else _ROWS_AT_ONCE
     run_progress.begin(run_progress.STEPPING, -(-batch // at_once) * total * (3 if perturbed is None else 4) // 2)
     if batch <= FEW:
-        starts = directions, others
+        starts = directions, magnitudes
         whole = record_of_few(channels, loops, *starts, with_propagators=with_propagators)
         pairs = quaternions_of_few(coarse, loops, *starts)
         whole.stepping[:] = largest_angle(whole.quaternions[:, ends], pairs)
