@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -26,8 +26,9 @@ def record_of_few(
     width, (batch, _) = 17 if with_propagators else 8, directions.shape
     count = loops * len(channels)
     states, sides = np.empty((batch, count + 1, width)), np.empty((batch, count, 2))
+    steps_of = partial(_momentum_function, with_propagators=with_propagators)
     for row in range(batch):
-        _take_steps(_momentum_function, channels, loops, directions[row], magnitudes[row], states[row], sides[row])
+        _take_steps(steps_of, channels, loops, directions[row], magnitudes[row], states[row], sides[row])
     marks = checkpoint_steps(count) if with_propagators else []
     return StepRecord(
         quaternions=states[:, :, 3:7],
@@ -49,10 +50,10 @@ def quaternions_of_few(channels: Array, loops: int, directions: Array, magnitude
 
 
 def _take_steps(
-    function_of: Callable[[int, int], Any], channels: Array, loops: int, direction: Array, magnitude: float,
+    steps_of: Callable[[int], Any], channels: Array, loops: int, direction: Array, magnitude: float,
     states: Array, *sides: Array,
 ) -> None:  # fmt: skip
-    """One momentum after another from the identity, by functions of so many steps: states (K + 1, n), sides (K, 2).
+    """All steps of one momentum from the identity, by functions of so many: states (K + 1, n), sides (K, 2).
 
     A state is direction, quaternion, magnitude and propagator.
     """
@@ -63,7 +64,7 @@ def _take_steps(
             block = channels[start : start + BLOCK]
             after = done + len(block)
             results = [states[done + 1 : after + 1], *(side[done:after] for side in sides)]
-            call_casadi_into(function_of(len(block), states.shape[1]), (states[done], block), results)
+            call_casadi_into(steps_of(len(block)), (states[done], block), results)
             run_progress.advance(len(block))
             done = after
 
@@ -83,13 +84,13 @@ def quaternions_of_one_loop(half_rates: Array) -> Array:
 
 
 @lru_cache(maxsize=1024)
-def _momentum_function(length: int, width: int) -> Any:
-    """`length` steps as one CasADi function of the state of so many numbers, and of channels."""
-    return momentum_step_function(with_propagators=width > 8).mapaccum("steps", length)
+def _momentum_function(length: int, *, with_propagators: bool) -> Any:
+    """`length` steps as one CasADi function of state and channels."""
+    return momentum_step_function(with_propagators=with_propagators).mapaccum("steps", length)
 
 
 @lru_cache(maxsize=1024)
-def _attitude_function(length: int, _width: int) -> Any:
+def _attitude_function(length: int) -> Any:
     """The same without turns and dynamic phases."""
     return attitude_step_function().mapaccum("steps", length)
 
