@@ -9,7 +9,7 @@ integrated along with it, shows how rounding grows.
 from __future__ import annotations
 
 from functools import cached_property
-from math import isfinite, sqrt
+from math import inf, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -304,6 +304,12 @@ class Integration:
             with_propagators=self._propagators is None,
             threads=self._threads,
         )
+
+    @property
+    def harmless_growth(self) -> float:
+        """Of errors, up to which what the samples miss is not looked at."""
+        expected = self._sampler.error(self._largest)
+        return NEGLIGIBLE * self._tolerance / expected if expected > 0.0 else inf
 
     def refined(self, errors: Errors) -> Refinements:
         """Finer steps and samples for the next round."""

@@ -198,7 +198,8 @@ def _further(
         row, error = lost
         raise _of_row(error, group.rows[failed[row : row + 1]], count) from None
     together: dict[Refinement, list[int]] = {}
-    for place, refinement in enumerate(_rounded(integration.refined(errors), group.history[-1]).each()):
+    refinements = _rounded(integration.refined(errors), group.history[-1], integration.harmless_growth)
+    for place, refinement in enumerate(refinements.each()):
         if refinement == group.history[-1]:
             # The next round would be the same.
             raise _of_row(integration.not_reached(errors, place), group.rows[failed[place : place + 1]], count)
@@ -220,13 +221,19 @@ def _after(samplers: Samplers, group: _Group) -> Sampler:
     return sampler
 
 
-def _rounded(refinements: Refinements, last: Refinement) -> Refinements:
-    """What is stricter than in the last round is made stricter by little more, so that many are the same."""
+def _rounded(refinements: Refinements, last: Refinement, harmless: float) -> Refinements:
+    """What is stricter than in the last round is made stricter by little more, so that many are the same.
+
+    `harmless` : growth of errors up to which samples as they are will do: there one is as good as another
+    """
     target, finer, amplified = refinements
+    same = target == last.sampling_target
+    grown = rounded_up(np.minimum(amplified, _MOST_GROWTH), STEPS_OF_OTHERS)
+    grown[same & (grown <= harmless)] = 1.0
     return Refinements(
-        np.where(target == last.sampling_target, target, 1.0 / rounded_up(1.0 / target, STEPS_OF_OTHERS)),
+        np.where(same, target, 1.0 / rounded_up(1.0 / target, STEPS_OF_OTHERS)),
         rounded_up(finer, STEPS_OF_FINER),
-        np.where(np.isinf(amplified), np.inf, rounded_up(np.minimum(amplified, _MOST_GROWTH), STEPS_OF_OTHERS)),
+        np.where(np.isinf(amplified), np.inf, grown),
     )
 
 

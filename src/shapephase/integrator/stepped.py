@@ -212,6 +212,6 @@ def of_rows(solution: SteppedRotation, rows: Integers, threads: int | None = Non
         for name, values in whole.items():
             values.take(rows[part], axis=0, out=chosen[name][part], mode="clip")
 
-    for _ in in_threads(copy, len(rows), 1, threads):
+    for _ in in_threads(copy, len(rows), 1, threads, chosen.values()):
         pass
     return replace(solution, **chosen)

@@ -67,7 +67,8 @@ def march_in_threads(
         )  # fmt: skip
 
     run_progress.begin(run_progress.STEPPING, max(batch, 1))
-    for rows in in_threads(run, batch, module.LANES, threads):
+    fresh = whole.quaternions, whole.directions, whole.turns, whole.dynamics, propagators
+    for rows in in_threads(run, batch, module.LANES, threads, fresh):
         run_progress.advance(rows.stop - rows.start)
     return whole
 

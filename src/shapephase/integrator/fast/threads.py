@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+
+from ...arrays import Array
 
 # Momenta for a thread of its own: some tenths of a millisecond of work.
 _LEAST_FOR_A_THREAD = 64
 # Momenta in one call: some tenths of a second, after which a run that is watched says so.
 _MOST_AT_ONCE = 8192
+# Numbers in a page of memory.
+_PAGE = 512
 
 
-def in_threads(run: Callable[[slice], None], batch: int, lanes: int, threads: int | None) -> Iterator[slice]:
+def in_threads(
+    run: Callable[[slice], None], batch: int, lanes: int, threads: int | None, fresh: Iterable[Array] = ()
+) -> Iterator[slice]:
     """Run for all rows, some of them in each call, in threads where there are enough; after each call its rows.
 
     Parameters
@@ -21,6 +27,7 @@ def in_threads(run: Callable[[slice], None], batch: int, lanes: int, threads: in
     run : frees the interpreter while it computes
     lanes : rows that are computed together
     threads : how many at most; None: one for each processor
+    fresh : arrays that nobody has written to yet
     """
     workers = max(1, min(processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
     parts = _parts(batch, lanes, workers)
@@ -29,6 +36,9 @@ def in_threads(run: Callable[[slice], None], batch: int, lanes: int, threads: in
             run(rows)
             yield rows
         return
+    # Pages of memory are there when they are first written to. Threads that do so at once wait for each other.
+    for array in fresh:
+        array.reshape(-1)[::_PAGE] = 0.0
     for rows, _ in zip(parts, _pool(workers).map(run, parts), strict=True):
         yield rows
 

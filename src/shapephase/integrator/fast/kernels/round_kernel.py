@@ -160,11 +160,13 @@ def take_rounds(
             found[12] = measured if math.isnan(found[12]) or measured < found[12] else found[12]
         rounds += 1
         excess = _too_coarse(found, tolerance)
+        grown = _up(found[3], marks_of_growth)
+        harmless = grown * expected <= NEGLIGIBLE * tolerance
         # A further round would look at perturbed series, which are not here.
-        is_blind = math.isinf(hidden) and _up(found[3], marks_of_growth) * expected > NEGLIGIBLE * tolerance
+        is_blind = math.isinf(hidden) and not harmless
         if rounds == _MOST_ROUNDS or excess == 0.0 or is_blind:
             return True, steps, quaternions, ends, turns, dynamics, propagators, found
         order = order_by_defects(found[5:10])
         finer *= min(max((excess / REFINED) ** (1.0 / order), 1.1, 1.02 * found[10]), 4.0)
         refinement[0] = _up(finer, marks_of_finer)
-        refinement[1] = _up(found[3], marks_of_growth)
+        refinement[1] = 1.0 if harmless else grown
