@@ -160,6 +160,8 @@ def wrap(phase: Array | float) -> Array:
     turn = 2.0 * np.pi
     phase = np.asarray(phase, dtype=float)
     inside = (phase > -np.pi) & (phase <= np.pi)
+    if inside.all():
+        return np.array(phase)
     return np.where(inside, phase, np.maximum(np.pi - np.mod(np.pi - phase, turn), np.nextafter(-np.pi, 0.0)))
 
 

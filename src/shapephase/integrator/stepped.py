@@ -69,7 +69,7 @@ class SteppedRotation:
     @cached_property
     def panel(self) -> Integers:
         """The interpolant's panel of each step: (K,)."""
-        each = np.tile(self.steps, self.interpolant.loops)
+        each = self._steps_of_all_loops
         return read_only(np.repeat(np.arange(len(each)), each))
 
     @property
@@ -79,11 +79,16 @@ class SteppedRotation:
 
     @cached_property
     def _times(self) -> Array:
-        edges, each = self.interpolant.edges, np.tile(self.steps, self.interpolant.loops)
+        edges, each = self.interpolant.edges, self._steps_of_all_loops
         done = np.cumsum(each)
-        within = np.arange(done[-1]) - np.repeat(done - each, each)
-        starts, widths = np.repeat(edges[:-1], each), np.repeat(np.diff(edges), each)
-        return np.append(starts + widths * (within / np.repeat(each, each)), edges[-1])
+        of_panels = np.array([edges[:-1], edges[1:] - edges[:-1], done - each, each])
+        starts, widths, before, counts = np.repeat(of_panels, each, axis=1)
+        return np.append(starts + widths * ((np.arange(done[-1]) - before) / counts), edges[-1])
+
+    @property
+    def _steps_of_all_loops(self) -> Integers:
+        loops = self.interpolant.loops
+        return self.steps if loops == 1 else np.tile(self.steps, loops)
 
     @property
     def error_estimate(self) -> Array:
