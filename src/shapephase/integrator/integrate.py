@@ -151,7 +151,12 @@ class Integration:
 
     def not_reached(self, errors: Errors, row: int) -> AccuracyNotReached:
         """The error of a row that no further round will help."""
-        return _not_reached(self._tolerance, errors, row)
+        estimate, sampling, stepping, rounding, amplification, *_ = (part[row] for part in errors[:6])
+        return AccuracyNotReached(
+            f"the tolerance {self._tolerance:.3g} rad was not reached: the estimate is {estimate:.3g} rad, of "
+            f"which sampling {sampling:.3g}, stepping {stepping:.3g} and rounding {rounding:.3g}, with "
+            f"errors amplified {amplification:.3g} times; loosen the tolerance or shorten the motion"
+        )
 
     @cached_property
     def is_long(self) -> bool:
@@ -323,15 +328,6 @@ def _too_many_steps(count: float, turn: float, interpolant: Interpolant) -> Accu
         f"the body turns up to {turns:.3g} times in {interpolant.edges[-1]:.6g} s, which takes some {count:.3g} steps; "
         f"at most {_MOST_STEPS} are taken, enough for about {turns * _MOST_STEPS / count:.3g} turns: shorten the "
         "motion, or lower the momentum"
-    )
-
-
-def _not_reached(tolerance: float, errors: Errors, row: int) -> AccuracyNotReached:
-    estimate, sampling, stepping, rounding, amplification, *_ = (part[row] for part in errors[:6])
-    return AccuracyNotReached(
-        f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {estimate:.3g} rad, of "
-        f"which sampling {sampling:.3g}, stepping {stepping:.3g} and rounding {rounding:.3g}, with "
-        f"errors amplified {amplification:.3g} times; loosen the tolerance or shorten the motion"
     )
 
 

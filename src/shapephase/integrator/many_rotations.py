@@ -195,8 +195,8 @@ def _further(
     """Rows that failed, by the refinements that they need."""
     at_rest, errors, best = not group.ceiling, attempt.errors.of(failed), group.best[failed]
     if (lost := integration.first_lost(errors, len(group.history), best)) is not None:
-        row, error = lost
-        raise _of_row(error, group.rows[failed[row : row + 1]], count) from None
+        place, error = lost
+        raise _of_row(error, group.rows[failed[place : place + 1]], count)
     together: dict[Refinement, list[int]] = {}
     refinements = _rounded(integration.refined(errors), group.history[-1], integration.harmless_growth)
     for place, refinement in enumerate(refinements.each()):
