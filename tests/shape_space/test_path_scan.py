@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 from benchmarks.hostile_paths import KINDS, SMOOTH, hostile_path, judged
+from scipy.interpolate import BarycentricInterpolator
 
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
@@ -135,6 +136,62 @@ def test_nothing_of_the_path_is_hidden_beyond_the_first_panels():
         hidden = scan.resolved.hidden(first.left, first.right, first.degree)
         assert (first.degree > 0).any()
         assert hidden.table.max() < 2.0 * tolerance
+
+
+CHIRP = Watched(lambda t: np.sin(20.0 * t * t), lambda t: 40.0 * t * np.cos(20.0 * t * t))
+RAMP = Watched(lambda t: np.tanh(30.0 * (t - 0.7)), lambda t: 30.0 / np.cosh(30.0 * (t - 0.7)) ** 2)
+
+
+@pytest.mark.parametrize("function", [swing(), CHIRP, RAMP, bump(0.7123, 0.2), bump(0.3, 0.002)])
+@pytest.mark.parametrize("kept", [False, True])
+def test_panels_hide_no_less_than_their_own_polynomials_miss(function: Watched, kept: bool):
+    """On panels of the first choice, and on any others; a polynomial adds up to as much again as its terms leave out.
+
+    The path is interpolated at each panel's own Chebyshev points, by barycentric sums, and compared at 3,000 times.
+    """
+    scan = function.path().scan
+    assert scan is not None
+    resolved, compared = scan.resolved, 0
+    for tolerance in (1e-2, 1e-5, 1e-8, 1e-11, 1e-14):
+        first = resolved.first_panels(tolerance)
+        if kept:
+            left, right, degree = first.left, first.right, first.degree
+        else:
+            places = resolved.left, resolved.right
+            left, right, degree = (np.tile(part, 3) for part in (*places, np.zeros(len(places[0]), dtype=int)))
+            degree += np.repeat([15, 40, 80], len(places[0]))
+        table = resolved.hidden(left, right, degree).table
+        for start, end, count, (*hides, noise) in zip(left, right, degree.tolist(), table, strict=True):
+            if not count:
+                continue
+            half, x = 0.5 * (end - start), np.linspace(-1.0, 1.0, 3000)
+            nodes = 0.5 * (start + end) - half * np.cos(np.pi * np.arange(count + 1) / count)
+            fit = BarycentricInterpolator(nodes, np.concatenate(function(nodes), axis=1))
+            times = 0.5 * (start + end) + half * x
+            missed = np.abs(fit(times) - np.concatenate(function(times), axis=1)).max(axis=0)
+            scale = np.abs(np.concatenate(function(times), axis=1)).max(axis=0)
+            for which, weight in ((0, 1.0), (1, half)):
+                columns = slice(3 * which, 3 * which + 3)
+                rounding = 100.0 * np.finfo(float).eps * max(1.0, scale[columns].max())
+                most = (2.0 if kept else 4.0) * (hides[which] + hides[2 + which]) + noise + rounding
+                assert weight * missed[columns].max() <= most
+                compared += 1
+    assert compared > 20
+
+
+def test_a_panel_of_more_terms_than_the_series_of_the_path_hides_less_than_these_miss():
+    """A swing of which 33 terms miss a part in 1e8, and 65 nothing."""
+    fast = Watched(lambda t: np.sin(52.0 * t), lambda t: 52.0 * np.cos(52.0 * t))
+    scan = fast.path().scan
+    assert scan is not None
+    resolved = scan.resolved
+    row = resolved.roots[1]
+    assert resolved.children[row] >= 0
+    assert 1e-9 < resolved.misfit[row].max() < 1e-8
+    ends = resolved.left[[row, row]], resolved.right[[row, row]]
+    fewer, more = resolved.hidden(*ends, np.array([16, 64])).table[:, :4].sum(axis=1)
+    assert more < 1e-4 * resolved.misfit[row].max()
+    assert fewer > 1e-2
 
 
 # ---- Kinks and jumps -----------------------------------------------------------------------------------------------

@@ -11,10 +11,8 @@ from ..arrays import Array, Integers, Mask
 from .fast.estimate_constants import (
     DENSE_SHARE,
     INFORMATIVE_ERROR,
-    LEAST_NOISE,
     MOST_SAMPLING,
     MOST_STEPPING,
-    NOISE_OF_SERIES,
     REFINED,
 )
 
@@ -26,8 +24,8 @@ _SAMPLING_SHARE = 0.3
 _MOST_ROUNDING = 0.9
 # Times the error of the samples: rounding that the last terms of their series show.
 _SHOWN_ROUNDING = 30.0
-# How many times it may be overrated before that: the most noise of series that is allowed for, over the least.
-_MOST_OVERRATED = NOISE_OF_SERIES / LEAST_NOISE
+# How many times it may be overrated before that, by what samples that are too few miss.
+_MOST_OVERRATED = 8.0
 
 
 class Refinement(NamedTuple):

@@ -264,7 +264,8 @@ class Integration:
         )
 
     def _measured_rounding(self, bound: Array, interpolant: Interpolant, steps: Integers, record: StepRecord) -> Array:
-        return measured_rounding(bound, interpolant, steps, record, self._magnitudes, self._tolerance)
+        sample = self._sampler.channels
+        return measured_rounding(bound, interpolant, steps, record, self._magnitudes, self._tolerance, sample)
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> tuple[Integers, float]:
         """Steps on each panel (P,), and how many more they are than planned, since they are whole.

@@ -21,6 +21,17 @@ Made = TypeVar("Made")
 DEGREE = 32
 # Of the series of a sampler's panel, from which its hidden part is read: above the degree of most panels.
 _TEST_DEGREE = 48
+# The same of panels that reach over several resolved ones; the terms from which on it tells what is beyond it, and how
+# many times their sum that may be.
+_FINE_TEST_DEGREE = 128
+_SEEN = 97
+_NOT_SEEN = 4.0
+# The most resolved panels that one such reaches over: the test is too coarse for more.
+_FEW_LEAVES = 4
+# Such panels at once, for some megabytes.
+_PANELS_AT_ONCE = 64
+# Of the largest value: smaller terms are rounding.
+_ROUNDED = 0.5 * 2.0**-52
 # [rad] What series at rest are off by rounding.
 _RESTING = 1e-14
 # Degrees that a path is looked at, and those that a panel is then sampled at first: a body's inertia swings faster than
@@ -136,18 +147,58 @@ class ResolvedPath:
 
     def _found_hidden(self, left: Array, right: Array, degree: Integers) -> Hidden:
         rows, half = self._smallest_around(left, right), 0.5 * (right - left)
-        nodes = 0.5 * (left + right)[:, None] + half[:, None] * unit_nodes(_TEST_DEGREE)
-        local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])
-        values = chebyshev(local, DEGREE + 1) @ self.coefficients[rows]
-        series = np.abs(values_to_coefficients(_TEST_DEGREE) @ values)
-        series *= (np.arange(_TEST_DEGREE + 1) > degree[:, None])[:, :, None]
-        beyond = series.sum(axis=1)
         table = np.empty((len(left), 5))
-        table[:, 0] = beyond[:, : self._n_shape].max(axis=1, initial=0.0)
-        table[:, 1] = half * beyond[:, self._n_shape :].max(axis=1, initial=0.0)
         table[:, 2:4], table[:, 4] = self.misfit[rows], self.noise[rows]
+        nodes = _nodes(left, right, _TEST_DEGREE)
+        local = local_coordinate(nodes, self.left[rows, None], self.right[rows, None])
+        beyond = _terms_beyond(chebyshev(local, DEGREE + 1) @ self.coefficients[rows], degree)
+        table[:, :2] = self._sums(beyond, half)
+        # A panel of more degrees than the series here follows the path better than these do.
+        halved = np.flatnonzero((self.children[rows] >= 0) & (degree > 0))
+        if len(halved):
+            first, last = self._leaves_within(left[halved], right[halved])
+            halved = halved[last - first < _FEW_LEAVES]
+            for start in range(0, len(halved), _PANELS_AT_ONCE):
+                some = halved[start : start + _PANELS_AT_ONCE]
+                table[some] = self._hidden_of_halves(left[some], right[some], degree[some], table[some])
         table[degree == 0] = 0.0
         return Hidden(table)
+
+    def _hidden_of_halves(self, left: Array, right: Array, degree: Integers, table: Array) -> Array:
+        """The table of panels that reach over several resolved ones, from these; as it is where they have noise."""
+        nodes, leaves = _nodes(left, right, _FINE_TEST_DEGREE), self.leaves
+        first, last = self._leaves_within(left, right)
+        # At the end of a panel its own last one, from which rates may jump to the next.
+        place = np.searchsorted(self.left[leaves], nodes, side="right") - 1
+        place = np.clip(place, first[:, None], last[:, None]).ravel()
+        values = np.empty((nodes.size, self.coefficients.shape[2]))
+        order = np.argsort(place, kind="stable")
+        for these in np.split(order, 1 + np.flatnonzero(np.diff(place[order]))):
+            row = leaves[place[these[0]]]
+            local = local_coordinate(nodes.ravel()[these], self.left[row], self.right[row])
+            values[these] = chebyshev(local, DEGREE + 1) @ self.coefficients[row]
+        beyond, half = _terms_beyond(values.reshape(*nodes.shape, -1), degree), 0.5 * (right - left)
+        terms = np.arange(_FINE_TEST_DEGREE + 1)
+        # What is far beyond the degree is seen as something slow, and does not average out.
+        is_far = (terms > 1.5 * degree[:, None])[:, :, None]
+        far = self._sums(beyond * is_far, half) + _NOT_SEEN * self._sums(beyond[:, _SEEN:], half)
+        found = np.array(table)
+        found[:, :2], found[:, 2:4] = self._sums(beyond * ~is_far, half), np.minimum(far, table[:, 2:4])
+        noisy = (self.noise[leaves][place].reshape(nodes.shape) > 0.0).any(axis=1)
+        worse = noisy | (found[:, :4].sum(axis=1) > table[:, :4].sum(axis=1))
+        return np.where(worse[:, None], table, found)
+
+    def _leaves_within(self, left: Array, right: Array) -> tuple[Integers, Integers]:
+        """The first and last places of resolved panels, in the order of time, within others: (P,), (P,)."""
+        leaves, slack = self.leaves, 1e-9 * (right - left)
+        first = np.searchsorted(self.right[leaves], left + slack, side="right")
+        return first, np.searchsorted(self.left[leaves], right - slack) - 1
+
+    def _sums(self, terms: Array, half: Array) -> Array:
+        """Of terms (P, k, 2 n), the largest of shapes, and of rates times half the width: (P, 2)."""
+        sums = terms.sum(axis=1)
+        shapes, rates = sums[:, : self._n_shape], sums[:, self._n_shape :]
+        return np.stack([shapes.max(axis=1, initial=0.0), half * rates.max(axis=1, initial=0.0)], axis=1)
 
     def reversed(self) -> ResolvedPath:
         """Of the path in the opposite order of time."""
@@ -213,6 +264,20 @@ class ResolvedPath:
             if not holds.any():
                 return rows
             rows = np.where(holds, half, rows)
+
+
+def _nodes(left: Array, right: Array, degree: int) -> Array:
+    """Of panels: (P,), (P,) -> (P, degree + 1) [s]."""
+    return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)
+
+
+def _terms_beyond(values: Array, degree: Integers) -> Array:
+    """Sizes of the terms beyond degrees (P,) of series through values at nodes, rounding as zero: (P, k, 2 n)."""
+    test = values.shape[1] - 1
+    series = np.abs(values_to_coefficients(test) @ values)
+    series *= series > _ROUNDED * np.abs(values).max(axis=1, keepdims=True)
+    series *= (np.arange(test + 1) > degree[:, None])[:, :, None]
+    return series
 
 
 def _remembered(known: dict[Any, Any], key: Any, value: Made) -> Made:

@@ -59,6 +59,10 @@ class Sampler(Protocol):
         """The same with errors like those that it probably has for momenta up to this magnitude."""
         ...
 
+    def channels(self, times: Array) -> Array:
+        """What is sampled, at times of the first loop that may be no nodes: (N,) -> (N, 9)."""
+        ...
+
 
 def sampler(
     evaluate: Evaluate,
@@ -228,6 +232,10 @@ class LoopSampler:
         """As `Sampler.perturbed`."""
         return self._sampler.perturbed(momentum)
 
+    def channels(self, times: Array) -> Array:
+        """As `Sampler.channels`."""
+        return self._channels(times)
+
 
 class FinishedSampler:
     """A finished interpolant in the place of a sampler: nothing is evaluated again."""
@@ -249,3 +257,7 @@ class FinishedSampler:
     def perturbed(self, momentum: float) -> Perturbed:  # noqa: ARG002
         """The same: its errors count elsewhere."""
         return Perturbed.same(self._interpolant.coefficients, 0.0)
+
+    def channels(self, times: Array) -> Array:
+        """As `Sampler.channels`: the interpolant's own."""
+        return self._interpolant.series(times)

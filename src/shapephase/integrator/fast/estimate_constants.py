@@ -158,13 +158,9 @@ ROUNDING_OF_RADIAN = 1.0
 MEASURED_ROUNDING = 0.5
 """Of the tolerance: a bound above it is not believed before other marches have been looked at."""
 OTHER_ROUNDINGS = 4
-"""Of these marches, each on series with other errors."""
-NOISE_OF_TAIL = 3.0
-"""Times the last coefficients of a series: these errors of all of them."""
-NOISE_OF_SERIES = 2.0
-"""Units, of a series' largest coefficient: what they are at most, where the last ones are more than noise."""
+"""Of these marches, each on series through samples that are rounded otherwise."""
 LEAST_NOISE = 0.25
-"""The same, at least: samples have half a unit, which averages out, and the last terms of a loop's panels have less."""
+"""Units, of a series' largest coefficient: by what its coefficients are off on these series at least."""
 ROUNDING_BY_CHANCE = 3.0
 """How many times the largest of their distances the error due to rounding may be."""
 LEAST_OF_BOUND = 1.0 / 6.0

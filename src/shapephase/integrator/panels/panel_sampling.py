@@ -210,6 +210,10 @@ class PanelSampler:
         make = partial(_perturbed, series, momentum, self._is_halved)
         return Perturbed(make, self._loops * hidden)
 
+    def channels(self, times: Array) -> Array:
+        """As `Sampler.channels`."""
+        return self._channels(times)
+
     @property
     def _is_halved(self) -> bool:
         if self._halves is None:

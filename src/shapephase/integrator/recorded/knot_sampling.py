@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from ...arrays import Array, Integers, Mask
-from ...chebyshev import chebyshev, nodes_on, unit_nodes, values_to_coefficients
+from ...chebyshev import chebyshev, local_coordinate, nodes_on, unit_nodes, values_to_coefficients
 from ...errors import AccuracyNotReached
 from .._last_terms import Perturbed
 from .._spectral_error import EPS, Channels, spectral_norms
@@ -208,6 +208,22 @@ class KnotSampler:
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`: what is missing is known better than the last terms could tell."""
         return Perturbed.same(self.interpolant().coefficients, self.error(momentum))
+
+    def channels(self, times: Array) -> Array:
+        """As `Sampler.channels`: along the polynomials that stand for the path."""
+        interpolant = self.interpolant()
+        panel = interpolant.panel_of(times)
+        left, right = interpolant.edges[panel], interpolant.edges[panel + 1]
+        local, found = local_coordinate(times, left, right), np.empty((len(times), 9))
+        for degree, group in self._groups.items():
+            mine = np.flatnonzero(np.isin(left, group.left))
+            if not len(mine):
+                continue
+            to_series = chebyshev(local[mine], degree + 1) @ values_to_coefficients(degree)
+            states = self._path.states(left[mine], right[mine], degree)
+            shapes, rates = ((to_series[:, None] @ state)[:, 0] for state in states)
+            found[mine] = self._channels(shapes, rates, times[mine])
+        return found
 
     # ---- Samples ----
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...arrays import Array, Integers
@@ -10,8 +12,6 @@ from ..fast.estimate_constants import (
     LEAST_NOISE,
     LEAST_OF_BOUND,
     MEASURED_ROUNDING,
-    NOISE_OF_SERIES,
-    NOISE_OF_TAIL,
     OTHER_ROUNDINGS,
     ROUNDING_BY_CHANCE,
 )
@@ -21,8 +21,13 @@ from .step_record import StepRecord
 
 # Numbers of quaternions at once: eight megabytes.
 _MOST_NUMBERS = 1_000_000
-# Terms of a series that tell its noise.
-_LAST = 5
+# Groups of neighbouring panels, and times in each at which samples are compared with the series.
+_GROUPS = 16
+_TIMES = 8
+# Of a group, none of them a node: a low-discrepancy sequence.
+_PLACES = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(1.0, _TIMES + 1.0), 1.0))
+# The channels of I^-1 and of I^-1 L_o.
+_PARTS = slice(0, 6), slice(6, 9)
 
 
 def measured_rounding(
@@ -32,25 +37,28 @@ def measured_rounding(
     record: StepRecord,
     magnitudes: Array,
     tolerance: float,
+    sample: Callable[[Array], Array],
 ) -> Array:
     """The bound (B,) [rad], and where it takes up most of the tolerance what it is by marches that round otherwise.
 
-    The bound supposes that all rounding meets the growth of errors at its worst. Series that differ by units of
-    rounding show what it does meet: each of some marches on such series is off by rounding of its own.
+    The bound supposes that all rounding meets the growth of errors at its worst. Series whose samples are rounded
+    otherwise show what it does meet: each of some marches on such series is off by rounding of its own.
 
     Parameters
     ----------
     steps : (P,) on each panel of one loop
     record : of these steps
     magnitudes : (B,) of the momentum [kg m^2/s]
+    sample : the channels at times of the first loop, (N,) -> (N, 9)
     """
     large = bound > MEASURED_ROUNDING * tolerance
     if not np.count_nonzero(large) or not len(rows := np.flatnonzero(large & np.isfinite(bound))):
         return bound
     apart = np.zeros(len(rows))
+    scatter = SampleScatter(interpolant, sample)
     at_once = max(1, _MOST_NUMBERS // record.quaternions[0].size)
     for number in range(OTHER_ROUNDINGS):
-        series = _rounded_otherwise(interpolant, number)
+        series = interpolant.coefficients + scatter.of_series(number)
         for first in range(0, len(rows), at_once):
             part = slice(first, first + at_once)
             these = rows[part]
@@ -64,30 +72,52 @@ def measured_rounding(
     return measured
 
 
-def _rounded_otherwise(interpolant: Interpolant, number: int) -> Array:
-    """Series (P, n, 9) with errors like those due to rounding, the same for the same number."""
-    coefficients = interpolant.coefficients
-    sampled = coefficients if interpolant.sampled is None else interpolant.sampled
-    noise = np.random.default_rng(number).uniform(-1.0, 1.0, coefficients.shape)
-    for channels in (slice(0, 6), slice(6, 9)):
-        sizes = noise_of_series(sampled[..., channels], interpolant.band)
-        noise[..., channels] *= np.repeat(sizes, len(coefficients) // len(sizes))[:, None, None]
-    return coefficients + noise
+class SampleScatter:
+    """How samples of a deformation scatter about the series through them.
 
-
-def noise_of_series(coefficients: Array, band: int | None = None) -> Array:
-    """How large errors due to rounding may be in the series of each panel: (P, n, k) -> (P,); band: of an interpolant.
-
-    Rounding of samples is alike in all terms, and the last ones are hardly anything else.
+    What they are off by at times that are no nodes is taken as it is, all nine channels of one time together: of a body
+    that hardly resists turning about one axis, samples scatter in that direction more than in others.
     """
-    sizes = np.abs(coefficients).max(axis=2)
-    count = sizes.shape[1]
-    last = count - 1 - np.argmax(sizes[:, ::-1] > 0.0, axis=1)
-    if band is not None:
-        last = np.minimum(last, band)
-    ends = np.clip(last[:, None] - np.arange(_LAST), 0, None)
-    tail = np.sqrt((np.take_along_axis(coefficients, ends[..., None], axis=1) ** 2).mean(axis=(1, 2)))
-    unit = EPS * sizes.max(axis=1)
-    # Of few terms the last ones are more than noise.
-    tail[last < 2 * _LAST] = np.inf
-    return np.clip(NOISE_OF_TAIL * tail, LEAST_NOISE * unit, NOISE_OF_SERIES * unit)
+
+    def __init__(self, interpolant: Interpolant, sample: Callable[[Array], Array]) -> None:
+        coefficients = interpolant.coefficients
+        panels = len(coefficients)
+        groups = min(panels, _GROUPS)
+        firsts = panels * np.arange(groups + 1) // groups
+        ends = interpolant.edges[firsts]
+        times = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * _PLACES
+        there = np.minimum(interpolant.panel_of(times.ravel()), panels - 1)
+        off = sample(times.ravel()) - interpolant.channels(times.reshape(-1, 1), there)[:, 0]
+        sizes = np.abs(coefficients).max(axis=1)
+        self._sizes = np.stack([sizes[:, part].max(axis=1) for part in _PARTS], axis=1)
+        for which, part in enumerate(_PARTS):
+            size = self._sizes[there, which][:, None]
+            off[:, part] = np.divide(off[:, part], size, out=np.zeros_like(off[:, part]), where=size > 0.0)
+        self._off = off.reshape(groups, _TIMES, 9)
+        self._group = np.repeat(np.arange(groups), np.diff(firsts))
+        self._counts = _independent_terms(interpolant)
+        self._shape = coefficients.shape
+
+    def of_series(self, number: int) -> Array:
+        """Errors (P, n, 9) of the series through samples with other scatter of this kind, the same for a number."""
+        rng, (panels, terms, _) = np.random.default_rng(number), self._shape
+        weights = rng.standard_normal((panels, terms, _TIMES)) * np.sqrt(2.0 / _TIMES)
+        weights /= np.sqrt(self._counts)[:, None, None]
+        noise = weights @ self._off[self._group]
+        # Steps round otherwise where samples do not scatter at all, too.
+        noise += LEAST_NOISE * EPS * rng.uniform(-1.0, 1.0, noise.shape)
+        noise[np.arange(terms) >= self._counts[:, None]] = 0.0
+        for which, part in enumerate(_PARTS):
+            noise[..., part] *= self._sizes[:, which, None, None]
+        return noise
+
+
+def _independent_terms(interpolant: Interpolant) -> Integers:
+    """Over how many terms of the series of each panel the scatter of its samples is spread: (P,)."""
+    coefficients = interpolant.coefficients if interpolant.sampled is None else interpolant.sampled
+    there = np.abs(coefficients).max(axis=2) > 0.0
+    counts = there.shape[1] - np.argmax(there[:, ::-1], axis=1)
+    if interpolant.band is not None:
+        counts = np.minimum(counts, interpolant.band + 1)
+    halves = len(interpolant.coefficients) // len(counts)
+    return np.repeat(np.maximum(counts // halves, 1), halves)
