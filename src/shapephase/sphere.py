@@ -231,7 +231,7 @@ def far_reference(directions: Array) -> Array:
     >>> float(reference[2]) > 0.9  # its antipode is far from the one direction, north
     True
     """
-    return _FIBONACCI[np.argmax(np.min(directions @ _FIBONACCI.T, axis=0))]
+    return REFERENCES[np.argmax(np.min(directions @ REFERENCES.T, axis=0))]
 
 
 def fibonacci_directions(count: int) -> Array:
@@ -250,4 +250,5 @@ def fibonacci_directions(count: int) -> Array:
     return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=-1)
 
 
-_FIBONACCI = fibonacci_directions(642)
+REFERENCES = fibonacci_directions(642)
+"""Those that `far_reference` chooses from: (642, 3)."""

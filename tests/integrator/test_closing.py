@@ -1,12 +1,12 @@
-"""Curves of directions closed by great circles: in machine code, on arrays, and as they are known."""
+"""Curves of directions closed by great circles, and references far from them: in machine code, on arrays, as known."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from shapephase import so3
-from shapephase.integrator.closing import closed_curves
+from shapephase import so3, sphere
+from shapephase.integrator.closing import closed_curves, far_references
 from support.both_engines import both
 
 EPS = np.finfo(float).eps
@@ -70,3 +70,15 @@ def test_turns_of_every_size_about_every_axis(
     found = closed_curves(corners, reference, axis[None], np.eye(3)[None], last)
     assert abs(so3.wrap(found.turn[0] - angle)) < 8.0 * EPS
     assert -np.pi < found.turn[0] <= np.pi
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.3, 3.0])
+def test_references_are_the_farthest(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator, spread: float):
+    """Of curves that are a point, that wind about one direction, and that are everywhere."""
+    steps = np.cumsum(spread * rng.normal(size=(40, 30, 3)), axis=1)
+    curves = so3.normalised(2.0 * rng.normal(size=(40, 1, 3)) + steps)
+    arrays, kernels = both(monkeypatch, lambda: far_references(curves))
+    np.testing.assert_array_equal(kernels, arrays)
+    nearest = (curves @ sphere.fibonacci_directions(642).T).min(axis=1)
+    chosen = np.einsum("bki,bi->bk", curves, kernels).min(axis=1)
+    np.testing.assert_allclose(chosen, nearest.max(axis=1), rtol=0, atol=4.0 * EPS)

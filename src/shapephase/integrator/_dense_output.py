@@ -233,8 +233,42 @@ def _pieces_of_panels(coefficients: Array, widths: Array, counts: Integers) -> A
     return np.concatenate(found)
 
 
-def piece_channels(interpolant: Interpolant, edges: Array) -> Array:
-    """Taylor terms as those of `end_channels`, for pieces between any edges (M + 1,) [s], each within one panel."""
+def terms_at_ends(interpolant: Interpolant, steps: Integers, which: Integers | None) -> tuple[Array, Integers]:
+    """The Taylor terms of `end_channels`, which steps of a panel share where one ends and the next begins.
+
+    Returns
+    -------
+    terms : (Q, TERMS, 9) at the ends of the steps of some panels, times a step's length
+    places : (W,) of each step's start among them, which its end follows
+    """
+    coefficients, widths = interpolant.coefficients, interpolant.widths
+    if which is None:
+        places = np.arange(len(steps)).repeat(steps) + np.arange(int(steps.sum()))
+        return _terms_of_panels(coefficients, widths, steps), np.tile(places, interpolant.loops)
+    inner = which % int(steps.sum())
+    starts = np.cumsum(steps) - steps
+    panels, place = np.unique(np.searchsorted(starts, inner, side="right") - 1, return_inverse=True)
+    terms = _terms_of_panels(coefficients[panels], widths[panels], steps[panels])
+    ends = np.cumsum(steps[panels] + 1) - (steps[panels] + 1)
+    return terms, inner - starts[panels[place]] + ends[place]
+
+
+def _terms_of_panels(coefficients: Array, widths: Array, counts: Integers) -> Array:
+    """(P, n, 9), (P,), (P,) -> (Q, TERMS, 9), of each panel at one end more than it has steps."""
+    scaled, each = coefficients * widths[:, None, None], counts.tolist()
+    terms = np.empty((sum(each) + len(each), TERMS, 9))
+    start = row = 0
+    for count, run in groupby(each):
+        stop = start + len(list(run))
+        after = row + (stop - start) * (count + 1)
+        out = terms[row:after].reshape(stop - start, -1, 9)
+        np.matmul(_matrix_of_terms(scaled.shape[1], count), scaled[start:stop], out=out)
+        start, row = stop, after
+    return terms
+
+
+def terms_of_pieces(interpolant: Interpolant, edges: Array) -> tuple[Array, Integers]:
+    """As `terms_at_ends`, for pieces between any edges (M + 1,) [s], each within one panel."""
     lengths = np.diff(edges)
     panel = interpolant.panel_of(edges[:-1] + 0.5 * lengths)
     widths = interpolant.edges[panel + 1] - interpolant.edges[panel]
@@ -245,10 +279,21 @@ def piece_channels(interpolant: Interpolant, edges: Array) -> Array:
     basis = chebyshev(x, degrees)
     needed, which = np.unique(panel % count, return_inverse=True)
     derivatives = slopes.reshape(degrees, TERMS, degrees).transpose(1, 0, 2) @ interpolant.coefficients[needed, None]
-    terms = basis[:, None] @ derivatives[which]
+    terms = (basis[:, None] @ derivatives[which]).transpose(0, 2, 1, 3)
     # A piece's length to the power of the term, in a variable that goes from 0 to 1.
-    terms *= ((2.0 * lengths / widths)[:, None] ** np.arange(TERMS) * lengths[:, None])[:, :, None, None]
-    return np.ascontiguousarray(terms.transpose(3, 1, 2, 0))
+    powers = (2.0 * lengths / widths)[:, None] ** np.arange(TERMS) * lengths[:, None]
+    return (terms * powers[:, None, :, None]).reshape(-1, TERMS, 9), 2 * np.arange(len(lengths))
+
+
+@lru_cache(maxsize=512)
+def _matrix_of_terms(degrees: int, count: int) -> Array:
+    """Chebyshev coefficients of a panel -> Taylor terms at the ends of its pieces: ((count + 1) TERMS, degrees)."""
+    slopes, _ = _calculus(degrees)
+    ends = 2.0 * np.arange(count + 1) / count - 1.0
+    # A piece's length to the power of the term, and the share of the panel.
+    lengths = (2.0 / count) ** np.arange(TERMS)[:, None] / count
+    terms = (chebyshev(ends, degrees) @ slopes).reshape(count + 1, TERMS, degrees) * lengths
+    return np.ascontiguousarray(terms.reshape(-1, degrees))
 
 
 @lru_cache(maxsize=512)
@@ -257,12 +302,10 @@ def _taylor_matrix(degrees: int, count: int) -> Array:
 
     (count (2 TERMS + 3), degrees), times a piece's share of the panel; the variable of the series goes from 0 to 1.
     """
-    slopes, integrals = _calculus(degrees)
+    _, integrals = _calculus(degrees)
     ends = 2.0 * np.arange(count + 1) / count - 1.0
     within = (2.0 * np.arange(count)[:, None] + 1.0 + _PLACES) / count - 1.0
-    # A piece's length to the power of the term, and the share of the panel.
-    lengths = (2.0 / count) ** np.arange(TERMS)[:, None] / count
-    terms = (chebyshev(ends, degrees) @ slopes).reshape(count + 1, TERMS, degrees) * lengths
+    terms = _matrix_of_terms(degrees, count).reshape(count + 1, TERMS, degrees)
     taylor = np.stack([terms[:-1], terms[1:]], axis=1)
     # The integral's own terms: its values, then those of the series over 1, 2, ...
     primitive = chebyshev(ends, degrees + 1) @ integrals * 0.5

@@ -1,6 +1,10 @@
-"""Curves of directions closed by great circles."""
+"""Curves of directions: closed by great circles, and references far from them."""
 
 from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
 
 from .. import so3, sphere
 from ..arrays import Array
@@ -12,6 +16,19 @@ def closed_curves(corners: Array, references: Array, axes: Array, first: Array, 
     """As `fast.closing.closed_curves`."""
     find = closing.closed_curves if engine.is_ready() else _closed_curves
     return find(corners, references, axes, first, last)
+
+
+def far_references(curves: Array) -> Array:
+    """`sphere.far_reference` of each of some curves: (B, N, 3) -> (B, 3)."""
+    if engine.is_ready():
+        return sphere.REFERENCES[closing.far_references(curves, _rows_of_references())]
+    return np.array(list(map(sphere.far_reference, curves)))
+
+
+@lru_cache(maxsize=1)
+def _rows_of_references() -> Array:
+    """(3, R)."""
+    return np.ascontiguousarray(sphere.REFERENCES.T)
 
 
 def _closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:

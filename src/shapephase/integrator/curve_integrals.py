@@ -13,8 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import so3
-from ..arrays import Array
-from ._dense_output import convolved, direction_terms, end_channels, hermite_matrix, piece_channels, transported
+from ..arrays import Array, Integers
+from ._dense_output import (
+    convolved,
+    direction_terms,
+    hermite_matrix,
+    terms_at_ends,
+    terms_of_pieces,
+    transported,
+)
 from .fast import engine
 from .fast.curves import PiecesOfCurve, curve_pieces
 from .fast.estimate_constants import TERMS
@@ -65,11 +72,11 @@ def curve_integrals(rotation: SteppedRotation, lift: Lift | None = None, edges: 
     for first in range(0, total, at_once):
         stop = min(first + at_once, total)
         if edges is not None:
-            channels = piece_channels(rotation.interpolant, edges[first : stop + 1])
+            terms, places = terms_of_pieces(rotation.interpolant, edges[first : stop + 1])
         else:
             which = None if stop - first == total else np.arange(first, stop)
-            channels, _ = end_channels(rotation.interpolant, rotation.steps, which)
-        find(channels, first, directions, frames, lengths, magnitudes, _rules(), pieces)
+            terms, places = terms_at_ends(rotation.interpolant, rotation.steps, which)
+        find(terms, places, first, directions, frames, lengths, magnitudes, _rules(), pieces)
     late, early = pieces.differences
     error = _SAFETY_FACTOR * (late * np.minimum(late / (early + _TINY), 1.0)).sum(axis=0)
     return CurveIntegrals(
@@ -78,7 +85,8 @@ def curve_integrals(rotation: SteppedRotation, lift: Lift | None = None, edges: 
 
 
 def _curve_pieces(
-    channels: Array,
+    terms: Array,
+    places: Integers,
     first: int,
     directions: Array,
     frames: Array | None,
@@ -88,7 +96,8 @@ def _curve_pieces(
     found: PiecesOfCurve,
 ) -> None:
     """As `fast.curves.curve_pieces`."""
-    part = slice(first, first + channels.shape[-1])
+    part = slice(first, first + len(places))
+    channels = terms[np.stack([places, places + 1])].transpose(3, 2, 0, 1)
     edges, after = slice(part.start, part.stop + 1), slice(part.start + 1, part.stop + 1)
     found.corners[:, edges] = directions[:, edges] if frames is None else so3.apply(frames[edges], directions[:, edges])
     ends = directions.transpose(2, 0, 1)

@@ -14,6 +14,7 @@ from .. import so3, sphere
 from ..arrays import Array, Integers, Mask
 from ..deformation.frames import GAUGES, Frames, frames_argument, named_frames
 from ..errors import GaugeError, ShapeError
+from ..integrator.closing import far_references
 from ..integrator.curve_integrals import CurveIntegrals, curve_integrals
 from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
@@ -214,7 +215,7 @@ def momentum_curve(
         ends = found.corners[:, np.searchsorted(found.edges, edges)]
     else:
         ends = found.corners if times is None else integrals(edges).corners
-    references = np.array(list(map(sphere.far_reference, ends)))
+    references = far_references(ends)
     if times is not None:
         found = _clear(integrals, found, references, _HALVINGS)
     if clear_of_start:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Integers
 from ._plain import plain
 
 
@@ -39,10 +39,18 @@ def closed_curves(corners: Array, references: Array, axes: Array, first: Array, 
     return ClosedCurves(areas[0], areas[1], tilts, gaps, turns)
 
 
+def far_references(curves: Array, references: Array) -> Integers:
+    """Which of the references (3, R) have their opposites farthest from curves (B, N, 3): (B,)."""
+    found = np.empty(len(curves), dtype=np.int64)
+    _kernel().far_references(plain(curves), plain(references), found)
+    return found
+
+
 def warm() -> None:
     """Call the kernel with the least that it takes."""
     north, here = np.array([[0.0, 0.0, 1.0]]), np.eye(3)[None]
     closed_curves(np.repeat(north[:, None], 2, axis=1), north, north, here, here)
+    far_references(north[None], here[0])
 
 
 @lru_cache(maxsize=1)

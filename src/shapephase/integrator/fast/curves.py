@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Integers
 from ._plain import plain
 
 _NO_FRAMES = np.empty((0, 3, 3))
@@ -33,7 +33,8 @@ class PiecesOfCurve(NamedTuple):
 
 
 def curve_pieces(
-    channels: Array,
+    terms: Array,
+    places: Integers,
     first: int,
     directions: Array,
     frames: Array | None,
@@ -42,11 +43,12 @@ def curve_pieces(
     rules: Array,
     found: PiecesOfCurve,
 ) -> None:
-    """Fill what is to be found of pieces `first`, `first` + 1, ..., and add to the differences.
+    """Fill what is to be found of N pieces `first`, `first` + 1, ..., and add to the differences.
 
     Parameters
     ----------
-    channels : (9, TERMS, 2, N) Taylor terms at both ends of N pieces, as of `end_channels`
+    terms : (Q, TERMS, 9) Taylor terms of the channels at the ends of pieces, as of `terms_at_ends`
+    places : (N,) where the start of each piece stands among them, which its end follows
     directions : (B, M + 1, 3) of the momentum at the ends of all pieces, body axes
     frames : (M + 1, 3, 3) of the horizontal gauge there, body axes to gauge axes; None: the gauge is the base
     lengths : (M,) [s]
@@ -54,14 +56,14 @@ def curve_pieces(
     rules : (3, 2 TERMS) from the terms at both ends to integrals
     """
     arrays = directions, _NO_FRAMES if frames is None else frames, lengths, magnitudes, rules
-    _kernel().curve_pieces(plain(channels), first, *map(plain, arrays), *found)
+    _kernel().curve_pieces(plain(terms), places, first, *map(plain, arrays), *found)
 
 
 def warm() -> None:
     """Call the kernel with the least that it takes."""
-    channels, directions = np.ones((9, 6, 2, 1)), np.ones((1, 2, 3))
+    terms, directions = np.ones((2, 6, 9)), np.ones((1, 2, 3))
     one, rules = np.ones(1), np.ones((3, 12))
-    curve_pieces(channels, 0, directions, None, one, one, rules, PiecesOfCurve.empty(1, 1))
+    curve_pieces(terms, np.zeros(1, dtype=np.int64), 0, directions, None, one, one, rules, PiecesOfCurve.empty(1, 1))
 
 
 @lru_cache(maxsize=1)

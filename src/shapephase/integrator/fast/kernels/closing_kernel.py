@@ -1,4 +1,4 @@
-"""What the great circle from the end of a curve of directions to its start makes of it.
+"""What the great circle from the end of a curve of directions to its start makes of it, and a reference far from it.
 
 Vectors are tuples of three numbers, quaternions xyzw of four; the formulas are those of `so3` and `sphere`.
 """
@@ -6,6 +6,8 @@ Vectors are tuples of three numbers, quaternions xyzw of four; the formulas are 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ....so3 import FAR_FROM_OPPOSITE, OPPOSITE
 from .jit import kernel, part
@@ -160,3 +162,24 @@ def close_curves(corners, references, axes, first, last, areas, tilts, gaps, tur
                 tilts[row, i, j] = tilt[i][j]
         whole_turn = _times_transposed(_rows(last[row]), there)
         turns[row] = _angle_about(_times_transposed(whole_turn, tilt), _vector(axes[row]))
+
+
+@kernel
+def far_references(curves, references, found):
+    """Rows of `references` (3, R) whose opposites are farthest from curves (B, N, 3): (B,)."""
+    for row in range(len(curves)):
+        curve, best, near = curves[row], -np.inf, 0
+        for candidate in range(references.shape[1]):
+            x, y, z = references[0, candidate], references[1, candidate], references[2, candidate]
+            # What came too near to the last one most likely does to this one.
+            least = curve[near, 0] * x + curve[near, 1] * y + curve[near, 2] * z
+            if least <= best:
+                continue
+            for k in range(len(curve)):
+                along = curve[k, 0] * x + curve[k, 1] * y + curve[k, 2] * z
+                if along < least:
+                    least, near = along, k
+                    if least <= best:
+                        break
+            if least > best:
+                best, found[row] = least, candidate

@@ -216,14 +216,14 @@ def _in_base(s, lanes, magnitude):
 
 
 @part
-def _begin(channels, side, block, directions, frames, start, lanes, corners, s):
+def _begin(terms, places, side, block, directions, frames, start, lanes, corners, s):
     """What goes in, of one end of some pieces; and the corners there."""
     lifted = len(frames) > 0
-    for channel in range(9):
+    for i in range(lanes):
+        place = places[block + i] + side
         for order in range(TERMS):
-            row = _CHANNELS + (channel * TERMS + order) * LANES
-            for i in range(lanes):
-                s[row + i] = channels[channel, order, side, block + i]
+            for channel in range(9):
+                s[_CHANNELS + (channel * TERMS + order) * LANES + i] = terms[place, order, channel]
     for i in range(lanes):
         here, at = start + i, start + i + side
         x, y, z = directions[at, 0], directions[at, 1], directions[at, 2]
@@ -258,12 +258,13 @@ def _end(directions, side, start, lanes, lengths, lifted, s, slopes, by_momentum
 
 @kernel
 def curve_pieces(
-    channels, first, directions, frames, lengths, magnitudes, rules,
+    terms, places, first, directions, frames, lengths, magnitudes, rules,
     dynamic, slivers, corners, slopes, by_momentum, differences,
 ):  # fmt: skip
     """Pieces `first`, `first` + 1, ...; what is in the last line of arguments is filled there, `differences` added to.
 
-    channels: (9, TERMS, 2, N) of N pieces, as `end_channels` gives them
+    terms: (Q, TERMS, 9) of the channels at the ends of pieces
+    places: (N,) where the start of each piece stands among them, which its end follows
     directions: (B, M + 1, 3) of the momentum at the ends of all pieces, body axes
     frames: (M + 1, 3, 3) of the horizontal gauge there, body axes to gauge axes; without any the gauge is the base
     lengths: (M,) [s]
@@ -271,14 +272,14 @@ def curve_pieces(
     rules: (3, 2 TERMS) from Taylor terms at both ends to integrals
     dynamic, slivers: (B, M); corners, slopes, by_momentum: (B, M + 1, 3); differences: (2, 2, B)
     """
-    lifted, count = len(frames) > 0, channels.shape[3]
+    lifted, count = len(frames) > 0, len(places)
     s, found = np.empty(_ROWS * LANES), np.empty((2, 3, LANES))
     for row in range(len(magnitudes)):
         for block in range(0, count, LANES):
             lanes, start = min(LANES, count - block), first + block
             found[:] = 0.0
             for side in range(2):
-                _begin(channels, side, block, directions[row], frames, start, lanes, corners[row], s)
+                _begin(terms, places, side, block, directions[row], frames, start, lanes, corners[row], s)
                 if lifted:
                     _in_lift(s, lanes, magnitudes[row])
                 else:
