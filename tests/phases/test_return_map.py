@@ -650,11 +650,11 @@ def test_a_magnitude_is_one_number_above_zero(magnitude):
 
 @pytest.fixture(scope="module")
 def unstable():
-    """A loop along which errors grow some 300 times, and a magnitude of the momentum."""
+    """A loop along which errors grow up to a thousand times, and a magnitude of the momentum."""
     body = sp.load_body("cat")
     sines = np.random.default_rng(1).normal(size=(body.n_shape, 3)) * 0.3 / np.arange(1, 4)
     path = sp.ShapePath.fourier(np.zeros(body.n_shape), 0.0 * sines, sines, 1.0)
-    return sp.articulated(body, path), 20.0 * np.trace(body.locked_inertia(np.zeros(body.n_shape))) / 3.0
+    return sp.articulated(body, path), 40.0 * np.trace(body.locked_inertia(np.zeros(body.n_shape))) / 3.0
 
 
 def test_along_an_unstable_loop_the_tolerance_is_what_can_be_met(unstable):
@@ -672,7 +672,7 @@ def test_along_an_unstable_loop_the_tolerance_is_what_can_be_met(unstable):
 def test_fixed_points_of_an_unstable_loop_close_by_another_integrator(unstable):
     deformation, magnitude = unstable
     found = sp.fixed_points(deformation, magnitude, most_directions=1000)
-    assert found.tolerance > 1e-11
+    assert 1e-11 <= found.tolerance <= 1e-9
     assert len(found.directions) >= 2
     for direction, gap in zip(found.directions, found.gap, strict=True):
         attitude = so3.between(direction, np.array([0.0, 0.0, 1.0]))

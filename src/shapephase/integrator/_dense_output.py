@@ -347,7 +347,7 @@ def taylor_terms(quaternions: Array, directions: Array | None, magnitude: Array,
     for order in range(TERMS - 1):
         v, w, rate = vectors[:, : order + 1], scalars[: order + 1], _backwards(rates, order)
         half = 0.5 / (order + 1)
-        vectors[:, order + 1] = half * (w * rate + _cross(v, rate)).sum(axis=1)
+        vectors[:, order + 1] = half * (w * rate + crossed(v, rate)).sum(axis=1)
         scalars[order + 1] = -half * (v * rate).sum(axis=(0, 1))
     return terms
 
@@ -367,14 +367,14 @@ def direction_terms(directions: Array, magnitude: Array, channels: Array) -> tup
         turning = (_backwards(inverse, order) * p[:, : order + 1]).sum(axis=(1, 2))
         rates[:, order] = turning - drift[:, order]
         if order + 1 < TERMS:
-            p[:, order + 1] = _cross(p[:, : order + 1], _backwards(rates, order)).sum(axis=1) / (order + 1)
+            p[:, order + 1] = crossed(p[:, : order + 1], _backwards(rates, order)).sum(axis=1) / (order + 1)
     return p, rates
 
 
 def transported(vectors: Array, rates: Array) -> None:
     """Complete the Taylor terms (3, TERMS, B, 2, M) of vectors that rest while the axes they are seen in turn."""
     for order in range(TERMS - 1):
-        vectors[:, order + 1] = _cross(vectors[:, : order + 1], _backwards(rates, order)).sum(axis=1) / (order + 1)
+        vectors[:, order + 1] = crossed(vectors[:, : order + 1], _backwards(rates, order)).sum(axis=1) / (order + 1)
 
 
 def convolved(a: Array, b: Array) -> Array:
@@ -390,7 +390,7 @@ def _backwards(terms: Array, order: int) -> Array:
     return terms[..., order::-1, :, :, :] if order else terms[..., :1, :, :, :]
 
 
-def _cross(a: Array, b: Array) -> Array:
+def crossed(a: Array, b: Array) -> Array:
     """Cross product of vectors along the first axis."""
     result = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):

@@ -16,6 +16,7 @@ from .. import so3
 from ..arrays import Array, Integers
 from ._dense_output import (
     convolved,
+    crossed,
     direction_terms,
     hermite_matrix,
     terms_at_ends,
@@ -123,17 +124,17 @@ def _curve_pieces(
     by_rule = (rules @ integrands.transpose(3, 1, 0, 2, 4).reshape(2 * TERMS, -1)).reshape(3, 2, *both.shape[1::2])
     found.dynamic[:, part], found.slivers[:, part] = by_rule[0]
     found.differences[:] += np.abs(by_rule[:2] - by_rule[1:]).sum(axis=-1)
-    turning = _at_edges(rates[:, 0], lengths[part])
-    found.slopes[:, edges] = found.by_momentum[:, edges] = so3.cross(directions[:, edges], turning)
+    slopes = crossed(ends[:, :, edges], _at_edges(rates[:, 0], lengths[part]))
+    found.slopes[:, edges] = found.by_momentum[:, edges] = slopes.transpose(1, 2, 0)
     if frames is None:
-        drift = _at_edges(channels[6:, 0, None], lengths[part])
-        found.by_momentum[:, edges] += so3.cross(directions[:, edges], drift)
+        by_drift = crossed(ends[:, :, edges], _at_edges(channels[6:, 0, None], lengths[part]))
+        found.by_momentum[:, edges] += by_drift.transpose(1, 2, 0)
 
 
 def _at_edges(of_pieces: Array, lengths: Array) -> Array:
-    """What is known at both ends of pieces, times their lengths, at the edges: (3, B, 2, N), (N,) -> (B, N + 1, 3)."""
+    """What is known at both ends of pieces, times their lengths, at the edges: (3, B, 2, N), (N,) -> (3, B, N + 1)."""
     rates = of_pieces / lengths
-    return np.concatenate([rates[:, :, 0], rates[:, :, 1, -1:]], axis=-1).transpose(1, 2, 0)
+    return np.concatenate([rates[:, :, 0], rates[:, :, 1, -1:]], axis=-1)
 
 
 @lru_cache(maxsize=1)
