@@ -650,7 +650,7 @@ def test_a_magnitude_is_one_number_above_zero(magnitude):
 
 @pytest.fixture(scope="module")
 def unstable():
-    """A loop along which errors grow some 300 times, and a magnitude of the momentum; of twice that a thousand times."""
+    """A loop along which errors grow some 300 times, and a magnitude of the momentum; of twice that, a thousand."""
     body = sp.load_body("cat")
     sines = np.random.default_rng(1).normal(size=(body.n_shape, 3)) * 0.3 / np.arange(1, 4)
     path = sp.ShapePath.fourier(np.zeros(body.n_shape), 0.0 * sines, sines, 1.0)
