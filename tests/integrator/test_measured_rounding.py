@@ -154,3 +154,42 @@ def test_rows_are_measured_each_for_itself():
     (alone,) = measured_rounding(np.array([1e-12]), interpolant, steps, one, sizes[:1], tolerance, alike)
     assert found[0] == alone < 1e-12
     assert found[1] == 1e-14
+
+
+def of_kind(kind: str, body: sp.Body, rng: np.random.Generator) -> sp.ShapePath:
+    """A loop of 0.8 s."""
+    sines = 0.3 * rng.normal(size=(body.n_shape, 2))
+    loop = sp.ShapePath.fourier(np.zeros(body.n_shape), 0.2 * sines[:, ::-1], sines, 0.8)
+    if kind == "recorded":
+        times = np.linspace(0.0, 0.8, 121)
+        return sp.ShapePath.spline(times, loop.curve(times)[0])
+    return loop if kind == "loop" else sp.ShapePath.function(loop.curve, 0.8)
+
+
+@pytest.mark.parametrize("fast", ["0", "1"])
+@pytest.mark.parametrize("kind", ["loop", "function", "recorded"])
+def test_samplers_give_the_deformation_between_their_nodes(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, fast: str, kind: str
+):
+    """As Pinocchio has it along the path, and not as the series through the samples has it."""
+    if fast == "1":
+        request.getfixturevalue("fast")
+    else:
+        monkeypatch.setenv("SHAPEPHASE_FAST", "0")
+    rng = np.random.default_rng(5)
+    body = sp.load_body("cat_two_halves")
+    path = of_kind(kind, body, rng)
+    sampler = sp.articulated(body, path).sampler()
+    sampler.refine(0.3, 1e-9)
+    times = rng.uniform(0.0, 0.8, 200)
+    found = np.array(sampler.channels(times))
+    shapes, rates = path.curve(times)
+    inverse = np.linalg.inv(body.locked_inertia(shapes))
+    drift = (inverse @ body.internal_momentum(shapes, rates)[:, :, None])[:, :, 0]
+    exact = np.column_stack([inverse[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]], drift])
+    scale = np.abs(exact).max(axis=0)
+    # Panels over several knots follow polynomials in the place of the path.
+    allowed = 1e-7 if kind == "recorded" else 64.0 * EPS
+    assert (np.abs(found - exact).max(axis=0) <= allowed * scale.max()).all()
+    series = sampler.interpolant().series(times)
+    assert 0.0 < np.abs(found - series).max() < 1e-6 * scale.max()
