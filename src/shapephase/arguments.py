@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from inspect import signature
 
 import numpy as np
@@ -83,6 +83,9 @@ _WAYS = {
     "SurfaceOfRevolution": {"": "make it with geodesics.spheroid(...) or surface_of_metric(...)"},
     "Reach": {"": "make it with reachable(body, shape)"},
     "InertiaErrors": {"": "make it with InertiaErrors(masses=0.05), for example"},
+    "TrajectoryNoise": {"": "make it with auditing.TrajectoryNoise(attitude=0.002), for example"},
+    "MjModel": {"": "make it with mujoco.MjModel.from_xml_path(file)"},
+    "Model": {"": "make it with pinocchio.buildModelFromUrdf(file, pinocchio.JointModelFreeFlyer())"},
 }
 OF_A_FALL = ("start", "velocity", "gravity")
 """Keywords of `Motion.base_position`, which what writes or shows a motion hands on."""
@@ -155,6 +158,18 @@ def check_file_name(value: object, name: str) -> None:
     """Raise WrongObjectError where an argument is no name of a file."""
     if not isinstance(value, str | os.PathLike):
         raise WrongObjectError(f"{name}: the name of a file is needed, got {what_came(value)}")
+
+
+def check_text(value: object, name: str, what: str) -> None:
+    """Raise WrongObjectError where an argument is no text; `what` says in words which is needed."""
+    if not isinstance(value, str):
+        raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
+
+
+def check_mapping(value: object, name: str, what: str) -> None:
+    """Raise ShapeError where an argument is no mapping; `what` says in words from what to what."""
+    if not isinstance(value, Mapping):
+        raise ShapeError(f"{name}: a mapping, {what}, is needed, got {what_came(value)}")
 
 
 def names_argument(value: object, name: str, what: str) -> tuple[str, ...]:

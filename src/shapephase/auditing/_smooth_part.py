@@ -12,7 +12,8 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.stats import chi2
 
-from ..arrays import Array
+from ..arguments import check_pair, whole_argument
+from ..arrays import Array, finite_array
 from ..display import short_repr
 
 _HIGHEST = 12
@@ -74,15 +75,18 @@ def smooth_part(
     >>> drift.ratio > 1.0  # more than noise of 0.01
     True
     """
-    highest = int(min(_HIGHEST, max(free, len(times) // _SAMPLES_EACH)))
-    basis = polynomials(times, highest)[:, free:]
+    lowest = whole_argument(free, "free", 0)
+    highest = int(min(_HIGHEST, max(lowest, len(times) // _SAMPLES_EACH)))
+    basis = polynomials(times, highest)[:, lowest:]
     parts = basis.T @ residuals
     # Of noise that is independent from sample to sample.
     if carried is None:
         spread = np.einsum("np,nq,nij->piqj", basis, basis, covariances)
     else:
+        check_pair(carried, "carried", "two arrays")
+        own, further = (finite_array(part, "carried", (*residuals.shape, None)) for part in carried)
         after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
-        of_each = np.einsum("np,nim->npim", basis, carried[0]) + np.einsum("np,nim->npim", after, carried[1])
+        of_each = np.einsum("np,nim->npim", basis, own) + np.einsum("np,nim->npim", after, further)
         spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
     count = parts.size
     matrix = spread.reshape(count, count)

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice, check_object, number_argument
+from ..arrays import Array, real_array
 from ..body.body import Body
-from ..errors import TrajectoryError
+from ..errors import ShapeError, TrajectoryError
 from .audit_result import Audit
 from .floating_trajectory import FloatingTrajectory
 from .trajectory_audit import audit
@@ -60,10 +61,12 @@ class FlightRecorder:
         return f"FlightRecorder({self.body.name!r}, {self.convention}, {len(self._times)} samples)"
 
     def add(self, time: float, configuration: ArrayLike, velocity: ArrayLike) -> None:
-        """Keep a copy of one state: its time [s], `qpos` and `qvel` or `q` and `v`."""
-        self._times.append(float(time))
-        self._places.append(np.array(configuration, dtype=float))
-        self._rates.append(np.array(velocity, dtype=float))
+        """Keep a copy of one state: its time [s], `qpos` and `qvel` or `q` and `v`. Raises ShapeError."""
+        at, place = number_argument(time, "time", "s"), _row(configuration, "configuration")
+        rate = _row(velocity, "velocity")
+        self._times.append(at)
+        self._places.append(place)
+        self._rates.append(rate)
 
     def trajectory(self) -> FloatingTrajectory:
         """What was kept. Raises TrajectoryError where that is nothing, or does not fit together."""
@@ -85,6 +88,14 @@ class FlightRecorder:
     def audit(self, *, tolerance: float = 1e-3, flight: str | Sequence[float] = "auto") -> Audit:
         """The audit of what was kept; parameters and errors as those of `audit`."""
         return audit(self.body, self.trajectory(), tolerance=tolerance, flight=flight)
+
+
+def _row(value: ArrayLike, name: str) -> Array:
+    """One row of numbers of a simulator, a copy; whether they are finite is looked at in the end. Raises ShapeError."""
+    row = real_array(value, name).copy()
+    if row.ndim != 1:
+        raise ShapeError(f"{name}: one row of numbers is needed, got shape {row.shape}")
+    return row
 
 
 def assert_right_in_flight(

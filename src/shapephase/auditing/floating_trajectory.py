@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, check_object, positive_argument
+from ..arguments import check_choice, check_object, names_argument, positive_argument
 from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
 from ..display import short_repr
@@ -139,7 +139,7 @@ class FloatingTrajectory:
         given = _rates(rates, "base", "world")
         quaternion = np.roll(places[:, 3:_POSE], -1, axis=1)
         return FloatingTrajectory(
-            times=np.asarray(times, dtype=float),
+            times=finite_array(times, "times", (None,), unit="s"),
             position=places[:, :3],
             quaternion=quaternion,
             shapes=places[:, _POSE:],
@@ -184,7 +184,7 @@ class FloatingTrajectory:
         places, rates = _arrays(body, q, v, joint_names, ("q", "v"))
         given = _rates(rates, "base", "base")
         return FloatingTrajectory(
-            times=np.asarray(times, dtype=float),
+            times=finite_array(times, "times", (None,), unit="s"),
             position=places[:, :3],
             quaternion=places[:, 3:_POSE],
             shapes=places[:, _POSE:],
@@ -242,7 +242,7 @@ def _arrays(
 ) -> tuple[Array, Array | None]:
     """Both arrays with their joints in the body's order."""
     check_object(body, "Body", "body")
-    order = list(body.joint_names if names is None else names)
+    order = list(body.joint_names if names is None else names_argument(names, "joint_names", "names of joints"))
     for joint in body.joint_names:
         if order.count(joint) > 1:
             raise ShapeError(f"joint_names: {joint!r} stands {order.count(joint)} times")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -97,7 +97,10 @@ def audit(
     check_object(body, "Body", "body")
     if body.ball_joints:
         raise ShapeError(f"audits take joints of one axis; {body.name} has ball joints: {', '.join(body.ball_joints)}")
-    runs = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
+    if noise is not None:
+        check_object(noise, "TrajectoryNoise", "noise")
+    given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else trajectories
+    runs = list(given) if isinstance(given, Iterable) else []
     if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
         raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
     within = positive_argument(tolerance, "tolerance", "a ratio")

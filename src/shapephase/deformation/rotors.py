@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from .. import so3
-from ..arguments import check_object, number_argument
+from ..arguments import check_mapping, check_object, number_argument
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
-from ..letters import what_came
 from ..shape_space.curves import Widened
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.shape_path import ShapePath
@@ -153,9 +152,10 @@ class RotorDescription(UngaugedDescription):
 
 def mapping_of_joints(value: Any, name: str) -> Mapping[str, Any]:
     """From joints to numbers; None: an empty one. Raises ShapeError."""
-    if value is not None and not isinstance(value, Mapping):
-        raise ShapeError(f"{name}: a mapping from joints to numbers is needed, got {what_came(value)}")
-    return value or {}
+    if value is None:
+        return {}
+    check_mapping(value, name, "joint -> number")
+    return value
 
 
 def rotors_argument(body: Body, momenta: Mapping[str, Any], speeds: Mapping[str, Any]) -> tuple[Rotor, ...]:

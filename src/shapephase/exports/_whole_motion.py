@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, times_argument
+from ..arguments import check_object, times_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.inverse_dynamics import floating_states, floating_velocities
@@ -36,9 +36,9 @@ class Fall:
     def of(cls, start: ArrayLike, velocity: ArrayLike, gravity: ArrayLike) -> Fall:
         """What a user has given. Raises ShapeError."""
         return cls(
-            start=finite_array(start, "start", (3,), unit="m"),
-            velocity=finite_array(velocity, "velocity", (3,), unit="m/s"),
-            gravity=finite_array(gravity, "gravity", (3,), unit="m/s^2"),
+            start=vector_argument(start, "start", unit="m"),
+            velocity=vector_argument(velocity, "velocity", unit="m/s"),
+            gravity=vector_argument(gravity, "gravity", unit="m/s^2"),
         )
 
     def centre(self, times: Array) -> Array:

@@ -9,7 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from .. import __version__
-from ..arguments import check_choice, check_file_name
+from ..arguments import check_choice, check_file_name, check_text
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import UnknownNameError
@@ -140,8 +140,9 @@ def write_aem(
 
 
 def _epoch(text: str) -> tuple[datetime.datetime, Decimal]:
-    """Whole seconds, and the rest [s]. Raises UnknownNameError."""
-    whole, _, rest = str(text).partition(".")
+    """Whole seconds, and the rest [s]. Raises UnknownNameError, WrongObjectError."""
+    check_text(text, "epoch", "a date and time as 2026-11-23T10:00:00.5")
+    whole, _, rest = text.partition(".")
     try:
         if rest and not (rest.isascii() and rest.isdigit()):
             raise ValueError

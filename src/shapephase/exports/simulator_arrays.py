@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..body.couplings.coordinate_map import check_no_balls
 from ..display import short_repr
@@ -127,6 +128,7 @@ def mujoco_arrays(
     if model is None:
         qpos, qvel = np.hstack([base[0], whole.joints]), np.hstack([base[1], whole.rates])
         return MujocoArrays(time=whole.times, qpos=qpos, qvel=qvel, joint_names=whole.names)
+    check_object(model, "MjModel", "model")
     free = [k for k in range(model.njnt) if model.jnt_type[k] == _MUJOCO_FREE]
     names = [model.joint(k).name for k in range(model.njnt) if k not in free]
     order = _order(whole, names, "MuJoCo", len(free))
@@ -186,6 +188,7 @@ def pinocchio_arrays(
             joint_names=whole.names,
         )
     check_no_balls(whole.body.chain.follows, "arrays by the order of another model need")
+    check_object(model, "Model", "model")
     kinds = list(model.joints)
     free = len(kinds) > 1 and (kinds[1].nq, kinds[1].nv) == (_FREE_Q, _FREE_V)
     names = list(model.names)[2:]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import so3
-from ..arguments import check_file_name, number_argument, whole_argument
+from ..arguments import check_file_name, check_text, number_argument, whole_argument
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, MissingExtraError, OutputFileError, UnknownNameError
@@ -143,7 +143,9 @@ def write_spice_ck(
     where, goal, start = Path(path), error_argument(error), number_argument(epoch, "epoch", "s")
     if where.suffix.lower() != ".bc":
         raise UnknownNameError(f"{where}: the name of a C-kernel ends in .bc")
-    number = -whole_argument(-instrument, "minus instrument", _OF_A_CLOCK)
+    check_text(reference, "reference", "SPICE's name of inertial axes")
+    whole = -instrument if isinstance(instrument, int | np.integer) else instrument
+    number = -whole_argument(whole, "minus instrument", _OF_A_CLOCK)
     try:
         import spiceypy
     except ImportError:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import positive_argument
+from ..arguments import check_mapping, names_argument, positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
@@ -385,6 +385,10 @@ def joint_coupling(
     body: Body, joints: Sequence[str] | None, symmetric: Mapping[str, tuple[str, float]] | None
 ) -> Array:
     """Rates of all joints from those of the free ones: (n, m). Raises UnknownNameError, TrajectoryError."""
+    if joints is not None:
+        names_argument(joints, "joints", "names of joints")
+    if symmetric is not None:
+        check_mapping(symmetric, "symmetric", "joint -> (joint that it follows, factor)")
     return _coupling(body, symmetric or {}, _fixed_joints(body, joints))[0]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import positive_argument
+from ..arguments import check_pair, number_argument, positive_argument
 from ..arrays import Array, common_shape, finite_array
 from ..errors import ShapeError
 from ..sphere import polygon_area
@@ -62,9 +62,11 @@ def two_link_turn(
     >>> print(f"{np.degrees(turn):.6f} degrees: equal links share it")
     -45.000000 degrees: equal links share it
     """
+    for pair, name in ((inertias, "inertias"), (masses, "masses"), (levers, "levers")):
+        check_pair(pair, name, "two numbers")
     first, second = (_moment(value, "inertias") for value in inertias)
     m1, m2 = (positive_argument(value, "masses", "a mass in kg") for value in masses)
-    a, b = (float(finite_array(value, "levers", unit="m")) for value in levers)
+    a, b = (number_argument(value, "levers", "m") for value in levers)
     turned = finite_array(angle, "angle", unit="rad")
     mass = m1 * m2 / (m1 + m2)
     whole, swing = first + second + mass * (a * a + b * b), 2.0 * mass * a * b
@@ -180,7 +182,7 @@ def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: 
     size = positive_argument(radius, "radius", "a length in m")
     free = finite_array(length, "length", unit="m")
     whole = size * size + moment / ends
-    return float(finite_array(rate, "rate", unit="rad/s")) * (whole - free * free) / (whole + free * free)
+    return number_argument(rate, "rate", "rad/s") * (whole - free * free) / (whole + free * free)
 
 
 def yo_yo_stop(hub: float, mass: float, radius: float) -> float:

@@ -197,7 +197,7 @@ def reconstruct_forced(
 ) -> ForcedMotion:
     """The motion under a torque. Arguments and errors as for `reconstruct`."""
     check_object(deformation, "Deformation", "deformation")
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise unknown_name("method with a torque", method, METHODS)
     law = torque_argument(torque)
     spatial, start = initial_state_arguments(momentum, attitude)

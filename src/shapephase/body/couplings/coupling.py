@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_choice, number_argument
+from ...arguments import check_choice, check_mapping, number_argument
 from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import what_came
@@ -103,6 +103,7 @@ class Coupling:
 
     def at(self, coordinates: dict[str, float]) -> float:
         """The coordinate where those of the drivers are known [rad or m]."""
+        check_mapping(coordinates, "coordinates", "joint -> coordinate")
         found = (float(function(np.array(coordinates[name])).value) for name, function in self.terms)
         return self.start + sum(found)
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_file_name, check_object, positive_argument
+from ...arguments import check_file_name, check_object, check_text, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...display import short_repr
@@ -335,6 +335,8 @@ def write_shape_path(
     suffix = where.suffix.lower()
     if suffix not in _WRITTEN and not output_target(where).is_stream:
         raise unknown_name(f"ending of the motion file {where}:", where.suffix, _WRITTEN)
+    if comment is not None:
+        check_text(comment, "comment", "a text")
     if path.joint_names is None:
         raise TrajectoryError("a motion file names its joints, and this path has no joint names; make it with them")
     t = path.sample_times if times is None else finite_array(times, "times", (None,), unit="s")

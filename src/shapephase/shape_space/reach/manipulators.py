@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import check_object
+from ...arguments import check_flag, check_object, vector_argument
 from ...arrays import Array, finite_array
 from ...body._link_motions import link_motions
 from ...body.body import Body
@@ -53,6 +53,7 @@ def generalised_jacobian(
     (6, 10)
     """
     check_object(body, "Body", "body")
+    check_flag(fixed_base, "fixed_base")
     connection = mechanical_connection(body, shape)
     r = finite_array(shape, "shape")
     if not isinstance(link, str) or link not in body.chain.link_frames:
@@ -61,7 +62,7 @@ def generalised_jacobian(
     rows = r.reshape(-1, body.n_shape)
     count = body.n_shape
     motions = link_motions(body.chain, np.repeat(rows, count, axis=0), np.tile(np.eye(count), (len(rows), 1)))
-    offset = pose[:3, :3] @ finite_array(point, "point", (3,), unit="m") + pose[:3, 3] - body.chain.centres[frame]
+    offset = pose[:3, :3] @ vector_argument(point, "point", unit="m") + pose[:3, 3] - body.chain.centres[frame]
     lever = so3.apply(motions.turns[:, frame], offset)
     place = (motions.places[:, frame] + lever).reshape(len(rows), count, 3)
     spin = motions.spins[:, frame]
