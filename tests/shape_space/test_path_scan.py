@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 from benchmarks.hostile_paths import KINDS, SMOOTH, hostile_path, judged
+from numpy.polynomial.chebyshev import chebinterpolate, chebval
 from scipy.interpolate import BarycentricInterpolator
 
 import shapephase as sp
@@ -192,6 +193,38 @@ def test_a_panel_of_more_terms_than_the_series_of_the_path_hides_less_than_these
     fewer, more = resolved.hidden(*ends, np.array([16, 64])).table[:, :4].sum(axis=1)
     assert more < 1e-4 * resolved.misfit[row].max()
     assert fewer > 1e-2
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-9])
+def test_terms_far_beyond_a_panel_s_degree_are_seen_as_something_slow(noise: float):
+    """T_30 on two halves: 16 points take it for a lower degree, which does not average out.
+
+    Where the halves have noise, what was found of the whole stays.
+    """
+    series = np.zeros((3, 33, 2))
+    series[0, 30] = [1.0, 3.0]
+    for half, middle in ((1, -0.5), (2, 0.5)):
+        swing = chebinterpolate(lambda y, middle=middle: chebval(0.5 * y + middle, np.eye(31)[30]), 32)
+        series[half] = swing[:, None] * [1.0, 3.0]
+    halves = ResolvedPath(
+        left=np.array([0.0, 0.0, 0.5]),
+        right=np.array([1.0, 0.5, 1.0]),
+        coefficients=series,
+        misfit=np.array([[7.0, 9.0], [0.0, 0.0], [0.0, 0.0]]),
+        noise=np.array([0.0, 0.0, noise]),
+        children=np.array([1, -1, -1]),
+        roots=np.array([0]),
+        duration=1.0,
+    )
+    whole = np.array([0.0]), np.array([1.0])
+    (hides,) = halves.hidden(*whole, np.array([15])).table
+    np.testing.assert_allclose(hides[2:4], [7.0, 9.0] if noise else [1.0, 1.5], rtol=1e-12)
+    if not noise:
+        # In panels of more degrees it is above the degree, and averages out; then it is not beyond it at all.
+        np.testing.assert_allclose(
+            halves.hidden(*whole, np.array([25])).table[0], [1.0, 1.5, 0.0, 0.0, 0.0], atol=1e-12
+        )
+        assert halves.hidden(*whole, np.array([30])).table.max() < 1e-12
 
 
 # ---- Kinks and jumps -----------------------------------------------------------------------------------------------
