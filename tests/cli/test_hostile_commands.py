@@ -73,8 +73,11 @@ def body_through_the_command_line(case, worker: Worker, tmp_path):
     file.write_bytes(case.content())
     answer = asked(worker, tmp_path, "check", file)
     if case.said is None:
-        # What loads with on_unphysical="warn" only is an error here.
-        assert answer["code"] == (3 if dict(case.options).get("on_unphysical") == "warn" else 0)
+        # What loads with such options only is an error here.
+        options = dict(case.options)
+        assert answer["code"] == (
+            3 if options.get("on_unphysical") == "warn" or {"root", "root_body"} & set(options) else 0
+        )
     else:
         assert answer["code"] in (2, 3)
         assert answer["error"]["type"] == case.error

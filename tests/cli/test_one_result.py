@@ -94,7 +94,7 @@ def test_everything_that_shows_a_split_shows_the_same_numbers(number, capfd, tmp
         assert float(last[f"{name}_deg"]) == pytest.approx(np.degrees(value), abs=np.degrees(near))
         assert float(last[f"{name}_rad"]) == pytest.approx(value, abs=near)
         assert curves[curve][-1] == pytest.approx(np.degrees(value), rel=1e-6, abs=1e-5)
-        assert any(f"{np.degrees(value):.2f}°".replace("-", "−") in words for words in figure), row
+        assert any(f"{np.degrees(value):z.2f}°".replace("-", "−") in words for words in figure), row
     gap, added = data["momentum_gap"], data["closing_phase"]
     story = html.unescape(" ".join(re.findall(r'<p class="story">(.*?)</p>', page)))
     assert f"Montgomery phase of {np.degrees(data['montgomery_phase']):.2f}°" in story

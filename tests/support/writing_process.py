@@ -112,7 +112,8 @@ def is_whole(content: bytes, writer: str) -> bool:
     if kind == "csv":
         import numpy as np
 
-        rows = np.genfromtxt(io.BytesIO(content), delimiter=",", skip_header=1)
+        lines = [line for line in content.decode().splitlines() if not line.startswith("#")]
+        rows = np.genfromtxt(lines[1:], delimiter=",")
         return content.endswith(b"\n") and len(rows) > 100 and bool(np.isfinite(rows).all())
     if kind in _ARRAYS:
         return _ARRAYS[kind](io.BytesIO(content)) > 100
