@@ -66,6 +66,9 @@ _SPARE = 2
 _COARSE_ITERATIONS = 40
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
 _COARSE_TOLERANCE = 1e-4
+# The same before "reduced": without second derivatives it does not get along a flat valley, and has to start at its end.
+_COARSE_ITERATIONS_OF_REDUCED = 100
+_COARSE_TOLERANCE_OF_REDUCED = 1e-6
 # Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
 _COARSE_INFEASIBILITY = 1e-2
 
@@ -359,6 +362,9 @@ def _starting_points(
     ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
     candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
+    most, tolerance = _COARSE_ITERATIONS, _COARSE_TOLERANCE
+    if search.method == "reduced":
+        most, tolerance = _COARSE_ITERATIONS_OF_REDUCED, _COARSE_TOLERANCE_OF_REDUCED
     found: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
         if reporter.stopped and found:
@@ -367,8 +373,8 @@ def _starting_points(
             candidate.control,
             task.duration,
             guessed_attitudes(task, candidate),
-            iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
-            tolerance=_COARSE_TOLERANCE,
+            iterations=min(most, int(search.iterations)),
+            tolerance=tolerance,
             via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
