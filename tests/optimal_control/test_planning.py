@@ -289,7 +289,7 @@ def test_a_planar_chain_follows_magnetic_geodesics(load_urdf):
     body = planar_chain(load_urdf)
     period = 1.0
     turn = so3.exp(np.array([0.0, 0.0, 0.35]))
-    plan = plan_reorientation(body, turn, duration=period, search=Search(pieces=240), **FREE)
+    plan = plan_reorientation(body, turn, duration=period, search=Search(pieces=320), **FREE)
     known = symbolic_body(body)
     metric, by_shape = known.shape_metric, known.derivative("shape_metric")
 

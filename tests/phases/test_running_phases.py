@@ -404,7 +404,7 @@ def test_twenty_loops_without_a_jump(name, closed):
         ("horizontal", frames_of(motion, "horizontal", times), -drift[..., 0]),
     ):
         phases = running_phases(motion, times, gauge)
-        assert phases.residual < 2e-12
+        assert phases.residual <= phases.error_estimates.montgomery_phase.max()
         v, seen = np.einsum("nij,nj->ni", frames, u), np.einsum("nij,nj->ni", frames, omega - spin)
         along = np.sum(v * seen, axis=1)
         height = v @ phases.reference
