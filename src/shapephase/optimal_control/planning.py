@@ -66,7 +66,7 @@ _SPARE = 2
 _COARSE_ITERATIONS = 40
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
 _COARSE_TOLERANCE = 1e-4
-# The same before "reduced": without second derivatives it does not get along a flat valley, and has to start at its end.
+# The same before "reduced", which without second derivatives does not get along a flat valley: it starts at its end.
 _COARSE_ITERATIONS_OF_REDUCED = 100
 _COARSE_TOLERANCE_OF_REDUCED = 1e-6
 # Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
