@@ -195,7 +195,7 @@ def matlab(chance: Random) -> Trial:
         }
 
     stream = io.BytesIO()
-    entries = {name: value for name, value in plain(_entries(chance)).items() if not name.startswith("_")}
+    entries = {name: value for name, value in plain(_entries(chance)).items() if name[:1].isalpha()}
     entries = {
         name: value if not isinstance(value, np.ndarray) or value.dtype.kind not in "mM" else value.astype(float)
         for name, value in entries.items()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import io
 import re
 import warnings
@@ -112,9 +113,12 @@ def yeadon_faults(file: Path, body: Any) -> Iterator[str]:
     small = [name for name, value in found.items() if value <= 0.0 and (name, value) != ("totalmass", -1.0)]
     if small:
         yield f"{small} are not above zero"
+    # The package scales the densities of all humans to come by the mass of one.
+    densities = copy.deepcopy(yeadon.Human.segmental_densities)
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         human = yeadon.Human(str(file))
+    yeadon.Human.segmental_densities = densities
     said = found.get("totalmass", -1.0)
     for expected in (human.mass, *([said] if said > 0.0 else [])):
         if not np.isclose(expected, body.mass, rtol=_OF_ROUNDING):
