@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask, lock_arrays
+from ..arrays import Array, Integers, Mask, lock_arrays, read_only
 from ..chebyshev import chebyshev, local_coordinate, unit_nodes, values_to_coefficients
 
 Made = TypeVar("Made")
@@ -102,11 +103,11 @@ class ResolvedPath:
 
     __post_init__ = lock_arrays
 
-    @property
+    @cached_property
     def leaves(self) -> Integers:
         """The rows of the resolved panels, in the order of time."""
         rows = np.flatnonzero(self.children < 0)
-        return rows[np.argsort(self.left[rows])]
+        return read_only(rows[np.argsort(self.left[rows])])
 
     def first_panels(self, tolerance: float) -> FirstPanels:
         """The panels and degrees with the fewest samples that leave less than `tolerance` [rad] of the path hidden."""

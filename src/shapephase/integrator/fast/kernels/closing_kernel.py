@@ -11,6 +11,7 @@ import numpy as np
 
 from ....so3 import FAR_FROM_OPPOSITE, OPPOSITE
 from .jit import kernel, part
+from .vectors import cross, dot, plus
 
 
 @part
@@ -19,63 +20,48 @@ def _vector(array):
 
 
 @part
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@part
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@part
-def _sum(a, b):
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@part
 def _unit(a):
-    length = math.sqrt(_dot(a, a))
+    length = math.sqrt(dot(a, a))
     return a[0] / length, a[1] / length, a[2] / length
 
 
 @part
 def _unit_quaternion(vector, scalar):
-    length = math.sqrt(_dot(vector, vector) + scalar * scalar)
+    length = math.sqrt(dot(vector, vector) + scalar * scalar)
     return vector[0] / length, vector[1] / length, vector[2] / length, scalar / length
 
 
 @part
 def _triangle(reference, start, end):
-    volume = _dot(reference, _cross(start, end))
-    return 2.0 * math.atan2(volume, 1.0 + _dot(start, end) + _dot(reference, start) + _dot(reference, end))
+    volume = dot(reference, cross(start, end))
+    return 2.0 * math.atan2(volume, 1.0 + dot(start, end) + dot(reference, start) + dot(reference, end))
 
 
 @part
 def _perpendicular(a):
     x, y, z = abs(a[0]), abs(a[1]), abs(a[2])
     if x <= y and x <= z:
-        return _unit(_cross(a, (1.0, 0.0, 0.0)))
-    return _unit(_cross(a, (0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0)))
+        return _unit(cross(a, (1.0, 0.0, 0.0)))
+    return _unit(cross(a, (0.0, 1.0, 0.0) if y <= z else (0.0, 0.0, 1.0)))
 
 
 @part
 def _middle(start, end):
-    total = _sum(start, end)
-    return _perpendicular(start) if math.sqrt(_dot(total, total)) < OPPOSITE else _unit(total)
+    total = plus(start, end)
+    return _perpendicular(start) if math.sqrt(dot(total, total)) < OPPOSITE else _unit(total)
 
 
 @part
 def _short_turn(start, end):
-    half = _unit(_sum(start, end))
-    return _unit_quaternion(_cross(start, half), _dot(start, half))
+    half = _unit(plus(start, end))
+    return _unit_quaternion(cross(start, half), dot(start, half))
 
 
 @part
 def _between(start, end):
-    scalar = 1.0 + _dot(start, end)
+    scalar = 1.0 + dot(start, end)
     if scalar > FAR_FROM_OPPOSITE:
-        return _unit_quaternion(_cross(start, end), scalar)
+        return _unit_quaternion(cross(start, end), scalar)
     half = _middle(start, end)
     a, b, c, d = _short_turn(half, end)
     x, y, z, w = _short_turn(start, half)
@@ -101,9 +87,9 @@ def _matrix(quaternion):
 def _times_transposed(a, b):
     """A product of matrices, the second one transposed."""
     return (
-        (_dot(a[0], b[0]), _dot(a[0], b[1]), _dot(a[0], b[2])),
-        (_dot(a[1], b[0]), _dot(a[1], b[1]), _dot(a[1], b[2])),
-        (_dot(a[2], b[0]), _dot(a[2], b[1]), _dot(a[2], b[2])),
+        (dot(a[0], b[0]), dot(a[0], b[1]), dot(a[0], b[2])),
+        (dot(a[1], b[0]), dot(a[1], b[1]), dot(a[1], b[2])),
+        (dot(a[2], b[0]), dot(a[2], b[1]), dot(a[2], b[2])),
     )
 
 
@@ -126,7 +112,7 @@ def _angle_about(m, axis):
         vector, scalar = (c + g, f + h, 1.0 + 2.0 * i - trace), d - b
     else:
         vector, scalar = (h - f, c - g, d - b), 1.0 + trace
-    twist = _dot(vector, axis)
+    twist = dot(vector, axis)
     angle = 2.0 * math.atan2(-twist, -scalar) if scalar < 0.0 else 2.0 * math.atan2(twist, scalar)
     return math.pi if angle <= -math.pi else angle
 
@@ -152,8 +138,8 @@ def close_curves(corners, references, axes, first, last, areas, tilts, gaps, tur
             whole += _triangle(reference, _vector(curve[k - 1]), _vector(curve[k]))
         areas[1, row] = _triangle(reference, end, half) + _triangle(reference, half, start)
         areas[0, row] = whole + areas[1, row]
-        across, along = _sum(start, (-end[0], -end[1], -end[2])), _sum(start, end)
-        gaps[row] = 2.0 * math.atan2(math.sqrt(_dot(across, across)), math.sqrt(_dot(along, along)))
+        across, along = plus(start, (-end[0], -end[1], -end[2])), plus(start, end)
+        gaps[row] = 2.0 * math.atan2(math.sqrt(dot(across, across)), math.sqrt(dot(along, along)))
         x, y, z, w = _between(end, start)
         there, back = _rows(first[row]), _matrix((-x, -y, -z, w))
         tilt = _times_transposed(_times_transposed(there, back), there)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..estimate_constants import TERMS
 from .jit import inline, kernel, part
+from .vectors import cross, dot, plus
 
 LANES = 32
 _DIRECTION = 0
@@ -27,33 +28,18 @@ _ROWS = _APART // LANES + TERMS
 
 
 @inline
-def _plus(a, b):
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@inline
 def _plus_3(a, b, c):
-    return _plus(_plus(a, b), c)
+    return plus(plus(a, b), c)
 
 
 @inline
 def _plus_4(a, b, c, d):
-    return _plus(_plus_3(a, b, c), d)
+    return plus(_plus_3(a, b, c), d)
 
 
 @inline
 def _over(a, number):
     return a[0] / number, a[1] / number, a[2] / number
-
-
-@inline
-def _dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inline
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inline
@@ -90,23 +76,23 @@ def _rate(s, order, i, magnitude, turned):
 @inline
 def _carried_2(v, r):
     """The term of this order of vectors carried by rates, from all terms of both before it."""
-    return _over(_plus(_cross(v[0], r[1]), _cross(v[1], r[0])), 2.0)
+    return _over(plus(cross(v[0], r[1]), cross(v[1], r[0])), 2.0)
 
 
 @inline
 def _carried_3(v, r):
-    return _over(_plus_3(_cross(v[0], r[2]), _cross(v[1], r[1]), _cross(v[2], r[0])), 3.0)
+    return _over(_plus_3(cross(v[0], r[2]), cross(v[1], r[1]), cross(v[2], r[0])), 3.0)
 
 
 @inline
 def _carried_4(v, r):
-    return _over(_plus_4(_cross(v[0], r[3]), _cross(v[1], r[2]), _cross(v[2], r[1]), _cross(v[3], r[0])), 4.0)
+    return _over(_plus_4(cross(v[0], r[3]), cross(v[1], r[2]), cross(v[2], r[1]), cross(v[3], r[0])), 4.0)
 
 
 @inline
 def _carried_5(v, r):
-    first = _plus_3(_cross(v[0], r[4]), _cross(v[1], r[3]), _cross(v[2], r[2]))
-    return _over(_plus_3(first, _cross(v[3], r[1]), _cross(v[4], r[0])), 5.0)
+    first = _plus_3(cross(v[0], r[4]), cross(v[1], r[3]), cross(v[2], r[2]))
+    return _over(_plus_3(first, cross(v[3], r[1]), cross(v[4], r[0])), 5.0)
 
 
 @inline
@@ -114,14 +100,14 @@ def _direction_terms(s, i, magnitude):
     """The terms of the momentum's direction and of omega."""
     p0 = _vector(s, _DIRECTION, i)
     r0 = _rate(s, 0, i, magnitude, _turned(s, 0, i, p0))
-    p1 = _cross(p0, r0)
-    r1 = _rate(s, 1, i, magnitude, _plus(_turned(s, 1, i, p0), _turned(s, 0, i, p1)))
+    p1 = cross(p0, r0)
+    r1 = _rate(s, 1, i, magnitude, plus(_turned(s, 1, i, p0), _turned(s, 0, i, p1)))
     p2 = _carried_2((p0, p1), (r0, r1))
     turned = _plus_3(_turned(s, 2, i, p0), _turned(s, 1, i, p1), _turned(s, 0, i, p2))
     r2 = _rate(s, 2, i, magnitude, turned)
     p3 = _carried_3((p0, p1, p2), (r0, r1, r2))
     turned = _plus_3(_turned(s, 3, i, p0), _turned(s, 2, i, p1), _turned(s, 1, i, p2))
-    r3 = _rate(s, 3, i, magnitude, _plus(turned, _turned(s, 0, i, p3)))
+    r3 = _rate(s, 3, i, magnitude, plus(turned, _turned(s, 0, i, p3)))
     p4 = _carried_4((p0, p1, p2, p3), (r0, r1, r2, r3))
     turned = _plus_3(_turned(s, 4, i, p0), _turned(s, 3, i, p1), _turned(s, 2, i, p2))
     r4 = _rate(s, 4, i, magnitude, _plus_3(turned, _turned(s, 1, i, p3), _turned(s, 0, i, p4)))
@@ -137,7 +123,7 @@ def _still_terms(s, i):
     m0, m1, m2 = _over(_drift(s, 0, i), -1.0), _over(_drift(s, 1, i), -1.0), _over(_drift(s, 2, i), -1.0)
     m3, m4 = _over(_drift(s, 3, i), -1.0), _over(_drift(s, 4, i), -1.0)
     v0 = _vector(s, _STILL, i)
-    v1 = _cross(v0, m0)
+    v1 = cross(v0, m0)
     v2 = _carried_2((v0, v1), (m0, m1))
     v3 = _carried_3((v0, v1, v2), (m0, m1, m2))
     v4 = _carried_4((v0, v1, v2, v3), (m0, m1, m2, m3))
@@ -148,12 +134,12 @@ def _still_terms(s, i):
 def _product(a, b):
     """The terms of a scalar product from those of its factors."""
     return (
-        _dot(a[0], b[0]),
-        _dot(a[0], b[1]) + _dot(a[1], b[0]),
-        _dot(a[0], b[2]) + _dot(a[1], b[1]) + _dot(a[2], b[0]),
-        _dot(a[0], b[3]) + _dot(a[1], b[2]) + _dot(a[2], b[1]) + _dot(a[3], b[0]),
-        _dot(a[0], b[4]) + _dot(a[1], b[3]) + _dot(a[2], b[2]) + _dot(a[3], b[1]) + _dot(a[4], b[0]),
-        _dot(a[0], b[5]) + _dot(a[1], b[4]) + _dot(a[2], b[3]) + _dot(a[3], b[2]) + _dot(a[4], b[1]) + _dot(a[5], b[0]),
+        dot(a[0], b[0]),
+        dot(a[0], b[1]) + dot(a[1], b[0]),
+        dot(a[0], b[2]) + dot(a[1], b[1]) + dot(a[2], b[0]),
+        dot(a[0], b[3]) + dot(a[1], b[2]) + dot(a[2], b[1]) + dot(a[3], b[0]),
+        dot(a[0], b[4]) + dot(a[1], b[3]) + dot(a[2], b[2]) + dot(a[3], b[1]) + dot(a[4], b[0]),
+        dot(a[0], b[5]) + dot(a[1], b[4]) + dot(a[2], b[3]) + dot(a[3], b[2]) + dot(a[4], b[1]) + dot(a[5], b[0]),
     )
 
 
@@ -173,8 +159,8 @@ def _quotient(a, b):
 def _seen_from_lift(s, i, r):
     """The terms of omega without the part by which the horizontal frame turns."""
     return (
-        _plus(r[0], _drift(s, 0, i)), _plus(r[1], _drift(s, 1, i)), _plus(r[2], _drift(s, 2, i)),
-        _plus(r[3], _drift(s, 3, i)), _plus(r[4], _drift(s, 4, i)), _plus(r[5], _drift(s, 5, i)),
+        plus(r[0], _drift(s, 0, i)), plus(r[1], _drift(s, 1, i)), plus(r[2], _drift(s, 2, i)),
+        plus(r[3], _drift(s, 3, i)), plus(r[4], _drift(s, 4, i)), plus(r[5], _drift(s, 5, i)),
     )  # fmt: skip
 
 
@@ -205,12 +191,12 @@ def _in_base(s, lanes, magnitude):
         p, rates = _direction_terms(s, i, magnitude)
         still = _vector(s, _STILL, i)
         cosine = (
-            _dot(still, p[0]), _dot(still, p[1]), _dot(still, p[2]),
-            _dot(still, p[3]), _dot(still, p[4]), _dot(still, p[5]),
+            dot(still, p[0]), dot(still, p[1]), dot(still, p[2]),
+            dot(still, p[3]), dot(still, p[4]), dot(still, p[5]),
         )  # fmt: skip
         product = (
-            _dot(still, rates[0]), _dot(still, rates[1]), _dot(still, rates[2]),
-            _dot(still, rates[3]), _dot(still, rates[4]), _dot(still, rates[5]),
+            dot(still, rates[0]), dot(still, rates[1]), dot(still, rates[2]),
+            dot(still, rates[3]), dot(still, rates[4]), dot(still, rates[5]),
         )  # fmt: skip
         _keep(s, i, p, rates, cosine, product)
 
@@ -249,10 +235,10 @@ def _end(directions, side, start, lanes, lengths, lifted, s, slopes, by_momentum
     for i in range(lanes - 1 if side else 0, lanes):
         at, length = start + i + side, lengths[start + i]
         direction = directions[at, 0], directions[at, 1], directions[at, 2]
-        slope = _cross(direction, _over(_vector(s, _RATES, i), length))
+        slope = cross(direction, _over(_vector(s, _RATES, i), length))
         slopes[at, 0], slopes[at, 1], slopes[at, 2] = slope
         if not lifted:
-            slope = _plus(slope, _cross(direction, _over(_drift(s, 0, i), length)))
+            slope = plus(slope, cross(direction, _over(_drift(s, 0, i), length)))
         by_momentum[at, 0], by_momentum[at, 1], by_momentum[at, 2] = slope
 
 
