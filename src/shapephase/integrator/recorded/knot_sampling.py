@@ -187,7 +187,9 @@ class KnotSampler:
         end = max(float(g.right.max()) for g in groups)
         order, place = _order_and_places(left)
         coefficients, start = groups[0].series, 0
-        if len(coefficients) > len(left) or any(g.series is not coefficients for g in groups):
+        # Series are handed on as they stand only where they stand in the order of the edges.
+        in_order = all(g.series is coefficients for g in groups) and len(coefficients) == len(left)
+        if not in_order or (np.concatenate([g.rows for g in groups]) != place).any():
             coefficients = np.zeros((len(left), max(self._groups) + 1, 9))
         while groups:
             group = groups.pop(0)
