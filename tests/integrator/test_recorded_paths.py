@@ -244,19 +244,19 @@ def test_many_rows_are_sampled_in_blocks(monkeypatch: pytest.MonkeyPatch):
     path = loop_of(body, 300)
     sizes: list[int] = []
     knots = knots_of(body, path)
-    follow = knots.follow
+    follow, along_path = knots.follow, sp.articulated(body, path).sampler().body_channels
 
     def counted(shapes: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         sizes.append(len(shapes))
         return follow(shapes, rates)
 
-    whole = KnotSampler(knots, 1)
+    whole = KnotSampler(knots, 1, along_path)
     whole.refine(0.0, 1e-9)
     monkeypatch.setattr(knots, "follow", counted)
     monkeypatch.setattr(knots, "directly", lambda *_: None)
     monkeypatch.setattr("shapephase.integrator.recorded.knot_sampling._NODES_AT_ONCE", 200)
     monkeypatch.setattr("shapephase.integrator.recorded.knot_sampling._BODIES_AT_ONCE", 50)
-    parts = KnotSampler(knots, 1)
+    parts = KnotSampler(knots, 1, along_path)
     parts.refine(0.0, 1e-9)
     assert max(sizes) <= 50 < len(path.breaks)
     assert parts.interpolant().coefficients == pytest.approx(whole.interpolant().coefficients, abs=1e-13)

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import AccuracyNotReached
@@ -254,3 +256,58 @@ def test_estimates_are_of_use():
 @pytest.mark.full
 def test_estimates_of_seventy_motions_are_of_use():
     are_of_use(70)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_rounded_times_of_a_long_rest_count(backwards: bool):
+    """A second's move after (before) 1e7 s of rest: times are rounded to a nanosecond, and attitudes to as much."""
+    body = sp.load_body("cat_two_halves")
+    move = sp.ShapePath.waypoints([0.0, 0.4, 1.0], [[0.0, 0.0, 0.0], [0.5, 1.0, -0.4], [0.1, 0.3, 0.9]])
+    rest = sp.ShapePath.waypoints([0.0, 1e7], np.zeros((2, 3)))
+    whole, alone, start = rest.then(move), move, 1e7
+    if backwards:
+        whole, alone, start = whole.reversed(), move.reversed(), 0.0
+    times = start + np.linspace(0.0, 1.0, 41)
+    motion = sp.reconstruct(sp.articulated(body, whole), np.zeros(3), tolerance=1e-7)
+    truth = sp.reconstruct(sp.articulated(body, alone), np.zeros(3), tolerance=1e-11)
+    exact = truth.attitude(np.minimum(times - start, 1.0))
+    assert apart(motion.attitude(np.minimum(times, whole.duration)), exact) < motion.error_estimate
+    with pytest.raises(AccuracyNotReached, match="rounding"):
+        sp.reconstruct(sp.articulated(body, whole), np.zeros(3), tolerance=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_rounded_inertia_of_a_spinning_javelin_counts(seed: int):
+    """Its long axis has 1/5,000 of the inertia of the others, and the spin magnifies the tensor's rounding by as much.
+
+    The truth is Rodrigues' formula: the momentum lies along an eigenvector of the tensor as given, both in 40 digits.
+    """
+    rotation = Rotation.random(random_state=seed).as_matrix()
+    inertia = rotation @ np.diag([1e-4, 0.5, 0.5 + 0.1 * seed]) @ rotation.T
+    inertia = 0.5 * (inertia + inertia.T)
+    with mpmath.workdps(40):
+        moments, axes = mpmath.eigsy(mpmath.matrix(inertia.tolist()))
+        axis = np.array([float(axes[i, 0]) for i in range(3)])
+        turn = float(mpmath.fmod(mpmath.mpf("0.06") / moments[0], 2 * mpmath.pi))
+    motion = sp.reconstruct(sp.rigid(inertia, 1.0), 0.06 * axis, tolerance=1e-8)
+    exact = Rotation.from_rotvec(turn * axis).as_matrix()
+    off = apart(motion.attitude(1.0), exact)
+    # The momentum's own rounding tilts it by one unit from the axis, which the moments' ratio magnifies.
+    assert off < motion.error_estimate + 5e3 * np.finfo(float).eps * seed
+    assert motion.error_estimate < 1e-8
+
+
+def test_rates_that_are_not_quite_the_derivatives_count():
+    """Off by 1e-10 of themselves: more than the tolerance is refused, less is in the estimate."""
+    body, speeds = sp.load_body("cat_two_halves"), np.array([3.0, 5.0, 7.0])
+
+    def path(factor: float) -> sp.ShapePath:
+        return sp.ShapePath.function(
+            lambda t: (np.sin(t[:, None] * speeds), factor * speeds * np.cos(t[:, None] * speeds)), 3.0
+        )
+
+    exact = sp.reconstruct(sp.articulated(body, path(1.0)), np.zeros(3), tolerance=1e-12).attitude(3.0)
+    motion = sp.reconstruct(sp.articulated(body, path(1.0 + 1e-10)), np.zeros(3), tolerance=1e-8)
+    assert 1e-11 < apart(motion.attitude(3.0), exact) < motion.error_estimate
+    with pytest.raises(AccuracyNotReached, match="derivatives"):
+        sp.reconstruct(sp.articulated(body, path(1.0 + 1e-10)), np.zeros(3), tolerance=1e-10)

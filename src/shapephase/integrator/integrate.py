@@ -28,11 +28,12 @@ from .fast.estimate_constants import (
     NEGLIGIBLE,
 )
 from .fast.rounds import Round, rounds_of_one
+from .fresh_times import compare, fresh_times
 from .interpolant import Interpolant
 from .sampling import Sampler
 from .stepped import SteppedRotation, for_whole_batch
 from .steps.error_propagator import exact_propagators, growth_and_rounding, largest_growth, looked_at_closely
-from .steps.measured_rounding import measured_rounding
+from .steps.measured_rounding import measured_rounding, rounding_of_body
 from .steps.stage_channels import stage_channels
 from .steps.step_control import StepRequirements
 from .steps.step_loop import integrate_steps, integrate_steps_at_rest
@@ -129,12 +130,20 @@ class Integration:
             attempt = self.attempt()
             worst = attempt.errors.worst
             if worst.estimate <= self._tolerance:
+                self.compare_with_body()
                 return for_whole_batch(attempt.rotation, self._momentum)
             number += 1
             if (lost := self.first_lost(worst, number, best)) is not None:
                 raise lost[1]
             best = np.minimum(best, worst.estimate)
             (self._refinement,) = self.refined(worst).each()
+
+    def compare_with_body(self) -> None:
+        """Raise AccuracyNotReached where the interpolant is not the deformation at fresh times."""
+        interpolant = self._sampler.interpolant()
+        times, _ = fresh_times(interpolant)
+        body, joined = self._sampler.body_channels(times), self._sampler.joined_panels()
+        compare(interpolant, body, joined, self._largest, self._tolerance)
 
     def first_lost(self, errors: Errors, number: int, best: Array) -> tuple[int, AccuracyNotReached] | None:
         """The first row that more than so many rounds will not help, and its error; None: there is none.
@@ -265,7 +274,8 @@ class Integration:
 
     def _measured_rounding(self, bound: Array, interpolant: Interpolant, steps: Integers, record: StepRecord) -> Array:
         sample = self._sampler.channels
-        return measured_rounding(bound, interpolant, steps, record, self._magnitudes, self._tolerance, sample)
+        marches = measured_rounding(bound, interpolant, steps, record, self._magnitudes, self._tolerance, sample)
+        return marches + rounding_of_body(interpolant, steps, record, self._magnitudes)
 
     def _plan(self, interpolant: Interpolant, requirements: StepRequirements) -> tuple[Integers, float]:
         """Steps on each panel (P,), and how many more they are than planned, since they are whole.

@@ -176,10 +176,12 @@ def _integrated(
             # Each by the growth of its own errors.
             return [], [group._replace(rows=rows[k : k + 1], best=group.best[k : k + 1]) for k in range(len(rows))]
         attempt = integration.attempt()
+        estimates = attempt.rotation.error_estimate
+        done = estimates <= tolerance
+        if done.any():
+            integration.compare_with_body()
     except AccuracyNotReached as error:
         raise _of_row(error, rows[:1], len(momentum)) from error
-    estimates = attempt.rotation.error_estimate
-    done = estimates <= tolerance
     if np.count_nonzero(done) == len(done):
         return [RotationPart(rows, for_whole_batch(attempt.rotation, starts))], []
     failed, found = np.flatnonzero(~done), []

@@ -88,6 +88,7 @@ class ResolvedPath:
     children : (N,) row of the left half, which the right one follows; -1: resolved
     roots : (R,) rows of the widest panels, in the order of time
     duration : [s]
+    defect : sum over the resolved panels of the largest difference between the integral of a rate and its shape [rad]
     """
 
     left: Array
@@ -98,6 +99,7 @@ class ResolvedPath:
     children: Integers
     roots: Integers
     duration: float
+    defect: float = 0.0
     _first: dict[float, FirstPanels] = field(default_factory=dict, init=False, repr=False)
     _hidden: dict[tuple[bytes, bytes, bytes], Hidden] = field(default_factory=dict, init=False, repr=False)
 
@@ -304,4 +306,5 @@ def joined(paths: Sequence[ResolvedPath]) -> ResolvedPath:
         ),
         roots=np.concatenate([path.roots + row for path, row in zip(paths, rows, strict=False)]),
         duration=float(starts[-1]),
+        defect=sum(path.defect for path in paths),
     )

@@ -12,13 +12,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ._last_terms import Perturbed
 from ._spectral_error import Channels, Directly, Evaluate, RememberedChannels, SampledChannels
 from .even.even_sampling import EvenSampler
 from .fast import engine
 from .interpolant import Interpolant
-from .panels.panel_sampling import PanelSampler
+from .panels.panel_sampling import NONE_JOINED, PanelSampler
 from .recorded.knot_path import KnotPath
 from .recorded.knot_sampling import KnotSampler
 from .resolved import ResolvedPath
@@ -61,6 +61,14 @@ class Sampler(Protocol):
 
     def channels(self, times: Array) -> Array:
         """What is sampled, at times of the first loop that may be no nodes: (N,) -> (N, 9)."""
+        ...
+
+    def body_channels(self, times: Array) -> Array:
+        """Channels of the deformation itself, at times of the first loop that may be no nodes: (N,) -> (N, 9)."""
+        ...
+
+    def joined_panels(self) -> Integers:
+        """Panels of the interpolant that have the sample at their right end in common with the next one: (J,)."""
         ...
 
 
@@ -140,7 +148,7 @@ def _sampler(
 ) -> Sampler:
     """Arguments as of `sampler`."""
     if knots is not None:
-        return KnotSampler(knots, loops)
+        return KnotSampler(knots, loops, channels)
     # The tail of a Fourier spectrum with gaps tells nothing; a Chebyshev series has none.
     if smooth_loop and oscillations is not None and not sparse:
         return LoopSampler(channels, float(breaks[-1]) / loops, loops, oscillations, swing)
@@ -236,6 +244,12 @@ class LoopSampler:
         """As `Sampler.channels`."""
         return self._channels(times)
 
+    body_channels = channels
+
+    def joined_panels(self) -> Integers:
+        """As `Sampler.joined_panels`: none."""
+        return NONE_JOINED
+
 
 class FinishedSampler:
     """A finished interpolant in the place of a sampler: nothing is evaluated again."""
@@ -261,3 +275,9 @@ class FinishedSampler:
     def channels(self, times: Array) -> Array:
         """As `Sampler.channels`: the interpolant's own."""
         return self._interpolant.series(times)
+
+    body_channels = channels
+
+    def joined_panels(self) -> Integers:
+        """As `Sampler.joined_panels`: none."""
+        return NONE_JOINED

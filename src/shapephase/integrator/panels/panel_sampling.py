@@ -37,11 +37,13 @@ _MOST_PANELS = 4000
 _HIDDEN_SHARE = 0.1
 # First panels, for so many tolerances, that are kept for the next motion.
 _MOST_KNOWN = 64
+# Of the tolerance: what rates and values of a function may disagree by.
+_DEFECT_SHARE = 0.5
 # Of a panel, relative to the interval: narrower ones would consist of rounding.
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
 _TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
-_NO_DEGREES = np.empty(0, dtype=np.int64)
+NONE_JOINED = _NO_DEGREES = np.empty(0, dtype=np.int64)
 _NO_VALUES = np.empty((0, 9))
 
 
@@ -56,6 +58,7 @@ class PanelSampler:
     Attributes
     ----------
     end : of all panels of a loop [s]
+    defect : what rates and values of a function of time disagree by in one loop [rad]
     """
 
     def __init__(
@@ -72,6 +75,7 @@ class PanelSampler:
     ) -> None:
         self._known = {} if known is None else known
         self._channels, self._probe, self._loops, self._resolved = channels, probe, loops, resolved
+        self.defect = 0.0 if resolved is None else resolved.defect
         self._is_bandlimited = oscillations is not None or (resolved is not None and not checked)
         self._breaks, self._oscillations = breaks, oscillations
         self.end, self._span = float(breaks[-1]), float(breaks[-1] - breaks[0])
@@ -83,6 +87,13 @@ class PanelSampler:
 
     def refine(self, momentum: float, tolerance: float) -> None:
         """As `Sampler.refine`."""
+        defect = self._loops * self.defect
+        if defect > _DEFECT_SHARE * tolerance:
+            raise AccuracyNotReached(
+                f"rates and values of the function of time disagree by {defect:.3g} rad over the motion, too much for a "
+                f"tolerance of {tolerance:.3g} rad of the samples; give the exact derivatives, or loosen the tolerance"
+            )
+        tolerance -= defect
         if self._is_bandlimited and engine.is_ready():
             if self._series is None or self._rough(momentum, tolerance)[1].any():
                 self._refine_in_machine_code(float(momentum), float(tolerance))
@@ -175,7 +186,7 @@ class PanelSampler:
     def error(self, momentum: float) -> float:
         """As `Sampler.error`."""
         errors = self._errors_at(momentum)
-        return self._loops * (errors.total + errors.sum_of_noise)
+        return self._loops * (errors.total + errors.sum_of_noise + self.defect)
 
     def interpolant(self) -> Interpolant:
         """As `Sampler.interpolant`; its panels are halves of those that were sampled where these take many steps."""
@@ -204,7 +215,7 @@ class PanelSampler:
     def perturbed(self, momentum: float) -> Perturbed:
         """As `Sampler.perturbed`."""
         series, errors = self.series, self._errors_at(momentum)
-        hidden = errors.total_hidden + errors.sum_of_noise
+        hidden = errors.total_hidden + errors.sum_of_noise + self.defect
         if not self._is_bandlimited:
             hidden += float((0.5 * series.width * (np.nan_to_num(series.gaps) @ np.array([momentum, 1.0]))).sum())
         make = partial(_perturbed, series, momentum, self._is_halved)
@@ -213,6 +224,12 @@ class PanelSampler:
     def channels(self, times: Array) -> Array:
         """As `Sampler.channels`."""
         return self._channels(times)
+
+    body_channels = channels
+
+    def joined_panels(self) -> Integers:
+        """As `Sampler.joined_panels`: none, since rates may jump at breaks that nobody stated."""
+        return NONE_JOINED
 
     @property
     def _is_halved(self) -> bool:

@@ -10,7 +10,7 @@ from ...arrays import Array, Integers, Mask
 from ...chebyshev import chebyshev, local_coordinate, nodes_on, unit_nodes, values_to_coefficients
 from ...errors import AccuracyNotReached
 from .._last_terms import Perturbed
-from .._spectral_error import EPS, Channels, spectral_norms
+from .._spectral_error import EPS, Channels, SampledChannels, spectral_norms
 from ..fast import engine
 from ..interpolant import Interpolant
 from .body_series import falling_terms
@@ -132,8 +132,8 @@ class _PanelErrors:
 class KnotSampler:
     """Samples a body along a path of polynomials between knots."""
 
-    def __init__(self, path: KnotPath, loops: int) -> None:
-        self._path, self._loops = path, loops
+    def __init__(self, path: KnotPath, loops: int, body_channels: SampledChannels) -> None:
+        self._path, self._loops, self._body_channels = path, loops, body_channels
         self._count = 0
         self._span = float(path.knots[-1])
         self._groups: dict[int, _Group] = {}
@@ -226,6 +226,16 @@ class KnotSampler:
             shapes, rates = ((to_series[:, None] @ state)[:, 0] for state in states)
             found[mine] = self._channels(shapes, rates, times[mine])
         return found
+
+    def body_channels(self, times: Array) -> Array:
+        """As `Sampler.body_channels`: along the recorded path itself."""
+        return self._body_channels(times)
+
+    def joined_panels(self) -> Integers:
+        """As `Sampler.joined_panels`: all but those that end where the rate jumps."""
+        interpolant = self.interpolant()
+        inner = interpolant.edges[1 : len(interpolant.coefficients)]
+        return np.flatnonzero(~np.isin(inner, self._path.knots[self._path.corners]))
 
     # ---- Samples ----
 

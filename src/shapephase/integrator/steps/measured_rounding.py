@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...arrays import Array, Integers
+from .._spectral_error import spectral_norms
 from ..fast.estimate_constants import (
     EPS,
     LEAST_NOISE,
@@ -26,6 +27,8 @@ _GROUPS = 16
 _TIMES = 8
 # Of a group, none of them a node: a low-discrepancy sequence.
 _PLACES = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(1.0, _TIMES + 1.0), 1.0))
+# Times of a motion at which its rate and inertia are looked at.
+_PLACES_OF_MOTION = 17
 # The channels of I^-1 and of I^-1 L_o.
 _PARTS = slice(0, 6), slice(6, 9)
 
@@ -70,6 +73,35 @@ def measured_rounding(
     found = np.where(np.isfinite(apart), ROUNDING_BY_CHANCE * apart, np.inf)
     measured[rows] = np.minimum(bound[rows], np.maximum(found, LEAST_OF_BOUND * bound[rows]))
     return measured
+
+
+def rounding_of_body(interpolant: Interpolant, steps: Integers, record: StepRecord, magnitudes: Array) -> Array:
+    """Attitude error because inertia and times are rounded before anything is sampled: (B,) [rad].
+
+    Inertia is off by eps |I| in any direction, which turns a body that spins at omega off by eps |I| |I^-1 omega| a
+    second: of a slender body about its long axis that is as many units a radian as its moments differ by. Times are off
+    by eps times the duration. No march shows either, since all have them in common.
+
+    Parameters
+    ----------
+    steps : (P,) on each panel of one loop
+    record : of these steps
+    magnitudes : (B,) of the momentum [kg m^2/s]
+    """
+    ends = np.cumsum(steps)
+    chosen = np.unique(np.linspace(0, interpolant.loops * int(ends[-1]), _PLACES_OF_MOTION).astype(np.int64))
+    of_loop = chosen % ends[-1]
+    panel = np.searchsorted(ends, of_loop, side="right")
+    share = (of_loop - ends[panel] + steps[panel]) / steps[panel]
+    inverse, drift = interpolant.inverse_and_drift(interpolant.edges[panel] + share * interpolant.widths[panel])
+    rates = np.broadcast_to(-drift, (len(magnitudes), *drift.shape))
+    if record.directions.shape[1]:
+        rates = rates + magnitudes[:, None, None] * np.einsum("bmi,mij->bmj", record.directions[:, chosen], inverse)
+    sizes = 1.0 / np.linalg.eigvalsh(inverse)[:, 0]
+    off = sizes * np.linalg.norm(np.einsum("bmi,mij->bmj", rates, inverse), axis=2)
+    inverse_rate, drift_rate = spectral_norms(interpolant.coefficients).sum(axis=1).max(axis=0)
+    fastest = magnitudes * inverse_rate + drift_rate
+    return EPS * float(interpolant.edges[-1]) * (off.mean(axis=1) + fastest)
 
 
 class SampleScatter:

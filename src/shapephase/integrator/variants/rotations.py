@@ -329,10 +329,17 @@ def _integrated(
     if lot.plan is None:
         return [], lot.rows.tolist()
     plan, panels = lot.plan, lot.plan.panels
-    channels, reliable = variants.channels(lot.rows, panels.times)
+    channels, reliable = variants.channels(lot.rows, panels.times_with_fresh)
+    count = len(panels.times)
+    series = panels.series(channels[reliable, :count], plan.ceiling)
+    # A deformation that its series do not give is sampled alone, where that becomes an error.
+    given = panels.swings(series.coefficients, channels[reliable, count:], plan.ceiling) <= tolerance
+    reliable[reliable] = given
+    series = series.some(given)
     rows, momentum = lot.rows[reliable], momentum[reliable]
     left = lot.rows[~reliable].tolist()
-    series = panels.series(channels[reliable], plan.ceiling)
+    if not len(rows):
+        return [], left
     (model_turn,) = plan.turns(plan.model.coefficients[None])
     turning = rounded_up(plan.turns(series.coefficients) / (model_turn or 1.0), _CLASSES)
     parts = []

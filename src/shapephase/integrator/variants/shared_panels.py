@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Mask
+from ...chebyshev import chebyshev, local_coordinate
 from .._last_terms import perturbed_series
+from ..fresh_times import fresh_times, swings
 from ..panels.panel_sampling import PanelSampler
 from ..panels.panel_series import panel_errors, series_through, sum_of_noise
 from ..resolved import Hidden
@@ -41,9 +43,19 @@ class SharedPanels:
     def __init__(self, sampler: PanelSampler) -> None:
         interpolant = sampler.as_sampled()
         self._end, self._panels, self._hidden = sampler.end, sampler.series, sampler.hidden
+        self._defect = sampler.defect
         self.degrees, self.widths = self._panels.degree, self._panels.width
         self.edges, self.loops = interpolant.edges, interpolant.loops
         self.times = sampler.sample_times
+        self._fresh, self._tested = fresh_times(interpolant)
+        self.times_with_fresh = np.concatenate([self.times, self._fresh])
+
+    def swings(self, coefficients: Array, fresh: Array, momentum: float) -> Array:
+        """Largest angle by which series differ from bodies at fresh times: (V, P, n, 9), (V, N, 9) -> (V,) [rad]."""
+        panel = self._tested
+        local, series = local_coordinate(self._fresh, self.edges[panel], self.edges[panel + 1]), coefficients[:, panel]
+        gaps = np.einsum("ij,vijk->vik", chebyshev(local, series.shape[2]), series) - fresh
+        return self.loops * swings(gaps, series, self.widths[panel], momentum).max(axis=1)
 
     def series(self, channels: Array, momentum: float) -> ManySeries:
         """Of deformations whose channels at the times are (V, S, 9), for momenta of this magnitude."""
@@ -59,8 +71,8 @@ class SharedPanels:
         return ManySeries(
             coefficients=found.coefficients.reshape(count, each, -1, 9),
             perturbed=changed.reshape(count, each, -1, 9),
-            error=self.loops * (_sums(errors.whole.reshape(count, each)) + noise),
-            hidden=self.loops * (_sums(errors.hidden.reshape(count, each)) + noise),
+            error=self.loops * (_sums(errors.whole.reshape(count, each)) + noise + self._defect),
+            hidden=self.loops * (_sums(errors.hidden.reshape(count, each)) + noise + self._defect),
         )
 
 

@@ -76,7 +76,7 @@ def panels_of(rows: list[tuple[float, float, int, int]], before: Array) -> Panel
     )
 
 
-def resolved_path(pieces: list[Piece], duration: float) -> ResolvedPath:
+def resolved_path(pieces: list[Piece], duration: float, defect: float) -> ResolvedPath:
     """The panels of all pieces, whose outermost ends are the breaks themselves."""
     shifts = np.cumsum([0, *(len(piece.ends) for piece in pieces)])
     ends = np.array([end for piece in pieces for end in piece.ends])
@@ -95,6 +95,7 @@ def resolved_path(pieces: list[Piece], duration: float) -> ResolvedPath:
         children=np.array(children, dtype=np.int64),
         roots=np.array([row + shift for piece, shift in numbered for row in piece.roots]),
         duration=duration,
+        defect=defect,
     )
 
 

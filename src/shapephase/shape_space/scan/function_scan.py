@@ -146,7 +146,6 @@ class FunctionScan:
     evaluations : times at which the function was evaluated
     calls : of the function
     noise : of the values, and of the rates times half the width of a panel, as far as series meet it [rad or m]
-    rate_defect : largest difference between the integral of a rate and its value on a panel [rad or m]
     """
 
     resolved: ResolvedPath
@@ -154,12 +153,16 @@ class FunctionScan:
     evaluations: int
     calls: int
     noise: float
-    rate_defect: float
 
     @property
     def panels(self) -> int:
         """How many panels resolve the function to rounding."""
         return len(self.resolved.leaves)
+
+    @property
+    def rate_defect(self) -> float:
+        """Difference between the integrals of rates and their values, summed over panels where above rounding [rad]."""
+        return self.resolved.defect
 
     @property
     def duration(self) -> float:
@@ -193,5 +196,4 @@ class FunctionScan:
             evaluations=sum(scan.evaluations for scan in scans),
             calls=sum(scan.calls for scan in scans),
             noise=max(scan.noise for scan in scans),
-            rate_defect=max(scan.rate_defect for scan in scans),
         )

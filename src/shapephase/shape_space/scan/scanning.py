@@ -147,8 +147,7 @@ class _Scan:
         done.sort(key=lambda piece: piece.left)
         self._find_corners(done)
         self._check_jumps(done)
-        defect = self._check_rates(done)
-        resolved = resolved_path(done, self._duration)
+        resolved = resolved_path(done, self._duration, self._checked_rates(done))
         found = np.array(sorted(self._found))
         kinks = np.array([time for time in found if time not in self._turned])
         if len(kinks):
@@ -159,7 +158,6 @@ class _Scan:
             evaluations=self._evaluations,
             calls=self._calls,
             noise=self._noise,
-            rate_defect=defect,
         )
 
     def _at(self, times: Array) -> Array:
@@ -386,8 +384,8 @@ class _Scan:
             "resolve it; declare the times of its jumps as breaks, or smooth the data"
         )
 
-    def _check_rates(self, pieces: list[Piece]) -> float:
-        """Compare the integral of each rate on each panel with its value: the largest difference."""
+    def _checked_rates(self, pieces: list[Piece]) -> float:
+        """Compare the integral of each rate on each panel with its value: the sum of the differences above rounding."""
         if not self._function.paired.any():
             return 0.0
         rows = [(piece, node) for piece in pieces for node, first in enumerate(piece.children) if first < 0]
@@ -398,8 +396,8 @@ class _Scan:
         apart = np.abs(integrals[:, 1:-1] - series[:, 1:, :n]).max(axis=1, initial=0.0)
         apart *= self._function.paired
         fastest = np.abs(series[:, :, n:]).sum(axis=1)
-        allowed = _RATE_DEFECT * np.maximum(1.0, self._reach) + 2.0 * _TIME_ROUNDING * self._tick * fastest
-        wrong = apart > allowed + _NOISE_MARGIN * self._noise
+        rounding = _ROUNDING * self._reach + 2.0 * _TIME_ROUNDING * self._tick * fastest + _NOISE_MARGIN * self._noise
+        wrong = apart > _RATE_DEFECT * np.maximum(1.0, self._reach) + rounding
         if wrong.any():
             panel, column = (int(i) for i in np.unravel_index(np.argmax(np.where(wrong, apart, 0.0)), wrong.shape))
             basis = polynomials(unit_nodes(DEGREE))
@@ -414,7 +412,7 @@ class _Scan:
                 f"{self._function.columns[column]} at {where:.9g} s, but its {words.values} change at "
                 f"{slopes[place] / weight:.9g}; return {words.returned}"
             )
-        return float(apart.max(initial=0.0))
+        return float(np.where(apart > rounding, apart, 0.0).max(axis=1, initial=0.0).sum())
 
     def _warn(self, found: Array) -> None:
         named = ", ".join(f"{time:.15g}" for time in found[:_NAMED_TIMES])
