@@ -77,6 +77,6 @@ def compare(interpolant: Interpolant, body: Array, joined: Integers, momentum: f
     if not angles[worst] <= tolerance:
         raise AccuracyNotReached(
             f"the samples near t = {times[worst]:.9g} s do not give the body there: the attitude may be off by "
-            f"{angles[worst]:.3g} rad, which no error estimate shows. Either a function of yours gives other values when "
-            'it is called again, or this is a fault of shapephase; method="dop853" takes no samples'
+            f"{angles[worst]:.3g} rad, which no error estimate shows. Either a function of yours gives other values "
+            'when it is called again, or this is a fault of shapephase; method="dop853" takes no samples'
         )

@@ -90,8 +90,8 @@ class PanelSampler:
         defect = self._loops * self.defect
         if defect > _DEFECT_SHARE * tolerance:
             raise AccuracyNotReached(
-                f"rates and values of the function of time disagree by {defect:.3g} rad over the motion, too much for a "
-                f"tolerance of {tolerance:.3g} rad of the samples; give the exact derivatives, or loosen the tolerance"
+                f"rates and values of the function of time disagree by {defect:.3g} rad, which is too much for samples "
+                f"good to {tolerance:.3g} rad; give the exact derivatives, or loosen the tolerance"
             )
         tolerance -= defect
         if self._is_bandlimited and engine.is_ready():
