@@ -138,9 +138,10 @@ class CurveErrors:
         errors = np.einsum("s,qsbn->qbn", _FACTORS, np.abs(grown) + _OF_LARGEST * on_the_way)
         errors += self._unseen_of_gauge[:, None] * (1.0 + _AT_ANY_TIME * paths + closing)
         errors += np.tensordot(_LEAST, largest, axes=1) * np.minimum(paths, 1.0)
-        errors += _EPS * (_ROUNDING + _ROUNDING_OF_RADIANS * (summed + lengths)) + curve.error[:, None] + residual
+        errors += _EPS * (_ROUNDING * (1.0 + closing) + _ROUNDING_OF_RADIANS * (summed + lengths))
+        errors += curve.error[:, None] + residual
         turned = _seen_so_far(sizes) + self._unseen_of_gauge[:, None]
-        gap = turned[:, stretches.first] + turned[:, stretches.last]
+        gap = turned[:, stretches.first] + turned[:, stretches.last] + _EPS * _ROUNDING
         # Near the point opposite the target any displacement turns the great circle round.
         near, whole = gap > np.arctan2(1.0, factor), 2.0 * np.pi
         tilt = np.minimum(_BEYOND_LINEAR * gap * np.sqrt(1.0 + factor * factor), np.pi)
@@ -154,11 +155,13 @@ class CurveErrors:
 
     def _beside(self, stretches: Stretches, targets: Array, ends: Array) -> Array:
         """What the turns do to the area beside the great circles: (2, B, N) [sr]."""
-        cosine = np.einsum("bni,bni->bn", targets, ends)[..., None]
-        across = np.einsum("sbni,bni->sbn", self._in_gauge(stretches.last), targets - cosine * ends)
+        # One and the cosine between them, without the cancellation near the opposite point.
+        total = targets + ends
+        versed = 0.5 * np.einsum("bni,bni->bn", total, total)[..., None]
+        across = np.einsum("sbni,bni->sbn", self._in_gauge(stretches.last), total - versed * ends)
         if stretches.first.any():
-            across += np.einsum("sbni,bni->sbn", self._in_gauge(stretches.first), cosine * targets - ends)
-        return -across / (1.0 + cosine[..., 0] + _EPS)
+            across += np.einsum("sbni,bni->sbn", self._in_gauge(stretches.first), versed * targets - total)
+        return -across / (versed[..., 0] + _TINY)
 
     def _in_gauge(self, place: Integers) -> Array:
         """The turns at edges, gauge axes: (N,) -> (2, B, N, 3)."""

@@ -14,7 +14,7 @@ from .. import so3, sphere
 from ..arrays import Array, Integers, Mask
 from ..deformation.frames import GAUGES, Frames, frames_argument, named_frames
 from ..errors import GaugeError, ShapeError
-from ..integrator.closing import far_references
+from ..integrator.closing import areas_back, far_references, jumps_between
 from ..integrator.curve_integrals import CurveIntegrals, curve_integrals
 from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
@@ -119,13 +119,11 @@ class MomentumCurve(CurvePieces):
         """
         corners, references = self.corners, self.references[:, None]
         start = corners[:, :1]
-        half = so3.middle(corners, start)
-        back = sphere.triangle_area(references, corners, half) + sphere.triangle_area(references, half, start)
+        back = areas_back(references, corners, start)
         back[:, 0] = 0.0
         one, other = corners[:, :-1], corners[:, 1:]
         grown = sphere.triangle_area(references, one, other) + np.diff(back, axis=1)
-        # Seen from the start the same triangle has no great circles beside it: it grows continuously.
-        spheres = np.rint((grown - sphere.triangle_area(start, one, other)) / (4.0 * np.pi)).astype(np.int64)
+        spheres = jumps_between(start, one, other, grown)
         jumps = np.concatenate([np.zeros((len(corners), 1), dtype=np.int64), np.cumsum(spheres, axis=1)], axis=1)
         place, moving = np.searchsorted(self.edges, times), self.has_phase[:, None]
         return np.where(moving, back[:, place], 0.0), np.where(moving, jumps[:, place], 0)

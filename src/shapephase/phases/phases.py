@@ -17,7 +17,7 @@ from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.closing import closed_curves
+from ..integrator.closing import areas_back, closed_curves
 from ..letters import what_came
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
@@ -361,9 +361,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     moving = curve.has_phase[:, None]
 
     def closed(start: Array, end: Array) -> Array:
-        half = so3.middle(end, start)
-        back = sphere.triangle_area(references[:, None], end, half)
-        return (back + sphere.triangle_area(references[:, None], half, start)) * moving
+        return areas_back(references[:, None], end, start) * moving
 
     def tilted(frames: Array, start: Array, end: Array) -> Array:
         tilts = frames @ so3.between(end, start) @ so3.transpose(frames)
