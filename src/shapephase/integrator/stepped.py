@@ -134,7 +134,7 @@ class SteppedRotation:
         back[:, 0] = 0.0
         arcs = sphere.triangle_area(references, corners[:, :-1], corners[:, 1:])
         jumps = jumps_between(start, corners[:, :-1], corners[:, 1:], arcs + np.diff(back, axis=1))
-        ends = _from_zero(arcs + self.dynamics - self.turns) + back - 4.0 * np.pi * _from_zero(jumps)
+        ends = _from_zero(arcs + self.dynamics - self.turns) + back - 4.0 * np.pi * _from_zero(jumps.astype(np.float64))
         attitude, near = self.rotation(t), corners[:, index]
         there = so3.apply(so3.transpose(attitude), start)
         # The turn about the direction at the step's start, the shortest rotation taken off.
@@ -202,7 +202,7 @@ class SteppedRotation:
         return self.interpolant.inverse_and_drift(t)
 
 
-def _from_zero(of_steps: Array | Integers) -> Array:
+def _from_zero(of_steps: Array) -> Array:
     """Sums over the steps up to each of their ends: (B, K) -> (B, K + 1)."""
     return np.concatenate([np.zeros((len(of_steps), 1)), np.cumsum(of_steps, axis=1)], axis=1)
 

@@ -234,7 +234,8 @@ def _integrals_of(
 ) -> Callable[[Array], CurvePieces]:
     """The integrals between any edges (K + 1,), the ends of the motion's steps among them."""
     solution = motion.solution
-    if not at_rest and frames is None and isinstance(solution, SteppedRotation):
+    by_kernel = frames is None and (lift is None or lift.is_without_wheels)
+    if not at_rest and by_kernel and isinstance(solution, SteppedRotation):
         return lambda edges: _from_steps(solution, lift, edges, goal)
     start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
     if at_rest:
@@ -273,8 +274,8 @@ def _curve(motion: Motion, lift: Lift | None, frames: Frames | None, start: Arra
         inverse, drift = interpolant.inverse_and_drift(at)
         turn = None
         if lift is not None:
-            # The horizontal frame turns at minus the drift: relative to it the body turns at I^-1 Pi.
-            turn, drift = lift.rotation.rotation(at)[0], np.zeros(3)
+            # The horizontal frame turns at minus the shape's drift: relative to it the body turns at I^-1 (Pi - h).
+            turn, drift = lift.rotation.rotation(at)[0], lift.drift_of_wheels(at)
         elif frames is not None:
             turn, spin = frames(at)
             drift = drift + spin

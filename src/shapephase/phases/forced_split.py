@@ -45,7 +45,7 @@ class ForcedSplit:
     gauge : the frame that the momentum was seen from
     total_rotation : (3, 3) Delta R, which takes the shape at the start to that at the end
     holonomy : (3, 3) what the shape alone does; is_loop False: the lift's endpoint of an open path
-    dynamical_rotation : (3, 3) the rest: total = dynamical holonomy
+    dynamical_rotation : (3, 3) the rest: total = dynamical holonomy; what wheels store turns the body by is in it
     phase : as above [rad]; `angle` is the same in (-pi, pi]
     dynamic_phase : integral of omega . Pi/|Pi| [rad]
     body_solid_angle, space_solid_angle : signed, of the closed curves u and m [sr]
