@@ -14,7 +14,7 @@ and steps are scaled by these sizes: without that, short ways along stiff or for
 As the largest moment I_3 goes to infinity, the square of the distance falls short of the sub-Riemannian one by the
 integral of Pi_3² over the shortest geodesic, in a unit of time, over I_3.
 
-Sources: theory.md section 7, Q6; Podobryaev and Sachkov 2016 for the cut times; Bellaiche 1996 for the scaling.
+Sources: theory.md section 7, Q6; Podobryaev and Sachkov 2016 for the cut times.
 """
 
 from __future__ import annotations
@@ -280,7 +280,7 @@ def _arrivals(metric: LeftInvariantMetric, starts: Array, target: Array, size: f
         derivative[taken] = exponential_derivative(inverse_moments, momenta[taken], times[taken])
         changed = np.where(better, 0.1 * damping[rows], 10.0 * damping[rows])
         damping[rows] = np.clip(changed, _LEAST_DAMPING, _LARGEST_DAMPING)
-        rows = rows[(sizes[rows] > _ROUNDING) & (damping[rows] < _HOPELESS_DAMPING)]
+        rows = rows[(sizes[rows] > _ROUNDING * weights.max()) & (damping[rows] < _HOPELESS_DAMPING)]
         if not rows.size:
             break
     return momenta, sizes
