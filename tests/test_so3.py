@@ -180,16 +180,14 @@ def test_between_is_the_shortest_turn(rng):
     np.testing.assert_allclose(np.sum(so3.log(turn) * (start + end), axis=-1), 0.0, atol=1e-14, rtol=0)
 
 
-@pytest.mark.parametrize("gap", [0.0, 1e-12, 0.9e-8, 1.1e-8, 1e-6, 1e-3])
+@pytest.mark.parametrize("gap", [0.0, 1e-15, 1e-13, 1e-12, 1e-10, 0.9e-8, 1e-6, 1e-3])
 def test_between_almost_opposite_and_almost_equal(gap):
-    """Both sides of the switch to a fixed half turn at 1e-8."""
+    """Both sides of the switch to a fixed half turn, where 1.4e-14 is left to the opposite point."""
     start = DIRECTIONS[3]
     nearby = so3.apply(so3.exp(gap * so3.perpendicular(start)), start)
     np.testing.assert_allclose(so3.between(start, nearby) @ start, nearby, atol=1e-15, rtol=0)
     opposite = so3.between(start, -nearby)
-    np.testing.assert_allclose(
-        opposite @ start, -nearby, atol=2e-8 if gap < 1e-8 else 1e-15 + 1e-16 / gap**2 * 1e-8, rtol=0
-    )
+    np.testing.assert_allclose(opposite @ start, -nearby, atol=1e-14, rtol=0)
     np.testing.assert_allclose(opposite @ opposite.T, np.eye(3), atol=1e-14, rtol=0)
 
 

@@ -12,8 +12,8 @@ from .errors import ShapeError
 
 FAR_FROM_OPPOSITE = 0.2
 """One and the product of two unit vectors: above it half the turn between them is far from a right angle."""
-OPPOSITE = 1e-8
-"""Length of the sum of two unit vectors below which they count as opposite: half of its digits are rounding."""
+OPPOSITE = 64.0 * float(np.finfo(float).eps)
+"""Length of the sum of two unit vectors below which they count as opposite: about a tenth of it may be rounding."""
 _SMALL_SINE = 1e-9
 """Sine of half an angle below which sine and angle agree to the last digit (they differ by a sixth of its cube)."""
 _ORTHOGONAL = 1e-6

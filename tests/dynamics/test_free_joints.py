@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import shapephase as sp
+from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from support.bodies import joint, link, urdf
 from support.independent import FourierLoop, apart, quaternion_rate, random_rotation, random_vector
@@ -150,6 +151,68 @@ def test_a_spinning_wheel_on_a_gimbal_turns_the_body_as_in_mujoco(load, seed):
     stopped = sp.articulated(body, fourier(loop, ["j0", "j1"]), rotor_speeds={"j2": 0.0})
     still = sp.reconstruct(stopped, momentum, attitude)
     assert apart(still.attitude(TIMES), turned) > 0.1, "the wheel must matter"
+
+
+@pytest.mark.parametrize(("kind", "value"), [("rotors", 1.3), ("rotor_speeds", 9.0)])
+def test_the_holonomy_of_a_body_with_wheels_is_what_its_pace_does_not_change(load, kind, value):
+    """What wheels store turns the body longer in a slower loop, and stands apart from what the shape does."""
+    body = load(wheel_chain(2).urdf)
+    path, momentum, start = fourier(loop_of(2, 2), ["j0", "j1"]), random_vector(2, 0.5), random_rotation(2)
+    splits = []
+    for factor, size in ((1.0, 0.0), (3.0, 0.0), (1.0, 1.0), (2.0, 1.0)):
+        deformation = sp.articulated(body, path.stretched(factor), **{kind: {"j2": value}})
+        splits.append(sp.split(sp.reconstruct(deformation, size * momentum, start, tolerance=1e-11)))
+    alone = sp.articulated(body, path, **{kind: {"j2": 0.0}})
+    assert not alone.has_wheels
+    shape = sp.split(sp.reconstruct(alone, np.zeros(3), start, tolerance=1e-11))
+    assert not shape.has_wheels
+    np.testing.assert_array_equal(shape.wheel_rotation, np.eye(3))
+    for found in (*splits, shape):
+        errors = found.error_estimates
+        assert apart(found.holonomy, shape.total_rotation) <= errors.holonomy + shape.error_estimates.total_rotation
+        assert apart(found.dynamical_rotation @ found.holonomy, found.total_rotation) < 1e-14
+        if found.has_phase:
+            about = so3.exp(found.montgomery_phase * momentum / np.linalg.norm(momentum))
+            assert apart(about @ found.tilt, found.dynamical_rotation) <= errors.montgomery_phase + errors.tilt
+        else:
+            assert apart(found.wheel_rotation, found.dynamical_rotation) < 1e-11
+            assert found.montgomery_phase == 0.0
+    turns = [float(so3.angle(found.wheel_rotation)) for found in splits]
+    assert turns[0] == pytest.approx(turns[2], abs=1e-11)
+    assert abs(turns[1] - turns[0]) > 0.1, "a slower loop leaves wheels more time"
+    assert "the shape alone turns the body" not in str(splits[0])
+    assert "by wheels alone" in str(splits[0])
+
+
+def test_the_holonomy_of_a_body_with_wheels_is_the_turn_that_mujoco_makes_with_wheels_at_rest(load):
+    chain = wheel_chain(2)
+    body, loop, start = load(chain.urdf), loop_of(2, 2), random_rotation(2)
+    path = fourier(loop, ["j0", "j1"])
+    resting = sp.reconstruct(sp.articulated(body, path, rotors={"j2": 0.0}), np.zeros(3), start)
+    speed = sp.dynamics.wheel_speeds(resting, 0.0)[0]
+    turned, _, _ = mujoco_swing(chain, loop, ["j0", "j1"], ["j2"], [(0.0, speed)], np.zeros(3), start)
+    moving = sp.reconstruct(sp.articulated(body, path, rotors={"j2": 1.3}), random_vector(2, 0.5), start)
+    assert apart(sp.split(moving).holonomy, turned[-1] @ start.T) < 1e-8
+    assert apart(sp.split(moving).total_rotation, turned[-1] @ start.T) > 0.1, "the wheel must matter"
+
+
+def test_the_turn_by_wheels_alone_of_a_body_that_keeps_its_shape(tmp_path):
+    """It is even, at -I^-1 p; and a motion read from a file knows it too, as does another gauge."""
+    satellite = sp.load_body("satellite")
+    rest = [name for name in satellite.joint_names if name != "wheel_spin"]
+    still = sp.ShapePath.waypoints([0.0, 7.0], np.zeros((2, len(rest))), joint_names=rest)
+    deformation = sp.articulated(satellite, still, rotors={"wheel_spin": 2.0})
+    motion = sp.reconstruct(deformation, [0.3, -0.2, 0.5], tolerance=1e-11)
+    motion.save(tmp_path / "motion.npz")
+    wanted = so3.exp(-7.0 * np.linalg.solve(deformation.inertia(0.0), [0.0, 0.0, 2.0]))
+    for found in (sp.split(motion), sp.split(sp.load_motion(tmp_path / "motion.npz"), "principal")):
+        assert apart(found.wheel_rotation, wanted) < 1e-13
+        assert apart(found.holonomy, np.eye(3)) < 1e-13
+    seen = sp.horizontal_gauge(deformation)
+    np.testing.assert_allclose(seen.closure, np.eye(3), rtol=0, atol=1e-13)
+    np.testing.assert_allclose(seen.internal_momentum(3.0), [0.0, 0.0, 2.0], rtol=0, atol=1e-13)
+    ends = sp.phases.running_phases(motion, 7.0)
+    assert ends.montgomery_phase == pytest.approx(float(sp.split(motion).montgomery_phase), abs=1e-12)
 
 
 def test_a_wheel_at_a_speed_is_the_joint_turning_evenly(load):

@@ -28,6 +28,7 @@ from support.independent import BODIES, apart, body_of, random_loop, random_vect
 GAUGES = ("base", "horizontal", "principal")
 NAMES = ("cat", "satellite", "cat_two_halves")
 EPS = float(np.finfo(float).eps)
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def motion_of(name: str, tolerance: float, seed: int = 1, loops: int = 1) -> sp.Motion:
@@ -100,6 +101,64 @@ def test_near_the_opposite_point_the_closing_makes_errors_large(away: float):
     for name in ("solid_angle", "montgomery_phase"):
         assert getattr(found.error_estimates, name) < 1.2 * expected + 10.0 * motion.error_estimate
     assert found.error_estimates.dynamic_phase < 20.0 * motion.error_estimate
+
+
+def spiral(gap: float) -> sp.Deformation:
+    """A round body whose momentum starts at the pole z and ends `gap` from its opposite, longitude 1.3 x colatitude."""
+
+    def internal_momentum(times: np.ndarray) -> np.ndarray:
+        colatitude, rate = (np.pi - gap) * np.sin(0.5 * np.pi * times) ** 2, np.sin(np.pi * times)
+        longitude, rate = 1.3 * colatitude, 0.5 * np.pi * (np.pi - gap) * rate
+        level = np.stack([np.cos(longitude), np.sin(longitude), 0.0 * times], axis=-1)
+        across = np.stack([-np.sin(longitude), np.cos(longitude), 0.0 * times], axis=-1)
+        sine, cosine = np.sin(colatitude)[:, None], np.cos(colatitude)[:, None]
+        unit, along = sine * level + cosine * UP, cosine * level - sine * UP
+        # With unit inertia u' = L_o x u; the part along u adds to the dynamic phase.
+        return np.cross(unit, rate[:, None] * (along + 1.3 * sine * across)) + 0.3 * unit
+
+    return sp.prescribed(lambda times: np.broadcast_to(np.eye(3), (len(times), 3, 3)), internal_momentum, 1.0)
+
+
+@pytest.mark.parametrize("gap", [9e-9, 1e-10, 1e-12, 1e-14, 0.0])
+def test_a_curve_that_ends_opposite_its_start_is_within_its_estimate(gap: float):
+    """Seen from the pole the area is that of the longitude, the integral of (1 - cos) 1.3; the circle back has none."""
+    motion = sp.reconstruct(spiral(gap), UP, tolerance=1e-11)
+    area, dynamic = 1.3 * (np.pi - gap - np.sin(gap)), 0.7
+    whole, arc = sp.split(motion, "base"), arc_phases(motion, [0.0, 1.0], "base")
+    running = running_phases(motion, 1.0, "base")
+    for found in (whole, running, arc):
+        errors = found.error_estimates
+        assert np.max(np.abs(sphere.wrapped(found.solid_angle - area))) <= np.max(errors.solid_angle)
+        assert np.max(np.abs(so3.wrap(found.montgomery_phase - dynamic + area))) <= np.max(errors.montgomery_phase)
+        # The error of the end, over half its distance from the opposite point.
+        grown = 2.0 * float(np.max(whole.error_estimates.momentum_gap)) / max(gap, 1e-300)
+        assert np.max(errors.solid_angle) < 2.0 * grown + 10.0 * motion.error_estimate
+    assert abs(sphere.wrapped(motion.solid_angle(1.0) - area)) <= whole.error_estimates.solid_angle
+
+
+def test_with_a_torque_too_a_curve_that_ends_opposite_its_start_is_within_its_estimate():
+    gap = 5e-9
+    nothing = sp.ExternalTorque(lambda _: [0.0, 0.0, 0.0], axes="space")
+    found = sp.split(sp.reconstruct(spiral(gap), UP, torque=nothing, tolerance=1e-9), "base")
+    error = abs(so3.wrap(found.phase - 0.7 + 1.3 * (np.pi - gap - np.sin(gap))))
+    assert error <= found.error_estimate < 0.1
+
+
+@pytest.mark.parametrize("off", [1e-5, 1e-7, 1e-9, -1e-11, -1e-7])
+def test_an_area_keeps_no_error_of_having_passed_the_opposite_of_its_start(off: float):
+    """The momentum goes round a circle through its start, whose farthest point is `off` from the start's opposite."""
+    radius = 0.5 * (np.pi - off)
+    spin = 2.0 * np.pi * np.array([np.sin(radius), 0.0, np.cos(radius)])
+    body = sp.prescribed(
+        lambda times: np.broadcast_to(np.eye(3), (len(times), 3, 3)), lambda times: np.tile(spin, (len(times), 1)), 3.0
+    )
+    motion = sp.reconstruct(body, UP, tolerance=1e-11)
+    turns = np.array([1.0, 2.0, 3.0])
+    area = 2.0 * np.pi * (1.0 - np.cos(radius)) * turns
+    np.testing.assert_allclose(sphere.wrapped(motion.solid_angle(turns) - area), 0.0, rtol=0, atol=2e-13)
+    times = np.linspace(0.03, 2.97, 50)
+    apart = sphere.wrapped(motion.solid_angle(times) - running_phases(motion, times, "base").solid_angle)
+    np.testing.assert_allclose(apart, 0.0, rtol=0, atol=2e-13)
 
 
 @pytest.mark.parametrize("duration", [3.0, 300.0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from shapephase.errors import MissingExtraError, ShapeError
+from shapephase.errors import MissingExtraError, ShapeError, SingularInertiaError
 from shapephase.plotting.polhode_plots import (
     herpolhode_times,
     plot_heavy_top_stability,
@@ -17,6 +17,7 @@ from shapephase.plotting.polhode_plots import (
     plot_polhodes,
 )
 from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body.lagrange_top import LagrangeTop, upright_potential
 from shapephase.rigid_body.poinsot import Poinsot
 
 MOMENTS = (2.0, 1.0, 4.0)
@@ -235,6 +236,18 @@ def test_heavy_top_chart_has_the_threshold_and_the_double_roots():
                           ((1.0 - ratio) * (spin / ratio) ** 2 + 1.0) ** 2])  # fmt: skip
         assert (np.abs(roots.real).max() < 1e-6) == (abs(spin) > 2.0)
     assert labels(ax)[:4] == ["stable", "unstable", r"$\Pi_3^2 = 4\,M g \ell I_1$", "$I_3 = 2I_1$, double roots"]
+
+
+def test_heavy_top_chart_and_the_sleeping_top_agree_at_the_threshold_too():
+    """At Pi3² = 4 M g l I1 the potential has a minimum of fourth order: it is stable, on both sides."""
+    ax = plot_heavy_top_stability(flat_axes(), [(2.0, 0.5), (-2.0, 1.5), (1.999, 0.5)])
+    assert sorted(map(tuple, markers(ax, "o"))) == [(-2.0, 1.5), (2.0, 0.5)]
+    assert sorted(map(tuple, markers(ax, "X"))) == [(1.999, 0.5)]
+    top, tilts = LagrangeTop(1.0, 0.5, 1.0), np.array([0.01, 0.1, 0.2])
+    assert np.all(upright_potential(top, 2.0, tilts) > 0.0)
+    assert upright_potential(top, 1.999, tilts)[0] < 0.0
+    with pytest.raises(SingularInertiaError, match="above 0"):
+        plot_heavy_top_stability(flat_axes(), [(3.0, 0.0)])
 
 
 def test_heavy_top_chart_grows_with_its_tops():

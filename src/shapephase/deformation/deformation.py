@@ -135,6 +135,22 @@ class Deformation:
         times = times_argument(t, self.duration)
         return self.description.sample(times.ravel())[1].reshape(*times.shape, 3)
 
+    def stored_momentum(self, t: ArrayLike) -> Array:
+        """Part of L_o that wheels hold whatever the joints do: times (...) -> (..., 3), base axes [kg m^2/s].
+
+        Zero without wheels. A wheel that keeps its momentum p about its axle a stores p a, one at a held speed J s a.
+        It is no rate of the shape: what it turns the body by grows with the time that a motion takes, and is no part
+        of the holonomy.
+        """
+        times = times_argument(t, self.duration)
+        stored = self.description.stored_momentum(times.ravel())
+        return np.zeros((*times.shape, 3)) if stored is None else stored.reshape(*times.shape, 3)
+
+    @property
+    def has_wheels(self) -> bool:
+        """Whether wheels store momentum."""
+        return self.description.stored_momentum(np.zeros(1)) is not None
+
     def inertia_rate(self, t: ArrayLike) -> Array:
         """Rate of the locked inertia: times (...) -> (..., 3, 3) [kg m^2/s]."""
         times = times_argument(t, self.duration)
@@ -288,7 +304,9 @@ def articulated(
 
     Joints are matched by name where the path has names, else by order. Of a `ParticleBody` it is one of `particles`.
     Wheels are left out of the path: those that no motor turns keep their momentum, others the speed that a motor
-    holds. On a joint of the path they make a control-moment gyroscope.
+    holds. On a joint of the path they make a control-moment gyroscope. What a wheel turns the body by depends on how
+    long the motion takes: `split` states it apart from the holonomy. A wheel among the joints of the path is part of
+    the shape: it turns by given angles, whatever the pace.
 
     Parameters
     ----------
@@ -521,9 +539,10 @@ def sampled_deformation(
     label: str,
     inputs: Mapping[str, str],
     made_from: Mapping[str, Any],
+    stored: Array | None = None,
 ) -> Deformation:
-    """A deformation known only by its interpolant, as kept in a file; `centre` are Chebyshev coefficients (P, n, 3)."""
-    description = SampledDescription(interpolant, centre)
+    """A deformation known only by its interpolant, as kept in a file; `centre` and `stored` as `SampledDescription`."""
+    description = SampledDescription(interpolant, centre, stored)
     return Deformation(
         description, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs, made_from=made_from
     )

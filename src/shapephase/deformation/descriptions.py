@@ -51,6 +51,10 @@ class Description(Protocol):
         """Rate of the locked inertia (N, 3, 3) [kg m^2/s]."""
         ...
 
+    def stored_momentum(self, times: Array, /) -> Array | None:
+        """Part of the internal momentum that wheels hold even at rest of all joints (N, 3); None without wheels."""
+        ...
+
     def frame(self, times: Array, /) -> Array:
         """This description's frame in the original one (N, 3, 3)."""
         ...
@@ -109,6 +113,9 @@ class UngaugedDescription:
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         raise NotImplementedError
+
+    def stored_momentum(self, times: Array) -> Array | None:  # noqa: ARG002
+        return None
 
     def frame(self, times: Array) -> Array:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)).copy()
@@ -359,10 +366,14 @@ class ParticlesAlong:
 
 @dataclass(frozen=True, eq=False)
 class SampledDescription(UngaugedDescription):
-    """What a file keeps of a deformation: its interpolant, and the centre of mass."""
+    """What a file keeps of a deformation: its interpolant, the centre of mass, and what wheels store.
+
+    Centre and stored momentum are Chebyshev coefficients on the interpolant's panels (P, n, 3).
+    """
 
     interpolant: Interpolant
     centre: Array
+    stored: Array | None = None
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         inverse, drift = self.interpolant.inverse_and_drift(times)
@@ -374,6 +385,9 @@ class SampledDescription(UngaugedDescription):
 
     def centre_of_mass(self, times: Array) -> Array:
         return PiecewiseChebyshev(self.interpolant.edges, self.centre)(times)
+
+    def stored_momentum(self, times: Array) -> Array | None:
+        return None if self.stored is None else PiecewiseChebyshev(self.interpolant.edges, self.stored)(times)
 
     def smoothness(self, breaks: Array) -> Smoothness:
         edges = np.union1d(breaks, self.interpolant.edges)

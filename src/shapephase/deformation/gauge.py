@@ -21,6 +21,7 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import SteppedRotation, stepped_rotation
+from ..integrator.lift import lift_along
 from ..integrator.resolved import joined
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, side_by_side
 from ..shape_space.scan.scanning import scanned
@@ -183,7 +184,8 @@ def named_gauge(deformation: Deformation, name: str) -> Deformation:
 def horizontal_gauge(deformation: Deformation) -> Deformation:
     """The deformation seen from the frame that the shape motion alone would carry along: L_o vanishes there.
 
-    U(0) is the identity and U' = -U hat(I^-1 L_o). For a loop the closure is the holonomy (base axes at t = 0).
+    U(0) is the identity and U' = -U hat(I^-1 L_o). For a loop the closure is the holonomy (base axes at t = 0). What
+    wheels store (`Deformation.stored_momentum`) does not count as L_o: it is what is left there.
     Source: Cabrera 2006, section 2.3.1 (a); theory.md B2.
 
     Notes
@@ -198,7 +200,8 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
     0.000000000
     """
     check_object(deformation, "Deformation", "deformation")
-    lift = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    rotation = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    lift = lift_along(rotation, deformation.stored_momentum if deformation.has_wheels else None).rotation
     return _seen_from(deformation, _HorizontalFrames(deformation.description, lift), "horizontal")
 
 
@@ -211,6 +214,9 @@ class _HorizontalFrames:
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         inertia, momentum = self.description.sample(times)
+        stored = self.description.stored_momentum(times)
+        if stored is not None:
+            momentum = momentum - stored
         return self.lift.rotation(times)[0], -so3.apply(inverse_inertia(inertia, times), momentum)
 
 
@@ -278,6 +284,10 @@ class _Gauged:
 
     def channels(self, times: Array) -> Array | None:  # noqa: ARG002
         return None
+
+    def stored_momentum(self, times: Array) -> Array | None:
+        stored = self.original.stored_momentum(times)
+        return None if stored is None else so3.apply(self.frames(times)[0], stored)
 
     def inertia_rate(self, times: Array) -> Array:
         inertia, _ = self.original.sample(times)

@@ -97,6 +97,15 @@ class RotorDescription(UngaugedDescription):
                 found = found - rotor.inertia * (product + so3.transpose(product))
         return found
 
+    def stored_momentum(self, times: Array) -> Array | None:
+        """As `Description`: p a of each wheel that keeps its momentum, J s a at a held speed."""
+        held = [
+            rotor.value * (1.0 if rotor.is_momentum else rotor.inertia) * self._axle(rotor, *self.route.curve(times))[0]
+            for rotor in self.rotors
+            if rotor.value
+        ]
+        return np.sum(held, axis=0) if held else None
+
     def spins(self, times: Array, omega: Array) -> Array:
         """Of the wheels on their axles, while the base turns at omega (..., N, 3): -> (..., N, wheels) [rad/s]."""
         shapes, rates = self.route.curve(times)

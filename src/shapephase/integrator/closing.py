@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from .. import so3, sphere
-from ..arrays import Array
+from ..arrays import Array, Integers
 from .fast import closing, engine
 from .fast.closing import ClosedCurves
 
@@ -42,3 +42,18 @@ def _closed_curves(corners: Array, references: Array, axes: Array, first: Array,
         gap=so3.angle_between(departing, arriving),
         turn=so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), axes),
     )
+
+
+def areas_back(references: Array, ends: Array, starts: Array) -> Array:
+    """Areas, seen from references, of the great circles from `ends` back to `starts`: (..., 3) each -> (...) [sr]."""
+    half = so3.middle(ends, starts)
+    return sphere.triangle_area(references, ends, half) + sphere.triangle_area(references, half, starts)
+
+
+def jumps_between(starts: Array, first: Array, second: Array, grown: Array) -> Integers:
+    """By how many spheres a closed area jumps between two corners of its curve: (..., 3) each, (...) -> (...).
+
+    `grown` is what it grows by, the great circles back to `starts` included [sr]. Seen from the start the same triangle
+    has no great circles beside it: it grows continuously, so that what differs is a whole number.
+    """
+    return np.rint((grown - sphere.triangle_area(starts, first, second)) / (4.0 * np.pi)).astype(np.int64)

@@ -1,15 +1,19 @@
-"""The rotation without momentum beside a motion with it, and how far both may be off at every time."""
+"""The rotation by the shape alone beside a motion, and how far both may be off at every time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array, Integers, lock_arrays, read_only
+from ..chebyshev import inside, nodes_on, values_to_coefficients
 from ..display import short_repr
+from ._last_terms import Perturbed
+from .interpolant import Interpolant
 from .stepped import SteppedRotation
 from .steps.error_propagator import growth_and_rounding
 from .steps.step_loop import largest_angle, quaternions_alone
@@ -31,6 +35,8 @@ class Lift:
     Attributes
     ----------
     motion : the attitude beside which it is
+    interpolant : on which it is stepped: the motion's own, or that without the drift by the momentum of wheels
+    perturbed : the same with errors like those that it probably has
     steps : (P,) of its own on each of the interpolant's panels
     quaternions : (1, M + 1, 4) xyzw at their ends
     finer : (1, 2 M + 1, 4) by twice as many
@@ -38,6 +44,8 @@ class Lift:
     """
 
     motion: SteppedRotation
+    interpolant: Interpolant
+    perturbed: Perturbed
     steps: Integers
     quaternions: Array
     finer: Array
@@ -59,8 +67,8 @@ class Lift:
     @cached_property
     def turns(self) -> Array:
         """As of `error_turns`, at the ends of the motion's steps: (2, 1, K + 1, 3)."""
-        motion, ends = self.motion, self.ends
-        other = quaternions_alone(motion.interpolant, motion.perturbed.coefficients, self.steps)
+        ends = self.ends
+        other = quaternions_alone(self.interpolant, self.perturbed.coefficients, self.steps)
         better = np.stack([self.finer[:, 2 * ends], other[:, ends]])
         return read_only(small_turns(self.quaternions[:, ends], better))
 
@@ -68,41 +76,80 @@ class Lift:
     def rotation(self) -> SteppedRotation:
         """It at all times, and how far it may be off; of a motion without momentum that itself."""
         motion, quaternions = self.motion, self.quaternions
-        if _is_at_rest(motion):
+        if _is_at_rest(motion) and self.is_without_wheels:
             return motion
         stepping, sampling = np.sqrt(np.einsum("sbki,sbki->sbk", self.turns, self.turns).max(axis=-1))
         growth, rounding = growth_and_rounding(np.empty((1, 0, 3, 3)), quaternions, _tolerance(motion))
         nothing = np.zeros((1, quaternions.shape[1] - 1))
         return SteppedRotation(
-            interpolant=motion.interpolant,
+            interpolant=self.interpolant,
             momentum=np.zeros((1, 3)),
             steps=self.steps,
             quaternions=quaternions,
             directions=np.empty((1, 0, 3)),
             turns=nothing,
             dynamics=nothing,
-            sampling_error=motion.perturbed.hidden + sampling,
+            sampling_error=self.perturbed.hidden + sampling,
             stepping_error=_SAFETY_FACTOR * stepping,
             rounding_error=rounding,
             amplification=growth,
-            perturbed=motion.perturbed,
+            perturbed=self.perturbed,
         )
 
+    @property
+    def is_without_wheels(self) -> bool:
+        """Whether all of the motion's drift is that of the shape."""
+        return self.interpolant is self.motion.interpolant
 
-def lift_along(rotation: SteppedRotation) -> Lift:
-    """The lift of a motion, in steps that err little beside it; how little is found when it is asked for."""
-    interpolant, series = rotation.interpolant, rotation.interpolant.coefficients
+    def drift_of_wheels(self, times: Array) -> Array:
+        """I^-1 h, with h the momentum that wheels store: (N,) -> (N, 3), body axes [rad/s]."""
+        if self.is_without_wheels:
+            return np.zeros((len(times), 3))
+        return self.motion.interpolant.inverse_and_drift(times)[1] - self.interpolant.inverse_and_drift(times)[1]
+
+
+def lift_along(rotation: SteppedRotation, wheels: Callable[[Array], Array] | None = None) -> Lift:
+    """The lift of a motion, in steps that err little beside it; how little is found when it is asked for.
+
+    `wheels` : the momentum that wheels store, (N,) [s] -> (N, 3) [kg m^2/s], which is no part of the shape's drift
+    """
+    interpolant, perturbed = rotation.interpolant, rotation.perturbed
+    if wheels is not None:
+        by_wheels = _drift_by(wheels, interpolant)
+        interpolant = replace(interpolant, coefficients=_less(interpolant.coefficients, by_wheels), sampled=None)
+        perturbed = Perturbed.known(_less(perturbed.coefficients, by_wheels), perturbed.hidden)
+    series = interpolant.coefficients
     at_rest, times_finer = _is_at_rest(rotation), 1
-    quaternions = rotation.quaternions[:1] if at_rest else quaternions_alone(interpolant, series, rotation.steps)
+    own = at_rest and wheels is None
+    quaternions = rotation.quaternions[:1] if own else quaternions_alone(interpolant, series, rotation.steps)
     finer = quaternions_alone(interpolant, series, 2 * rotation.steps)
-    tolerance = np.inf if at_rest else _tolerance(rotation)
+    tolerance = np.inf if own else _tolerance(rotation)
     for _ in range(_MOST_HALVINGS):
         if _SAFETY_FACTOR * float(largest_angle(quaternions, finer[:, ::2])[0]) <= tolerance:
             break
         times_finer *= 2
         quaternions, finer = finer, quaternions_alone(interpolant, series, 2 * times_finer * rotation.steps)
     ends = times_finer * np.arange(rotation.quaternions.shape[1])
-    return Lift(rotation, times_finer * rotation.steps, quaternions, finer, ends)
+    return Lift(rotation, interpolant, perturbed, times_finer * rotation.steps, quaternions, finer, ends)
+
+
+def _drift_by(wheels: Callable[[Array], Array], interpolant: Interpolant) -> Array:
+    """Coefficients of I^-1 h on the panels of the first loop: (P, n, 3)."""
+    panels, count = interpolant.coefficients.shape[:2]
+    left, right = interpolant.edges[:panels], interpolant.edges[1 : panels + 1]
+    first, last = inside(left, right)
+    # Twice as many degrees: what the product of two series has beyond them is cut off, not folded back.
+    times = np.clip(nodes_on(left, right, 2 * count), first[:, None], last[:, None])
+    inverse, _ = interpolant.inverse_and_drift(times.ravel())
+    values = so3.apply(inverse, wheels(times.ravel())).reshape(*times.shape, 3)
+    return (values_to_coefficients(2 * count) @ values)[:, :count]
+
+
+def _less(coefficients: Array, drift: Array) -> Array:
+    """The nine channels without a part of the drift: (P, n, 9), (P, n, 3) -> (P, n, 9)."""
+    found = coefficients.copy()
+    found[:, :, 6:] -= drift
+    return found
 
 
 def _is_at_rest(rotation: SteppedRotation) -> bool:

@@ -12,6 +12,7 @@ from ..arrays import Array, Integers, lock_arrays, read_only
 from ..display import short_repr
 from ._dense_output import DenseOutput
 from ._last_terms import Perturbed
+from .closing import areas_back, far_references, jumps_between
 from .fast.estimate_constants import DENSE_SHARE
 from .fast.threads import in_threads
 from .interpolant import Interpolant
@@ -112,9 +113,9 @@ class SteppedRotation:
 
     def dynamic_phase(self, t: Array) -> Array:
         """The integral of omega . Pi/|Pi| from 0 to t: (N,) -> (B, N) [rad]; zero without momentum."""
-        before = np.cumsum(self.dynamics, axis=1) - self.dynamics
-        found = before[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)
-        return self._exact_at_ends(t, self.dynamics, found) * self._moving
+        ends = _from_zero(self.dynamics)
+        found = ends[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)
+        return self._exact_at_ends(t, ends, found) * self._moving
 
     def solid_angle(self, t: Array) -> Array:
         """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
@@ -125,25 +126,33 @@ class SteppedRotation:
         """
         if not self.directions.shape[1]:
             return np.zeros((len(self.momentum), len(t)))
-        start, corners, index = self.directions[:, :1], self.directions, self._dense.step_of(t)
-        fans = sphere.triangle_area(start, corners[:, :-1], corners[:, 1:]) + self.dynamics - self.turns
-        before = np.cumsum(fans, axis=1) - fans
+        corners, index = self.directions, self._dense.step_of(t)
+        # Counted from a region far from the curve: counted from the start, errors near the point opposite it would
+        # stay in the sum. Whole spheres by which the great circle back to the start makes the area jump are taken off.
+        start, references = corners[:, :1], far_references(corners)[:, None]
+        back = areas_back(references, corners, start)
+        back[:, 0] = 0.0
+        arcs = sphere.triangle_area(references, corners[:, :-1], corners[:, 1:])
+        jumps = jumps_between(start, corners[:, :-1], corners[:, 1:], arcs + np.diff(back, axis=1))
+        ends = _from_zero(arcs + self.dynamics - self.turns) + back - 4.0 * np.pi * _from_zero(jumps.astype(np.float64))
         attitude, near = self.rotation(t), corners[:, index]
         there = so3.apply(so3.transpose(attitude), start)
         # The turn about the direction at the step's start, the shortest rotation taken off.
         steps = so3.transpose(so3.matrix_from_quat(self.quaternions[:, index])) @ attitude
         turn = np.where(t == self.times[index], 0.0, so3.angle_about(steps @ so3.between(near, there), near))
-        part = sphere.triangle_area(start, near, there) + self._dense.dynamic_phase(t) - turn
-        return self._exact_at_ends(t, fans, before[:, index] + part) * self._moving
+        grown = sphere.triangle_area(references, near, there)
+        grown += areas_back(references, there, start) - back[:, index]
+        grown -= 4.0 * np.pi * jumps_between(start, near, there, grown)
+        found = ends[:, index] + grown + self._dense.dynamic_phase(t) - turn
+        return self._exact_at_ends(t, ends, found) * self._moving
 
-    def _exact_at_ends(self, t: Array, of_steps: Array, found: Array) -> Array:
+    def _exact_at_ends(self, t: Array, ends: Array, found: Array) -> Array:
         """What is found between the ends of steps, and there the sum over steps, free of the polynomials' errors.
 
-        (N,), (B, S), (B, N) -> (B, N).
+        (N,), (B, K + 1), (B, N) -> (B, N).
         """
         place = np.minimum(np.searchsorted(self.times, t), len(self.times) - 1)
-        whole = np.concatenate([np.zeros((len(of_steps), 1)), np.cumsum(of_steps, axis=1)], axis=1)
-        return np.where(self.times[place] == t, whole[:, place], found)
+        return np.where(self.times[place] == t, ends[:, place], found)
 
     @property
     def _moving(self) -> Array:
@@ -191,6 +200,11 @@ class SteppedRotation:
     def inverse_and_drift(self, t: Array) -> tuple[Array, Array]:
         """I^-1 and I^-1 L_o at times: (N,) -> (N, 3, 3), (N, 3)."""
         return self.interpolant.inverse_and_drift(t)
+
+
+def _from_zero(of_steps: Array) -> Array:
+    """Sums over the steps up to each of their ends: (B, K) -> (B, K + 1)."""
+    return np.concatenate([np.zeros((len(of_steps), 1)), np.cumsum(of_steps, axis=1)], axis=1)
 
 
 def estimate_from_ends(error: Array) -> Array:

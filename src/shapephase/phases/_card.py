@@ -32,7 +32,10 @@ def split_card(self: PhaseSplit) -> Card:
         ("error, residual", f"{error_text(about.error_estimate)}, {error_text(self.residual)}"),
     ]
     if not np.any(self.has_phase):
-        rows = [*rows[:3], ("phases", "none: there is no angular momentum"), rows[-1]]
+        whose = "total angular momentum" if self.has_wheels else "angular momentum"
+        rows = [*rows[:3], ("phases", f"none: there is no {whose}"), rows[-1]]
+    if self.has_wheels:
+        rows.insert(3, ("turn by wheels alone", angle_text(so3.angle(self.wheel_rotation))))
     title = f"PhaseSplit of {about.label}, {about.duration:g} s, {self.gauge} gauge"
     if np.ndim(self.montgomery_phase) or not self.has_phase:
         return Card(title, rows)

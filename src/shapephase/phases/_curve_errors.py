@@ -14,6 +14,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Integers
+from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 from ._momentum_curve import MomentumCurve
@@ -103,8 +104,17 @@ class CurveErrors:
     @property
     def lift(self) -> Array:
         """Of the horizontal lift at its end: (1,) or (B,) [rad]."""
-        lift = self.motion.lift_with_errors
-        return np.minimum(_at_end(lift.turns) + self._unseen_of_lift, lift.rotation.error_estimate)
+        return self._of_end(self.motion.lift_with_errors)
+
+    @property
+    def wheels(self) -> Array:
+        """Of the turn by the momentum that wheels store, at its end: (1,) or (B,) [rad]."""
+        if not self.motion.deformation.has_wheels:
+            return np.zeros(1)
+        return self.lift + self._of_end(self.motion.lift_without_momentum)
+
+    def _of_end(self, lift: Lift) -> Array:
+        return np.minimum(_at_end(lift.turns) + _unseen_of(lift), lift.rotation.error_estimate)
 
     @property
     def between(self) -> Array:
@@ -138,9 +148,10 @@ class CurveErrors:
         errors = np.einsum("s,qsbn->qbn", _FACTORS, np.abs(grown) + _OF_LARGEST * on_the_way)
         errors += self._unseen_of_gauge[:, None] * (1.0 + _AT_ANY_TIME * paths + closing)
         errors += np.tensordot(_LEAST, largest, axes=1) * np.minimum(paths, 1.0)
-        errors += _EPS * (_ROUNDING + _ROUNDING_OF_RADIANS * (summed + lengths)) + curve.error[:, None] + residual
+        errors += _EPS * (_ROUNDING * (1.0 + closing) + _ROUNDING_OF_RADIANS * (summed + lengths))
+        errors += curve.error[:, None] + residual
         turned = _seen_so_far(sizes) + self._unseen_of_gauge[:, None]
-        gap = turned[:, stretches.first] + turned[:, stretches.last]
+        gap = turned[:, stretches.first] + turned[:, stretches.last] + _EPS * _ROUNDING
         # Near the point opposite the target any displacement turns the great circle round.
         near, whole = gap > np.arctan2(1.0, factor), 2.0 * np.pi
         tilt = np.minimum(_BEYOND_LINEAR * gap * np.sqrt(1.0 + factor * factor), np.pi)
@@ -154,11 +165,13 @@ class CurveErrors:
 
     def _beside(self, stretches: Stretches, targets: Array, ends: Array) -> Array:
         """What the turns do to the area beside the great circles: (2, B, N) [sr]."""
-        cosine = np.einsum("bni,bni->bn", targets, ends)[..., None]
-        across = np.einsum("sbni,bni->sbn", self._in_gauge(stretches.last), targets - cosine * ends)
+        # One and the cosine between them, without the cancellation near the opposite point.
+        total = targets + ends
+        versed = 0.5 * np.einsum("bni,bni->bn", total, total)[..., None]
+        across = np.einsum("sbni,bni->sbn", self._in_gauge(stretches.last), total - versed * ends)
         if stretches.first.any():
-            across += np.einsum("sbni,bni->sbn", self._in_gauge(stretches.first), cosine * targets - ends)
-        return -across / (1.0 + cosine[..., 0] + _EPS)
+            across += np.einsum("sbni,bni->sbn", self._in_gauge(stretches.first), versed * targets - total)
+        return -across / (versed[..., 0] + _TINY)
 
     def _in_gauge(self, place: Integers) -> Array:
         """The turns at edges, gauge axes: (N,) -> (2, B, N, 3)."""
@@ -201,8 +214,7 @@ class CurveErrors:
 
     @cached_property
     def _unseen_of_lift(self) -> Array:
-        lift = self.motion.horizontal_lift
-        return lift.perturbed.hidden + lift.rounding_error
+        return _unseen_of(self.motion.lift_with_errors)
 
     @cached_property
     def _unseen_of_gauge(self) -> Array:
@@ -236,6 +248,11 @@ class CurveErrors:
         return sums
 
 
+def _unseen_of(lift: Lift) -> Array:
+    """What neither finer steps nor the perturbed series show of a lift: (1,) or (B,) [rad]."""
+    return lift.perturbed.hidden + lift.rotation.rounding_error
+
+
 def _norms(vectors: Array) -> Array:
     """Lengths: (..., 3) -> (...)."""
     return np.sqrt(np.einsum("...i,...i", vectors, vectors))
@@ -262,10 +279,12 @@ def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> Split
     def of(error: Array) -> Array:
         return (error.reshape(-1) * curve.has_phase).reshape(batch)[()]
 
+    has_wheels = motion.deformation.has_wheels
     return SplitErrors(
         total_rotation=errors.attitude.reshape(batch)[()],
         holonomy=np.broadcast_to(errors.lift, residual.shape).reshape(batch)[()],
-        dynamical_rotation=of(errors.between),
+        dynamical_rotation=np.where(curve.has_phase | has_wheels, errors.between, 0.0).reshape(batch)[()],
+        wheel_rotation=np.broadcast_to(errors.wheels, residual.shape).reshape(batch)[()],
         montgomery_phase=of(whole.phase),
         montgomery_angle=of(whole.phase),
         dynamic_phase=of(whole.dynamic),

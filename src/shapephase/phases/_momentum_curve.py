@@ -14,7 +14,7 @@ from .. import so3, sphere
 from ..arrays import Array, Integers, Mask
 from ..deformation.frames import GAUGES, Frames, frames_argument, named_frames
 from ..errors import GaugeError, ShapeError
-from ..integrator.closing import far_references
+from ..integrator.closing import areas_back, far_references, jumps_between
 from ..integrator.curve_integrals import CurveIntegrals, curve_integrals
 from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
@@ -119,13 +119,11 @@ class MomentumCurve(CurvePieces):
         """
         corners, references = self.corners, self.references[:, None]
         start = corners[:, :1]
-        half = so3.middle(corners, start)
-        back = sphere.triangle_area(references, corners, half) + sphere.triangle_area(references, half, start)
+        back = areas_back(references, corners, start)
         back[:, 0] = 0.0
         one, other = corners[:, :-1], corners[:, 1:]
         grown = sphere.triangle_area(references, one, other) + np.diff(back, axis=1)
-        # Seen from the start the same triangle has no great circles beside it: it grows continuously.
-        spheres = np.rint((grown - sphere.triangle_area(start, one, other)) / (4.0 * np.pi)).astype(np.int64)
+        spheres = jumps_between(start, one, other, grown)
         jumps = np.concatenate([np.zeros((len(corners), 1), dtype=np.int64), np.cumsum(spheres, axis=1)], axis=1)
         place, moving = np.searchsorted(self.edges, times), self.has_phase[:, None]
         return np.where(moving, back[:, place], 0.0), np.where(moving, jumps[:, place], 0)
@@ -236,7 +234,8 @@ def _integrals_of(
 ) -> Callable[[Array], CurvePieces]:
     """The integrals between any edges (K + 1,), the ends of the motion's steps among them."""
     solution = motion.solution
-    if not at_rest and frames is None and isinstance(solution, SteppedRotation):
+    by_kernel = frames is None and (lift is None or lift.is_without_wheels)
+    if not at_rest and by_kernel and isinstance(solution, SteppedRotation):
         return lambda edges: _from_steps(solution, lift, edges, goal)
     start = so3.apply(so3.transpose(motion.initial_attitude.reshape(-1, 3, 3)), axis)
     if at_rest:
@@ -275,8 +274,8 @@ def _curve(motion: Motion, lift: Lift | None, frames: Frames | None, start: Arra
         inverse, drift = interpolant.inverse_and_drift(at)
         turn = None
         if lift is not None:
-            # The horizontal frame turns at minus the drift: relative to it the body turns at I^-1 Pi.
-            turn, drift = lift.rotation.rotation(at)[0], np.zeros(3)
+            # The horizontal frame turns at minus the shape's drift: relative to it the body turns at I^-1 (Pi - h).
+            turn, drift = lift.rotation.rotation(at)[0], lift.drift_of_wheels(at)
         elif frames is not None:
             turn, spin = frames(at)
             drift = drift + spin

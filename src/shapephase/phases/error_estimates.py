@@ -17,7 +17,7 @@ class SplitErrors:
 
     Attributes
     ----------
-    total_rotation, holonomy, dynamical_rotation, tilt : angle from the true rotation [rad]
+    total_rotation, holonomy, dynamical_rotation, wheel_rotation, tilt : angle from the true rotation [rad]
     montgomery_phase, dynamic_phase, geometric_phase, closing_phase : modulo 4 pi [rad]
     montgomery_angle : modulo 2 pi [rad]
     solid_angle : modulo 4 pi [sr]
@@ -34,6 +34,7 @@ class SplitErrors:
     total_rotation: Array
     holonomy: Array
     dynamical_rotation: Array
+    wheel_rotation: Array
     montgomery_phase: Array
     montgomery_angle: Array
     dynamic_phase: Array

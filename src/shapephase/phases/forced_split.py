@@ -24,6 +24,7 @@ _NO_MOMENTUM = 1e-9
 _DOUBT = 1e-3
 # [sr], [rad] Below the error of any motion.
 _SETTLED = 1e-12
+_ROUNDING = 1e-14  # [rad] of a direction, where the motion is as good as exact
 # Of all steps, for a momentum that is small for a short time only.
 _HALVINGS = 10
 
@@ -44,7 +45,7 @@ class ForcedSplit:
     gauge : the frame that the momentum was seen from
     total_rotation : (3, 3) Delta R, which takes the shape at the start to that at the end
     holonomy : (3, 3) what the shape alone does; is_loop False: the lift's endpoint of an open path
-    dynamical_rotation : (3, 3) the rest: total = dynamical holonomy
+    dynamical_rotation : (3, 3) the rest: total = dynamical holonomy; what wheels store turns the body by is in it
     phase : as above [rad]; `angle` is the same in (-pi, pi]
     dynamic_phase : integral of omega . Pi/|Pi| [rad]
     body_solid_angle, space_solid_angle : signed, of the closed curves u and m [sr]
@@ -152,7 +153,10 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
     total = own[1] @ closure @ own[0].T
     holonomy = own[0] @ lift @ closure @ own[0].T
     # The curve in the body is displaced by both errors, by which areas and read-off angle change about as much.
-    doubt = motion.error_estimate + motion.momentum_error / least
+    doubt = motion.error_estimate + motion.momentum_error / least + _ROUNDING
+    gaps = so3.angle_between(np.stack([v, n]), np.stack([u, m]))
+    # Each radian by which an end is displaced across its closing great circle adds so much to the area.
+    closing = min(float(np.tan(0.5 * gaps).sum()) * doubt, 2.0 * np.pi)
     return ForcedSplit(
         gauge=gauge if isinstance(gauge, str) else "given",
         total_rotation=total,
@@ -162,10 +166,10 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
         dynamic_phase=dynamic,
         body_solid_angle=body_area,
         space_solid_angle=space_area,
-        body_gap=float(so3.angle_between(v, u)),
-        space_gap=float(so3.angle_between(n, m)),
+        body_gap=float(gaps[0]),
+        space_gap=float(gaps[1]),
         residual=float(np.abs(so3.wrap(phase - read_off))),
-        error_estimate=(4.0 + length) * doubt + _SETTLED,
+        error_estimate=(4.0 + length) * doubt + closing + _SETTLED,
         work=float(motion.work(motion.duration)),
         energy_change=_energy_change(motion),
         is_loop=deformation.closure is not None,

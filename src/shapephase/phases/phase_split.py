@@ -44,10 +44,10 @@ class SplitMotion:
 
 @dataclass(frozen=True, eq=False)
 class PhaseSplit:
-    """What turned a free body: its shape, and its angular momentum.
+    """What turned a free body: its shape, its angular momentum, and what its wheels store of that.
 
     All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
-    the momentum, seen from the gauge's frame,
+    the momentum (where there is some), seen from the gauge's frame,
 
         exp(montgomery_phase hat(mu)) tilt = dynamical_rotation            in the horizontal gauge,
         exp(montgomery_phase hat(mu)) tilt = total_rotation                in the base gauge of a closed joint path,
@@ -57,8 +57,11 @@ class PhaseSplit:
     ----------
     gauge : the frame from which the momentum curve was seen
     total_rotation : (3, 3) Delta R, from the start to the end of the motion, the same in every gauge
-    holonomy : (3, 3) R_G, what the loop of shapes alone does; for an open path the endpoint of its lift
-    dynamical_rotation : (3, 3) R_D, what the momentum adds
+    holonomy : (3, 3) R_G, what the loop of shapes alone does, whatever its pace; for an open path the endpoint of its
+        lift
+    dynamical_rotation : (3, 3) R_D, what the momentum adds, that which wheels store included
+    wheel_rotation : (3, 3) R_W, what wheels that store momentum add where there is no total momentum: R_D is R_W then,
+        and otherwise R_D R_W^T is what the total momentum adds to it; the identity without such wheels
     montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
     montgomery_angle : the same in (-pi, pi] [rad]
     dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's magnitude [rad]
@@ -72,8 +75,13 @@ class PhaseSplit:
     shape_gap : how far the end shape is from the start shape
     residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
     is_loop : whether the shape closes
-    has_phase : whether there is angular momentum; without it all phases are 0 and R_D is the identity
+    has_phase : whether there is angular momentum; without it all phases are 0 and R_D is R_W
+    has_wheels : whether wheels store momentum (`articulated(..., rotors=, rotor_speeds=)`)
     about : what was split
+
+    Notes
+    -----
+    Equations :eq:`split`, :eq:`tilt` and, with wheels, :eq:`wheel-split` of the documentation.
 
     Examples
     --------
@@ -87,6 +95,7 @@ class PhaseSplit:
     total_rotation: Array
     holonomy: Array
     dynamical_rotation: Array
+    wheel_rotation: Array
     montgomery_phase: Array
     montgomery_angle: Array
     dynamic_phase: Array
@@ -99,6 +108,7 @@ class PhaseSplit:
     residual: Array
     is_loop: bool
     has_phase: Mask
+    has_wheels: bool
     about: SplitMotion = field(repr=False)
     _errors: Deferred[SplitErrors] = field(repr=False)
 

@@ -17,7 +17,7 @@ from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.closing import closed_curves
+from ..integrator.closing import areas_back, closed_curves
 from ..letters import what_came
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
@@ -103,7 +103,12 @@ def split(
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     total = end @ closure @ so3.transpose(start)
     holonomy = start @ lift.end @ closure @ so3.transpose(start)
-    dynamical = np.where(moving, total @ so3.transpose(holonomy), np.eye(3))
+    has_wheels = deformation.has_wheels
+    dynamical = np.where(moving | has_wheels, total @ so3.transpose(holonomy), np.eye(3))
+    wheels = np.broadcast_to(np.eye(3), total.shape)
+    if has_wheels:
+        with watched(progress):
+            wheels = start @ motion.lift_without_momentum.end @ so3.transpose(start @ lift.end)
     closed = closed_curves(curve.corners, curve.references, curve.axis, first, last)
     tilt = np.where(moving, closed.tilt, np.eye(3))
     dynamic = np.where(has_phase, curve.dynamic.sum(axis=1), 0.0)
@@ -116,6 +121,7 @@ def split(
         total_rotation=total.reshape(matrix),
         holonomy=holonomy.reshape(matrix),
         dynamical_rotation=dynamical.reshape(matrix),
+        wheel_rotation=wheels.reshape(matrix),
         montgomery_phase=phase.reshape(batch)[()],
         montgomery_angle=so3.wrap(phase).reshape(batch)[()],
         dynamic_phase=dynamic.reshape(batch)[()],
@@ -128,6 +134,7 @@ def split(
         residual=residual.reshape(batch)[()],
         is_loop=deformation.closure is not None,
         has_phase=has_phase.reshape(batch)[()],
+        has_wheels=has_wheels,
         about=SplitMotion(
             label=deformation.label,
             duration=motion.duration,
@@ -361,9 +368,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     moving = curve.has_phase[:, None]
 
     def closed(start: Array, end: Array) -> Array:
-        half = so3.middle(end, start)
-        back = sphere.triangle_area(references[:, None], end, half)
-        return (back + sphere.triangle_area(references[:, None], half, start)) * moving
+        return areas_back(references[:, None], end, start) * moving
 
     def tilted(frames: Array, start: Array, end: Array) -> Array:
         tilts = frames @ so3.between(end, start) @ so3.transpose(frames)

@@ -53,8 +53,10 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
             "  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy, errors.holonomy
         ),
         rotation_line("  dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
-        "",
     ]
+    if result.has_wheels:
+        lines.append(rotation_line("    by wheels alone", result.wheel_rotation, errors.wheel_rotation))
+    lines.append("")
     if result.has_phase:
         lines += [
             f"{f'seen in the {result.gauge} gauge':30}{'[deg]':>10}{'± [rad]':>11}{'[rad]':>20}",
@@ -67,7 +69,10 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
             f"{'residual':24}{result.residual:16.2e} rad   (the phase by its formula, less that of the attitude)",
         ]
     else:
-        lines.append("no angular momentum: the shape alone turns the body, there is no Montgomery phase")
+        words = "no angular momentum: the shape alone turns the body, there is no Montgomery phase"
+        if result.has_wheels:
+            words = "no total angular momentum: the shape turns the body, and what wheels store; no Montgomery phase"
+        lines.append(words)
     if not result.is_loop:
         gap = shape_gap or f"{result.shape_gap:.6g}, of the joint that ends farthest off (rad or m)"
         lines.append(f"{'shape gap':24}{gap}: the shape does not return, there is no holonomy")
@@ -146,6 +151,7 @@ def _batch_lines(result: PhaseSplit, heading: str) -> list[str]:
     rows = {
         "total rotation": so3.angle(result.total_rotation),
         "shape holonomy": so3.angle(result.holonomy),
+        **({"turn by wheels alone": so3.angle(result.wheel_rotation)} if result.has_wheels else {}),
         "Montgomery phase": result.montgomery_phase,
         "dynamic phase": result.dynamic_phase,
         "geometric phase": result.geometric_phase,

@@ -54,14 +54,19 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     words = [f"{name} changes its shape for {motion.duration:g} s {loop}."]
     if is_rigid(motion):
         words = [f"The body is rigid and turns for {motion.duration:g} s."]
-    if not result.has_phase:
+    if not result.has_phase and not result.has_wheels:
         words.append(f"There is no angular momentum: the shape alone turned it by {_turn(result.total_rotation)}.")
         return words
     size = float(np.linalg.norm(motion.momentum))
+    momentum = f"the angular momentum of {size:.4g} kg m²/s"
+    if result.has_wheels:
+        momentum = f"{momentum} with that stored in wheels" if result.has_phase else "the momentum stored in wheels"
     alone = (
-        f"The shape alone turned it by {_turn(result.holonomy)}; the angular momentum of {size:.4g} kg m²/s added "
+        f"The shape alone turned it by {_turn(result.holonomy)}; {momentum} added "
         f"{_turn(result.dynamical_rotation)}. Both together turned it by {_turn(result.total_rotation)}."
     )
+    if not result.has_phase:
+        return [*words, "There is no total angular momentum.", alone]
     if is_rigid(motion):
         alone = f"The angular momentum of {size:.4g} kg m²/s turned it by {_turn(result.total_rotation)}."
     words.append(alone)
@@ -124,8 +129,12 @@ def split_rows(result: PhaseSplit) -> list[Row]:
         _rotation("Shape holonomy" if result.is_loop else "Shape lift (open path)", result.holonomy, errors.holonomy),
         _rotation("Dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
     ]
+    if result.has_wheels:
+        rows.append(_rotation("By wheels alone", result.wheel_rotation, errors.wheel_rotation))
     if not result.has_phase:
         words = "none: there is no angular momentum, the body turns by its shape alone"
+        if result.has_wheels:
+            words = "none: there is no total angular momentum, the body turns by its shape and what its wheels store"
         return [*rows, ("Montgomery phase", "", words)]
     area = f"{float(result.solid_angle):z.{digits_left(float(errors.geometric_phase), RADIAN_DIGITS)}f}"
     closing = []

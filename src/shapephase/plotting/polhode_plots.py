@@ -16,6 +16,7 @@ from ..arrays import Array, finite_array
 from ..elliptic import incomplete_f
 from ..errors import ShapeError
 from ..rigid_body.euler_top import EulerTop
+from ..rigid_body.lagrange_top import LagrangeTop, sleeping_top
 from ..rigid_body.poinsot import Poinsot
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
 from ._sphere_axes import SphereAxes
@@ -168,22 +169,24 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
 def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float = 4.0) -> Axes:
     """Where the upright Lagrange top is stable: I3/I1 against Pi3/sqrt(M g l I1), both without unit.
 
-    Stable for Pi3² > 4 M g l I1, whatever I3; at I3 = 2 I1 eigenvalues are double for every Pi3 and the spectrum does
-    not decide.
+    Stable for Pi3² >= 4 M g l I1, whatever I3, at equality too: the verdict of `sleeping_top`. At I3 = 2 I1 eigenvalues
+    are double for every Pi3; beyond the threshold they are imaginary there as elsewhere. No top with weight reaches
+    that line, since I1 is taken about the point of support: I3 < 2 I1.
 
     Parameters
     ----------
     ax : flat axes
-    tops : (N, 2) tops to mark, Pi3/sqrt(M g l I1) and I3/I1
+    tops : (N, 2) tops to mark, Pi3/sqrt(M g l I1) and I3/I1 > 0
     fastest : end of the axis of Pi3, above 2
 
     Raises
     ------
-    MissingExtraError, ShapeError
+    MissingExtraError, ShapeError, SingularInertiaError
+        For a ratio of moments that is not above 0.
 
     Notes
     -----
-    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M-E10.
+    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M6 for equality, M-E10 for the spectrum.
 
     Examples
     --------
@@ -212,8 +215,10 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
     ax.plot(
         [-end, end], [2.0, 2.0], color=BLUE, linewidth=1.5, linestyle=(0, (1, 1)), label="$I_3 = 2I_1$, double roots"
     )
+    # In units of I1 and M g l.
+    verdicts = np.array([sleeping_top(LagrangeTop(1.0, ratio, 1.0), spin).verdict for spin, ratio in marked.tolist()])
     for stable, label, style in ((True, "stable top", "o"), (False, "unstable top", "X")):
-        chosen = marked[(np.abs(marked[:, 0]) > 2.0) == stable]
+        chosen = marked[(verdicts == "stable") == stable]
         if len(chosen):
             colour = GREEN if stable else VERMILION
             ax.plot(chosen[:, 0], chosen[:, 1], marker=style, color=colour, linestyle="none", markersize=5, label=label)

@@ -24,7 +24,9 @@ def check_deformation(arrays: Mapping[str, Any], loops: int) -> None:
         raise ValueError("breaks do not ascend from 0")
     if breaks[-1] != edges[-1]:
         raise ValueError(f"breaks end at {breaks[-1]:g} s, edges at {edges[-1]:g} s")
-    _numbers(arrays, "centre", len(coefficients), None, 3)
+    for name in ("centre", "stored"):
+        if name in arrays or name == "centre":
+            _numbers(arrays, name, len(coefficients), None, 3)
     if "closure" in arrays:
         _check_rotations(_numbers(arrays, "closure", 3, 3), "closure")
 

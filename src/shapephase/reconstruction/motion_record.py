@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ _STEPS = (
     "amplification",
 )
 _SAMPLES = ("edges", "coefficients")
-_CENTRE_DEGREE = 24
+_VECTOR_DEGREE = 24
 # What a motion's file may unpack to [bytes]: a hundred times the longest in use.
 _MOST_BYTES = 2**31
 
@@ -81,9 +81,11 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "spatial_momentum": record.momentum,
         "initial_attitude": record.initial_attitude,
         "breaks": deformation.breaks,
-        "centre": _centre_coefficients(deformation, interpolant),
+        "centre": _vector_coefficients(deformation.centre_of_mass, interpolant),
         **_samples(interpolant),
     }
+    if deformation.has_wheels:
+        arrays["stored"] = _vector_coefficients(deformation.stored_momentum, interpolant)
     if isinstance(record.solution, GroupedRotations):
         header["parts"] = [part.rotation.interpolant.evaluations for part in record.solution.parts]
         arrays["header"] = np.array(json.dumps(header))
@@ -164,6 +166,7 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         str(header["deformation"]),
         {str(name): str(digest) for name, digest in header["sha256"].items()},
         _made_from(header),
+        arrays.get("stored"),
     )
     return MotionRecord(
         deformation,
@@ -220,10 +223,10 @@ def _rotation(arrays: Mapping[str, Any], interpolant: Interpolant) -> SteppedRot
     return SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS}, perturbed=perturbed)
 
 
-def _centre_coefficients(deformation: Deformation, interpolant: Interpolant) -> Array:
-    """Chebyshev coefficients of the centre of mass on the interpolant's panels: (P, n, 3)."""
+def _vector_coefficients(vector: Callable[[Array], Array], interpolant: Interpolant) -> Array:
+    """Chebyshev coefficients of a vector in time on the interpolant's panels: (P, n, 3)."""
     edges = interpolant.edges[: len(interpolant.coefficients) + 1]
     left, right = edges[:-1], edges[1:]
-    times = np.clip(nodes_on(left, right, _CENTRE_DEGREE), left[:, None], right[:, None])
-    values = deformation.description.centre_of_mass(times.ravel()).reshape(*times.shape, 3)
-    return values_to_coefficients(_CENTRE_DEGREE) @ values
+    times = np.clip(nodes_on(left, right, _VECTOR_DEGREE), left[:, None], right[:, None])
+    values = vector(times.ravel()).reshape(*times.shape, 3)
+    return values_to_coefficients(_VECTOR_DEGREE) @ values

@@ -230,13 +230,23 @@ class Motion(MotionViews):
     @cached_property
     def lift_with_errors(self) -> Lift:
         """The same, with how far it may be off."""
-        return lift_along(self.stepped.finest if isinstance(self.stepped, GroupedRotations) else self.stepped)
+        deformation = self.deformation
+        return lift_along(self._finest, deformation.stored_momentum if deformation.has_wheels else None)
+
+    @cached_property
+    def lift_without_momentum(self) -> Lift:
+        """How the body would turn without total momentum: by its shape, and by the momentum that wheels store."""
+        return lift_along(self._finest) if self.deformation.has_wheels else self.lift_with_errors
+
+    @property
+    def _finest(self) -> SteppedRotation:
+        return self.stepped.finest if isinstance(self.stepped, GroupedRotations) else self.stepped
 
     @cached_property
     def error_turns(self) -> Array:
         """How far attitudes probably are off at the ends of steps, as of `integrator.lift.error_turns`."""
         assert isinstance(self.stepped, SteppedRotation), "a batch has them part by part"
-        return read_only(error_turns(self.stepped, self.lift_with_errors))
+        return read_only(error_turns(self.stepped, self.lift_without_momentum))
 
     @property
     def interpolant(self) -> Interpolant:

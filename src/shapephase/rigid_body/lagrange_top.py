@@ -236,13 +236,19 @@ def second_variation(
     a = phi'', b = 4 Phi'', c = Phi_dot_dot, d = 2 Phi_dot'. The entries a36 = Phi_dot + p c + d and
     a66 = 2 Phi' + b + p^2 c + 2 p d differ from the printed ones.
 
-    Source: Marsden and Ratiu (15.10.5-7) with theory.md M-E9.
+    It is positive definite if and only if 1/I3 + a + c > 0 (15.10.8), 2 Phi'/I1 > Phi_dot^2 (15.10.9) and
+    (1/I3 + a + c) a66 > a36^2. The third condition printed, a66 > 0 (15.10.10), is necessary and not sufficient: the
+    example meets all three, and has a negative eigenvalue. The threshold of stability does not change, since b may be
+    as large as one likes.
+
+    Source: Marsden and Ratiu (15.10.5-10) with theory.md M-E9.
 
     Examples
     --------
-    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
-    >>> sp.rigid_body.second_variation(top, 3.0, 0.0).shape
-    (6, 6)
+    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 0.1)
+    >>> matrix = sp.rigid_body.second_variation(top, 3.0, -1.5, b=-3.9)
+    >>> print(f"{matrix[5, 5]:.6f} {np.linalg.eigvalsh(matrix).min():.6f}")  # (15.10.10) holds
+    0.500000 -0.427051
     """
     check_object(top, "LagrangeTop", "top")
     p, phi_dot, a, b, c, d = (_number(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))

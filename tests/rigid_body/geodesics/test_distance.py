@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.polynomial.legendre import leggauss
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from shapephase import so3
@@ -109,6 +110,47 @@ def test_distances_are_a_metric_between_their_bounds_q6(moments):
     # Moments twice as large: lengths larger by the root of two.
     twice = shortest_geodesic(left_invariant_metric(2.0 * np.array(moments)), attitudes[1])
     assert abs(twice.length - np.sqrt(2.0) * found[1].length) < 1e-10
+
+
+def heisenberg(moments, turn):
+    """Length of the shortest way near the identity where axis 3 is forbidden: in scaled turns an arc of a circle.
+
+    Its chord is r, its length r (w/2)/sin(w/2), and the area between both, which is the turn about axis 3,
+    r² (w - sin w)/(8 sin²(w/2)), with w the angle of the arc.
+    """
+    mean = np.sqrt(moments[0] * moments[1])
+    chord, area = np.hypot(*(np.sqrt(moments[:2] / mean) * turn[:2])), abs(turn[2])
+    if chord == 0.0:
+        return np.sqrt(4.0 * np.pi * area * mean)
+    excess = lambda w: chord**2 * (w - np.sin(w)) / (8.0 * np.sin(0.5 * w) ** 2) - area  # noqa: E731
+    angle = brentq(excess, 1e-6, 2.0 * np.pi - 1e-9, xtol=1e-14) if area else 1e-9
+    return np.sqrt(mean) * chord * 0.5 * angle / np.sin(0.5 * angle)
+
+
+@pytest.mark.parametrize(
+    ("moments", "turn"),
+    [
+        ((1.0, 1.0), (0.0, 0.0, 1e-4)),
+        ((1.0, 2.0), (0.0, 0.0, 1e-6)),
+        ((3.0, 1.0), (2e-4, -3e-4, 2e-7)),
+        ((1.0, 1e3), (1e-4, 1e-5, 1e-7)),
+    ],
+    ids=str,
+)
+def test_short_ways_along_the_forbidden_direction_are_those_of_heisenbergs_group_q5(moments, turn):
+    """But for a part that falls with the square of the length."""
+    wanted = heisenberg(np.array(moments), np.array(turn))
+    found = shortest_geodesic(left_invariant_metric([*moments, np.inf]), so3.exp(np.array(turn)))
+    assert abs(found.length / wanted - 1.0) < wanted**2 / min(moments)
+    assert found.lower_bound * (1.0 - 1e-12) <= found.length <= found.upper_bound * (1.0 + 1e-12)
+    assert found.residual < 1e-15 + 1e-8 * wanted
+
+
+def test_short_turns_about_stiff_axes_are_straight_q5():
+    """As long as no loop of the other turns is shorter: below 2 pi sqrt(I_1 I_2)/I_3 about axis 3."""
+    for moments, k in (([1e6, 2.0, 1.0], 0), ([5e3, 1.0, 4e3], 2), ([1.0, 2.0, 3.0], 1)):
+        found = shortest_geodesic(left_invariant_metric(moments), so3.exp(1e-6 * np.eye(3)[k]))
+        assert found.length == pytest.approx(1e-6 * np.sqrt(moments[k]), rel=1e-8)
 
 
 def test_distances_converge_as_the_inverse_of_the_moment_q5():

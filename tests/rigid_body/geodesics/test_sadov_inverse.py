@@ -11,6 +11,7 @@ from shapephase.rigid_body import EulerTop
 from shapephase.rigid_body.geodesics import (
     andoyer_from_sadov,
     andoyer_variables,
+    sadov_frequencies,
     sadov_variables,
     serret_andoyer_metric,
 )
@@ -64,6 +65,27 @@ def test_a_free_motion_is_a_straight_line_r15(moments, momentum):
     found = andoyer_from_sadov(moments, angles, actions, side_of(moments, np.array(momentum)))
     assert np.abs(found.attitude - top.attitude(times)).max() < 1e-12
     assert np.abs(found.body_momentum - top.body_momentum(times)).max() < 1e-12
+
+
+@pytest.mark.parametrize(("moments", "symmetry"), [([3.0, 3.0, 1.0], 2), ([3.0, 1.0, 1.0], 0), ([2.0, 2.0, 2.0], 2)])
+def test_of_two_equal_moments_the_error_says_which_variables_to_take_r15(moments, symmetry):
+    """And it is right: l and g of Andoyer's, about the axis of symmetry, grow evenly at these rates."""
+    momentum, times = np.array([0.6, 0.3, 0.4]), np.linspace(0.0, 1.5, 4)
+    order = [(symmetry + 1) % 3, (symmetry + 2) % 3, symmetry]
+    top = EulerTop.principal(np.array(moments)[order], momentum[order])
+    found = andoyer_variables(top.attitude(times), top.body_momentum(times))
+    equal, own = moments[order[0]], moments[symmetry]
+    size, along = np.linalg.norm(momentum), momentum[symmetry]
+    for angle, rate in ((found.l, along * (1.0 / own - 1.0 / equal)), (found.g, size / equal)):
+        np.testing.assert_allclose(so3.wrap(angle - angle[0] - rate * times), 0.0, rtol=0, atol=1e-13)
+    state = andoyer_variables(np.eye(3), momentum)
+    for call in (
+        lambda: sadov_variables(moments, state),
+        lambda: sadov_frequencies(moments, momentum),
+        lambda: andoyer_from_sadov(moments, [0.0, 0.0, 0.0], [0.5, 1.0, 0.2]),
+    ):
+        with pytest.raises(ShapeError, match="are angles and actions already"):
+            call()
 
 
 def test_the_ends_of_the_action_and_what_is_refused():

@@ -382,17 +382,25 @@ def test_area_of_the_whole_sphere_k2():
 def test_orbit_form_on_any_algebra_k2(algebra, rng):
     mu, a, b = rng.normal(size=(3, 10, algebra.dimension))
     u, v = algebra.coad(a, mu), algebra.coad(b, mu)
-    form = coadjoint_orbit_form(u, v, mu, algebra)
+    form = coadjoint_orbit_form(mu, u, v, algebra)
     np.testing.assert_allclose(form, lie_poisson_bracket(a, b, mu, algebra), atol=1e-11, rtol=0)
-    np.testing.assert_allclose(coadjoint_orbit_form(v, u, mu, algebra), -form, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(coadjoint_orbit_form(mu, v, u, algebra), -form, atol=1e-11, rtol=0)
     np.testing.assert_allclose(form, np.sum(a * v, axis=-1), atol=1e-11, rtol=0)
     if algebra.dimension == 3 and algebra.name in ("so(3)", "su(2)"):
         np.testing.assert_allclose(form, sphere_symplectic_form(mu, u, v), atol=1e-11, rtol=0)
 
 
+def test_all_forms_take_the_momentum_first_k2():
+    """At (0, 0, r) the form of x and y is -1/r: by position, one order for all of them."""
+    x, y, point = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 5.0]
+    assert sphere_area_form(point, x, y) == 1.0
+    assert sphere_symplectic_form(point, x, y) == -0.2
+    assert coadjoint_orbit_form(point, x, y) == pytest.approx(-0.2, abs=1e-15)
+
+
 def test_what_is_not_tangent_or_no_sphere_is_refused_k2():
     with pytest.raises(ShapeError, match="not tangent"):
-        coadjoint_orbit_form([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2.0])
+        coadjoint_orbit_form([0.0, 0.0, 2.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
     with pytest.raises(ShapeError, match="radius 0"):
         sphere_area_form(np.zeros(3), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
 

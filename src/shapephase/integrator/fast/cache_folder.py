@@ -70,8 +70,11 @@ def _make_private(folder: Path) -> None:
 
 
 def _fingerprint() -> str:
-    """Of the source of all kernels: a function that was compiled does not know when one that it calls has changed."""
+    """Hash of the sources of all kernels, and of `so3`, whose constants they contain.
+
+    A function that was compiled does not know when one that it calls, or a constant, has changed.
+    """
     whole = hashlib.sha256()
-    for file in sorted(_HERE.rglob("*.py")):
+    for file in [*sorted(_HERE.rglob("*.py")), _HERE.parents[1] / "so3.py"]:
         whole.update(file.read_bytes())
     return whole.hexdigest()[:16]

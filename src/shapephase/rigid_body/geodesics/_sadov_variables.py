@@ -11,6 +11,10 @@ momentum circles the axis of I_3 or its opposite, angles count from l = pi/2 or 
 I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it follows from l.
 `andoyer_from_sadov` goes the other way; the side of the axis on which the momentum is has to be given.
 
+With two equal moments there is nothing to be found: with the axis of symmetry as third, Andoyer's own variables are
+angles and actions, l, g, k and L, G, K. Of H = G²/(2 I_e) + L² (1/I_s − 1/I_e)/2 the rates are l' = L (1/I_s − 1/I_e)
+and g' = G/I_e, I_s being the moment about that axis and I_e the equal ones; with three equal moments l' = 0.
+
 Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
 speed by homogeneity: the action and the rates are sqrt(2 E) times theirs.
 """
@@ -23,7 +27,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import elliptic, so3
-from ...arguments import check_object
+from ...arguments import check_object, moments_argument
 from ...arrays import Array, Mask, common_batch, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
@@ -79,9 +83,10 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
     Raises
     ------
     ShapeError
-        If two moments are equal, or a state is on the separatrix or along the axis of the middle moment, where the
-        period is infinite and there are no angles. Next to it they lose digits in proportion to 1/m1, m1 the
-        complement of the elliptic modulus.
+        If two moments are equal, for which Andoyer's variables about the axis of symmetry are angles and actions
+        themselves (the message has their rates), or a state is on the separatrix or along the axis of the middle
+        moment, where the period is infinite and there are no angles. Next to it they lose digits in proportion to
+        1/m1, m1 the complement of the elliptic modulus.
 
     Examples
     --------
@@ -92,7 +97,7 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
     1.581138830 0.474919
     """
     check_object(variables, "AndoyerVariables", "variables")
-    metric = serret_andoyer_metric(moments)
+    metric = _metric(moments)
     axes = metric.andoyer_axes
     if not np.array_equal(axes, np.eye(3)):
         variables = andoyer_variables(variables.attitude @ axes, variables.body_momentum @ axes)
@@ -147,7 +152,7 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     >>> print(f"{own * top.period:.9f} = 2 pi")
     6.283185307 = 2 pi
     """
-    metric = serret_andoyer_metric(moments)
+    metric = _metric(moments)
     momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
     family = metric.geodesics_of(momentum)
     speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))
@@ -190,7 +195,7 @@ def andoyer_from_sadov(
     >>> print(again.body_momentum.round(9))
     [1.5 0.3 0.4]
     """
-    metric = serret_andoyer_metric(moments)
+    metric = _metric(moments)
     axes, metric = metric.andoyer_axes, _descending(metric)
     turn, action = finite_array(angles, "angles", (3,), unit="rad"), finite_array(actions, "actions", (3,))
     hemisphere = finite_array(side, "side")
@@ -231,6 +236,18 @@ def andoyer_from_sadov(
     if np.array_equal(axes, np.eye(3)):
         return state
     return andoyer_variables(state.attitude @ axes.T, state.body_momentum @ axes.T)
+
+
+def _metric(moments: ArrayLike) -> SerretAndoyerMetric:
+    """As `serret_andoyer_metric`; of two equal moments the error says which variables to take."""
+    values = moments_argument(moments)
+    if len(np.unique(values)) < 3:
+        raise ShapeError(
+            f"moments: got {values}, of which two are equal. Take `andoyer_variables` with the axis of symmetry as the "
+            "third one: then l, g, k and L, G, K are angles and actions already, l' = L (1/I_s - 1/I_e) and "
+            "g' = G/I_e, with I_s the moment about that axis and I_e the equal ones"
+        )
+    return serret_andoyer_metric(values)
 
 
 def _descending(metric: SerretAndoyerMetric) -> SerretAndoyerMetric:

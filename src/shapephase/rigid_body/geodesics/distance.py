@@ -1,10 +1,15 @@
 """Distances of left-invariant metrics on SO(3), by shooting from many starts at once.
 
-Every shortest geodesic ends at or before its first conjugate point. So the starts are momenta in all directions, scaled
-to fractions of their conjugate times or of the largest distance possible, and each is led to the attitude by
-Levenberg-Marquardt steps with the exact differential of the exponential map. The shortest geodesic among those that
-arrive is the distance, if none was missed. For two equal moments the known cut time decides whether one was; for three
-different ones the distances of the next smaller and the next larger axisymmetric metric bound it.
+Of two equal moments the shortest geodesic is known in closed form. For three different ones the distances of the next
+smaller and the next larger axisymmetric metric bound it, and it is searched for: momenta of all directions and several
+sizes are led to the attitude by Levenberg-Marquardt steps with the exact differential of the exponential map. The
+shortest geodesic among those that arrive is the distance, if none was missed; the search is repeated with starts that
+are scaled to it, until it finds nothing shorter.
+
+A way of length L turns by up to L/sqrt(I_1) and L/sqrt(I_2) about the first two axes, and about the third by
+L/sqrt(I_3) or, as a loop of the other two turns, by L²/(4 pi sqrt(I_1 I_2)). Its momenta are up to L sqrt(I_i), and
+along the third axis up to 2 pi/sqrt((a_1 − a_3)(a_2 − a_3)), with which such a loop closes however short it is. Starts
+and steps are scaled by these sizes: without that, short ways along stiff or forbidden directions are missed.
 
 As the largest moment I_3 goes to infinity, the square of the distance falls short of the sub-Riemannian one by the
 integral of Pi_3² over the shortest geodesic, in a unit of time, over I_3.
@@ -19,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import so3
+from ... import so3, sphere
 from ...arguments import check_object
 from ...arrays import Array
 from ...display import short_repr
@@ -28,18 +33,22 @@ from ._momentum_flow import attitude_flow, exponential_derivative
 from .axisymmetric_cut import axisymmetric_metric
 from .left_invariant import LeftInvariantMetric
 
-_FRACTIONS = (0.25, 0.5, 0.75, 0.95)
-"""Where along each direction the starts are, in parts of the way to its conjugate point, which stays excluded."""
-_ROUNDS = (48, 384)
-"""Directions of the first search, and of the second where that finds nothing as short as the upper bound."""
+_FRACTIONS = (0.35, 0.7, 1.05, 1.4)
+"""Sizes of the starts, in parts of the largest momenta along the axes; a loop that closes is at about sqrt(2)."""
+_FEW, _MANY = 48, 384
+"""Directions of a search, and of the last where the others find nothing as short as the upper bound."""
+_MOST_SEARCHES = 4
+"""Searches with starts scaled to the last one's length; the second rarely finds anything shorter."""
 _STEPS = 60
 """Levenberg-Marquardt steps; Newton's last few square the error, the others only have to reach their basin."""
 _CLOSE = 1e-9
-"""[rad] Arrived: what the next step would leave is rounding. At conjugate points the error shrinks no further."""
+"""In parts of how far such a way can turn: arrived, what the next step would leave is rounding."""
 _ROUNDING = 1e-15
 """[rad] An attitude is no better known."""
 _MARGIN = 1e-7
 """By so much, in parts, a length may be above its upper bound, or an end past the cut, for rounding."""
+_IMPROVED = 1e-9
+"""In parts: a length that is shorter by more is another way."""
 _FIRST_DAMPING = 1e-2
 """Of the mean square of the differential: near Newton's step, but bounded where the differential is singular."""
 _LEAST_DAMPING = 1e-16
@@ -113,16 +122,11 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     target = metric.axes.T @ matrix @ metric.axes
     lower, upper = _bounds(metric, target)
     momentum, length, residual = np.zeros(3), 0.0, float(so3.angle(target))
-    for count in _ROUNDS if residual > _ROUNDING else ():
-        momentum, length, residual = _shortest_arrival(metric, target, count, upper)
-        if length <= upper * (1.0 + _MARGIN) + _CLOSE:
-            break
-    else:
-        if length:
-            raise AccuracyNotReached(
-                f"distance: the shortest geodesic found has the length {length:.9g} and misses the attitude by "
-                f"{residual:.3g} rad, but the distance is at most {upper:.9g}; try an attitude nearby"
-            )
+    if residual > _ROUNDING:
+        known = _axisymmetric_momentum(metric, target)
+        momentum = _searched(metric, target, upper) if known is None else known
+        length = float(np.sqrt(np.sum(metric.inverse_moments * momentum**2)))
+        residual = float(np.linalg.norm(_rotation_errors(metric.inverse_moments, momentum[None], target)))
     return ShortestGeodesic(
         momentum=metric.axes @ momentum,
         length=length,
@@ -179,62 +183,125 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     return best, nearest
 
 
-def _shortest_arrival(
-    metric: LeftInvariantMetric, target: Array, count: int, upper: float
-) -> tuple[Array, float, float]:
-    """The shortest of those that arrive from `count` directions; of infinite length if there is none."""
-    inverse = metric.inverse_moments
-    momenta, residuals = _arrivals(inverse, _starts(metric, count, upper), target)
-    lengths = np.where(residuals < _CLOSE, np.sqrt(np.sum(inverse * momenta**2, axis=-1)), np.inf)
+def _axisymmetric_momentum(metric: LeftInvariantMetric, target: Array) -> Array | None:
+    """That of the shortest geodesic, in principal axes, for two equal moments; None for three different ones."""
+    smallest, middle, largest = metric.moments.tolist()
+    if smallest == middle:
+        return axisymmetric_metric(middle, largest).shortest_momentum(target)
+    if middle == largest:
+        order = _FIRST_AXIS_LAST
+        turned = axisymmetric_metric(largest, smallest).shortest_momentum(target[np.ix_(order, order)])
+        return turned[np.argsort(order)]
+    return None
+
+
+def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array:
+    """The momentum of the shortest geodesic that arrives, for three different moments. Raises AccuracyNotReached."""
+    first, middle, largest = metric.moments.tolist()
+    # Near the identity the metric is, in scaled turns, that of two equal moments.
+    mean = np.sqrt(first * middle)
+    scaled = so3.log(target) * np.sqrt([first / mean, middle / mean, 1.0])
+    near = float(np.linalg.norm(scaled)) < 0.5 * np.pi
+    expected = float(axisymmetric_metric(mean, largest).distance(so3.exp(scaled))) if near else upper
+    best = _shortest_arrival(metric, target, _FEW, min(expected, upper))
+    for _ in range(_MOST_SEARCHES):
+        other = _shortest_arrival(metric, target, _FEW, min(best[1], upper))
+        improved = other[1] < best[1] * (1.0 - _IMPROVED)
+        best = other if other[1] < best[1] else best
+        if not improved:
+            break
+    most = upper * (1.0 + _MARGIN + _ROUNDING / _reach(metric, upper).min())
+    if best[1] > most:
+        best = min(best, _shortest_arrival(metric, target, _MANY, upper), key=lambda found: found[1])
+    if best[1] > most:
+        raise AccuracyNotReached(
+            f"distance: the shortest geodesic found has the length {best[1]:.9g}, but the distance is at most "
+            f"{upper:.9g}; try an attitude nearby"
+        )
+    return best[0]
+
+
+def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, size: float) -> tuple[Array, float]:
+    """The shortest of those that arrive from `count` directions at lengths like this; infinite if there is none."""
+    momenta, residuals = _arrivals(metric, _starts(count), target, size)
+    close = _CLOSE + _ROUNDING / _reach(metric, size).min()
+    lengths = np.where(residuals < close, np.sqrt(np.sum(metric.inverse_moments * momenta**2, axis=-1)), np.inf)
     best = int(np.argmin(lengths))
-    return momenta[best], float(lengths[best]), float(residuals[best])
+    return momenta[best], float(lengths[best])
 
 
-def _starts(metric: LeftInvariantMetric, count: int, upper: float) -> Array:
-    """Momenta in principal axes, in all directions and at times before the conjugate one and the upper bound.
-
-    Denser round the axis of the largest moment: more of the geodesics along it reach a given distance.
-    """
-    number = np.arange(count) + 0.5
-    tilt, turn = np.pi * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
-    momenta = np.stack([np.sin(tilt) * np.sin(turn), -np.sin(tilt) * np.cos(turn), np.cos(tilt)], axis=-1)
-    in_body = momenta @ metric.axes.T
-    latest = np.minimum(metric.conjugate_time(in_body), 1.05 * upper / metric.speed(in_body))
-    return np.concatenate([(fraction * latest)[:, None] * momenta for fraction in _FRACTIONS])
+def _starts(count: int) -> Array:
+    """Momenta in units of the largest along each axis: all directions, several sizes."""
+    directions = sphere.fibonacci_directions(count)
+    return np.concatenate([fraction * directions for fraction in _FRACTIONS])
 
 
-def _arrivals(inverse_moments: Array, momenta: Array, target: Array) -> tuple[Array, Array]:
-    """Where the steps lead from every start: momenta, and the angle between their ends and the target [rad]."""
-    times = np.ones(len(momenta))
-    momenta = momenta.copy()
-    # No shortest geodesic has more momentum than takes it to its conjugate point; half as much again is room for steps.
-    largest = 1.5 * float(np.linalg.norm(momenta, axis=-1).max())
-    errors = _rotation_errors(inverse_moments, momenta, target)
-    angles = np.linalg.norm(errors, axis=-1)
+def _reach(metric: LeftInvariantMetric, size: float) -> Array:
+    """How far ways of this length can turn about each principal axis: (3,) [rad]."""
+    first, middle, _ = metric.moments
+    straight = size * np.sqrt(metric.inverse_moments)
+    straight[2] = max(straight[2], size * size / (4.0 * np.pi * np.sqrt(first * middle)))
+    return np.minimum(straight, np.pi)
+
+
+def _largest_momenta(metric: LeftInvariantMetric, size: float) -> Array:
+    """Along each principal axis, of shortest ways of this length in a unit of time: (3,) [kg m^2/s]."""
+    first, middle, third = metric.inverse_moments
+    # A way that turns further than half round the first axis comes to itself with more momentum than a small loop.
+    loop = 2.0 * np.pi / np.sqrt((first - third) * (middle - third)) * max(1.0, size * np.sqrt(first) / np.pi)
+    return np.append(size * np.sqrt(metric.moments[:2]), min(size * np.sqrt(metric.moments[2]), loop))
+
+
+def _arrivals(metric: LeftInvariantMetric, starts: Array, target: Array, size: float) -> tuple[Array, Array]:
+    """Where the steps lead from every start: momenta, and the errors of their ends in parts of `_reach`."""
+    inverse_moments, units, weights = metric.inverse_moments, _largest_momenta(metric, size), 1.0 / _reach(metric, size)
+    times, momenta = np.ones(len(starts)), starts * units
+    # Half as much again as the longest start is room for steps.
+    largest = 1.5 * float(np.linalg.norm(starts, axis=-1).max())
+    errors = _rotation_errors(inverse_moments, momenta, target) * weights
+    sizes = np.linalg.norm(errors, axis=-1)
     damping = np.full(len(momenta), _FIRST_DAMPING)
     rows = np.arange(len(momenta))
     derivative = exponential_derivative(inverse_moments, momenta, times)
     for _ in range(_STEPS):
-        z = derivative[rows]
+        z = weights[:, None] * derivative[rows] * units
         normal = so3.transpose(z) @ z
         scale = np.trace(normal, axis1=-2, axis2=-1) / 3.0
         normal += (damping[rows] * scale)[:, None, None] * np.eye(3)
         step = np.linalg.solve(normal, so3.transpose(z) @ errors[rows][..., None])[..., 0]
-        trial = momenta[rows] + step
+        trial = _bent_step(momenta[rows] / units, step)
         length = np.linalg.norm(trial, axis=-1, keepdims=True)
-        trial *= np.minimum(1.0, largest / np.maximum(length, largest))
-        error = _rotation_errors(inverse_moments, trial, target)
-        angle = np.linalg.norm(error, axis=-1)
-        better = angle < angles[rows]
+        trial *= units * np.minimum(1.0, largest / np.maximum(length, largest))
+        error = _rotation_errors(inverse_moments, trial, target) * weights
+        missed = np.linalg.norm(error, axis=-1)
+        better = missed < sizes[rows]
         taken = rows[better]
-        momenta[taken], errors[taken], angles[taken] = trial[better], error[better], angle[better]
+        momenta[taken], errors[taken], sizes[taken] = trial[better], error[better], missed[better]
         derivative[taken] = exponential_derivative(inverse_moments, momenta[taken], times[taken])
         changed = np.where(better, 0.1 * damping[rows], 10.0 * damping[rows])
         damping[rows] = np.clip(changed, _LEAST_DAMPING, _LARGEST_DAMPING)
-        rows = rows[(angles[rows] > _ROUNDING) & (damping[rows] < _HOPELESS_DAMPING)]
+        rows = rows[(sizes[rows] > _ROUNDING * weights.max()) & (damping[rows] < _HOPELESS_DAMPING)]
         if not rows.size:
             break
-    return momenta, angles
+    return momenta, sizes
+
+
+def _bent_step(start: Array, step: Array) -> Array:
+    """Where steps lead that turn about the third axis instead of going straight across: (N, 3), (N, 3) -> (N, 3).
+
+    Loops that begin in different directions of the first two axes end almost together, so that the errors have a valley
+    round a circle, along which straight steps would have to be tiny.
+    """
+    flat = start[:, :2]
+    radius = np.linalg.norm(flat, axis=-1)
+    safe = np.where(radius > 0.0, radius, 1.0)
+    out = flat / safe[:, None]
+    across = np.stack([-out[:, 1], out[:, 0]], axis=-1)
+    along, aside = np.sum(step[:, :2] * out, axis=-1), np.sum(step[:, :2] * across, axis=-1)
+    angle = aside / safe
+    bent = (radius + along)[:, None] * (np.cos(angle)[:, None] * out + np.sin(angle)[:, None] * across)
+    short = (np.abs(aside) < radius)[:, None]
+    return np.concatenate([np.where(short, bent, flat + step[:, :2]), start[:, 2:] + step[:, 2:]], axis=-1)
 
 
 def _rotation_errors(inverse_moments: Array, momenta: Array, target: Array) -> Array:

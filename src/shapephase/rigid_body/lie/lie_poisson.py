@@ -220,15 +220,16 @@ def quadratic_casimirs(algebra: LieAlgebra) -> Array:
     return np.einsum("cq,qij->cij", _null_space(equations.T), symmetric)
 
 
-def coadjoint_orbit_form(first: ArrayLike, second: ArrayLike, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
+def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """The minus form of the coadjoint orbit, omega(ad*_a mu, ad*_b mu) = -<mu, [a, b]>: (...).
 
-    {F, G} = omega(X_F, X_G), and omega(X_H, v) = dH . v.
+    {F, G} = omega(X_F, X_G), and omega(X_H, v) = dH . v. Arguments in the order of all forms here, as
+    `sphere_symplectic_form`, which it is on so(3).
 
     Parameters
     ----------
+    momentum : (..., d) the point mu
     first, second : (..., d) tangent vectors of the orbit
-    momentum : (..., d)
 
     Raises
     ------
@@ -239,7 +240,7 @@ def coadjoint_orbit_form(first: ArrayLike, second: ArrayLike, momentum: ArrayLik
     --------
     >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.coadjoint_orbit_form(x, y, [0.0, 0.0, 5.0]).item()
+    >>> lie.coadjoint_orbit_form([0.0, 0.0, 5.0], x, y).item()
     -0.2
     """
     check_object(algebra, "LieAlgebra", "algebra")
