@@ -117,7 +117,7 @@ def macro_of(root: Node) -> Node | None:
     for top in root.children:
         read = top.tag in _ROBOT_PARTS
         for node in top.walk():
-            left = "wiki/xacro}" in node.tag or "xacro:" in node.tag
+            left = "/xacro}" in node.tag or node.tag.startswith("xacro:")
             if left or (read and any("${" in value or "$(" in value for value in node.attributes.values())):
                 return node
     return None
