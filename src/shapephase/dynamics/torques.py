@@ -146,7 +146,8 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     Raises
     ------
     WrongObjectError
-        If the body has no joints, or none along a path: made of particles or functions, or read from a file of `Motion.save`.
+        If the body has no joints, or none along a path: made of particles or functions, or read from a file of
+        `Motion.save`.
     TrajectoryError
         For times outside of the motion.
 
