@@ -34,6 +34,8 @@ _LEAST_RADIUS = 1e-4
 """Radius of gyration [m]; a smaller one suggests moments in other units than kg m^2."""
 _MOST_RADIUS = 10.0
 """Radius of gyration [m]; a larger one suggests lengths in millimetres."""
+_HOLLOW = 0.01
+"""Share of the body's inertia about an axis that a link without mass may have: some files give dummies a little."""
 _HEAVY = 1e5
 """Mass of a link [kg]; a larger one suggests grams."""
 
@@ -218,6 +220,47 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
             bad = [links[i] for i in np.flatnonzero(which)]
             found.append(f"{bad[0].where}: {_listed([label.format(link.name) for link in bad])}: {text}")
     return found
+
+
+def hollow_warnings(
+    links: Iterable[Link], turns: Array, inertia: Array, on_unphysical: str, label: str = "link {!r}"
+) -> list[str]:
+    """The links without mass that have moments of inertia, as one message.
+
+    Parameters
+    ----------
+    turns : (N, 3, 3) axes of the links to those of the base, in the neutral shape
+    inertia : (3, 3) of the whole body there, base axes [kg m^2]
+
+    Raises
+    ------
+    UnphysicalInertiaError
+        If one has more than 1 % of the body's inertia about any axis (unless `on_unphysical` is "warn").
+    """
+    links = list(links)
+    # Scaled so that the body's is the identity; what it has about its thinnest axis may be nothing but rounding.
+    moments, axes = np.linalg.eigh(inertia)
+    scaled = axes / np.sqrt(np.maximum(moments, ROUNDING * moments[-1]))
+    found = []
+    for link, turn in zip(links, turns, strict=True):
+        largest = float(np.linalg.eigvalsh(link.inertia)[-1])
+        if link.mass == 0.0 and largest > ROUNDING * moments[-1]:
+            share = float(np.linalg.eigvalsh(scaled.T @ turn @ link.inertia @ turn.T @ scaled)[-1])
+            found.append((share, largest, link))
+    if not found:
+        return []
+    share, largest, worst = max(found, key=lambda each: each[0])
+    if share > _HOLLOW and on_unphysical == "error":
+        raise UnphysicalInertiaError(
+            f"{worst.where}: {label.format(worst.name)} has no mass and a moment of inertia of {largest:.4g} kg m^2, "
+            f"{share:.3g} of the whole body's: no distribution of mass has that; give it its mass, or none of both, or "
+            "load it with on_unphysical='warn'"
+        )
+    named = _listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in found])
+    return [
+        f"{found[0][2].where}: {named}: moments of inertia without mass, up to {share:.2g} of the whole body's: no "
+        "distribution of mass has them; they count as the file has them"
+    ]
 
 
 def massless_warning(tree: LinkTree) -> list[str]:

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..arguments import check_choice, check_flag, positive_argument
 from ..child_process import limit_this_process, run_alone
 from ..errors import (
@@ -26,7 +28,7 @@ from ..errors import (
 )
 from ..letters import what_came
 from ._cross_check import check_against_file
-from ._link_tree import inertia_warnings, massless_warning
+from ._link_tree import hollow_warnings, inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded
@@ -71,7 +73,8 @@ def load_body(
         (`shapephase[yeadon]`), or a BVH file, whose skeleton becomes a human; a name from `robot_names()` such as
         "cat"; "example:human", a body of the installed example-robot-data; or a `pinocchio.Model` whose root joint is
         a free-flyer
-    on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
+    on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment, or that has no mass and
+        more than 1 % of the body's inertia about an axis
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted
     root : "free" removes the hinges and slides between the world and an MJCF's body, as planar walkers have them; None:
@@ -307,6 +310,10 @@ def _from_file(
     check_against_file(body, tree, where)
     check_against_engine(body, tree, poses, where)
     doubts += massless_warning(tree)
+    shape = body.shape()
+    parts = [link for name, link in tree.links.items() if name not in tree.frames]
+    turns = np.array([body.link_pose(shape, link.name)[:3, :3] for link in parts])
+    doubts += hollow_warnings(parts, turns, body.locked_inertia(shape), on_unphysical)
     found: list[tuple[type[Warning], str]] = [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
     if tree.notes:
         found.append((IgnoredElementWarning, "; ".join(tree.notes)))
@@ -329,9 +336,16 @@ def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[W
 
     if not isinstance(model, pinocchio.Model):  # pyright: ignore[reportAttributeAccessIssue]
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(model).__name__}")
-    checked, doubts = checked_model(model, f"model {model.name!r}", on_unphysical)
+    where = f"model {model.name!r}"
+    checked, moved, doubts = checked_model(model, where, on_unphysical)
     _name_bare_parts(checked)
-    return Body(checked, model.name), [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
+    body = Body(checked, model.name)
+    data = checked.createData()
+    pinocchio.forwardKinematics(checked, data, pinocchio.neutral(checked))
+    turns = np.array([data.oMi[number].rotation for number in range(1, checked.njoints)])
+    inertia = body.locked_inertia(body.shape())
+    doubts += hollow_warnings(moved, turns, inertia, on_unphysical, "what joint {!r} moves")
+    return body, [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
 
 
 def _name_bare_parts(model: Any) -> None:
