@@ -486,8 +486,8 @@ def test_inertia_without_mass_is_an_error_above_a_hundredth_of_the_bodys(moments
     assert ".urdf:8: " in str(refused.value)
     with pytest.warns(UnphysicalInertiaWarning, match=r"'camera' \(.* kg m\^2\): moments of inertia without mass"):
         body = load_urdf(text, on_unphysical="warn")
-    turned = np.array([moments[2], moments[1], moments[0]])
-    np.testing.assert_allclose(body.locked_inertia(body.shape()), np.diag(turned) + np.diag([0.5, 0.4, 0.2]), atol=1e-12)
+    whole = np.diag([0.5, 0.4, 0.2]) + np.diag(moments[::-1])
+    np.testing.assert_allclose(body.locked_inertia(body.shape()), whole, atol=1e-12)
 
 
 def test_a_little_inertia_without_mass_is_a_warning(load_urdf):

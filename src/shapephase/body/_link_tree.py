@@ -65,7 +65,7 @@ class Joint:
 
     Attributes
     ----------
-    kind : "revolute", "continuous", "prismatic", "ball" or "fixed"
+    kind : "revolute", "continuous", "prismatic", "ball" or "fixed"; on the way to a base also "floating" or "planar"
     place, turn : (3,) [m], (3, 3) the joint's axes in those of the parent
     axis : (3,) in the joint's axes, of any length; of a ball joint it means nothing
     after : (3,) the origin of the child in the joint's axes [m]
@@ -99,6 +99,7 @@ class LinkTree:
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what the file says and is not taken up
     text : the URDF that was checked, written anew; None for other formats, and with ball joints
+    base_joints : what leads to the root link from a world without mass: coordinates of the base, not of the shape
     base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
         it, as "zxy"; None where the file names none
     base_slides : names of three coordinates that move the root link along x, y and z; None where the file names none
@@ -112,6 +113,7 @@ class LinkTree:
     frames: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
     text: str | None = None
+    base_joints: tuple[Joint, ...] = ()
     base_angles: tuple[tuple[str, ...], str] | None = None
     base_slides: tuple[str, ...] | None = None
     length_unit: float | None = None

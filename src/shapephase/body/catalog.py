@@ -38,7 +38,7 @@ from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 
 _EXAMPLE = "example:"
-_OF_URDF = ("packages",)
+_OF_URDF = ("packages", "root")
 """Options of a URDF."""
 _OF_BVH = ("length_unit", "person_mass")
 """Options of a BVH file."""
@@ -77,8 +77,9 @@ def load_body(
         more than 1 % of the body's inertia about an axis
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted
-    root : "free" removes the hinges and slides between the world and an MJCF's body, as planar walkers have them; None:
-        they are an error
+    root : "free" removes all joints between the world, or a root link without mass, and the body of an MJCF or a URDF;
+        None: a single one is an error, as of an arm that is bolted down; two or more are the free base, with a warning.
+        Their columns are the recorded base
     root_body : the body that floats, with all that hangs on it, of an MJCF, an OpenSim or a bioMod file; needed where
         the file has several trees
     packages : folders in which the packages that a URDF or a xacro file names, `package://NAME`, `$(find NAME)`, are
@@ -301,9 +302,10 @@ def _from_file(
     elif root is None or owned == MJCF:
         tree, poses = engine_tree(path, owned or MJCF, given)
     else:
-        tree = urdf_tree(root)
+        tree = urdf_tree(root, given.get("root"))
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.couplings)
+    body.base_joints = tree.base_joints
     body.base_angles, body.base_slides, body.length_unit = tree.base_angles, tree.base_slides, tree.length_unit
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     body.packages = tuple(map(os.path.abspath, given.get("packages", ())))
@@ -327,7 +329,7 @@ def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -
         if name in _OF_BVH and name not in options:
             raise ShapeError(f"{name} is for BVH files; {quoted(where)} has units and masses of its own")
         if name not in options:
-            files = "MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
+            files = "URDF, xacro and MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
             raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")
 
 
