@@ -114,7 +114,7 @@ def way_words(names: Sequence[str], above: str, link: str, root: str | None) -> 
     if len(names) == 1:
         return (
             f"the only joint between {above!r}, which has no mass, and {link!r}: what is bolted down does not float. "
-            f"root=\"free\" (--root free) removes it: {link!r} floats, and the joint's column is its recorded motion"
+            f'root="free" (--root free) removes it: {link!r} floats, and the joint\'s column is its recorded motion'
         ), ""
     listed = ", ".join(map(repr, names))
     return "", (
@@ -224,7 +224,10 @@ def _single_axes(joint: Joint) -> tuple[Joint, ...]:
 def _inside(joint: Joint) -> str:
     """Why a floating or planar joint inside a body is none."""
     why, instead = {
-        ANYWHERE: ("it has the coordinates of a rigid motion, and only the base floats here", "three slides and a ball"),
+        ANYWHERE: (
+            "it has the coordinates of a rigid motion, and only the base floats here",
+            "three slides and a ball",
+        ),
         IN_A_PLANE: ("its two slides turn with it", "two slides and a hinge"),
     }[joint.kind]
     return (

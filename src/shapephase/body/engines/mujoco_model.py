@@ -165,7 +165,9 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
         )
     fault, note = way_words([compiled.joint_name(joint) for joint in joints], "the world", names[base], root)
     if fault:
-        raise UnusableModelError(f"joint {compiled.joint_name(joints[0])!r}: {fault}", compiled.line(joints[0], "joint"))
+        raise UnusableModelError(
+            f"joint {compiled.joint_name(joints[0])!r}: {fault}", compiled.line(joints[0], "joint")
+        )
     # Behind what has mass nobody knows where the world is.
     return base, [] if above else way, notes + [note] * bool(note)
 

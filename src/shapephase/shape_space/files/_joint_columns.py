@@ -108,9 +108,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     found: dict[int, str] = {}
     units: dict[str, str] = {}
     known: set[int] = set()
-    base = BaseColumns(
-        recording, choices.base, choices.degrees, body.base_angles, body.base_slides, body.base_joints
-    )
+    base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles, body.base_slides, body.base_joints)
     left_out = {text: f"{what}, no column" for text, what in table.unread.items()}
     for text, values in table.columns.items():
         target = choices.names.get(text, text)
