@@ -36,6 +36,7 @@ from .engines.formats import BVH, FORMATS, MJCF, XACRO, format_of
 from .formats.bvh import bvh_tree
 from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
+from .joint_orders import joint_orders
 
 _EXAMPLE = "example:"
 _OF_URDF = ("packages", "root")
@@ -305,7 +306,7 @@ def _from_file(
         tree = urdf_tree(root, given.get("root"))
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.couplings)
-    body.base_joints = tree.base_joints
+    body.joint_orders, body.base_joints = joint_orders(tree, from_urdf=owned in (None, XACRO)), tree.base_joints
     body.base_angles, body.base_slides, body.length_unit = tree.base_angles, tree.base_slides, tree.length_unit
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     body.packages = tuple(map(os.path.abspath, given.get("packages", ())))
