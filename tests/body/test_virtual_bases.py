@@ -51,11 +51,12 @@ SIX = (
     ("roll", "continuous", "1 1 0", ""),
 )
 MJCF = """<mujoco><compiler angle="radian"/><worldbody><body name="rail" pos="0.1 0 0.5" euler="0 0 1">
-<body name="trunk" euler="0.3 0.1 0"><joint name="px" type="slide" axis="1 0 0"/><joint name="py" type="slide" axis="0 1 0"/>
-<joint name="pz" type="slide" axis="0 0 1" ref="0.4"/><joint name="yaw" axis="0 0 1" pos="0.1 0 0"/><joint name="pitch" axis="0 1 0"/>
+<body name="trunk" euler="0.3 0.1 0"><joint name="px" type="slide" axis="1 0 0"/>
+<joint name="py" type="slide" axis="0 1 0"/><joint name="pz" type="slide" axis="0 0 1" ref="0.4"/>
+<joint name="yaw" axis="0 0 1" pos="0.1 0 0"/><joint name="pitch" axis="0 1 0"/>
 <inertial pos="0.02 0 0.1" mass="4" diaginertia="0.09 0.08 0.03"/><body name="leg" pos="0.1 0.2 0">
-<joint name="hip" axis="1 2 2"/><inertial pos="0 0.05 -0.2" mass="1" diaginertia="0.02 0.03 0.015"/></body></body></body>
-</worldbody></mujoco>"""
+<joint name="hip" axis="1 2 2"/><inertial pos="0 0.05 -0.2" mass="1" diaginertia="0.02 0.03 0.015"/></body></body>
+</body></worldbody></mujoco>"""
 FILES = {
     "six.urdf": (chain(*SIX), ("px", "py", "pz", "yaw", "pitch", "roll")),
     "two_hinges.urdf": (chain(SIX[3], SIX[6]), ("yaw", "roll")),
@@ -72,9 +73,10 @@ SINGLE = ("planar.urdf", "hinge.urdf")
 
 
 def simulated(path, names, file):
-    """The body swings its leg in MuJoCo, without momentum at first; times, xmat, xpos. The file has all of qpos."""
+    """The body swings its leg in MuJoCo, without momentum at first; xmat and xpos. The file has all of qpos."""
     # Of what moves, MuJoCo wants some mass: a part in 10^10 of the body's.
-    dust = '<inertial><mass value="5e-10"/><inertia ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"/></inertial>'
+    moments = 'ixx="1e-12" iyy="1e-12" izz="1e-12" ixy="0" ixz="0" iyz="0"'
+    dust = f'<inertial><mass value="5e-10"/><inertia {moments}/></inertial>'
     text = re.sub(r'<link name="(step.)"/>', rf'<link name="\1">{dust}</link>', path.read_text())
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity[:] = 0.0
@@ -91,7 +93,7 @@ def simulated(path, names, file):
     times, qpos, turned, placed = (np.array(each) for each in zip(*rows, strict=True))
     header = ",".join(["time", *names, "hip"])
     np.savetxt(file, np.column_stack([times, qpos]), delimiter=",", header=header, comments="", fmt="%.17g")
-    return times, turned, placed
+    return turned, placed
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -99,7 +101,7 @@ def test_the_base_is_where_mujoco_has_it(name, tmp_path):
     text, names = FILES[name]
     path, file = tmp_path / name, tmp_path / "run.csv"
     path.write_text(text)
-    times, turned, placed = simulated(path, names, file)
+    turned, placed = simulated(path, names, file)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         body = sp.load_body(path, root="free" if name in SINGLE else None)
@@ -123,14 +125,14 @@ def test_a_body_free_to_turn_turns_as_mujoco_says(name, tmp_path):
     text, names = FILES[name]
     path, file = tmp_path / name, tmp_path / "run.csv"
     path.write_text(text)
-    _, turned, _ = simulated(path, names, file)
+    turned, _ = simulated(path, names, file)
     with pytest.warns(IgnoredElementWarning, match="are the free base"):
         body = sp.load_body(path)
     motion = sp.reconstruct(sp.articulated(body, sp.read_shape_path(file, body)), [0.0, 0.0, 0.0])
     np.testing.assert_allclose(sp.split(motion).total_rotation, turned[0].T @ turned[-1], atol=1e-7)
 
 
-def test_a_planar_walker_turns_by_closed_form(tmp_path):
+def test_a_planar_walker_turns_by_closed_form():
     """About one axis, theta' = -J/I of the leg's angle, from two inertias about the common centre of mass."""
     with pytest.warns(IgnoredElementWarning, match="'root_x', 'root_z', 'root_y' between 'world'"):
         body = sp.load_body(CASES / "planar_walker.urdf")

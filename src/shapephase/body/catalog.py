@@ -343,8 +343,9 @@ def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[W
     checked, moved, doubts = checked_model(model, where, on_unphysical)
     _name_bare_parts(checked)
     body = Body(checked, model.name)
+    pin: Any = pinocchio
     data = checked.createData()
-    pinocchio.forwardKinematics(checked, data, pinocchio.neutral(checked))
+    pin.forwardKinematics(checked, data, pin.neutral(checked))
     turns = np.array([data.oMi[number].rotation for number in range(1, checked.njoints)])
     inertia = body.locked_inertia(body.shape())
     doubts += hollow_warnings(moved, turns, inertia, on_unphysical, "what joint {!r} moves")

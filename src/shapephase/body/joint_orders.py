@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ._link_tree import Joint, LinkTree
 from .virtual_base import joint_coordinates
+
+if TYPE_CHECKING:
+    from .body import Body
 
 MUJOCO, ISAAC, ISAAC_BY_NAME, OWN = "mujoco", "isaac", "isaac-by-name", "body"
 WORDS = (MUJOCO, ISAAC, ISAAC_BY_NAME, OWN)
@@ -41,8 +45,8 @@ def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
     """The orders of a file's joints in simulators, MuJoCo's first.
 
     MuJoCo compiles a URDF depth first, children in the order in which the file lists their joints; its own files, and
-    those of programs that it does not read, are in their own order. Isaac Lab goes breadth first; links that are fixed to
-    others are theirs, or bodies of their own.
+    those of programs that it does not read, are in their own order. Isaac Lab goes breadth first; links that are fixed
+    to others are theirs, or bodies of their own.
     """
     below: dict[str, list[Joint]] = {}
     for joint in tree.joints:
@@ -56,6 +60,11 @@ def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
         for merged in (True, False):
             found.append(_order(word, first, _breadth_first(first, below, key, merged=merged), merged=merged))
     return tuple(found)
+
+
+def simulator_order(body: Body, word: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
+    """All joints of a body in an order; of one without a file, whose joints have none but their own, what is given."""
+    return next((known.joints for known in body.joint_orders if known.word == word), otherwise)
 
 
 def _order(word: str, first: str, joints: Sequence[Joint], *, merged: bool) -> JointOrder:

@@ -231,6 +231,6 @@ def _inside(joint: Joint) -> str:
         IN_A_PLANE: ("its two slides turn with it", "two slides and a hinge"),
     }[joint.kind]
     return (
-        f"{joint.where}: joint {joint.name!r}: type {joint.kind!r} is not supported inside a body: {why}; use {instead} "
-        "joint in a row, or remove it and what it moves"
+        f"{joint.where}: joint {joint.name!r}: type {joint.kind!r} is not supported inside a body: {why}; use "
+        f"{instead} joint in a row, or remove it and what it moves"
     )

@@ -241,7 +241,7 @@ class BaseColumns:
         if self.slides is not None:
             groups = (*groups, _Group("position", self.slides))
         moved = set(way_names(self.way))
-        # A name may be that of a joint on the way to the base, and one that is known anyway, with others that are there.
+        # A name may be that of a joint on the way to the base, and one of several that are known anyway.
         whole = any(
             moved & set(one.names) and not set(one.names) <= moved and set(one.names) <= set(self.found)
             for one in groups
@@ -297,7 +297,7 @@ class BaseColumns:
             self._check_parts(turned)
         if "order" not in record and self.choices.order is not None:
             raise TrajectoryError(
-                f"{self.recording.table.where}: base_order is for angles, and the attitude of the base is not told by three"
+                f"{self.recording.table.where}: base_order is for angles, and the base's attitude is not told by three"
             )
         record |= {"axes": self.choices.said or usual, "axes_said": self.choices.said is not None}
         axes = named_axes(usual) if self.choices.axes is None else self.choices.axes

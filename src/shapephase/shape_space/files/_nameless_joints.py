@@ -14,7 +14,7 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...body.body import Body
-from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder
+from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder, simulator_order
 from ...body.virtual_base import way_names
 from ...errors import TrajectoryError, TrajectoryWarning
 
@@ -70,21 +70,17 @@ def nameless_joints(body: Body, width: int, where: str, order: str | None) -> Na
         Where Isaac's order depends on how its importer sorted the joints of a link.
     """
     word = order or MUJOCO
-    found = {
-        (names, free)
-        for all_names in {_joints(body, word)}
-        for names, free in _columns(body, all_names)
-        if width == len(names) + free
-    }
+    joints = simulator_order(body, word, body.joint_names)
+    found = {(names, free) for names, free in _columns(body, joints) if width == len(names) + free}
     if len(found) != 1:
-        own = _own(body, _joints(body, word))
+        own = _own(body, joints)
         raise TrajectoryError(
-            f"{where} has {width} columns; with {len(own)} joints ({', '.join(own)}) it has {len(own) + FREE_JOINT}, or "
-            f"{len(own)} without the free joint; joints that follow others may be there, too. Add an array "
+            f"{where} has {width} columns; with {len(own)} joints ({', '.join(own)}) it has {len(own) + FREE_JOINT}, "
+            f"or {len(own)} without the free joint; joints that follow others may be there, too. Add an array "
             "'joint_names' with the names of the columns"
         )
     ((names, free),) = found
-    other = _own(body, _joints(body, ISAAC_BY_NAME))
+    other = _own(body, simulator_order(body, ISAAC_BY_NAME, body.joint_names))
     if word == ISAAC and other != _own(body, names):
         warnings.warn(
             f"{where}: joints of one link are taken as the file of {body.name} lists them: {', '.join(names)}; if the "
@@ -140,8 +136,8 @@ def placed_joints(
     best, chosen, which = min(tried, key=lambda each: each[0])
     if best > _FITS * extent:
         raise TrajectoryError(
-            f"{where}: in no order of the joints do the links of {body.name} lie where the file has its bodies: at best "
-            f"{best:.3g} m from there, rms; is it another robot? Add an array 'joint_names' if it is not"
+            f"{where}: in no order of the joints do the links of {body.name} lie where the file has its bodies: at "
+            f"best {best:.3g} m from there, rms; is it another robot? Add an array 'joint_names' if it is not"
         )
     meant = _shapes(body, joints, chosen.names)
     for off, one, other in tried:
@@ -155,18 +151,13 @@ def placed_joints(
     return chosen, which
 
 
-def _joints(body: Body, word: str) -> tuple[str, ...]:
-    """All joints of a body in an order; of a body without a file they have none but their own."""
-    return next((known.joints for known in body.joint_orders if known.word == word), body.joint_names)
-
-
 def _own(body: Body, names: Sequence[str]) -> tuple[str, ...]:
     """The independent ones."""
     return tuple(name for name in names if name in body.joint_names)
 
 
 def _columns(body: Body, names: tuple[str, ...]) -> list[tuple[tuple[str, ...], int]]:
-    """What the columns may be: all joints or the independent ones, behind a free joint, what moves the base, or none."""
+    """What columns may be: all joints or the independent ones, behind a free joint, what moves the base, or none."""
     way = way_names(body.base_joints)
     found = [(each, free) for each in dict.fromkeys((names, _own(body, names))) for free in (FREE_JOINT, 0)]
     if way:

@@ -142,8 +142,8 @@ def _simulated_times(arrays: dict[str, Any], where: Path, count: int, timestep: 
     given = [name for name in ("time", "timestep", "fps") if name in arrays] + ["argument"] * (timestep is not None)
     if len(given) != 1:
         raise TrajectoryError(
-            f"{where}: the times come from one of the array 'time', the arrays 'timestep' and 'fps' of one number and the "
-            f"argument timestep; {'none' if not given else 'more than one'} is there"
+            f"{where}: the times come from one of the array 'time', the arrays 'timestep' and 'fps' of one number and "
+            f"the argument timestep; {'none' if not given else 'more than one'} is there"
         )
     if given == ["time"]:
         return _array(arrays["time"], where, "time", (count,), "s")
