@@ -280,8 +280,8 @@ def test_what_pinocchio_loses_without_a_word_is_seen(load_urdf, monkeypatch):
         ("hip", "hop"),
     ):
 
-        def spoiling(root, old=old, new=new):
-            tree = urdf_tree(root)
+        def spoiling(root, free, old=old, new=new):
+            tree = urdf_tree(root, free)
             assert old in tree.text
             return replace(tree, text=tree.text.replace(old, new))
 

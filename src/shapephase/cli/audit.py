@@ -71,8 +71,8 @@ class TrajectoryOptions:
         Parameter(
             show_default=False,
             help="Order of the joints in MuJoCo's qpos or Isaac's joint_pos without names: mujoco, isaac, "
-            "isaac-by-name or body, without unit; without it by the places of bodies in the file, else mujoco. For example "
-            "`--joint-order isaac`.",
+            "isaac-by-name or body, without unit; without it by the places of bodies in the file, else mujoco. For "
+            "example `--joint-order isaac`.",
         ),
     ] = None
     rest_missing: Annotated[

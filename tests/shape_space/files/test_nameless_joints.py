@@ -32,7 +32,8 @@ def random_tree(rng):
             mimic = f'<mimic joint="j{names[1]}" multiplier="2"/>' if child == 7 and kind == "revolute" else ""
             kind = "revolute" if child == 1 else kind
             text.append(
-                f'<joint name="j{name}" type="{kind}"><parent link="{names[rng.integers(child)]}"/><child link="{name}"/>'
+                f'<joint name="j{name}" type="{kind}"><parent link="{names[rng.integers(child)]}"/>'
+                f'<child link="{name}"/>'
                 f'<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/>{mimic}</joint>'
             )
     return f'<robot name="r">{"".join(rng.permutation(text))}</robot>'
@@ -69,7 +70,7 @@ def test_qpos_is_in_the_order_in_which_mujoco_compiles_the_file(seed, tmp_path):
     np.testing.assert_allclose(sp.read_trajectory(tmp_path / "m.csv", body).shapes, expected, atol=1e-15)
 
 
-def recorded_by(order, first=0, quaternions="wxyz", fixed=False):
+def recorded_by(order, first=0, quaternions="wxyz"):
     """Arrays as Isaac Lab's: joints and bodies in an order, where MuJoCo has the bodies at these joints."""
     model = in_mujoco(LEGS)
     data = mujoco.MjData(model)
