@@ -198,6 +198,15 @@ def test_the_base_leads_and_follows_no_joint(load_urdf):
         load_urdf(chain(SIX[3], ("turn", "continuous", "1 0 0", ""), body=PARTS.replace(LEG, tied)))
 
 
+def test_what_leads_to_the_base_is_not_drawn(load_urdf):
+    box = "<visual><geometry><box size='1 1 1'/></geometry></visual>"
+    text = chain(*SIX).replace('<link name="world"/>', f'<link name="world">{box}</link>')
+    with pytest.warns(IgnoredElementWarning):
+        body = load_urdf(text.replace('<link name="trunk">', f'<link name="trunk">{box}'))
+    assert [shape.link for shape in sp.body.visuals(body) if shape.kind == "box"][:1] == ["trunk"]
+    assert "world" not in {shape.link for shape in sp.body.visuals(body)}
+
+
 def test_columns_that_are_not_all_there_are_asked_for(tmp_path):
     (tmp_path / "r.urdf").write_text(FILES["six.urdf"][0])
     with pytest.warns(IgnoredElementWarning):
