@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import shapephase as sp
@@ -22,9 +23,12 @@ from shapephase.errors import (
     ModelFileError,
     ShapePhaseError,
     UnknownNameError,
+    UnphysicalInertiaError,
+    UnphysicalInertiaWarning,
 )
 from support.bodies import BODIES, joint, link, urdf
 
+CASES = Path(__file__).parents[1] / "cases"
 BASE = link("base", 3.0, [0.3, 0.5, 0.6])
 ARM = link("arm", 1.0, [0.02, 0.03, 0.04], (0.2, 0.1, 0.0))
 GOOD = urdf(BASE, ARM, joint("hip", "revolute", "base", "arm", (0, 1, 0)))
@@ -467,6 +471,40 @@ def test_a_message_begins_with_file_and_line_and_names_the_element(tmp_path):
     assert re.match(
         rf"{re.escape(str(path))}:{number + 1}: link '\w+': <mass> value='1,5': a finite number", str(caught.value)
     )
+
+
+@pytest.mark.parametrize("moments", [(95.0, 95.0, 95.0), (0.0041, 0.0041, 1e-5)])
+def test_inertia_without_mass_is_an_error_above_a_hundredth_of_the_bodys(moments, load_urdf):
+    """About its own axes: the camera is turned by 90 degrees about y, the trunk has 0.5, 0.4 and 0.2 kg m^2."""
+    text = (CASES / "dummy_with_inertia.urdf").read_text()
+    for axis, moment in zip("xyz", moments, strict=True):
+        text = text.replace(f'i{axis}{axis}="95"', f'i{axis}{axis}="{moment}"')
+    with pytest.raises(
+        UnphysicalInertiaError, match=r"link 'camera' has no mass and .*on_unphysical=.warn."
+    ) as refused:
+        load_urdf(text)
+    assert ".urdf:8: " in str(refused.value)
+    with pytest.warns(UnphysicalInertiaWarning, match=r"'camera' \(.* kg m\^2\): moments of inertia without mass"):
+        body = load_urdf(text, on_unphysical="warn")
+    whole = np.diag([0.5, 0.4, 0.2]) + np.diag(moments[::-1])
+    np.testing.assert_allclose(body.locked_inertia(body.shape()), whole, atol=1e-12)
+
+
+def test_a_little_inertia_without_mass_is_a_warning(load_urdf):
+    """0.0039 of 0.5 kg m^2 about x, and 0.002 of 0.2 about z."""
+    text = (CASES / "dummy_with_inertia.urdf").read_text().replace('izz="95"', 'izz="0.0039"').replace("95", "0.002")
+    with pytest.warns(UnphysicalInertiaWarning, match=r"'camera' \(0.0039 kg m\^2\): moments of inertia without mass"):
+        load_urdf(text)
+
+
+def test_inertia_without_mass_is_found_in_a_pinocchio_model():
+    model = pin.Model()
+    number = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
+    model.appendBodyToJoint(number, pin.Inertia(5.0, np.zeros(3), np.diag([0.5, 0.4, 0.2])), pin.SE3.Identity())
+    number = model.addJoint(number, pin.JointModelRX(), pin.SE3.Identity(), "hinge")
+    model.inertias[number] = pin.Inertia(0.0, np.zeros(3), np.diag([0.03, 0.03, 0.03]))
+    with pytest.raises(UnphysicalInertiaError, match="what joint 'hinge' moves has no mass"):
+        sp.load_body(model)
 
 
 def test_one_warning_for_each_kind_names_all_its_links(load_urdf):

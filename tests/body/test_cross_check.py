@@ -126,7 +126,14 @@ class FromXml:
             for element in self.joints.values()
             if element.get("type") != "fixed" and not any(found[name][0] for name in self.hanging(element))
         ]
-        return {"negative": negative, "triangle": triangle, "units": units, "without mass": massless}
+        hollow = [name for name, (mass, _, _, moments) in found.items() if mass == 0.0 and moments[2] > floor]
+        return {
+            "negative": negative,
+            "triangle": triangle,
+            "units": units,
+            "but without mass": massless,
+            "moments of inertia without mass": hollow,
+        }
 
     def hanging(self, element):
         child = element.find("child").get("link")
@@ -273,8 +280,8 @@ def test_what_pinocchio_loses_without_a_word_is_seen(load_urdf, monkeypatch):
         ("hip", "hop"),
     ):
 
-        def spoiling(root, old=old, new=new):
-            tree = urdf_tree(root)
+        def spoiling(root, free, old=old, new=new):
+            tree = urdf_tree(root, free)
             assert old in tree.text
             return replace(tree, text=tree.text.replace(old, new))
 

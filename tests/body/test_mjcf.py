@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
+import pinocchio
 import pytest
 
 import shapephase as sp
@@ -326,12 +327,14 @@ WALKER = """<mujoco><worldbody><body name="torso" pos="0 0 1.3">
 </body>{}</worldbody>{}</mujoco>"""
 
 
-def test_a_planar_walker_is_set_free_on_request(load_mjcf):
+def test_the_joints_of_a_planar_walker_in_the_world_are_its_free_base(load_mjcf):
     text = WALKER.format("", "")
-    with pytest.raises(ModelFileError, match=r"'torso': .*'rootx', 'rootz', 'rooty'; .*root=\"free\" \(--root free\)"):
-        load_mjcf(text)
-    body = load_mjcf(text, root="free")
+    with pytest.warns(
+        IgnoredElementWarning, match=r"'rootx', 'rootz', 'rooty' between 'the world'.* are the free base"
+    ):
+        body = load_mjcf(text)
     assert body.joint_names == ("hip", "ankle")
+    assert load_mjcf(text, root="free").base_joints[0].name == "rootx"
     free = re.sub(r"<joint name=\"root.*?/>", "", text.replace("\n", " "))
     agree(body, free, 1)
 
@@ -346,17 +349,18 @@ def test_one_of_several_trees_is_named(load_mjcf):
         load_mjcf(text)
     assert load_mjcf(text, root_body="ball").n_shape == 0
     assert load_mjcf(text, root_body="torso", root="free").joint_names == ("hip", "ankle")
-    with pytest.raises(ModelFileError, match="'leg': a joint between 'torso' and the body that floats, 'hip'"):
+    with pytest.raises(ModelFileError, match="'leg': 'hip' between 'torso' and the body that floats"):
         load_mjcf(text, root_body="leg")
     leg = load_mjcf(text, root_body="leg", root="free")
     assert (leg.link_names, leg.joint_names) == (("leg", "foot"), ("ankle",))
 
 
-def test_what_floats_is_a_question_of_mjcf_alone(load_mjcf):
-    for options in ({"root": "free"}, {"root_body": "base"}):
-        (name,) = options
-        with pytest.raises(ShapeError, match=f"{name} is for MJCF.* files; .*cat.urdf has one root"):
-            sp.load_body("cat", **options)
+def test_what_floats_is_a_question_of_files_with_a_world(load_mjcf):
+    with pytest.raises(ShapeError, match=r"root_body is for MJCF.* files; .*cat.urdf has one root"):
+        sp.load_body("cat", root_body="base")
+    with pytest.raises(ShapeError, match=r"root is for URDF, xacro and MJCF files; a pinocchio.Model has one root"):
+        sp.load_body(pinocchio.Model(), root="free")
+    assert sp.load_body("cat", root="free").joint_names == sp.load_body("cat").joint_names
     with pytest.raises(UnknownNameError, match=r"value of root 'fixed'.*free"):
         load_mjcf(GOOD_MJCF, root="fixed")
 

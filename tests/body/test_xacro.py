@@ -51,6 +51,29 @@ def test_a_file_is_the_urdf_that_it_stands_for(walker, tmp_path):
     assert mesh.mesh == packages / "legs" / "wedge.obj"
 
 
+@pytest.mark.parametrize("address", ["http://wiki.ros.org/xacro", "https://www.ros.org/wiki/xacro", "xacro", "urn:any"])
+def test_macros_are_told_by_their_prefix_whatever_its_address(address, tmp_path):
+    wing = '<xacro:macro name="wing" params="side sign">{}{}</xacro:macro>'.format(
+        LINK.format("${side}", "2", ""), HINGE.format("${sign * 0.5}").replace('"hip"', '"${side}_hinge"')
+    ).replace('"leg"', '"${side}"')
+    used = '<xacro:wing side="left" sign="1"/><xacro:wing side="right" sign="-1"/>'
+    text = ROBOT.replace("http://www.ros.org/wiki/xacro", address).format(LINK.format("trunk", "10", "") + wing + used)
+    (tmp_path / "a.urdf").write_text(text)
+    body = sp.load_body(tmp_path / "a.urdf")
+    # By hand: three links, and places mirrored in the plane of symmetry.
+    assert (body.mass, body.joint_names) == (14.0, ("left_hinge", "right_hinge"))
+    centres = [body.link_pose(body.shape(), side)[:3, 3] for side in ("left", "right")]
+    np.testing.assert_array_equal(centres, [[0.1, 0.5, 0.0], [0.1, -0.5, 0.0]])
+
+
+@pytest.mark.parametrize("address", ["http://www.ros.org/wiki/xacro", "http://wiki.ros.org/xacro"])
+def test_macros_by_another_prefix_which_xacro_leaves_are_no_urdf(address, tmp_path):
+    text = f'<robot name="a" xmlns:x="{address}">{LINK.format("trunk", "5", "")}<x:leg/></robot>'
+    (tmp_path / "a.urdf").write_text(text)
+    with pytest.raises(ModelFileError, match="a macro or an expression that xacro has left"):
+        sp.load_body(tmp_path / "a.urdf")
+
+
 def test_a_package_that_is_not_found_is_named(walker):
     with pytest.raises(ModelFileError, match=r"walker.urdf.xacro:1: <robot>: xacro does not accept it: .*legs"):
         sp.load_body(walker[0])

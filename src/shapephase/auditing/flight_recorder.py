@@ -26,7 +26,7 @@ class FlightRecorder:
     ----------
     body : as it should be
     convention : "mujoco", for `qpos` and `qvel`, or "pinocchio", for `q` and `v`
-    joint_names : in the order of these arrays; None: in the body's order
+    joint_names : in the order of these arrays; None: MuJoCo's of the body's file, or Pinocchio's, which is the body's
     step : of the integrator [s]; None: that between samples
 
     Examples

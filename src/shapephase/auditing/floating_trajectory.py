@@ -13,8 +13,10 @@ from .. import so3
 from ..arguments import check_choice, check_object, names_argument, positive_argument
 from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
+from ..body.joint_orders import WORDS
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..shape_space.files._nameless_joints import nameless_joints
 
 FRAMES = ("world", "base")
 _POSE = 7
@@ -45,6 +47,7 @@ class FloatingTrajectory:
     rate_axes, velocity_axes : "world" or "base": in which axes these two are
     step : of the integrator that made it [s]; None: that between samples
     name : for people
+    joint_order : of arrays without names, in which order their joints were taken, in words; None: they had names
 
     Examples
     --------
@@ -66,6 +69,7 @@ class FloatingTrajectory:
     velocity_axes: str = "world"
     step: float | None = None
     name: str = "trajectory"
+    joint_order: str | None = None
 
     __repr__ = short_repr
 
@@ -110,6 +114,7 @@ class FloatingTrajectory:
         qvel: ArrayLike | None = None,
         *,
         joint_names: Sequence[str] | None = None,
+        joint_order: str | None = None,
         step: float | None = None,
         name: str = "trajectory",
     ) -> FloatingTrajectory:
@@ -120,7 +125,9 @@ class FloatingTrajectory:
         times : (N,) [s]
         qpos : (N, 7 + n) place, quaternion w x y z, joints
         qvel : (N, 6 + n), or None
-        joint_names : in the order of these arrays; None: in the body's order
+        joint_names : in the order of these arrays; None: in that of `joint_order`
+        joint_order : "mujoco", "isaac", "isaac-by-name" or "body", as `read_recorded_motion` has them; None: "mujoco",
+            the order in which MuJoCo compiles the body's file
         step : of the integrator [s]; None: that between samples
 
         Raises
@@ -135,6 +142,16 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_mujoco(cat, np.linspace(0.0, 1.0, 21), qpos).shapes.shape
         (21, 3)
         """
+        check_object(body, "Body", "body")
+        nameless = None
+        if joint_order is not None:
+            check_choice(joint_order, "joint_order", WORDS)
+            if joint_names is not None:
+                raise ShapeError("joint_order is for arrays without names, and joint_names are given; leave one out")
+        if joint_names is None:
+            width = finite_array(qpos, "qpos", (None, None)).shape[1]
+            nameless = nameless_joints(body, width, "qpos", joint_order)
+            joint_names = nameless.names
         places, rates = _arrays(body, qpos, qvel, joint_names, ("qpos", "qvel"))
         given = _rates(rates, "base", "world")
         quaternion = np.roll(places[:, 3:_POSE], -1, axis=1)
@@ -145,6 +162,7 @@ class FloatingTrajectory:
             shapes=places[:, _POSE:],
             step=step,
             name=name,
+            joint_order=None if nameless is None else f"{nameless.title}: {', '.join(nameless.names)}",
             **given,
         )
 

@@ -15,6 +15,7 @@ from .. import so3
 from ..arguments import check_file_name, check_object, positive_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.virtual_base import way_names
 from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError, UnknownNameError
 from ..files import npz_arrays
 from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
@@ -38,6 +39,7 @@ def read_trajectory(
     degrees: bool | None = None,
     timestep: float | None = None,
     topic: str | None = None,
+    joint_order: str | None = None,
     rest_missing: bool = False,
     ignore_extra: bool = False,
     base_order: str | None = None,
@@ -47,7 +49,8 @@ def read_trajectory(
 
     By the arrays of an NPZ file, or the columns of a table with the same names and numbers (`qpos_0`, `qpos[1]`):
 
-    - `qpos` and, if there, `qvel`: MuJoCo's, joints in the order of `joint_names` where that is given, else the body's;
+    - `qpos` and, if there, `qvel`: MuJoCo's, joints in the order of `joint_names` where that is given, else in that of
+      `joint_order`, else that in which MuJoCo compiles the body's file;
     - `q` and, if there, `v`: Pinocchio's, each joint by one number;
     - `Q` and, if there, `Qdot`: biorbd's, (6 + n, N) or (N, 6 + n), the root first.
 
@@ -57,6 +60,7 @@ def read_trajectory(
     Parameters
     ----------
     step : of the integrator that made it [s]; None: that between samples, or the file's array `timestep`
+    joint_order : of arrays without names, as `read_recorded_motion` has it
 
     Raises
     ------
@@ -80,9 +84,14 @@ def read_trajectory(
         step = positive_argument(step, "step")
     arrays = _arrays(where, suffix) if suffix in (".npz", *_TEXTS) else {}
     kind = next((kind for kind in ("qpos", "q", "Q") if kind in arrays), None)
+    # Places of bodies, and joints that move the base in place of a free one, say what the reader of recordings knows.
+    if kind == "qpos" and suffix == ".npz" and ("body_pos_w" in arrays or _has_way(body, arrays)):
+        kind = None
+    if joint_order is not None and kind in ("q", "Q"):
+        raise TrajectoryError(f"{where}: joint_order is for MuJoCo's and Isaac's arrays; {kind} is in the body's order")
     if kind is not None:
         try:
-            return _of_arrays(where, arrays, kind, body, step, timestep)
+            return _of_arrays(where, arrays, kind, body, step, timestep, joint_order)
         except (ShapeError, TrajectoryError, UnknownNameError) as error:
             raise _of_file(where, error) from None
     recorded = read_recorded_motion(
@@ -92,6 +101,7 @@ def read_trajectory(
         degrees=degrees,
         timestep=timestep,
         topic=topic,
+        joint_order=joint_order,
         rest_missing=rest_missing,
         ignore_extra=ignore_extra,
         base_order=base_order,
@@ -102,6 +112,7 @@ def read_trajectory(
             f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
             "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
         )
+    order = recorded.record["joint_order"]
     try:
         return FloatingTrajectory(
             times=recorded.times,
@@ -110,9 +121,16 @@ def read_trajectory(
             position=recorded.base_position,
             step=step,
             name=where.name,
+            joint_order=None if order is None else f"{order['means']}: {', '.join(order['joints'])}",
         )
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None
+
+
+def _has_way(body: Body, arrays: Mapping[str, Any]) -> bool:
+    """Whether `qpos` begins with the joints by which the body's file moves its base."""
+    width = np.shape(arrays["qpos"])[-1] if "joint_names" not in arrays else 0
+    return bool(body.base_joints) and width == len(way_names(body.base_joints)) + body.n_shape
 
 
 def _of_file(where: Path, error: Exception) -> TrajectoryError | UnknownNameError:
@@ -163,7 +181,13 @@ def _of_table(table: Table) -> dict[str, Any]:
 
 
 def _of_arrays(
-    where: Path, arrays: Mapping[str, Any], kind: str, body: Body, step: float | None, timestep: float | None
+    where: Path,
+    arrays: Mapping[str, Any],
+    kind: str,
+    body: Body,
+    step: float | None,
+    timestep: float | None,
+    order: str | None,
 ) -> FloatingTrajectory:
     rates = {"qpos": "qvel", "q": "v", "Q": "Qdot"}[kind]
     names = [str(name) for name in np.ravel(arrays["joint_names"])] if "joint_names" in arrays else None
@@ -177,8 +201,10 @@ def _of_arrays(
         step = positive_argument(np.ravel(stored)[0].item(), "timestep")
     if kind == "Q":
         return replace(_of_biorbd(body, times, places, moving, where.name), step=step)
-    make = FloatingTrajectory.from_mujoco if kind == "qpos" else FloatingTrajectory.from_pinocchio
-    return make(body, times, places, moving, joint_names=names, step=step, name=where.name)
+    given: dict[str, Any] = {"joint_names": names, "step": step, "name": where.name}
+    if kind == "qpos":
+        return FloatingTrajectory.from_mujoco(body, times, places, moving, joint_order=order, **given)
+    return FloatingTrajectory.from_pinocchio(body, times, places, moving, **given)
 
 
 def _times(arrays: Mapping[str, Any], count: int, timestep: float | None) -> Array:

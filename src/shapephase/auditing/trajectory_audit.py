@@ -307,6 +307,8 @@ def _notes(seen: Sequence[Observation], looked: Sequence[RunAudit], order: StepO
     if not all(one.given_rates for one in seen):
         found.append("Rates are not given: neither their frames nor whether they belong to the attitudes can be told.")
     for one in seen:
+        if one.trajectory.joint_order is not None:
+            found.append(f"{one.trajectory.name}: joints without names are in {one.trajectory.joint_order}.")
         rates = so3.apply(one.attitude, one.rate)
         strengths = np.linalg.svd(rates, compute_uv=False)
         if strengths[1] <= _ONE_AXIS * strengths[0]:

@@ -47,6 +47,7 @@ def coupled_body(body: Body, couplings: Mapping[str, Coupling]) -> Body:
         if not isinstance(coupling, Coupling):
             raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
     changed = type(body)(body._model, body.name, {**body.couplings, **couplings})
+    changed.joint_orders, changed.base_joints = body.joint_orders, body.base_joints
     changed.base_angles, changed.base_slides = body.base_angles, body.base_slides
     changed.length_unit = body.length_unit
     return changed

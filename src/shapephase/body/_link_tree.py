@@ -34,6 +34,8 @@ _LEAST_RADIUS = 1e-4
 """Radius of gyration [m]; a smaller one suggests moments in other units than kg m^2."""
 _MOST_RADIUS = 10.0
 """Radius of gyration [m]; a larger one suggests lengths in millimetres."""
+_HOLLOW = 0.01
+"""Share of the body's inertia about an axis that a link without mass may have: some files give dummies a little."""
 _HEAVY = 1e5
 """Mass of a link [kg]; a larger one suggests grams."""
 
@@ -63,7 +65,7 @@ class Joint:
 
     Attributes
     ----------
-    kind : "revolute", "continuous", "prismatic", "ball" or "fixed"
+    kind : "revolute", "continuous", "prismatic", "ball" or "fixed"; on the way to a base also "floating" or "planar"
     place, turn : (3,) [m], (3, 3) the joint's axes in those of the parent
     axis : (3,) in the joint's axes, of any length; of a ball joint it means nothing
     after : (3,) the origin of the child in the joint's axes [m]
@@ -97,6 +99,7 @@ class LinkTree:
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what the file says and is not taken up
     text : the URDF that was checked, written anew; None for other formats, and with ball joints
+    base_joints : what leads to the root link from a world without mass: coordinates of the base, not of the shape
     base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
         it, as "zxy"; None where the file names none
     base_slides : names of three coordinates that move the root link along x, y and z; None where the file names none
@@ -110,6 +113,7 @@ class LinkTree:
     frames: frozenset[str] = frozenset()
     notes: tuple[str, ...] = ()
     text: str | None = None
+    base_joints: tuple[Joint, ...] = ()
     base_angles: tuple[tuple[str, ...], str] | None = None
     base_slides: tuple[str, ...] | None = None
     length_unit: float | None = None
@@ -218,6 +222,47 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
             bad = [links[i] for i in np.flatnonzero(which)]
             found.append(f"{bad[0].where}: {_listed([label.format(link.name) for link in bad])}: {text}")
     return found
+
+
+def hollow_warnings(
+    links: Iterable[Link], turns: Array, inertia: Array, on_unphysical: str, label: str = "link {!r}"
+) -> list[str]:
+    """The links without mass that have moments of inertia, as one message.
+
+    Parameters
+    ----------
+    turns : (N, 3, 3) axes of the links to those of the base, in the neutral shape
+    inertia : (3, 3) of the whole body there, base axes [kg m^2]
+
+    Raises
+    ------
+    UnphysicalInertiaError
+        If one has more than 1 % of the body's inertia about any axis (unless `on_unphysical` is "warn").
+    """
+    links = list(links)
+    # Scaled so that the body's is the identity; what it has about its thinnest axis may be nothing but rounding.
+    moments, axes = np.linalg.eigh(inertia)
+    scaled = axes / np.sqrt(np.maximum(moments, ROUNDING * moments[-1]))
+    found = []
+    for link, turn in zip(links, turns, strict=True):
+        largest = float(np.linalg.eigvalsh(link.inertia)[-1])
+        if link.mass == 0.0 and largest > ROUNDING * moments[-1]:
+            share = float(np.linalg.eigvalsh(scaled.T @ turn @ link.inertia @ turn.T @ scaled)[-1])
+            found.append((share, largest, link))
+    if not found:
+        return []
+    share, largest, worst = max(found, key=lambda each: each[0])
+    if share > _HOLLOW and on_unphysical == "error":
+        raise UnphysicalInertiaError(
+            f"{worst.where}: {label.format(worst.name)} has no mass and a moment of inertia of {largest:.4g} kg m^2, "
+            f"{share:.3g} of the whole body's: no distribution of mass has that; give it its mass, or none of both, or "
+            "load it with on_unphysical='warn'"
+        )
+    named = _listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in found])
+    return [
+        f"{found[0][2].where}: {named}: moments of inertia without mass, up to {share:.2g} of the whole body's: no "
+        "distribution of mass has them; they count as the file has them"
+    ]
 
 
 def massless_warning(tree: LinkTree) -> list[str]:

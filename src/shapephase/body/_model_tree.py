@@ -45,8 +45,8 @@ def model_of(tree: LinkTree, where: str) -> pin.Model:
         raise ModelFileError(f"{where}:1: robot {tree.name!r}: Pinocchio does not accept it: {error}") from None
 
 
-def checked_model(model: pin.Model, where: str, on_unphysical: str) -> tuple[pin.Model, list[str]]:
-    """A copy of a Pinocchio model whose root joint is a free-flyer, and what is doubtful about its inertias.
+def checked_model(model: pin.Model, where: str, on_unphysical: str) -> tuple[pin.Model, list[Link], list[str]]:
+    """A copy of a Pinocchio model whose root joint is a free-flyer, what each joint moves, and what is doubtful there.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def checked_model(model: pin.Model, where: str, on_unphysical: str) -> tuple[pin
     doubts = inertia_warnings(moved, on_unphysical, "what joint {!r} moves")
     if not any(link.mass for link in moved):
         raise ModelFileError(f"{where}: nothing in it has mass")
-    return model.copy(), doubts
+    return model.copy(), moved, doubts
 
 
 def model_with(model: pin.Model, masses: Array, centres: Array, tensors: Array) -> pin.Model:

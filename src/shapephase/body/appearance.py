@@ -136,7 +136,7 @@ def drawn_shapes(body: Body) -> tuple[list[Visual], list[str]]:
     looks = _Looks(body.file.parent if body.file else Path(), body.packages)
     root = _unchanged(body, looks.doubts)
     if root is not None:
-        _read_mjcf(body, looks) if root.tag == "mujoco" else _read_urdf(root, looks)
+        _read_mjcf(body, looks) if root.tag == "mujoco" else _read_urdf(root, body, looks)
     if looks.unread:
         looks.doubts.append(f"{looks.unread} meshes are not read: all have more than {_MOST_BYTES_IN_ALL >> 20} MiB")
     shapes, simplified = within_limits(looks.found)
@@ -236,10 +236,14 @@ def _pose(place: Array, turn: Array) -> Array:
 # ---- URDF -----------------------------------------------------------------------------------------------------------
 
 
-def _read_urdf(root: Node, looks: _Looks) -> None:
+def _read_urdf(root: Node, body: Body, looks: _Looks) -> None:
     named = [(material, material.get("name")) for node in root.walk() for material in node.all("material")]
     materials: dict[str, Node] = {name: material for material, name in named if name and material.all("color")}
+    links = set(body.link_names)
     for link in root.all("link"):
+        # What only leads to the base is no part of the body.
+        if link.get("name") not in links:
+            continue
         for node in link.all("visual"):
             looks.attempt(lambda link=link, node=node: _urdf_shape(link, node, materials, looks))
 

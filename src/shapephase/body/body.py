@@ -33,9 +33,11 @@ from ._centroidal_maps import (
 from ._changed_body import changed_body, coupled_body
 from ._given_inertias import Given, given_inertias
 from ._link_motions import link_motions
+from ._link_tree import Joint
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
 from .joint_chain import joint_chain
+from .joint_orders import JointOrder
 from .moving_parts import MovingPart, moving_parts
 
 if TYPE_CHECKING:
@@ -71,6 +73,8 @@ class Body:
     continuous : (n,) True for a joint that turns without end: shapes 2 pi apart are the same
     chain : its links and joints as plain numbers
     couplings : by the name of each joint that follows others, how it does
+    joint_orders : the orders in which simulators number the joints of its file; none without a file
+    base_joints : of its file, those that lead from a world without mass to the base, whose recorded motion they are
     base_angles : names and axes of the angles by which its file turns the base; None where it names none
     base_slides : names of what its file moves the base along x, y and z by; None where it names none
     length_unit : of the lengths in its file [m]; None where its format has a unit of its own
@@ -89,6 +93,8 @@ class Body:
         self.sha256: str | None = None
         self.file: Path | None = None
         self.packages: tuple[str, ...] = ()
+        self.joint_orders: tuple[JointOrder, ...] = ()
+        self.base_joints: tuple[Joint, ...] = ()
         self.base_angles: tuple[tuple[str, ...], str] | None = None
         self.base_slides: tuple[str, ...] | None = None
         self.length_unit: float | None = None

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..arguments import check_choice, check_flag, positive_argument
 from ..child_process import limit_this_process, run_alone
 from ..errors import (
@@ -26,7 +28,7 @@ from ..errors import (
 )
 from ..letters import what_came
 from ._cross_check import check_against_file
-from ._link_tree import inertia_warnings, massless_warning
+from ._link_tree import hollow_warnings, inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded
@@ -34,9 +36,10 @@ from .engines.formats import BVH, FORMATS, MJCF, XACRO, format_of
 from .formats.bvh import bvh_tree
 from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
+from .joint_orders import joint_orders
 
 _EXAMPLE = "example:"
-_OF_URDF = ("packages",)
+_OF_URDF = ("packages", "root")
 """Options of a URDF."""
 _OF_BVH = ("length_unit", "person_mass")
 """Options of a BVH file."""
@@ -71,11 +74,13 @@ def load_body(
         (`shapephase[yeadon]`), or a BVH file, whose skeleton becomes a human; a name from `robot_names()` such as
         "cat"; "example:human", a body of the installed example-robot-data; or a `pinocchio.Model` whose root joint is
         a free-flyer
-    on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment
+    on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment, or that has no mass and
+        more than 1 % of the body's inertia about an axis
     isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
         is an error; names of bodies that are installed are trusted
-    root : "free" removes the hinges and slides between the world and an MJCF's body, as planar walkers have them; None:
-        they are an error
+    root : "free" removes all joints between the world, or a root link without mass, and the body of an MJCF or a URDF;
+        None: a single one is an error, as of an arm that is bolted down; two or more are the free base, with a warning.
+        Their columns are the recorded base
     root_body : the body that floats, with all that hangs on it, of an MJCF, an OpenSim or a bioMod file; needed where
         the file has several trees
     packages : folders in which the packages that a URDF or a xacro file names, `package://NAME`, `$(find NAME)`, are
@@ -298,15 +303,20 @@ def _from_file(
     elif root is None or owned == MJCF:
         tree, poses = engine_tree(path, owned or MJCF, given)
     else:
-        tree = urdf_tree(root)
+        tree = urdf_tree(root, given.get("root"))
     doubts = inertia_warnings(tree.links.values(), on_unphysical)
     body = Body(model_of(tree, where), path.stem, tree.couplings)
+    body.joint_orders, body.base_joints = joint_orders(tree, from_urdf=owned in (None, XACRO)), tree.base_joints
     body.base_angles, body.base_slides, body.length_unit = tree.base_angles, tree.base_slides, tree.length_unit
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     body.packages = tuple(map(os.path.abspath, given.get("packages", ())))
     check_against_file(body, tree, where)
     check_against_engine(body, tree, poses, where)
     doubts += massless_warning(tree)
+    shape = body.shape()
+    parts = [link for name, link in tree.links.items() if name not in tree.frames]
+    turns = np.array([body.link_pose(shape, link.name)[:3, :3] for link in parts])
+    doubts += hollow_warnings(parts, turns, body.locked_inertia(shape), on_unphysical)
     found: list[tuple[type[Warning], str]] = [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
     if tree.notes:
         found.append((IgnoredElementWarning, "; ".join(tree.notes)))
@@ -320,7 +330,7 @@ def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -
         if name in _OF_BVH and name not in options:
             raise ShapeError(f"{name} is for BVH files; {quoted(where)} has units and masses of its own")
         if name not in options:
-            files = "MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
+            files = "URDF, xacro and MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
             raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")
 
 
@@ -329,9 +339,17 @@ def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[W
 
     if not isinstance(model, pinocchio.Model):  # pyright: ignore[reportAttributeAccessIssue]
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(model).__name__}")
-    checked, doubts = checked_model(model, f"model {model.name!r}", on_unphysical)
+    where = f"model {model.name!r}"
+    checked, moved, doubts = checked_model(model, where, on_unphysical)
     _name_bare_parts(checked)
-    return Body(checked, model.name), [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
+    body = Body(checked, model.name)
+    pin: Any = pinocchio
+    data = checked.createData()
+    pin.forwardKinematics(checked, data, pin.neutral(checked))
+    turns = np.array([data.oMi[number].rotation for number in range(1, checked.njoints)])
+    inertia = body.locked_inertia(body.shape())
+    doubts += hollow_warnings(moved, turns, inertia, on_unphysical, "what joint {!r} moves")
+    return body, [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
 
 
 def _name_bare_parts(model: Any) -> None:

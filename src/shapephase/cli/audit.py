@@ -66,6 +66,15 @@ class TrajectoryOptions:
             "example `--degrees`.",
         ),
     ] = None
+    joint_order: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Order of the joints in MuJoCo's qpos or Isaac's joint_pos without names: mujoco, isaac, "
+            "isaac-by-name or body, without unit; without it by the places of bodies in the file, else mujoco. For "
+            "example `--joint-order isaac`.",
+        ),
+    ] = None
     rest_missing: Annotated[
         bool,
         Parameter(
@@ -155,6 +164,7 @@ def audit_command(
                 names=column_names(reading.names),
                 degrees=reading.degrees,
                 timestep=reading.timestep,
+                joint_order=reading.joint_order,
                 rest_missing=reading.rest_missing,
                 ignore_extra=reading.ignore_extra,
                 base_order=reading.base_order,

@@ -205,6 +205,14 @@ class RecordingOptions:
             "structure of a .mat file; for example `--topic /joint_states`."
         ),
     ] = None
+    joint_order: Annotated[
+        str | None,
+        _motion_option(
+            "Order of the joints in MuJoCo's qpos or Isaac's joint_pos without names: mujoco, isaac, isaac-by-name or "
+            "body, without unit; without it by the places of bodies in the file, else mujoco. For example "
+            "`--joint-order isaac`."
+        ),
+    ] = None
     rest: Annotated[
         tuple[str, ...],
         _motion_option(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object, times_argument
 from ..arrays import Array, lock_arrays
 from ..display import short_repr
-from ..errors import MissingExtraError, ShapeError
+from ..errors import MissingExtraError, ShapeError, WrongObjectError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
@@ -146,7 +146,8 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     Raises
     ------
     WrongObjectError
-        If the body has no joints along a path: made of particles or functions, or read from a file of `Motion.save`.
+        If the body has no joints, or none along a path: made of particles or functions, or read from a file of
+        `Motion.save`.
     TrajectoryError
         For times outside of the motion.
 
@@ -166,6 +167,8 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     if not isinstance(motion, ForcedMotion):
         check_object(motion, "Motion", "motion")
     body, _ = needed_body_and_path(motion, BY_JOINTS)
+    if not body.n_shape:
+        raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` says how it turns")
     given = np.linspace(0.0, motion.duration, _ROWS) if t is None else t
     times = times_argument(given, motion.duration)
     found = drive(motion, times.ravel())

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..body.couplings.coordinate_map import check_no_balls
+from ..body.joint_orders import MUJOCO, simulator_order
 from ..display import short_repr
 from ..errors import UnknownNameError
 from ..reconstruction.forced_motion import ForcedMotion
@@ -102,7 +103,7 @@ def mujoco_arrays(
     motion : of an articulated body, in any gauge
     times : (N,) [s]; None: 201 even times
     model : a `mujoco.MjModel` with one free joint, in whose order the joints are put by their names; None: all joints
-        in the body's order, behind the free joint
+        in the order in which MuJoCo compiles the body's file, behind a free joint
     start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
 
     Raises
@@ -126,8 +127,10 @@ def mujoco_arrays(
     quaternions = whole.quat_xyzw[:, _SCALAR_FIRST]
     base = np.hstack([whole.position, quaternions]), np.hstack([whole.world_velocity, whole.angular_velocity])
     if model is None:
-        qpos, qvel = np.hstack([base[0], whole.joints]), np.hstack([base[1], whole.rates])
-        return MujocoArrays(time=whole.times, qpos=qpos, qvel=qvel, joint_names=whole.names)
+        names = simulator_order(whole.body, MUJOCO, whole.names)
+        places = [whole.names.index(name) for name in names]
+        qpos, qvel = np.hstack([base[0], whole.joints[:, places]]), np.hstack([base[1], whole.rates[:, places]])
+        return MujocoArrays(time=whole.times, qpos=qpos, qvel=qvel, joint_names=names)
     check_object(model, "MjModel", "model")
     free = [k for k in range(model.njnt) if model.jnt_type[k] == _MUJOCO_FREE]
     names = [model.joint(k).name for k in range(model.njnt) if k not in free]

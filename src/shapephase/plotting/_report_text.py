@@ -44,7 +44,10 @@ def lead(motion: Motion) -> str:
 
 def is_rigid(motion: Motion) -> bool:
     """Whether the body keeps its shape."""
-    return isinstance(motion.deformation.description, RigidDescription)
+    description = motion.deformation.description
+    path = getattr(description, "path", None)
+    rests = path is not None and not np.ptp(path.shape(path.sample_times), axis=0).any()
+    return rests or isinstance(description, RigidDescription)
 
 
 def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:

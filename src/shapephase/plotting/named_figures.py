@@ -94,6 +94,7 @@ FIGURES: Mapping[str, Figure] = {
         height=2.8,
         draw=lambda ax, motion, path, _: _draw_shape(ax, motion, path),
         with_path=True,
+        of_change=True,
     ),
     "torques": Figure(
         caption="The torques of the joints",

@@ -96,9 +96,10 @@ def write_report(
     begin("recording the animation")
     scene, data = scene_and_data(motion, speed=None, frames=None, trail=trail, ghost=True, up=up, fall={})
     beside = report_data(motion, scene.times, result.gauge, scene.body, scene.shapes)
+    has_joints = shape_path is not None and shape_path.n_shape > 0
     figures = []
     for kind, figure in FIGURES.items():
-        if (figure.with_momentum and not result.has_phase) or (figure.with_path and shape_path is None):
+        if (figure.with_momentum and not result.has_phase) or (figure.with_path and not has_joints):
             continue
         if figure.of_change and is_rigid(motion):
             continue

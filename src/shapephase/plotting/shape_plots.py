@@ -103,6 +103,8 @@ def plot_shape_path(
     if joints is not None and (isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray)):
         raise ShapeError(f"joints: several names or numbers in a list are needed, got {what_came(joints)}")
     chosen = np.flatnonzero(span > _AT_REST) if joints is None else np.array([_place(j, names) for j in joints], int)
+    if not names:
+        raise ShapeError("the body has no joints to draw; the figure 'attitude' shows how it turns")
     if not len(chosen):
         raise ShapeError("joints: none of them moves along this path; name those to draw")
     chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MAX_NAMED else chosen

@@ -92,6 +92,8 @@ def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array
 
 def recorded_path(body: Body | ParticleBody, path: ShapePath) -> KnotPath | None:
     """A recorded path, whose columns are in the body's order, with how the body follows it; None: it is none."""
+    if not path.n_shape:
+        return None
     pieces, follows = recorded_pieces(path), None if isinstance(body, ParticleBody) else body.chain.follows
     # Just at a knot where a slope jumps, rounding decides on which side a joint is.
     if pieces is None or (follows is not None and follows.has_kinks):

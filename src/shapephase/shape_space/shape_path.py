@@ -259,6 +259,9 @@ class ShapePath:
     @property
     def smoothness(self) -> Smoothness:
         """Of whatever depends smoothly on shapes and rates."""
+        if not self.n_shape:
+            # A rigid body: nothing moves, however many samples say so.
+            return Smoothness(breaks=self.breaks[[0, -1]], oscillations=0.0)
         scan = self.scan
         breaks = self.breaks
         if scan is not None and len(scan.found_breaks):

@@ -491,6 +491,19 @@ def test_what_rests_without_a_word_rests_within_its_limits(tmp_path):
     np.testing.assert_array_equal(found.path.shape(0.5), np.clip(0.0, lower, upper))
 
 
+@pytest.mark.parametrize("base", ["", "base_qx,base_qy,base_qz,base_qw,"])
+def test_a_file_of_which_no_column_is_a_joint_is_no_body_at_rest(base, tmp_path):
+    turned = "0,0,0,1," if base else ""
+    (tmp_path / "m.csv").write_text(f"time,{base}l_hip,r_hip\n0,{turned}0.1,0\n0.5,{turned}0.2,0.1\n1,{turned}0.1,0\n")
+    options = {"rest_missing": True, "ignore_extra": True}
+    with pytest.raises(TrajectoryError, match=r"no column is a joint of .*'l_hip', 'r_hip'.*--names COLUMN=JOINT"):
+        read_recorded_motion(tmp_path / "m.csv", BODY, **options)
+    # One that is a joint is enough, and so is to name what is left out.
+    for names in ({"l_hip": JOINTS[0]}, {"l_hip": None, "r_hip": None}):
+        found = read_recorded_motion(tmp_path / "m.csv", BODY, names=names, **options)
+        assert list(found.record["columns"]) == [joint for joint in names.values() if joint]
+
+
 def test_a_stretch_is_kept_by_the_file_s_own_times(tmp_path):
     (tmp_path / "m.csv").write_text(text(1e3 * TIMES + 5000.0, SHAPES, labels("time [ms]")))
     found = read_recorded_motion(tmp_path / "m.csv", BODY, trim=(5200.0, 5500.0))

@@ -40,6 +40,7 @@ class Chain:
     notes : what the file says and is not taken up
     poses : what the engine gives at random shapes, as `add_pose` takes it
     couplings : of joints that follow others, by name, as `couple` takes them
+    base_joints : as `joints`, those that lead from the world to the base
     base_angles : names of three angles of the base and the axes they turn about, one after the other; or none
     base_slides : names of three coordinates that move the base along x, y and z; or none
     """
@@ -51,6 +52,7 @@ class Chain:
     notes: list[str] = field(default_factory=list)
     poses: list[dict[str, Any]] = field(default_factory=list)
     couplings: dict[str, dict[str, Any]] = field(default_factory=dict)
+    base_joints: list[dict[str, Any]] = field(default_factory=list)
     base_angles: tuple[list[str], str] | None = None
     base_slides: list[str] | None = None
 

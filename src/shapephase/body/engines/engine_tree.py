@@ -87,21 +87,7 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
         )
         for entry in said["links"]
     }  # fmt: skip
-    joints = [
-        Joint(
-            name=entry["name"],
-            where=f"{where}:{entry['line']}",
-            kind=entry["kind"],
-            parent=entry["parent"],
-            child=entry["child"],
-            place=np.array(entry["place"]),
-            turn=np.array(entry["turn"]).reshape(3, 3),
-            axis=np.array(entry["axis"]),
-            after=np.array(entry["after"]),
-            limits=(-np.inf, np.inf) if entry["limits"] is None else (entry["limits"][0], entry["limits"][1]),
-        )
-        for entry in said["joints"]
-    ]
+    joints = [_joint(entry, where) for entry in said["joints"]]
     first, ordered = from_the_root(links, joints, where)
     reached = {first}
     # The engine's own order, where it has parents before children, as every tree of links has them.
@@ -119,10 +105,26 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
         couplings,
         frames,
         notes,
+        base_joints=tuple(_joint(entry, where) for entry in said["base_joints"]),
         base_angles=None if base is None else (tuple(base[0]), base[1]),
         base_slides=None if slides is None else tuple(slides),
     )
     return tree, said["poses"]
+
+
+def _joint(entry: dict[str, Any], where: str) -> Joint:
+    return Joint(
+        name=entry["name"],
+        where=f"{where}:{entry['line']}",
+        kind=entry["kind"],
+        parent=entry["parent"],
+        child=entry["child"],
+        place=np.array(entry["place"]),
+        turn=np.array(entry["turn"]).reshape(3, 3),
+        axis=np.array(entry["axis"]),
+        after=np.array(entry["after"]),
+        limits=(-np.inf, np.inf) if entry["limits"] is None else (entry["limits"][0], entry["limits"][1]),
+    )
 
 
 def _coupling(rule: dict[str, Any]) -> Coupling:

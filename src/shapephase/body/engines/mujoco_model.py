@@ -18,6 +18,7 @@ import numpy as np
 
 from ...arrays import Array
 from ..formats.xml_text import xml_tree
+from ..virtual_base import way_words
 from .chain import UnusableModelError
 
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
@@ -132,36 +133,78 @@ def _refused(said: str, text: str) -> UnusableModelError:
     return UnusableModelError(f"{element}: MuJoCo does not accept it: {reason}", max(number, 1))
 
 
-def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tuple[int, list[str]]:
-    """The body that floats, and notes on what is left out.
+def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tuple[int, list[int], list[str]]:
+    """The body that floats, those on the way to it from the world whose joints move it, and notes on what is done.
 
-    root : "free" removes the joints between it and what it hangs on
+    root : "free" removes a single joint between it and what it hangs on, too
     root_body : its name, where the file has several trees
     """
     model, names = compiled.model, compiled.names
     notes: list[str] = []
     if root_body is None:
-        base = _only_tree(compiled, notes)
+        way = _way_to_mass(compiled, _only_tree(compiled, notes))
     elif root_body in names[1:]:
-        base = names.index(root_body, 1)
+        way = _way_from_world(compiled, names.index(root_body, 1))
     else:
         near = difflib.get_close_matches(root_body, names[1:], 1) or names[1:]
         raise UnusableModelError(
             f"<worldbody>: root_body: no body is named {root_body[:60]!r}; there is {listed(near)}", compiled.line(0)
         )
+    base = way[-1]
     if model.body_mocapid[base] >= 0:
         raise UnusableModelError(
             f"body {names[base]!r}: a mocap body is moved from outside; name another by root_body", compiled.line(base)
         )
-    holding = [compiled.joint_name(joint) for joint in compiled.joints_of(base) if model.jnt_type[joint] != FREE]
-    if holding and root is None:
-        above = int(model.body_parentid[base])
+    joints = [joint for body in way for joint in compiled.joints_of(body) if model.jnt_type[joint] != FREE]
+    above = int(model.body_parentid[way[0]])
+    if above and joints and root is None:
         raise UnusableModelError(
-            f"body {names[base]!r}: a joint between {repr(names[above]) if above else 'the world'} and the body that "
-            f'floats, {listed(holding)}; a free body has none: root="free" (--root free) removes it',
+            f"body {names[base]!r}: {listed([compiled.joint_name(joint) for joint in joints])} between "
+            f'{names[above]!r} and the body that floats; a free body has none: root="free" (--root free) removes it',
             compiled.line(base),
         )
-    return base, notes
+    fault, note = way_words([compiled.joint_name(joint) for joint in joints], "the world", names[base], root)
+    if fault:
+        raise UnusableModelError(
+            f"joint {compiled.joint_name(joints[0])!r}: {fault}", compiled.line(joints[0], "joint")
+        )
+    # Behind what has mass nobody knows where the world is.
+    return base, [] if above else way, notes + [note] * bool(note)
+
+
+def _way_to_mass(compiled: Compiled, top: int) -> list[int]:
+    """From a body in the world to the first that has mass, or on which several move, each the only one on the last."""
+    model, way = compiled.model, [top]
+    while not any(model.jnt_type[joint] == FREE for joint in compiled.joints_of(way[-1])):
+        fixed, moving = _rigid_part(compiled, way[-1])
+        if len(moving) != 1 or any(model.body_mass[body] for body in fixed) or not model.body_subtreemass[top]:
+            break
+        way += [*_between(compiled, way[-1], moving[0]), moving[0]]
+    return way
+
+
+def _way_from_world(compiled: Compiled, base: int) -> list[int]:
+    """From a body in the world to another where nothing on the way has mass; else the last alone."""
+    model, way = compiled.model, [*_between(compiled, 0, base), base]
+    clear = all(not model.body_mass[body] for step in way[:-1] for body in _rigid_part(compiled, step)[0])
+    return way if clear else [base]
+
+
+def _rigid_part(compiled: Compiled, body: int) -> tuple[list[int], list[int]]:
+    """A body with those that are fixed to it, and those that move on them."""
+    fixed, moving = [body], list[int]()
+    for part in compiled.below(body)[1:]:
+        if int(compiled.model.body_parentid[part]) in fixed:
+            (moving if len(compiled.joints_of(part)) else fixed).append(part)
+    return fixed, moving
+
+
+def _between(compiled: Compiled, above: int, below: int) -> list[int]:
+    """The bodies between one and another that hangs on it, from above; without both."""
+    found = [int(compiled.model.body_parentid[below])]
+    while found[-1] != above:
+        found.append(int(compiled.model.body_parentid[found[-1]]))
+    return found[-2::-1]
 
 
 def _only_tree(compiled: Compiled, notes: list[str]) -> int:

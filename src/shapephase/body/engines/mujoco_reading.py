@@ -48,11 +48,11 @@ class Rule(NamedTuple):
 def chain_of(path: str, root: str | None = None, root_body: str | None = None) -> Chain:
     """Links and joints of an MJCF file.
 
-    root : "free" removes the joints between the body that floats and the world
+    root : "free" removes a single joint between the body that floats and the world, too
     root_body : the body that floats, with all that hangs on it
     """
     compiled = compiled_model(path)
-    base, notes = base_of(compiled, root, root_body)
+    base, way, notes = base_of(compiled, root, root_body)
     bodies = compiled.below(base)
     if len(bodies) > MOST_LINKS:
         raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")
@@ -64,6 +64,12 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
         _add_link(chain, compiled, body)
         if body != base:
             _add_joints(chain, compiled, body)
+    moved = Chain("")
+    for body in way:
+        # Of a free joint, or without one, nothing leads to the body.
+        if all(compiled.model.jnt_type[joint] != FREE for joint in compiled.joints_of(body)):
+            _add_joints(moved, compiled, body)
+    chain.base_joints = moved.joints if moved.moving() else []
     for joint, rule in rules.items():
         terms = [
             (compiled.joint_name(leader), np.zeros(0), np.array([rule.about]), np.array(rule.powers)[:, None])

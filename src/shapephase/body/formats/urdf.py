@@ -17,6 +17,7 @@ from ...arrays import Array
 from ...errors import ModelFileError
 from .._link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, from_the_root
 from ..couplings.coupling import Coupling
+from ..virtual_base import ANYWHERE, IN_A_PLANE, free_base
 from .xml_text import (
     Node,
     child_of,
@@ -32,11 +33,6 @@ from .xml_text import (
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
-# Why joints of several directions are no chain of coordinates.
-_REASONS = {
-    "floating": ": inside a body it has the coordinates of a rigid motion, and only the base floats here",
-    "planar": ": its two slides turn with it",
-}
 _ROBOT_PARTS = ("link", "joint")
 _LINK_PARTS = ("inertial", "visual", "collision")
 _JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
@@ -63,13 +59,15 @@ class Mimic:
 class _Reading:
     """What is found on the way through the file."""
 
-    text: list[str] = field(default_factory=list)
+    text: dict[tuple[str, str], str] = field(default_factory=dict)  # by kind of element and name
     mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
-def urdf_tree(root: Node) -> LinkTree:
+def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
     """Check a URDF from its root element.
+
+    free : "free": a single joint between a root without mass and the rest goes, too
 
     Raises
     ------
@@ -91,14 +89,18 @@ def urdf_tree(root: Node) -> LinkTree:
     joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint").items()}
     first, ordered = from_the_root(links, joints.values(), root.file)
     _check_mimics(reading.mimics, joints)
-    found = {first: links[first]} | {joint.child: links[joint.child] for joint in ordered}
-    # The parser of Pinocchio knows no ball joints.
-    parsed = all(joint.kind != "ball" for joint in joints.values())
-    text = f"<robot name={quoteattr(name)}>{''.join(reading.text)}</robot>" if parsed else None
     couplings = {
         key: Coupling.linear(rule.leader, rule.multiplier, rule.offset) for key, (_, rule) in reading.mimics.items()
     }
-    return LinkTree(name, found, ordered, couplings, notes=tuple(reading.notes), text=text)
+    base = free_base(first, links, ordered, couplings, free)
+    found = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
+    # The parser of Pinocchio knows no ball joints.
+    text = None
+    if all(joint.kind != "ball" for joint in base.joints):
+        written = [("link", link) for link in found] + [("joint", joint.name) for joint in base.joints]
+        text = f"<robot name={quoteattr(name)}>{''.join(reading.text[key] for key in written)}</robot>"
+    notes = (*reading.notes, *base.notes)
+    return LinkTree(name, found, base.joints, couplings, notes=notes, text=text, base_joints=base.way)
 
 
 def rpy_matrix(rpy: Array) -> Array:
@@ -117,7 +119,7 @@ def macro_of(root: Node) -> Node | None:
     for top in root.children:
         read = top.tag in _ROBOT_PARTS
         for node in top.walk():
-            left = "wiki/xacro}" in node.tag or "xacro:" in node.tag
+            left = "/xacro}" in node.tag or node.tag.startswith("xacro:")
             if left or (read and any("${" in value or "$(" in value for value in node.attributes.values())):
                 return node
     return None
@@ -147,7 +149,7 @@ def _link(name: str, node: Node, reading: _Reading) -> Link:
     no_misspelt_children(node, _LINK_PARTS, owner)
     inertial = child_of(node, "inertial", owner)
     if inertial is None:
-        reading.text.append(f"<link name={quoteattr(name)}/>")
+        reading.text["link", name] = f"<link name={quoteattr(name)}/>"
         return Link(name, where)
     for part in inertial.children:
         if part.tag not in ("origin", "mass", "inertia"):
@@ -164,7 +166,7 @@ def _link(name: str, node: Node, reading: _Reading) -> Link:
     xx, xy, xz, yy, yz, zz = values = [number(written, key, owner, most=MOST_MASS) for key in _INERTIA]
     place, turn, origin = _origin(inertial, owner)
     entries = " ".join(f'{key}="{value!r}"' for key, value in zip(_INERTIA, values, strict=True))
-    reading.text.append(
+    reading.text["link", name] = (
         f'<link name={quoteattr(name)}><inertial>{origin}<mass value="{mass!r}"/><inertia {entries}/></inertial></link>'
     )
     inertia = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
@@ -175,10 +177,10 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     owner = f"joint {name!r}"
     no_misspelt_children(node, _JOINT_PARTS, owner)
     kind = node.get("type") or ""
-    if kind not in (*_AXIS_JOINTS, _BALL, "fixed"):
+    if kind not in (*_AXIS_JOINTS, _BALL, "fixed", ANYWHERE, IN_A_PLANE):
         raise node.fault(
             owner,
-            f"type {quoted(kind)!r} is not supported{_REASONS.get(kind, '')}; use {', '.join(_AXIS_JOINTS)}, {_BALL} "
+            f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)}, {_BALL} "
             "or fixed, several in a row for a joint of several axes",
         )
     ends = {end: needed_child(node, end, owner) for end in ("parent", "child")}
@@ -188,7 +190,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     place, turn, parts = _origin(node, owner)
     parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
     axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
-    if kind in _AXIS_JOINTS:
+    if kind in (*_AXIS_JOINTS, IN_A_PLANE):
         written = child_of(node, "axis", owner)
         if written is not None:
             known_attributes(written, ("xyz",), owner)
@@ -205,7 +207,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
         parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="{effort!r}" velocity="{fastest!r}"/>'
     elif kind == "continuous" and (fastest or effort):
         parts += f'<limit effort="{effort!r}" velocity="{fastest!r}"/>'
-    reading.text.append(f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>')
+    reading.text["joint", name] = f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>'
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
     if kind == _BALL and child_of(node, "limit", owner) is not None:
@@ -258,8 +260,8 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
     if kind == "fixed":
         reading.notes.append(f"{element.file}:{element.line}: {owner}: <mimic> of a fixed joint is ignored")
         return
-    if kind == _BALL:
-        raise element.fault(owner, "a ball joint follows no other: its turn is no one number; remove the <mimic>")
+    if kind not in _AXIS_JOINTS:
+        raise element.fault(owner, f"a {kind} joint follows no other: it has no single number; remove the <mimic>")
     known_attributes(element, ("joint", "multiplier", "offset"), owner)
     multiplier, offset = (number(element, k, owner, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
     reading.mimics[name] = (element, Mimic(name_of(element, "joint"), multiplier, offset))

@@ -158,8 +158,9 @@ class _Builder:
 
     def __init__(self, where: str) -> None:
         self.where = where
-        # UTF-8 whatever the declaration says, and namespaces as part of a tag: "http://...}tag".
+        # UTF-8 whatever the declaration says, and namespaces as part of a tag: "http://...}tag}prefix".
         self.parser = expat.ParserCreate("utf-8", "}")
+        self.parser.namespace_prefixes = True
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self._doctype
         self.parser.StartElementHandler = self._start
@@ -173,6 +174,11 @@ class _Builder:
         )
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        named = tag.rsplit("}", 2)
+        if len(named) == 3:
+            address, name, prefix = named
+            # xacro goes by the prefix alone: files bind it to several addresses, old and new.
+            tag = f"xacro:{name}" if prefix == "xacro" else f"{address}}}{name}"
         node = Node(tag, attributes, self.where, self.parser.CurrentLineNumber)
         self.count += 1
         if len(self.open) >= _MOST_DEPTH:

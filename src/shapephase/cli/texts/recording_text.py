@@ -122,6 +122,9 @@ def _unit_lines(record: Any) -> list[str]:
 def _column_lines(body: Body, record: Any) -> list[str]:
     """Columns under other names, joints without a column, columns without a joint."""
     lines = []
+    if record["joint_order"] is not None:
+        order = record["joint_order"]
+        lines.append(f"{'joints without names':24}{order['means']} ({order['order']}): {', '.join(order['joints'])}")
     renamed = [f"{name} from {column!r}" for name, column in record["columns"].items() if not column.startswith(name)]
     if renamed:
         lines.append(f"{'columns':24}{_listed(renamed)}")

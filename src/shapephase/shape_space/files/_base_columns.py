@@ -11,6 +11,8 @@ import numpy as np
 
 from ... import so3
 from ...arrays import FARTHEST, Array, Integers
+from ...body._link_tree import Joint
+from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import what_came
 from ._labels import ANGLES, LENGTHS, SI, Label, label
@@ -31,6 +33,8 @@ _PREFIXES = ("base", "pelvis", "root")
 _OFF_UNIT = 1e-3
 _MOST_ANGLE = 2.0 * np.pi
 """[rad] An angle of the base beyond it, of which nobody has said the unit, is rather in degrees."""
+_LEAST_SLIDES = 2
+"""Joints that slide the base, from which its place is known: of a single one, the others of its directions are held."""
 _FARTHEST = 50.0
 """[m] A base farther from the origin, of which nobody has said the unit, is rather in millimetres."""
 _AXES = "xyz"
@@ -44,7 +48,7 @@ class _Group(NamedTuple):
 
     Attributes
     ----------
-    kind : "quaternion", "angles" or "position"
+    kind : "quaternion", "angles", "position", or "joints", by which the body's file moves its base
     names : of the columns
     parts : for each column its part of the quaternion, or the axis it turns about
     order : of angles, the usual one: each turns about its axis as those before have turned it
@@ -166,6 +170,7 @@ class BaseColumns:
     degrees: bool | None
     angles: tuple[tuple[str, ...], str] | None  # that the body's file turns the base by, and their axes
     slides: tuple[str, ...] | None  # that it moves the base by
+    way: tuple[Joint, ...] = ()  # the joints of the body's file that lead to the base
     found: dict[str, tuple[str, str | None]] = field(default_factory=dict)
     rates: dict[str, str] = field(default_factory=dict)
 
@@ -176,7 +181,8 @@ class BaseColumns:
             return True
         if target in _VELOCITIES:
             return True
-        parts = Label(target, None) if target in _KNOWN else label(target)
+        plain = target in _KNOWN or target in self._own_names
+        parts = Label(target, None) if plain else label(target)
         if parts.name not in _KNOWN and parts.name not in self._own_names:
             return False
         table = self.recording.table
@@ -212,14 +218,14 @@ class BaseColumns:
                     )
                 left_out |= {self.found[name][0]: f"of the base, without {lacking}" for name in there}
             elif there:
-                what = "position" if group.kind == "position" else "attitude"
-                if what in groups or self._stored(what) is not None:
-                    first = groups[what].names[0] if what in groups else "an array"
-                    raise TrajectoryError(
-                        f"{table.where}: the {what} of the base stands twice, as {first} and as {group.names[0]}; "
-                        "leave one out with names={column: None} (--names COLUMN=)"
-                    )
-                groups[what] = group
+                for what in self._told_by(group):
+                    if what in groups or self._stored(what) is not None:
+                        first = groups[what].names[0] if what in groups else "an array"
+                        raise TrajectoryError(
+                            f"{table.where}: the {what} of the base stands twice, as {first} and as {group.names[0]}; "
+                            "leave one out with names={column: None} (--names COLUMN=)"
+                        )
+                    groups[what] = group
         attitude, record = self._attitude(groups.get("attitude"))
         position = self._position(groups.get("position"))
         if position is not None:
@@ -234,11 +240,33 @@ class BaseColumns:
             groups = (*(one for one in groups if set(one.names) != set(names)), _Group("angles", names, axes, axes))
         if self.slides is not None:
             groups = (*groups, _Group("position", self.slides))
+        moved = set(way_names(self.way))
+        # A name may be that of a joint on the way to the base, and one of several that are known anyway.
+        whole = any(
+            moved & set(one.names) and not set(one.names) <= moved and set(one.names) <= set(self.found)
+            for one in groups
+        )
+        if not whole and moved & set(self.found):
+            groups = (*(one for one in groups if not moved & set(one.names)), self._joints_of_the_base())
         return groups
+
+    def _joints_of_the_base(self) -> _Group:
+        """The joints on the way to the base, without slides where none of these has a column."""
+        turns = tuple(name for joint in self.way if joint.kind != "prismatic" for name in joint_coordinates(joint))
+        names = way_names(self.way)
+        return _Group("joints", names if set(names) - set(turns) & set(self.found) or not turns else turns)
+
+    def _told_by(self, group: _Group) -> tuple[str, ...]:
+        """What columns say of the base: "attitude", "position" or both."""
+        if group.kind != "joints":
+            return ("position",) if group.kind == "position" else ("attitude",)
+        sliding = [joint.name in group.names for joint in self.way if joint.kind == "prismatic"]
+        turning = len(group.names) > sum(sliding)
+        return ("attitude",) * turning + ("position",) * (sum(sliding) >= _LEAST_SLIDES)
 
     @property
     def _own_names(self) -> tuple[str, ...]:
-        return (*(self.angles[0] if self.angles else ()), *(self.slides or ()))
+        return (*(self.angles[0] if self.angles else ()), *(self.slides or ()), *way_names(self.way))
 
     def _stored(self, what: str) -> Array | None:
         table = self.recording.table
@@ -252,8 +280,11 @@ class BaseColumns:
             assert stored is not None
             turned, usual = _by_quaternions(stored, self.recording), _SAME_AXES
             record["attitude"] = "base_quat_xyzw"
+        elif group.kind == "joints":
+            turned, usual = self._by_joints(group)[0], group.axes
+            record["attitude"] = list(self._texts(group))
         else:
-            values = np.stack([self._values(name, group) for name in group.names], axis=-1)
+            values = np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
             usual = group.axes
             record["attitude"] = list(self._texts(group))
             if group.kind == "quaternion":
@@ -262,11 +293,11 @@ class BaseColumns:
                 order = self.choices.order or group.order
                 turned = _by_angles(values, group.parts, order)
                 record |= {"order": order, "order_said": self.choices.order is not None}
-        if "order" not in record:
+        if "order" not in record and (group is None or group.kind == "quaternion"):
             self._check_parts(turned)
         if "order" not in record and self.choices.order is not None:
             raise TrajectoryError(
-                f"{self.recording.table.where}: base_order is for angles, and the attitude of the base is a quaternion"
+                f"{self.recording.table.where}: base_order is for angles, and the base's attitude is not told by three"
             )
         record |= {"axes": self.choices.said or usual, "axes_said": self.choices.said is not None}
         axes = named_axes(usual) if self.choices.axes is None else self.choices.axes
@@ -298,25 +329,40 @@ class BaseColumns:
     def _position(self, group: _Group | None) -> Array | None:
         if group is None:
             return self._stored("position")
-        return np.stack([self._values(name, group) for name in group.names], axis=-1)
+        if group.kind == "joints":
+            return self._by_joints(group)[1]
+        return np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
+
+    def _by_joints(self, group: _Group) -> tuple[Array, Array]:
+        """Attitude and place by the joints on the way to the base, seen from the world that they start from."""
+        kinds = {
+            name: {"ball": "quaternion", "prismatic": "position"}.get(joint.kind, "angles")
+            for joint in self.way
+            for name in joint_coordinates(joint)
+        }
+        values = {name: self._values(name, kinds[name]) for name in group.names}
+        for joint in self.way:
+            if joint.kind == "ball":
+                _by_quaternions(np.stack([values[name] for name in joint_coordinates(joint)], axis=-1), self.recording)
+        return way_poses(self.way, values, len(self.recording.times))
 
     def _texts(self, group: _Group) -> tuple[str, ...]:
         return tuple(self.found[name][0] for name in group.names)
 
-    def _values(self, name: str, group: _Group) -> Array:
+    def _values(self, name: str, kind: str) -> Array:
         """A column in rad, m or, of a quaternion, without unit."""
         table = self.recording.table
         text, said = self.found[name]
         table.check_column(text)
         values = table.columns[text]
-        if group.kind == "quaternion":
+        if kind == "quaternion":
             if said is not None:
                 raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; a quaternion has no unit")
             return values
-        sizes: Mapping[str, float] = ANGLES if group.kind == "angles" else LENGTHS
+        sizes: Mapping[str, float] = ANGLES if kind == "angles" else LENGTHS
         if said is not None and said != SI and said not in sizes:
             raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; {', '.join(sizes)} are possible")
-        found = self._lengths(text, values, said) if group.kind == "position" else self._angles(text, values, said)
+        found = self._lengths(text, values, said) if kind == "position" else self._angles(text, values, said)
         farthest = int(np.argmax(np.abs(found)))
         if abs(found[farthest]) > FARTHEST:
             raise TrajectoryError(

@@ -66,13 +66,16 @@ class Input(NamedTuple):
     sha256: str | None
 
 
-def read_input(source: Any, body: Body, topic: str | None, timestep: float | None) -> tuple[Input, float | None]:
+def read_input(
+    source: Any, body: Body, topic: str | None, timestep: float | None, order: str | None
+) -> tuple[Input, float | None]:
     """The table of a file, of standard input (`-`), or of a frame in memory; and the time step, if it is still needed.
 
     Parameters
     ----------
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
     timestep : [s], for what has no times
+    order : of the joints in arrays without names, or None
 
     Raises
     ------
@@ -115,7 +118,7 @@ def read_input(source: Any, body: Body, topic: str | None, timestep: float | Non
     data = file_bytes(where, MOST_YAML if suffix in _YAML else MOST_BYTES)
     sha256 = hashlib.sha256(data).hexdigest()
     if suffix in _ARRAYS:
-        return Input(read_arrays(where, data, body.joint_names, timestep), str(source), sha256), None
+        return Input(read_arrays(where, data, body, timestep, order), str(source), sha256), None
     if suffix in _WITH_BODY:
         return Input(_WITH_BODY[suffix](where, data, body), str(source), sha256), timestep
     table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)

@@ -21,6 +21,8 @@ from ._unit_doubts import check_unit, warn_of_values
 
 _STILL = 1e-9
 """Range of a coordinate [rad, m or degrees] below which it was locked."""
+_MOST_SHOWN = 50
+"""Columns that an error lists."""
 _SAME = 1e-6
 """Difference of two coordinates, relative to their range: what printed digits leave of one that follows another."""
 
@@ -106,7 +108,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     found: dict[int, str] = {}
     units: dict[str, str] = {}
     known: set[int] = set()
-    base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles, body.base_slides)
+    base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles, body.base_slides, body.base_joints)
     left_out = {text: f"{what}, no column" for text, what in table.unread.items()}
     for text, values in table.columns.items():
         target = choices.names.get(text, text)
@@ -129,6 +131,8 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         known |= {joint} if stated else set()
         shapes[:, joint] = (1.0 if unit == NO_UNIT else (ANGLES | LENGTHS)[unit]) * values
     _check_unread(found, body, recording, choices)
+    if body.n_shape and not found and choices.rest_missing:
+        _check_meant(left_out, body, recording, choices)
     at_rest = _rest_of_missing(found, body, where, choices)
     for name, value in at_rest.items():
         shapes[:, body.joint_index(name)] = value
@@ -239,6 +243,23 @@ def _check_unread(found: Mapping[int, str], body: Body, recording: Recording, ch
             f"{table.where}: no vector is a joint of {body.name}, and {table.unnamed[0]!r} is "
             f"{table.unread[table.unnamed[0]]}; name its columns in `joint_names`"
         )
+
+
+def _check_meant(left_out: Mapping[str, str], body: Body, recording: Recording, choices: JointChoices) -> None:
+    """Raise TrajectoryError where all joints would rest because the columns of theirs have other names.
+
+    Where nothing is left out but what the caller has named, as in a file of the base alone, they do rest.
+    """
+    table = recording.table
+    others = [repr(text) for text in left_out if text in table.columns and text not in choices.names]
+    if not others:
+        return
+    more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""
+    raise TrajectoryError(
+        f"{table.where}: no column is a joint of {body.name}; there is {', '.join(others[:_MOST_SHOWN])}{more}, and "
+        f"joints are {', '.join(body.joint_names)}. Say which column is which: names={{column: joint}} (--names "
+        "COLUMN=JOINT); if all joints do rest, leave out each column by names={column: None} (--names COLUMN=)"
+    )
 
 
 def _rest_of_missing(found: Mapping[int, str], body: Body, where: str, choices: JointChoices) -> dict[str, float]:

@@ -14,6 +14,7 @@ import numpy as np
 from ...arguments import check_time_steps
 from ...arrays import Array, Integers
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
+from ._nameless_joints import NamelessJoints
 
 MOST_BYTES = 256 * 2**20
 """Size of a motion file [bytes]; as numbers in memory it takes several times as much."""
@@ -43,6 +44,7 @@ class Table:
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
     unread : name -> what it is, of arrays and other entries of the file that are no columns
+    nameless : how columns of an array without names became those of joints; None: they have names
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     """
 
@@ -61,6 +63,7 @@ class Table:
     base_position: Array | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
     unnamed: Sequence[str] = ()
+    nameless: NamelessJoints | None = None
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_file_name, check_object, check_text, positive_argument
+from ...arguments import check_choice, check_file_name, check_object, check_text, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
+from ...body.joint_orders import WORDS
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import output_target, write_whole
@@ -93,6 +94,7 @@ def read_recorded_motion(
     time_unit: str | None = None,
     timestep: float | None = None,
     topic: str | None = None,
+    joint_order: str | None = None,
     rest: Mapping[str, float | str] | None = None,
     rest_missing: bool = False,
     ignore_extra: bool = False,
@@ -125,7 +127,9 @@ def read_recorded_motion(
     - `.bag`, `.mcap`, `.db3`, a rosbag2 folder: messages of these two types. A trajectory's velocities are not used.
     - `.npz` with `qpos` and `time` or `timestep`, or `.npy` with the argument `timestep`: MuJoCo. With a free joint,
       the first seven columns are x y z and the quaternion w x y z; then one column for each joint, by the array
-      `joint_names` or, without it, **in the order of `body.joint_names`**, which a MuJoCo model may not have.
+      `joint_names` or, without it, in the order in which MuJoCo compiles the body's file, or the one of `joint_order`.
+    - `.npz` with `joint_pos`, `body_pos_w`, `body_quat_w` and `fps`: Isaac Lab. Without `joint_names` the order is the
+      one in which the links lie where the bodies are.
 
     The base in columns: `base_qx,base_qy,base_qz,base_qw` (or `qx` and so on), `base_roll,base_pitch,base_yaw` or
     OpenSim's `pelvis_tilt,pelvis_list,pelvis_rotation`; and `base_x,base_y,base_z` or `pelvis_tx,pelvis_ty,pelvis_tz`.
@@ -144,6 +148,9 @@ def read_recorded_motion(
     time_unit : of the times: "s", "ms", "us", "ns" or "min"; None: as the file says
     timestep : between samples, for a file without times [s]
     topic : which part of a file with more than one motion: topic of a bag, sheet of a workbook, structure of a `.mat`
+    joint_order : of joints in `qpos` or `joint_pos` without names: "mujoco" (depth first, joints of one link as the
+        body's URDF lists them; of an MJCF its own), "isaac" (breadth first), "isaac-by-name" (the same, joints of one
+        link by their names), "body" (`body.joint_names`); None: by `body_pos_w` where the file has it, else "mujoco"
     rest : joint -> value [rad or m], or a text as "30deg" or "5 mm", for joints without a column
     rest_missing : whether all other joints without a column rest at zero, or at their limit next to it
     ignore_extra : whether columns that are no joints are left out
@@ -196,8 +203,12 @@ def read_recorded_motion(
     base = base_choices(base_order, base_axes)
     within = close_argument(close)
     rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
-    given, step = read_input(file, body, topic, timestep)
+    if joint_order is not None:
+        check_choice(joint_order, "joint_order", WORDS)
+    given, step = read_input(file, body, topic, timestep, joint_order)
     table = given.table
+    if joint_order is not None and table.nameless is None:
+        raise TrajectoryError(f"{table.where}: joint_order is for arrays without names; columns here have names")
     mapping = _mapping(read_names(names) if isinstance(names, str | os.PathLike) else names, table)
     recording = recording_of(table, body.joint_names, mapping, time_unit, step, kept)
     choices = JointChoices(
@@ -252,6 +263,7 @@ def read_shape_path(
     time_unit: str | None = None,
     timestep: float | None = None,
     topic: str | None = None,
+    joint_order: str | None = None,
     rest: Mapping[str, float | str] | None = None,
     rest_missing: bool = False,
     ignore_extra: bool = False,
@@ -286,6 +298,7 @@ def read_shape_path(
         time_unit=time_unit,
         timestep=timestep,
         topic=topic,
+        joint_order=joint_order,
         rest=rest,
         rest_missing=rest_missing,
         ignore_extra=ignore_extra,
@@ -428,6 +441,7 @@ def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
         "at_rest": motion.at_rest,
         "left_out": motion.left_out,
         "base": motion.base.record,
+        "joint_order": None if recording.table.nameless is None else recording.table.nameless.record,
     }
 
 

@@ -1,0 +1,179 @@
+"""Columns of simulators' arrays, which have no names: which joint each is, by the order that the simulator gives them.
+
+Where the file has the places of the bodies, too, the order is the one in which the body's links come to lie there.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder, simulator_order
+from ...body.virtual_base import way_names
+from ...errors import TrajectoryError, TrajectoryWarning
+
+FREE_JOINT = 7
+"""Entries of a free joint: a place and a quaternion."""
+_SAMPLES = 50
+"""Of a motion, at which places of bodies are compared: enough for every joint to have moved."""
+_FITS = 0.01
+"""Of the extent of the body, rms: links that lie farther from where the file has its bodies are others."""
+_ALIKE = 5.0
+"""Times the least distance: orders within it are not told apart by places, which have few digits."""
+
+
+@dataclass(frozen=True)
+class NamelessJoints:
+    """What the columns of an array are.
+
+    Attributes
+    ----------
+    order : the word for their order, one of `WORDS`
+    names : of the columns behind the free joint
+    free : the number of columns before them, 7 or none
+    """
+
+    order: str
+    names: tuple[str, ...]
+    free: int
+
+    @property
+    def title(self) -> str:
+        """The order in words."""
+        return TITLES[self.order]
+
+    @property
+    def record(self) -> dict[str, object]:
+        """As JSON holds it."""
+        return {"order": self.order, "means": self.title, "joints": list(self.names)}
+
+
+def nameless_joints(body: Body, width: int, where: str, order: str | None) -> NamelessJoints:
+    """The joints of an array of so many columns, with a free joint before them or without.
+
+    order : one of `WORDS`; None: MuJoCo's
+
+    Raises
+    ------
+    TrajectoryError
+        If the body has another number of joints.
+
+    Warns
+    -----
+    TrajectoryWarning
+        Where Isaac's order depends on how its importer sorted the joints of a link.
+    """
+    word = order or MUJOCO
+    joints = simulator_order(body, word, body.joint_names)
+    found = {(names, free) for names, free in _columns(body, joints) if width == len(names) + free}
+    if len(found) != 1:
+        own = _own(body, joints)
+        raise TrajectoryError(
+            f"{where} has {width} columns; with {len(own)} joints ({', '.join(own)}) it has {len(own) + FREE_JOINT}, "
+            f"or {len(own)} without the free joint; joints that follow others may be there, too. Add an array "
+            "'joint_names' with the names of the columns"
+        )
+    ((names, free),) = found
+    other = _own(body, simulator_order(body, ISAAC_BY_NAME, body.joint_names))
+    if word == ISAAC and other != _own(body, names):
+        warnings.warn(
+            f"{where}: joints of one link are taken as the file of {body.name} lists them: {', '.join(names)}; if the "
+            f"importer sorted them by name, give joint_order={ISAAC_BY_NAME!r} (--joint-order {ISAAC_BY_NAME})",
+            TrajectoryWarning,
+            stacklevel=2,
+        )
+    return NamelessJoints(word, names, free)
+
+
+def placed_joints(
+    body: Body, joints: Array, places: Array, attitudes: Sequence[Array], where: str, order: str | None
+) -> tuple[NamelessJoints, int]:
+    """The joints of an array whose bodies' places are known, and which of the attitudes belongs to them.
+
+    Parameters
+    ----------
+    joints : (N, n) without the free joint
+    places : (N, b, 3) of the bodies, the base first [m]
+    attitudes : of the base, (N, 3, 3) each, as the numbers of its quaternion may be ordered
+    order : one of `WORDS`; None: all are tried
+
+    Raises
+    ------
+    TrajectoryError
+        If no order lets the links lie where the bodies are, or several do that say different things.
+    """
+    if places.ndim != 3 or places.shape[::2] != (len(joints), 3):
+        raise TrajectoryError(
+            f"{where}: the places of bodies have the shape {places.shape}; ({len(joints)}, bodies, 3) is needed"
+        )
+    rows = np.unique(np.linspace(0, len(joints) - 1, _SAMPLES).astype(int))
+    apart = places[rows, 1:] - places[rows, :1]
+    seen = [np.einsum("tji,tkj->tki", turned[rows], apart) for turned in attitudes]
+    extent = float(np.sqrt(np.mean(np.sum(apart**2, axis=-1)))) if apart.size else 0.0
+    tried: list[tuple[float, NamelessJoints, int]] = []
+    for known in (*body.joint_orders, JointOrder(OWN, body.joint_names, ())):
+        names = next((n for n, free in _columns(body, known.joints) if not free and len(n) == joints.shape[1]), None)
+        if names is None or len(known.links) != places.shape[1] or (order is not None and known.word != order):
+            continue
+        shapes = _shapes(body, joints[rows], names)
+        first, *others = (body.link_pose(shapes, link)[:, :3, 3] for link in known.links)
+        laid = np.stack([other - first for other in others], axis=1) if others else np.zeros_like(apart)
+        for which, measured in enumerate(seen):
+            off = float(np.sqrt(np.mean(np.sum((laid - measured) ** 2, axis=-1)))) if others else 0.0
+            tried.append((off, NamelessJoints(known.word, names, 0), which))
+    if not tried:
+        raise TrajectoryError(
+            f"{where}: {joints.shape[1]} joints and {places.shape[1]} bodies are there, and {body.name} has "
+            f"{body.n_shape} joints and {len(body.link_names)} links: the order of the joints cannot be told; add an "
+            "array 'joint_names', or give joint_order (--joint-order)"
+        )
+    best, chosen, which = min(tried, key=lambda each: each[0])
+    if best > _FITS * extent:
+        raise TrajectoryError(
+            f"{where}: in no order of the joints do the links of {body.name} lie where the file has its bodies: at "
+            f"best {best:.3g} m from there, rms; is it another robot? Add an array 'joint_names' if it is not"
+        )
+    meant = _shapes(body, joints, chosen.names)
+    for off, one, other in tried:
+        if off > _ALIKE * best + 1e-9 * extent:
+            continue
+        if other != which or not np.array_equal(_shapes(body, joints, one.names), meant):
+            raise TrajectoryError(
+                f"{where}: the places of the bodies fit {chosen.title}, and {one.title} as well; give joint_order "
+                f"(--joint-order {chosen.order} or {one.order}), or add an array 'joint_names'"
+            )
+    return chosen, which
+
+
+def _own(body: Body, names: Sequence[str]) -> tuple[str, ...]:
+    """The independent ones."""
+    return tuple(name for name in names if name in body.joint_names)
+
+
+def _columns(body: Body, names: tuple[str, ...]) -> list[tuple[tuple[str, ...], int]]:
+    """What columns may be: all joints or the independent ones, behind a free joint, what moves the base, or none."""
+    way = way_names(body.base_joints)
+    found = [(each, free) for each in dict.fromkeys((names, _own(body, names))) for free in (FREE_JOINT, 0)]
+    if way:
+        found += [((*way, *each), 0) for each in dict.fromkeys((names, _own(body, names)))]
+    return found
+
+
+def _shapes(body: Body, joints: Array, names: tuple[str, ...]) -> Array:
+    """The columns of the independent joints, in the body's order."""
+    return joints[:, [names.index(name) for name in body.joint_names]]
+
+
+def attitudes_of(quaternions: Array, where: str) -> tuple[Array, Array]:
+    """Attitudes (N, 3, 3) of quaternions (N, 4), read as w x y z and as x y z w. Raises TrajectoryError."""
+    norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    if not np.all(np.abs(norms - 1.0) <= 1e-3):
+        raise TrajectoryError(f"{where}: the quaternions of the base are not of length 1")
+    unit = quaternions / norms
+    return so3.matrix_from_quat(np.roll(unit, -1, axis=-1)), so3.matrix_from_quat(unit)
