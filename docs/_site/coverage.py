@@ -59,9 +59,11 @@ def coverage(root: Path) -> dict[str, tuple[str, list[str], list[str]]]:
                 for one in _codes(text) | codes:
                     tests[one].append(f"{file.relative_to(root / 'tests')}: {name}")
     more = _listed(root)
+    # Listed names come first: a docstring may cite a code that its function only uses.
     for found, table in ((functions, "functions"), (tests, "tests")):
         for code, names in more[table].items():
-            found[code] = [*found[code], *(name for name in names if name.rpartition(".")[2] not in found[code])]
+            short = {name.rpartition(".")[2] for name in names}
+            found[code] = [*names, *(name for name in found[code] if name not in short)]
     return {code: (text, functions[code], tests[code]) for code, text in entries.items()}
 
 

@@ -445,6 +445,31 @@ def test_azimuth_arguments_are_checked_e10():
             function(crossing)
 
 
+def test_a_momentum_that_closes_returns_before_the_misread_bound_c_e10():
+    """I_1 is six times its least value for a moment, inside of the turn; Pi comes back to its very start.
+
+    The pulse is even about the instant at which Pi crosses the plane of axes 1 and 2: the way back mirrors the way out.
+    """
+    centre = 5.282198725746
+
+    def moments(t):
+        pulse = np.exp(-4.0 * (np.asarray(t) - centre) ** 2)
+        return 1.0 + 5.0 * pulse, 6.5 + 0.0 * pulse, 7.0 + 0.0 * pulse
+
+    start = np.array([0.8, 0.6, 0.0])
+    times = np.linspace(0.0, 2.0 * centre, 1001)
+    momenta = raw_momentum(moments, start, times)
+    assert momenta[-1] == pytest.approx(start, abs=1e-9)
+    assert np.linalg.norm(momenta[30:-30] - start, axis=1).min() > 0.1
+    # The condition of case 1, corrected by C-E5, holds, and Pi goes once round axis 1.
+    assert (0.5 * momenta**2 / np.stack(moments(times), axis=-1)).sum(axis=1).min() > 0.5 / 6.5
+    angle = -np.unwrap(np.arctan2(momenta[:, 2], momenta[:, 1]))
+    assert angle[-1] == pytest.approx(2.0 * np.pi, abs=1e-8)
+    radius = 2.0 * np.pi * np.linalg.norm(np.cross(start, [1.0, 0.0, 0.0]))
+    assert (round(radius, 2), round(times[-1], 2), round(6.0 * radius, 2)) == (3.77, 10.56, 22.62)
+    assert radius < times[-1] < 6.0 * radius
+
+
 def test_return_time_with_the_other_extreme_is_false_c_e10():
     """Remark 4.1 read with 1/max I_1 claims more time than Pi takes; with 1/min I_1 it holds, the sharper one also.
 

@@ -887,7 +887,7 @@ def test_energies_of_a_file(tmp_path):
         np.testing.assert_allclose(theirs.montgomery_phase, ours.montgomery_phase, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("method", ["collocation", "dop853"])
+@pytest.mark.parametrize("method", ["spectral", "dop853"])
 def test_other_methods_have_running_phases_too(method):
     momentum, attitude = random_vector(2, 12.0), random_rotation(3)
     motion = sp.reconstruct(deformation_of("satellite"), momentum, attitude, tolerance=1e-9, method=method)

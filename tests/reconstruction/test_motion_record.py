@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import InputFileNotFoundError, ResultFileError, ShapeError
+from shapephase.errors import InputFileNotFoundError, ResultFileError, ShapeError, UnknownNameError
 from support.independent import BODIES, apart, body_of, random_loop, random_rotation, random_vector
 
 TIMES = np.linspace(0.0, 2.0, 101)
@@ -177,6 +177,23 @@ def rewritten(saved: Path, target: Path, **changes) -> Path:
     arrays = {name: value for name, value in {**arrays, **changes}.items() if value is not None}
     np.savez(target, **arrays)
     return target
+
+
+def test_the_former_name_of_the_method_is_read_and_no_longer_taken(saved: Path, tmp_path):
+    """Files of before name the spectral method "collocation"; what is written again does not."""
+    with np.load(saved) as stored:
+        header = json.loads(str(stored["header"]))
+    assert header["method"] == "spectral"
+    header["method"] = "collocation"
+    old = sp.load_motion(rewritten(saved, tmp_path / "old.npz", header=np.array(json.dumps(header))))
+    new = sp.load_motion(saved)
+    assert (old.method, new.method) == ("spectral", "spectral")
+    assert np.array_equal(old.quat_xyzw([0.3, 0.7]), new.quat_xyzw([0.3, 0.7]))
+    old.save(tmp_path / "again.npz")
+    with np.load(tmp_path / "again.npz") as stored:
+        assert json.loads(str(stored["header"]))["method"] == "spectral"
+    with pytest.raises(UnknownNameError, match=r"'collocation'.*spectral"):
+        sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 5.0], method="collocation")
 
 
 def test_there_is_no_such_file(tmp_path):

@@ -155,6 +155,20 @@ def test_the_printed_attitude_contradicts_the_printed_velocities_m_e5():
         assert np.abs(ZXZ.attitude(angles) - here).max() > 1e-3
 
 
+def test_where_theta_is_zero_angles_are_not_unique_m_e15():
+    """There the attitude knows phi + psi alone, by SciPy's turns; the differential loses one rank of three, not all."""
+    for theta, sign in ((0.0, 1.0), (np.pi, -1.0)):
+        angles = np.array([[0.3, theta, 1.1], [0.3 + 0.5, theta, 1.1 - sign * 0.5]])
+        first, second = Rotation.from_euler("ZXZ", angles).as_matrix()
+        assert np.abs(first - second).max() < ROUNDING
+        assert np.abs(ZXZ.attitude(angles) - first).max() < ROUNDING
+    step = 1e-6
+    for theta, rank in ((0.0, 2), (1.0, 3)):
+        around = [Rotation.from_euler("ZXZ", np.array([0.0, theta, 0.0]) + step * e).as_rotvec() for e in np.eye(3)]
+        here = Rotation.from_euler("ZXZ", [0.0, theta, 0.0]).as_rotvec()
+        assert np.linalg.matrix_rank((np.array(around) - here) / step, tol=1e-3) == rank
+
+
 @CHARTS
 def test_angular_velocities_are_the_derivative_of_the_attitude_j2(chart):
     rng = np.random.default_rng(4)

@@ -249,9 +249,54 @@ def test_the_discriminant_vanishes_for_a_flat_disc_and_the_spectrum_still_decide
         assert np.abs(spectrum.imag if slow else spectrum.real).max() == 0.0
         assert spectrally_stable(moments, mgl, p) == (not slow)
         assert sleeping_top(LagrangeTop(1.5, 3.0, mgl), p).verdict == ("unstable" if slow else "stable")
-    # Nor is it negative at rest.
-    assert characteristic_polynomial([1.0, 1.0, 0.6], mgl, 0.0)[2] == 0.0
-    assert not spectrally_stable([1.0, 1.0, 0.6], mgl, 0.0)
+        # The closed form of the double roots, by NumPy's eigenvalues of the linearised equations.
+        matrix = sleeping_matrix(moments, mgl, p)
+        square = (4.0 * mgl * 1.5 - p * p) / (4.0 * 1.5**2)
+        assert np.abs(matrix @ matrix - square * np.eye(4)).max() < 1e-12
+    growth = np.linalg.eigvals(sleeping_matrix([1.0, 1.0, 2.0], 0.9, 0.95 * 2.0 * np.sqrt(0.9))).real
+    assert np.sort(growth) == pytest.approx([-0.296, -0.296, 0.296, 0.296], abs=5e-4)
+    # Disc of mass M and moments (m, m, 2 m) about its own centre, at the distance l: I3 = 2 (I1 - M l^2) < 2 I1.
+    points = np.array([[np.cos(u), np.sin(u), 0.7] for u in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)])
+    inertia = np.einsum("ij,ij->", points, points) * np.eye(3) - points.T @ points
+    assert inertia[2, 2] == pytest.approx(2.0 * (inertia[0, 0] - 12.0 * 0.7**2), rel=1e-14)
+
+
+def test_the_printed_conditions_do_not_make_the_second_variation_definite_m_e14():
+    """(15.10.8) to (15.10.10) ask of the corner only that it is positive; definite needs its Schur complement to be."""
+    i1, i3, mgl, p, phi_dot, b = 1.0, 0.5, 0.1, 3.0, -1.5, -3.9
+    vertical = -(mgl + phi_dot * p)
+    assert 1.0 / i3 > 0.0
+    assert vertical / i1 - phi_dot**2 > 0.0
+    assert vertical + b > 0.0
+    matrix = np.diag([1.0 / i1, 1.0 / i1, 1.0 / i3, vertical, vertical, vertical + b])
+    for k in range(3):
+        matrix[k, k + 3] = matrix[k + 3, k] = phi_dot
+    assert np.linalg.eigvalsh(matrix)[0] == pytest.approx(-0.427, abs=5e-4)
+    exact, _ = lifted(LagrangeTop(i1, i3, mgl), p, phi_dot, 0.0, b, 0.0, 0.0)
+    assert np.abs(exact - matrix).max() < 1e-12
+    rng = np.random.default_rng(19)
+    for _ in range(40):
+        top, p, phi_dot = random_lagrange(rng), rng.normal() * 3.0, rng.normal()
+        a, b, c, d = rng.normal(size=4) * 4.0
+        exact, _ = lifted(top, p, phi_dot, a, b, c, d)
+        corner, coupling, axial = exact[5, 5], exact[2, 5], 1.0 / top.axial + a + c
+        inner = exact[3, 3] / top.transverse - phi_dot**2
+        right = axial > 0.0 and inner > 0.0 and axial * corner > coupling**2
+        assert right == (np.linalg.eigvalsh(exact)[0] > 0.0)
+
+
+def test_a_top_at_rest_and_one_that_spins_backwards_m_e16():
+    """The theorem means |Pi3|. At rest the discriminant is zero, the two squares of the roots are Mgl/I1."""
+    mgl = 2.0
+    for axial in (0.6, 1.7):
+        moments = [1.3, 1.3, axial]
+        squares = np.linalg.eigvals(sleeping_matrix(moments, mgl, 0.0)) ** 2
+        assert squares == pytest.approx(np.full(4, mgl / 1.3), rel=1e-7)
+        assert characteristic_polynomial(moments, mgl, 0.0)[2] == 0.0
+        assert not spectrally_stable(moments, mgl, 0.0)
+        top = LagrangeTop(1.3, axial, mgl)
+        assert sleeping_top(top, 0.0).verdict == "unstable"
+        assert [sleeping_top(top, p).verdict for p in (-10.0, -1.0)] == ["stable", "unstable"]
 
 
 def test_energy_casimir_spectrum_and_simulation_agree_m8():

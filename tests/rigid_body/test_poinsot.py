@@ -550,6 +550,20 @@ def test_moments_equal_to_rounding_count_as_equal_h2():
         cones(EulerTop.principal((1.0, 1.0 + 1e-9, 2.0), momentum))
 
 
+def test_the_sign_of_lambda_does_not_decide_how_the_cones_roll_m_e17():
+    """lambda = -a1 Pi3 changes its sign with Pi3; the cones stay: outside each other with I1 = I2 > I3, else inside."""
+    for moments in ((2.0, 2.0, 0.7), (2.0, 2.0, 3.1)):
+        for side in (1.0, -1.0):
+            momentum = np.array([0.6, 0.0, 0.8 * side])
+            printed = -(moments[1] - moments[2]) / (moments[1] * moments[2]) * momentum[2]
+            omega, axis = momentum / moments, np.array([0.0, 0.0, side])
+            # By coplanarity alone: the momentum lies between axis and omega, or omega between axis and momentum.
+            to_omega, to_momentum = (np.arccos(v @ axis / np.linalg.norm(v)) for v in (omega, momentum))
+            assert cones(EulerTop.principal(moments, momentum)).space_inside_body == (to_omega > to_momentum)
+            assert (to_omega > to_momentum) == (moments[2] > moments[0])
+            assert (printed > 0.0) == ((moments[2] > moments[0]) == (side > 0.0))
+
+
 def test_cone_formulas_as_restored_m_e6():
     """The scan loses the indices and a square; a3 = 0 for a1, a2 and I1 for I3 are its other readings, and fail."""
     random = np.random.default_rng(3)

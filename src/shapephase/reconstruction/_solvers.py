@@ -1,4 +1,4 @@
-"""The ways to the attitude: collocation on an interpolant, the closed form of a rigid body, and SciPy's DOP853."""
+"""The ways to the attitude: steps on a spectral interpolant, the closed form of a rigid body, and SciPy's DOP853."""
 
 from __future__ import annotations
 
@@ -153,12 +153,12 @@ def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float)
     if worst > tolerance:
         raise AccuracyNotReached(
             f"DOP853 reached {worst:.3g} rad where {tolerance:.3g} was requested; loosen the tolerance or use "
-            "method='collocation'"
+            "method='spectral'"
         )
     return Dop853Rotation(tuple(dense), times, np.array(estimates), evaluations)
 
 
-def _by_collocation(
+def _by_interpolant(
     deformation: Deformation, at_start: Array, tolerance: float, threads: int | None
 ) -> tuple[Solution, int]:
     with engine.Decided():
@@ -194,8 +194,8 @@ def _by_dop853(
 # evaluations.
 Solver = Callable[[Deformation, Array, float, int | None], tuple[Solution, int]]
 SOLVERS: dict[str, Solver] = {
-    "auto": _by_collocation,
-    "collocation": _by_collocation,
+    "auto": _by_interpolant,
+    "spectral": _by_interpolant,
     "closed_form": _by_closed_form,
     "dop853": _by_dop853,
 }

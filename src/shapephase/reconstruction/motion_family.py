@@ -18,7 +18,7 @@ from ..errors import ShapeError, unknown_name
 from ..integrator.variants.rotations import VariantRotations, rotations_of_variants
 from .reconstruction import Motion
 
-_METHODS = ("auto", "collocation")
+_METHODS = ("auto", "spectral")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class MotionFamily(Sequence[Motion]):
             momentum=self.momentum[numbers],
             initial_attitude=self.initial_attitude[numbers],
             tolerance=self.tolerance,
-            method="collocation",
+            method="spectral",
             evaluations=solution.interpolant.evaluations,
             solution=solution,
         )

@@ -173,7 +173,8 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         arrays["spatial_momentum"],
         so3.orthonormalised(arrays["initial_attitude"]),
         _positive(header, "tolerance"),
-        str(header["method"]),
+        # The name in files of earlier versions.
+        "spectral" if header["method"] == "collocation" else str(header["method"]),
         int(header["evaluations"]),
         _solution(header, arrays, interpolant),
     )

@@ -388,9 +388,9 @@ def reconstruct(
     attitude : (..., 3, 3) of the deformation's frame at t = 0, to inertial axes; None: the identity. Leading
         axes of both broadcast.
     tolerance : of the attitude, over the whole interval, between 1e-13 and 1e-4 [rad]
-    method : "auto" or "collocation" (the deformation sampled at Chebyshev points, the attitude stepped on the
-        interpolant), "closed_form" (of a rigid body, by elliptic functions: `rigid_body.EulerTop`), or "dop853"
-        (SciPy's integrator on the deformation itself, an independent check)
+    method : "auto" or "spectral" (the deformation sampled at Chebyshev points, the attitude stepped on the interpolant
+        by a Runge-Kutta method of order 8), "closed_form" (of a rigid body, by elliptic functions:
+        `rigid_body.EulerTop`), or "dop853" (SciPy's integrator on the deformation itself, an independent check)
     threads : at most, for many momenta or bodies; None: one for each processor. Results do not depend on it
     progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
         falls, and what is being done; if it returns something true, the run stops
@@ -455,7 +455,7 @@ def reconstruct(
         momentum=spatial,
         initial_attitude=start,
         tolerance=goal,
-        method="collocation" if method == "auto" else method,
+        method="spectral" if method == "auto" else method,
         evaluations=evaluations,
         solution=solution,
     )

@@ -446,7 +446,10 @@ def test_gauss_curvature_of_the_polar_form_r10():
 
 
 def test_lemma_4_2_over_200_bodies_r10():
-    """The largest curvature, (B - A)(C - A)/A, is on the equator; the least at z = 2 B only if 2 I_2 >= I_1 + I_3."""
+    """The largest curvature, (B - A)(C - A)/A, is on the equator, as the lemma says.
+
+    The least, of which it says nothing, is at z = 2 B only if 2 I_2 >= I_1 + I_3.
+    """
     inner = 0
     for moments in random_moments(np.random.default_rng(5), 200):
         metric = serret_andoyer_metric(moments)

@@ -205,7 +205,7 @@ class SerretAndoyerMetric:
         smallest value is -(a_2 - a_3)(a_1 - a_2)/a_2, at `crest`, only if I_2 >= (I_1 + I_3)/2; else it is lower, where
         m = (I_1 + I_2 + I_3)/3.
 
-        Source: Bonnard et al., lemma 4.2.
+        Source: Bonnard et al., lemma 4.2, of the largest; the smallest is derived from it, which states none.
         """
         a1, a2, a3 = self._inverse.tolist()
         i1, i2, i3 = self._ascending.tolist()
