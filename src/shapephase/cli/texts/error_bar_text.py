@@ -87,7 +87,7 @@ def error_bar_lines(
             f"{'± of the recorded base':24}alone; the noise of the joints is not stated (--joint-noise 0.3deg)"
         )
     if found.smoothing_bias:
-        lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most, which the bars do not hold")
+        lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most; the bars hold it")
     return lines
 
 

@@ -152,7 +152,7 @@ def read_recorded_motion(
     smooth : noise level of the samples, rms, a number [rad or m] or a text as "0.3deg" or "0.3deg,1mm", one for all
         joints or by joint (the others are interpolated); None: the path goes through all samples. See
         `smoothing.smoothed_path`.
-    smooth_penalty : instead of the penalty that follows from the noise [s^3]
+    smooth_penalty : instead of the penalties that follow from the noise [s^5]
     close : the largest gap between the ends of a cycle that is closed, a number [rad or m] or a text as "3deg" or
         "3deg,5mm"; None: what meets to 1e-9 runs smoothly from its end to its start, else the ends stay apart; False:
         they are not joined even then
@@ -399,8 +399,8 @@ def _smoothing_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
     """What smoothing did, as JSON can hold it."""
     rms = np.sqrt(np.mean(smoothing.bias**2, axis=0))
     return {
-        "penalty_s3": smoothing.penalty,
-        "degrees_of_freedom": smoothing.degrees_of_freedom,
+        "penalty_s5": dict(zip(body.joint_names, smoothing.penalty.tolist(), strict=True)),
+        "degrees_of_freedom": dict(zip(body.joint_names, smoothing.degrees_of_freedom.tolist(), strict=True)),
         "bias_rms": dict(zip(body.joint_names, rms.tolist(), strict=True)),
         "bias_in_bars": smoothing.bias_in_bars,
     }
