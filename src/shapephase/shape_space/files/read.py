@@ -30,6 +30,7 @@ from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
 from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
+from ._surroundings import surrounded
 from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
@@ -147,7 +148,8 @@ def read_recorded_motion(
     rest : joint -> value [rad or m], or a text as "30deg" or "5 mm", for joints without a column
     rest_missing : whether all other joints without a column rest at zero, or at their limit next to it
     ignore_extra : whether columns that are no joints are left out
-    trim : the first and the last time to be kept, as the file tells the time (its unit, its start)
+    trim : the first and the last time to be kept, as the file tells the time (its unit, its start); what is smoothed is
+        smoothed before it is cut
     resample : the path goes through this many of its own values a second instead, evenly spaced [1/s]
     smooth : noise level of the samples, rms, a number [rad or m] or a text as "0.3deg" or "0.3deg,1mm", one for all
         joints or by joint (the others are interpolated); None: the path goes through all samples. See
@@ -207,6 +209,13 @@ def read_recorded_motion(
     try:
         noise = _noise_levels(smooth, body)
         samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)
+        if noise.any() and (kept is not None or free is not None):
+            samples = surrounded(
+                samples,
+                recording,
+                lambda: recording_of(table, body.joint_names, mapping, time_unit, step, None),
+                lambda part: matched(part, body, choices).shapes,
+            )
         path, smoothing, closing = _path(samples, body, within, close_by, loop=close is None, penalty=smooth_penalty)
         check_swings(path, body)
     except (TrajectoryError, ShapeError) as error:
