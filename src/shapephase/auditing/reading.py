@@ -19,13 +19,15 @@ from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError, Unknow
 from ..files import npz_arrays
 from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
 from ..shape_space.files.formats.text_tables import read_delimited
-from ..shape_space.files.read import read_recorded_motion
+from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from .floating_trajectory import FloatingTrajectory
 
 _NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot)[_\[ ]?([0-9]{1,6})\]?")
 """Labels of a table such as qpos_0, qpos[0] and qpos0."""
 _ROOT = 6
 """Coordinates of biorbd's root: three places, three angles."""
+_CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
+"""Formats in which people are recorded; they say what is in degrees, and how attitudes are written."""
 _TEXTS = (".csv", ".tsv", ".txt")
 
 
@@ -110,9 +112,26 @@ def read_trajectory(
             position=recorded.base_position,
             step=step,
             name=where.name,
+            certain=_certain(recorded, degrees),
+            captured=recorded.format in _CAPTURED,
         )
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None
+
+
+def _certain(recorded: RecordedMotion, degrees: bool | None) -> tuple[str, ...]:
+    """What is no hypothesis: said by the format, by labels or by the caller."""
+    found = []
+    units = set(recorded.record["units"].values())
+    if recorded.format in _CAPTURED or degrees is not None or "rad" not in units:
+        found.append("units")
+    base = recorded.record["base"] or {}
+    # Three angles have no order of four numbers.
+    if recorded.format in _CAPTURED or "order" in base:
+        found.append("order")
+    if recorded.format in _CAPTURED:
+        found.append("direction")
+    return tuple(found)
 
 
 def _of_file(where: Path, error: Exception) -> TrajectoryError | UnknownNameError:

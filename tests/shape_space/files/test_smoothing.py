@@ -117,7 +117,7 @@ def ends_and_middle(estimate, truth):
     return np.array([[np.sqrt(np.mean(part**2)) for part in (one[[0, -1]], one[2:-2])] for one in off])
 
 
-@pytest.mark.parametrize("count, noise", [(46, 0.02), (61, 0.005)])
+@pytest.mark.parametrize(("count", "noise"), [(46, 0.02), (61, 0.005)])
 def test_where_a_recording_ends_errors_are_those_of_the_best_quintic_spline(count, noise):
     """At most 1.5 times the least that any one penalty has over 12 seeds, for rate and for acceleration; the best
     penalty is found with the truth known."""
