@@ -34,6 +34,7 @@ from .deformation.deformation import Deformation, DeformationFamily, articulated
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .dynamics.loads import JointLoads
 from .dynamics.swinging import FreeHinges, free_hinges
+from .dynamics.torque_errors import TorqueErrors, torque_errors
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.inertia_errors import InertiaErrors
@@ -85,6 +86,7 @@ from .shape_space.connection import (
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
+from .shape_space.path_errors import PathErrors, path_errors
 from .shape_space.reach.holonomy_algebra import Reach, reachable
 from .shape_space.reach.manipulators import dynamic_manipulability, generalised_jacobian, reaction_null_space
 from .shape_space.reach.perturbation_frames import MinimumPerturbation, minimum_perturbation
@@ -124,6 +126,7 @@ __all__ = [
     "MotionFamily",
     "OrbitBranch",
     "ParticleBody",
+    "PathErrors",
     "PathSummary",
     "PhaseSplit",
     "Reach",
@@ -136,6 +139,7 @@ __all__ = [
     "Sensitivity",
     "ShapePath",
     "ShapePhaseError",
+    "TorqueErrors",
     "TorqueState",
     "TrajectoryWarning",
     "Uncertainty",
@@ -193,6 +197,7 @@ __all__ = [
     "parallel_transport",
     "particle_body",
     "particles",
+    "path_errors",
     "path_summary",
     "phases",
     "plan_reorientation",
@@ -220,6 +225,7 @@ __all__ = [
     "stokes_holonomy",
     "stroboscopic_map",
     "study",
+    "torque_errors",
     "uncertainty",
     "view",
     "write_shape_path",

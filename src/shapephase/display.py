@@ -7,6 +7,7 @@ Results without a card of their own print their fields by `short_repr`. Neither 
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Protocol
@@ -117,6 +118,22 @@ def error_text(error: Any) -> str:
     """An error estimate; of a batch its largest."""
     most = float(np.max(error)) if np.size(error) else 0.0
     return f"{most:.1e} rad{' at most' if np.ndim(error) else ''}"
+
+
+def number_with_bar(value: float, bar: float) -> str:
+    """A number and its bar, of which two digits are shown; both end at the same digit.
+
+    Examples
+    --------
+    >>> sp.display.number_with_bar(12.3456, 0.123)
+    '12.35 ± 0.12'
+    """
+    if not bar > 0.0:
+        return f"{value:.4g} ± 0"
+    if not 1e-4 <= bar < 1e6:
+        return f"{value:.4g} ± {bar:.2g}"
+    digits = max(1 - math.floor(math.log10(bar)), 0)
+    return f"{value:.{digits}f} ± {bar:.{digits}f}"
 
 
 def momentum_text(momentum: Array) -> str:

@@ -6,8 +6,12 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
+from shapephase import so3
+from shapephase.errors import ShapeError, TrajectoryError
+from support.ball_bodies import BALLS, ORDER, Hinges
 from support.flown_bodies import body_of, flown, noisy
 from support.planted_faults import FAULTS, clean_run, faults_of_finding, planted, trajectory
 
@@ -159,3 +163,109 @@ def test_a_recorder_in_a_running_loop_and_an_assertion():
         sp.auditing.assert_right_in_flight(case.body, case.trajectory)
     with pytest.raises(sp.errors.TrajectoryError, match="nothing was recorded"):
         sp.auditing.FlightRecorder(body_of("diver")).trajectory()
+
+
+def moved_diver(times, momentum=(2.0, 12.0, 4.0)):
+    """Joints of a diver, and its exact motion."""
+    body = body_of("diver")
+    turn = 2.0 * np.pi * times[:, None] / times[-1]
+    shapes = np.array([1.2, -1.0]) + np.array([0.9, 0.6]) * np.sin(turn + np.array([0.0, 0.7]))
+    path = sp.ShapePath.spline(times, shapes, periodic=False, joint_names=body.joint_names)
+    return body, shapes, sp.reconstruct(sp.articulated(body, path), momentum)
+
+
+def in_free_fall(times, centres):
+    return centres + np.outer(3.0 * times - 0.5 * 9.81 * times**2, [0.0, 0.0, 1.0])
+
+
+def test_a_body_that_walks_or_stands_is_nowhere_in_the_air():
+    """Steps twice a second; and a sway of a centimetre about the feet, with arms that move."""
+    body, times = body_of("diver"), np.arange(0.0, 8.0, 0.01)
+    random = np.random.default_rng(0)
+    arms = 0.4 * np.sin(2.0 * np.pi * times[:, None] + [0.0, 2.0]) + 1e-4 * random.normal(size=(len(times), 2))
+    half = 0.05 * np.sin(2.0 * np.pi * times)
+    yaw = np.column_stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)])
+    walk = np.column_stack([0.8 * times, 0.03 * np.sin(2.0 * np.pi * times), 0.9 + 0.02 * np.sin(4.0 * np.pi * times)])
+    sway = 0.01 * np.column_stack([np.sin(2.0 * times), np.cos(1.3 * times), 90.0 + 0.0 * times])
+    for places in (walk, sway):
+        run = sp.FloatingTrajectory(times=times, quaternion=yaw, shapes=arms, position=places)
+        with pytest.raises(TrajectoryError, match="nowhere in the air"):
+            sp.audit(body, run)
+
+
+def test_an_engine_without_its_gyroscopic_term_is_named():
+    """A rigid body whose angular velocity stays what it is, in world axes, as SciPy turns it."""
+    body, times, rate = body_of("cat_two_halves"), np.linspace(0.0, 1.2, 61), np.array([5.0, 0.4, 1.0])
+    turned = (Rotation.from_rotvec(times[:, None] * rate) * Rotation.from_rotvec([0.3, 0.2, 0.1])).as_quat()
+    still = np.tile([0.5, 0.2, 0.1], (61, 1))
+    found = sp.audit(body, sp.FloatingTrajectory(times=times, quaternion=turned, shapes=still))
+    assert [one.kind for one in found.cause] == ["engine"]
+    fitted = [value.value for value in found.cause[0].values.values()]
+    np.testing.assert_allclose(fitted, rate, rtol=1e-6)
+
+
+def test_a_recording_of_a_person_is_held_to_what_can_be_known():
+    """The centre of the trunk wanders by 6 mm, as markers on skin do: of a simulator that is wrong, of a person not."""
+    times = np.linspace(0.0, 0.6, 73)
+    body, shapes, motion = moved_diver(times)
+    wander = 0.006 * np.sin(2.0 * np.pi * times[:, None] / 0.5 + [0.0, 1.0])
+    given = {
+        "times": times,
+        "quaternion": so3.quat_from_matrix(motion.attitude(times)),
+        "shapes": shapes + 4.0 * wander,
+        "position": in_free_fall(times, motion.base_position(times)),
+    }
+    person = sp.audit(body, sp.FloatingTrajectory(**given, captured=True))
+    assert person.right, person.table()
+    assert 0.005 < person.runs[0].relative_drift < person.runs[0].tolerance
+    drift = person.runs[0].momentum_drift / np.linalg.norm(motion.momentum)
+    assert f"conserved within {100.0 * drift:.1g}" in person.verdict
+    assert "falls with 9.8" in person.verdict
+    assert not sp.audit(body, sp.FloatingTrajectory(**given)).right
+    assert not sp.audit(body, sp.FloatingTrajectory(**given, captured=True), tolerance=1e-3).right
+
+
+def test_what_no_body_can_have_is_no_hypothesis_and_a_star_leaves_a_fifth_at_most():
+    """A torque of 30 N m from outside about the axis of the turn: the momentum doubles, which a trunk with a negative
+    moment of inertia would explain."""
+    times = np.linspace(0.0, 0.8, 73)
+    body, shapes, motion = moved_diver(times, (0.0, 24.5, 0.0))
+    path = sp.ShapePath.spline(times, shapes, periodic=False, joint_names=body.joint_names)
+    pushed = sp.reconstruct(
+        sp.articulated(body, path),
+        motion.momentum,
+        torque=sp.ExternalTorque(lambda _: [0.0, 30.0, 0.0], axes="space"),
+    )
+    run = sp.FloatingTrajectory(
+        times=times, quaternion=so3.quat_from_matrix(pushed.attitude(times)), shapes=shapes, certain=("order", "units")
+    )
+    found = sp.audit(body, run)
+    assert "torque from outside" in [one.name for one in found.cause], found.table()
+    for one in found.hypotheses:
+        assert one.kind != "units"
+        for label, fitted in one.values.items():
+            if label in ("mass", "both"):
+                assert fitted.value > -100.0
+    assert all(one.share <= 0.2 or one.left_over <= np.sqrt(2.0) for one in found.cause)
+
+
+def test_ball_joints_are_audited(tmp_path):
+    """A link that weighs a twentieth more, between ball joints."""
+    (tmp_path / "balls.urdf").write_text(BALLS)
+    body, times = sp.load_body(tmp_path / "balls.urdf"), np.linspace(0.0, 1.0, 61)
+    angles = [0.8, 0.5, 0.7] * np.sin(times[:, None] * [6.0, 3.0, 5.0] + [[0.0, 1.0, 2.0]])
+    shapes = np.hstack([Hinges.quaternions(angles), Hinges.quaternions(0.5 * angles[::-1]), 0.6 + angles[:, :1]])
+    path = sp.ShapePath.spline(times, shapes, periodic=False, joint_names=ORDER)
+    arm = next(part for part in body.moving_parts if part.links[0] == "arm")
+    heavier = body.with_inertias(masses={"arm": 1.05 * arm.mass})
+    for other, causes in ((body, []), (heavier, ["mass of arm"])):
+        motion = sp.reconstruct(sp.articulated(other, path), [2.0, 5.0, 1.0], tolerance=1e-11)
+        run = sp.FloatingTrajectory(
+            times=times,
+            quaternion=so3.quat_from_matrix(motion.attitude(times)),
+            shapes=path.matched(body.joint_names, body.name).shape(times),
+            position=in_free_fall(times, motion.base_position(times)),
+        )
+        assert [one.name for one in sp.audit(body, run).cause] == causes
+    with pytest.raises(ShapeError, match="ball joints are not read"):
+        sp.FloatingTrajectory.from_mujoco(body, times, np.zeros((61, 16)))

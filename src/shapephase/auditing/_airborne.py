@@ -14,6 +14,7 @@ from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
 from ..shape_space.files._free_fall import free_fall
+from ._noise import white_noise
 from .floating_trajectory import FloatingTrajectory
 
 _GRAVITY = 9.81
@@ -24,6 +25,15 @@ _WINDOWS = 12
 """Over the whole trajectory, over each of which an acceleration is fitted."""
 _LEAST_WINDOW = 8
 """Samples of a window."""
+_STRAIGHT = 0.5
+"""Of how far the base is off parabolas: the centre of mass of a body that nothing carries is off by less, in most
+windows; that of a body that stands or walks goes with its base, or farther."""
+_BY_NOISE = 4.0
+"""Standard deviations of the noise, by which it may be off anyway."""
+_MANY = 5000
+"""Samples; of more, so few a second are looked at that they are about this far apart:"""
+_ENOUGH = 1.0 / 120.0
+"""[s] A twentieth of the shortest flight that can be told from rest."""
 
 
 @dataclass(frozen=True)
@@ -76,13 +86,33 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
         raise ShapeError(f"flight: 'auto', 'all' or two times are needed, got {what_came(flight)}")
     if centres is None:
         return _part(times, None, 0, len(times), "all of it: places are not given, and no fall can be looked for")
-    found = _accelerations(times, centres)
+    usual = float(np.median(np.diff(times)))
+    every = max(1, int(_ENOUGH / usual)) if len(times) > _MANY else 1
+    some, base = centres[::every], trajectory.position[::every] if trajectory.position is not None else centres
+    at = times[::every]
+    found = _accelerations(at, some)
     if np.linalg.norm(found - np.median(found, axis=0), axis=1).max() < _EVEN * _GRAVITY:
-        falls = np.linalg.norm(np.median(found, axis=0)) > _EVEN * _GRAVITY
-        how = "all of it: the centre of mass falls" if falls else "all of it: the centre of mass has no weight"
-        return _part(times, centres, 0, len(times), how)
-    fall = free_fall(times - times[0], centres, trajectory.name)
-    return _part(times, centres, fall.first, fall.last + 1, f"the centre of mass falls, {fall.up} up")
+        if np.linalg.norm(np.median(found, axis=0)) > _EVEN * _GRAVITY:
+            return _part(times, centres, 0, len(times), "all of it: the centre of mass falls")
+        if _goes_straight(at, some, base):
+            return _part(times, centres, 0, len(times), "all of it: the centre of mass has no weight")
+    try:
+        fall = free_fall(at - at[0], some, trajectory.name)
+    except TrajectoryError:
+        raise TrajectoryError(
+            f"{trajectory.name}: nowhere in the air: the centre of mass neither falls freely anywhere, nor goes "
+            "straight where the base does not. Are the axes of the base right (base_axes, --base-axes)? If so, and "
+            "there is a flight, give its times: flight=(first, last) (--flight FIRST LAST)"
+        ) from None
+    past = min(every * fall.last + 1, len(times))
+    return _part(times, centres, every * fall.first, past, f"the centre of mass falls, {fall.up} up")
+
+
+def _goes_straight(times: Array, centres: Array, base: Array) -> bool:
+    """Whether a centre of mass stays on parabolas in most windows, while the base leaves them."""
+    noise = float(white_noise(centres[:, None], 3)[0])
+    off, beside = (_off_parabolas(times, places) for places in (centres, base))
+    return bool(np.median(off <= np.maximum(_STRAIGHT * beside, _BY_NOISE * noise)) > 0.5)
 
 
 def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
@@ -107,6 +137,20 @@ def _acceleration(times: Array, centres: Array) -> Array:
 
 
 def _accelerations(times: Array, centres: Array) -> Array:
-    count = max(_LEAST_WINDOW, len(times) // _WINDOWS)
-    starts = range(0, len(times) - count + 1, count)
-    return np.array([_acceleration(times[k : k + count], centres[k : k + count]) for k in starts])
+    return np.array([_acceleration(times[part], centres[part]) for part in _windows(len(times))])
+
+
+def _off_parabolas(times: Array, places: Array) -> Array:
+    """Rms of what the best parabola leaves in each window, along the axis where it is most [m]."""
+    found = []
+    for part in _windows(len(times)):
+        since = times[part] - times[part].mean()
+        basis = np.linalg.qr(since[:, None] ** np.arange(3))[0]
+        left = places[part] - basis @ (basis.T @ places[part])
+        found.append(np.sqrt((left**2).mean(axis=0)).max())
+    return np.array(found)
+
+
+def _windows(samples: int) -> list[slice]:
+    count = max(_LEAST_WINDOW, samples // _WINDOWS)
+    return [slice(k, k + count) for k in range(0, samples - count + 1, count)]

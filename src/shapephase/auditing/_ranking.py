@@ -15,7 +15,7 @@ _ALIKE = 0.5
 """Of what the best leaves, where that is more than noise: hypotheses that leave so little more explain as well."""
 _MORE_THAN_NOISE = 2.0
 """Mean square from which what is left is more than noise."""
-_EXPLAINS = 0.2
+EXPLAINS = 0.2
 """Of the rms without any hypothesis: what explains it leaves less, or no more than noise."""
 
 
@@ -67,6 +67,5 @@ def ranking(candidates: Sequence[Candidate], square: float, freedom: int) -> Ran
     # A force contains a torque: where that is enough, it is named alone.
     if any(one.kind == "torque" for one in near):
         near = [one for one in near if one.kind != "force"]
-    clean = best.hypothesis.square <= _MORE_THAN_NOISE * freedom
-    explains = clean or best.hypothesis.square <= _EXPLAINS**2 * square
-    return Ranking(ranked=tuple(one.hypothesis for one in ordered), tie=tuple(near) if explains else ())
+    explaining = [one for one in near if one.square <= max(_MORE_THAN_NOISE * freedom, EXPLAINS**2 * square)]
+    return Ranking(ranked=tuple(one.hypothesis for one in ordered), tie=tuple(explaining))

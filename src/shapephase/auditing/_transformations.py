@@ -55,6 +55,7 @@ class _Gradual:
     label: str
     unit: str
     needs_rates: bool = False
+    needs_joints: bool = True
 
 
 def other_readings(
@@ -85,7 +86,9 @@ def other_readings(
         found.append((hypothesis, of_rates))
     curves = [_Curves(run, level) for run, level in zip(runs, levels, strict=True)]
     return found + [
-        _gradual(body, reading, runs, curves, levels) for reading in _GRADUAL if given or not reading.needs_rates
+        _gradual(body, reading, runs, curves, levels)
+        for reading in _GRADUAL
+        if (given or not reading.needs_rates) and (body.n_shape or not reading.needs_joints)
     ]
 
 
@@ -98,9 +101,11 @@ def read_otherwise(body: Body, run: FloatingTrajectory) -> Iterator[FloatingTraj
 
 def _readings(body: Body, run: FloatingTrajectory) -> Iterator[_Reading]:
     order, frame, units = "quaternion", "frame", "units"
-    yield _Reading("quaternion written x y z w, read with w first", order, lambda t: _rolled(t, 1))
-    yield _Reading("quaternion written w x y z, read with w last", order, lambda t: _rolled(t, -1))
-    yield _Reading("quaternion of the world in base axes", order, lambda t: _inverse(t))
+    if "order" not in run.certain:
+        yield _Reading("quaternion written x y z w, read with w first", order, lambda t: _rolled(t, 1))
+        yield _Reading("quaternion written w x y z, read with w last", order, lambda t: _rolled(t, -1))
+    if "direction" not in run.certain:
+        yield _Reading("quaternion of the world in base axes", order, lambda t: _inverse(t))
     rate, velocity = _OTHER_FRAME[run.rate_axes], _OTHER_FRAME[run.velocity_axes]
     yield _Reading(f"angular velocity in {rate} axes", frame, lambda t: replace(t, rate_axes=rate), needs_rates=True)
     if run.velocity is not None:
@@ -117,7 +122,7 @@ def _readings(body: Body, run: FloatingTrajectory) -> Iterator[_Reading]:
             needs_rates=True,
         )
     turning = np.array([unit == "rad" for unit in body.joint_units], dtype=bool)
-    if turning.any():
+    if turning.any() and "units" not in run.certain:
         yield _Reading("joint angles in degrees", units, lambda t: _scaled(t, turning, angles=True))
         for rates, base, name in (
             (True, False, "joint rates in degrees per second"),
@@ -192,7 +197,7 @@ class _Curves:
     def moved(self, curves: Sequence[Any], times: Array, late: float) -> Array:
         """What a shift in time adds: (N, k)."""
         later = np.clip(times + late, self._times[0], self._times[-1])
-        return np.stack([curve(later) - curve(times) for curve in curves], axis=1)
+        return np.array([curve(later) - curve(times) for curve in curves]).reshape(len(curves), len(times)).T
 
 
 def _curve(times: Array, values: Array, noise: float) -> Any:
@@ -239,7 +244,7 @@ def _left(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise | None) ->
 
 _GRADUAL = (
     _Gradual("joints shifted in time", "time", _shifted_joints, "late by", "s"),
-    _Gradual("rates shifted in time", "time", _shifted_rates, "late by", "s", needs_rates=True),
+    _Gradual("rates shifted in time", "time", _shifted_rates, "late by", "s", needs_rates=True, needs_joints=False),
     _Gradual("joints filtered", "filter", _sharpened_joints, "square of the width", "s^2"),
 )
 

@@ -26,6 +26,12 @@ _MOST_LOST = 0.9
 _AXES = "xyz"
 _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+_NARROWER = 0.95
+"""Of the sum of two principal moments, that the third is at most: what is fitted is known to some per cent."""
+_FARTHEST = 3.0
+"""Radii of gyration of the whole body: no link's centre is farther from where it was."""
+_MOST_TIMES = 100.0
+"""What a link weighs, of what it weighed."""
 _UNSEEN = 1e-9
 """Of a column's entries, relative to those of the body's own momentum: what moves nothing cannot be fitted."""
 
@@ -73,6 +79,8 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
         way, value, square = ways[place], float(guesses[place]), float(squares[place])
         if rank < _CANDIDATES:
             value, square = _to_the_end(body, way, value, columns[:, place], fits, matrices)
+        if not _can_be(body, way, value, seen[0].extent):
+            continue
         bar = float(1.0 / np.sqrt(strength[place]))
         shown = FittedValue(value=value * way.scale, bar=bar * way.scale, unit=way.unit)
         found.append(
@@ -86,6 +94,21 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
             )
         )
     return found
+
+
+def _can_be(body: Body, way: _Direction, value: float, extent: float) -> bool:
+    """Whether any body can have such a link: principal moments that are positive, of which none exceeds the sum of the
+    others, a centre that is within reach, and a mass."""
+    mass = body.chain.masses[way.frame]
+    if not 0.0 < mass + value * way.mass <= _MOST_TIMES * mass:
+        return False
+    if float(np.abs(value * way.centre).max()) > _FARTHEST * extent:
+        return False
+    own = body.chain.inertias[way.frame]
+    before, after = np.linalg.eigvalsh(own), np.linalg.eigvalsh(own + value * way.inertia)
+    # What the file itself has may be no body's.
+    least = min(_NARROWER, (before[0] + before[1]) / max(before[2], np.finfo(float).tiny))
+    return bool(after[0] >= -_UNSEEN * after[2] and least * _NARROWER * after[2] <= after[0] + after[1])
 
 
 def _directions(body: Body) -> list[_Direction]:

@@ -14,6 +14,7 @@ from ._airborne import AirbornePart
 from ._consistency import RateAgreement
 from ._integration_step import StepOrder
 from ._noise import TrajectoryNoise
+from ._ranking import EXPLAINS
 from .hypothesis import Hypothesis
 
 _MOST_SHOWN = 8
@@ -42,6 +43,8 @@ class RunAudit:
     extent : radius of gyration of the body [m]
     agreement : of given rates with the configurations, or None
     attitude_error : (N,) angle to the nearest exact reconstruction that was found [rad]; None where there is none
+    tolerance : of the momentum, by which that was decided, without unit
+    recorded : whether the samples were measured, not computed
     right : whether momentum, fall and rates hold within noise or tolerance
 
     Examples
@@ -71,6 +74,8 @@ class RunAudit:
     extent: float
     agreement: RateAgreement | None
     attitude_error: Array | None
+    tolerance: float
+    recorded: bool
     right: bool
 
     __repr__ = short_repr
@@ -79,6 +84,26 @@ class RunAudit:
     def relative_drift(self) -> float:
         """Of the momentum, without unit."""
         return self.momentum_drift / self.momentum_scale if self.momentum_scale > 0.0 else 0.0
+
+    @property
+    def drift_of_itself(self) -> float:
+        """The change of the momentum over its own size in the mean, without unit; infinite where it has none."""
+        size = float(np.linalg.norm(self.momentum.mean(axis=0)))
+        return self.momentum_drift / size if size > 0.0 else np.inf
+
+    @property
+    def words(self) -> str:
+        """What a recording shows, in a line."""
+        part = self.drift_of_itself
+        if not np.isfinite(part):
+            found = "no angular momentum"
+        elif self.right:
+            found = f"conserved within {100.0 * part:.2g} % of itself"
+        else:
+            found = f"not conserved, changes by {100.0 * part:.2g} % of itself"
+        if self.airborne.acceleration is not None:
+            found += f", falls with {float(np.linalg.norm(self.airborne.acceleration)):.3g} m/s^2"
+        return found
 
     @property
     def record(self) -> dict[str, Any]:
@@ -98,7 +123,9 @@ class RunAudit:
             "momentum_kg_m2_s": self.momentum.mean(axis=0).tolist(),
             "momentum_drift_kg_m2_s": self.momentum_drift,
             "momentum_drift_relative": self.relative_drift,
+            "momentum_drift_of_itself": self.drift_of_itself if np.isfinite(self.drift_of_itself) else None,
             "momentum_over_noise": self.momentum_ratio,
+            "tolerance": self.tolerance,
             "fall_off_m": self.fall_off,
             "fall_over_noise": self.fall_ratio,
             "rates_mismatch": None if fit is None else fit.mismatch,
@@ -150,8 +177,17 @@ class Audit:
     @property
     def verdict(self) -> str:
         """In a line."""
+        recorded = [run.words for run in self.runs if run.recorded]
+        shown = "; ".join(recorded)
         if self.right:
-            return f"right within noise or {self.tolerance:g}"
+            within = f"right within noise or {self.tolerance:.2g}"
+            return f"{shown}: {within}, as 1 cm of wander leaves it" if recorded else within
+        if recorded:
+            return f"{shown}; {self._blame}"
+        return self._blame
+
+    @property
+    def _blame(self) -> str:
         if not self.cause:
             return "wrong, and no single hypothesis explains it"
         if len(self.cause) == 1:
@@ -190,7 +226,11 @@ class Audit:
         if self.step_order is not None:
             lines += _order_lines(self.step_order)
         if self.hypotheses:
-            lines += ["", "what explains it, by what it leaves over, of all and in units of the noise:"]
+            lines += [
+                "",
+                "what explains it, by what it leaves over, of all and in units of the noise; * leaves no more than "
+                f"{100.0 * EXPLAINS:.0f} % or noise:",
+            ]
             names = {one.name for one in self.cause}
             width = max(len(one.name) for one in self.hypotheses[:_MOST_SHOWN])
             for one in self.hypotheses[:_MOST_SHOWN]:

@@ -48,6 +48,9 @@ class FloatingTrajectory:
     step : of the integrator that made it [s]; None: that between samples
     name : for people
     joint_order : of arrays without names, in which order their joints were taken, in words; None: they had names
+    certain : what the format of its file leaves no doubt about, which is no hypothesis: "units" of the joints, "order"
+        of the base's quaternion, "direction" of its attitude
+    captured : whether a format says so in which people are recorded: places of such are known to a centimetre
 
     Examples
     --------
@@ -70,6 +73,8 @@ class FloatingTrajectory:
     step: float | None = None
     name: str = "trajectory"
     joint_order: str | None = None
+    certain: tuple[str, ...] = ()
+    captured: bool = False
 
     __repr__ = short_repr
 
@@ -260,6 +265,11 @@ def _arrays(
 ) -> tuple[Array, Array | None]:
     """Both arrays with their joints in the body's order."""
     check_object(body, "Body", "body")
+    if body.ball_joints:
+        raise ShapeError(
+            f"{labels[0]}: arrays of bodies with ball joints are not read, for quaternions may stand in another order "
+            f"there; {body.name} has {', '.join(body.ball_joints)}. Give `shapes` with columns as body.joint_names"
+        )
     order = list(body.joint_names if names is None else names_argument(names, "joint_names", "names of joints"))
     for joint in body.joint_names:
         if order.count(joint) > 1:

@@ -20,13 +20,15 @@ from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError, Unknow
 from ..files import npz_arrays
 from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
 from ..shape_space.files.formats.text_tables import read_delimited
-from ..shape_space.files.read import read_recorded_motion
+from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from .floating_trajectory import FloatingTrajectory
 
 _NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot)[_\[ ]?([0-9]{1,6})\]?")
 """Labels of a table such as qpos_0, qpos[0] and qpos0."""
 _ROOT = 6
 """Coordinates of biorbd's root: three places, three angles."""
+_CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
+"""Formats in which people are recorded; they say what is in degrees, and how attitudes are written."""
 _TEXTS = (".csv", ".tsv", ".txt")
 
 
@@ -122,6 +124,8 @@ def read_trajectory(
             step=step,
             name=where.name,
             joint_order=None if order is None else f"{order['means']}: {', '.join(order['joints'])}",
+            certain=_certain(recorded, degrees),
+            captured=recorded.format in _CAPTURED,
         )
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None
@@ -131,6 +135,21 @@ def _has_way(body: Body, arrays: Mapping[str, Any]) -> bool:
     """Whether `qpos` begins with the joints by which the body's file moves its base."""
     width = np.shape(arrays["qpos"])[-1] if "joint_names" not in arrays else 0
     return bool(body.base_joints) and width == len(way_names(body.base_joints)) + body.n_shape
+
+
+def _certain(recorded: RecordedMotion, degrees: bool | None) -> tuple[str, ...]:
+    """What is no hypothesis: said by the format, by labels or by the caller."""
+    found = []
+    units = set(recorded.record["units"].values())
+    if recorded.format in _CAPTURED or degrees is not None or "rad" not in units:
+        found.append("units")
+    base = recorded.record["base"] or {}
+    # Three angles have no order of four numbers.
+    if recorded.format in _CAPTURED or "order" in base:
+        found.append("order")
+    if recorded.format in _CAPTURED:
+        found.append("direction")
+    return tuple(found)
 
 
 def _of_file(where: Path, error: Exception) -> TrajectoryError | UnknownNameError:

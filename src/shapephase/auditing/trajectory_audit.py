@@ -22,6 +22,7 @@ from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part
 from ._consistency import rate_agreement
 from ._integration_step import StepOrder, as_semi_implicit_euler, step_hypothesis, step_order
+from ._missing_term import no_gyroscopic_term
 from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
 from ._outside_pushes import outside_pushes
@@ -40,12 +41,20 @@ _NEAR = 1e-4
 """[rad] From there on another start may be nearer: motions near the middle axis make much of the last digit."""
 _STEADY = 0.01
 """Of what turns the body: a momentum that changes by more is no flight's, which need not be looked for."""
+_TOLERANCE = 1e-3
+"""Of momentum, rates and fall, where nothing else is asked for."""
+_WANDER = 0.01
+"""[m] Skin moves over bones, and bodies are not what tables make of them: markers and masses wander by so much."""
+_MEASURED = 1e-4
+"""[rad or m] Noise from which on samples were measured, not computed."""
 _AS_EULER = 0.2
 """Of the drift of one run: less is left by what semi-implicit Euler does, where it agrees with that."""
 _ONE_AXIS = 1e-3
 """Of the base's rates: less is across their main axis where the base turns about one axis alone."""
 _MOST_SAMPLES = 500
 """Of each run, by which hypotheses are told apart."""
+_MOST_LOOKED_AT = 5000
+"""Samples of a trajectory that is read otherwise, to see where it falls then."""
 _NEARLY_ALL = 0.9
 """Of the samples: with so many in the air nobody asks whether there would be more, were they read otherwise."""
 _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
@@ -55,7 +64,7 @@ def audit(
     body: Body,
     trajectories: FloatingTrajectory | Sequence[FloatingTrajectory],
     *,
-    tolerance: float = 1e-3,
+    tolerance: float | None = None,
     flight: str | Sequence[float] = "auto",
     noise: TrajectoryNoise | None = None,
 ) -> Audit:
@@ -73,14 +82,15 @@ def audit(
     body : as it should be
     trajectories : one, or several runs of the same body, with different steps to find the order of an integrator
     tolerance : of momentum and rates relative to those that turn and move the body, of the fall to its extent;
-        without unit
+        without unit; None: 0.001, and of recordings with noise, or in a format in which people are recorded, what parts
+        of the body that wander by a centimetre over the flight make of it
     flight : "auto", where the centre of mass falls; "all"; or its first and last time [s]
     noise : of the samples; None: what they show
 
     Raises
     ------
     ShapeError
-        For arguments of the wrong kind, and bodies with ball joints.
+        For arguments of the wrong kind.
     TrajectoryError
         If a trajectory has no flight that is long enough.
 
@@ -95,15 +105,13 @@ def audit(
     True
     """
     check_object(body, "Body", "body")
-    if body.ball_joints:
-        raise ShapeError(f"audits take joints of one axis; {body.name} has ball joints: {', '.join(body.ball_joints)}")
     if noise is not None:
         check_object(noise, "TrajectoryNoise", "noise")
     given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else trajectories
     runs = list(given) if isinstance(given, Iterable) else []
     if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
         raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
-    within = positive_argument(tolerance, "tolerance", "a ratio")
+    within = None if tolerance is None else positive_argument(tolerance, "tolerance", "a ratio")
     parts = [_airborne(body, run, flight) for run in runs]
     flown = [run.part(part.first, part.past) for run, part in zip(runs, parts, strict=True)]
     seen = [observed(body, run, noise) for run in flown]
@@ -111,15 +119,16 @@ def audit(
     looked = [_run_audit(body, run, one, part, within) for run, one, part in zip(flown, seen, parts, strict=True)]
     order = step_order(seen, [one.momentum_noise for one in looked])
     notes = _notes(seen, looked, order)
+    most = max(one.tolerance for one in looked)
     if all(one.right for one in looked):
         return Audit(
-            body=body.name, runs=tuple(looked), tolerance=within, hypotheses=(), cause=(), step_order=order, notes=notes
+            body=body.name, runs=tuple(looked), tolerance=most, hypotheses=(), cause=(), step_order=order, notes=notes
         )
     found = _ranked(body, flown, fits, looked, order, noise)
     return Audit(
         body=body.name,
         runs=tuple(looked),
-        tolerance=within,
+        tolerance=most,
         hypotheses=found.ranked,
         cause=found.tie,
         step_order=order,
@@ -136,13 +145,15 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
         fault = error
     if found is not None and found.past - found.first >= _NEARLY_ALL * len(run.times):
         return found
-    for other in read_otherwise(body, run):
+    every = -(-len(run.times) // _MOST_LOOKED_AT)
+    for other in read_otherwise(body, run.every(every)):
         try:
             part = airborne_part(body, other, flight)
         except TrajectoryError:
             continue
-        if found is None or part.past - part.first > found.past - found.first:
-            found = replace(part, how=f"{part.how}, if it is read otherwise")
+        first, past = every * part.first, min(every * (part.past - 1) + 1, len(run.times))
+        if found is None or past - first > found.past - found.first:
+            found = replace(part, first=first, past=past, how=f"{part.how}, if it is read otherwise")
     if found is None:
         assert fault is not None
         raise fault
@@ -150,9 +161,15 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
 
 
 def _run_audit(
-    body: Body, run: FloatingTrajectory, seen: Observation, part: AirbornePart, tolerance: float
+    body: Body, run: FloatingTrajectory, seen: Observation, part: AirbornePart, given: float | None
 ) -> RunAudit:
     scale = seen.scale
+    wander = _wander(run, seen) if given is None else 0.0
+    tolerance = _TOLERANCE if given is None else given
+    of_fall = max(tolerance, wander / seen.extent)
+    if wander and scale > 0.0:
+        span = float(seen.times[-1] - seen.times[0])
+        tolerance = max(tolerance, 2.0 * np.pi / span * seen.mass * wander * seen.extent / scale)
     momentum = seen.seen(seen.momentum)
     free = 1 if seen.given_rates else 2
     smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise)
@@ -168,7 +185,7 @@ def _run_audit(
     off = None if fall is None else float(np.linalg.norm(fall.values, axis=1).max())
     error = _attitude_error(body, seen)
     right = _holds(smooth.ratio, drift / scale if scale > 0.0 else 0.0, tolerance)
-    right = right and (fall is None or off is None or _holds(fall.ratio, off / seen.extent, tolerance))
+    right = right and (fall is None or off is None or _holds(fall.ratio, off / seen.extent, of_fall))
     if agreement is not None:
         # Half a step apart, as semi-implicit integrators leave them, is no fault.
         late = abs(agreement.late) <= run.integrator_step
@@ -193,8 +210,16 @@ def _run_audit(
         extent=seen.extent,
         agreement=agreement,
         attitude_error=error,
+        tolerance=tolerance,
+        recorded=wander > 0.0,
         right=right,
     )
+
+
+def _wander(run: FloatingTrajectory, seen: Observation) -> float:
+    """How far parts of a body are known to be from where a recording has them [m]; 0 of what a simulator stores."""
+    noisy = not seen.given_rates and max(seen.noise.attitude, seen.noise.position) > _MEASURED
+    return _WANDER if run.captured or noisy else 0.0
 
 
 def _holds(ratio: float, value: float, tolerance: float) -> bool:
@@ -247,7 +272,8 @@ def _ranked(
     square = sum(fit.square for fit in fits)
     candidates = [
         Candidate(hypothesis=_with(found, of_rates, freedom + more), of_rates=of_rates)
-        for found in (*wrong_inertias(body, fits), *outside_pushes(fits))
+        for found in (*wrong_inertias(body, fits), *outside_pushes(fits), no_gyroscopic_term(fits))
+        if found is not None
     ]
     readings = other_readings(body, runs, noise, [fit.seen.noise for fit in fits])
     candidates += [Candidate(hypothesis=found, of_rates=rates) for found, rates in readings]

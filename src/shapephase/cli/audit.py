@@ -117,7 +117,7 @@ def audit_command(
     /,
     *trajectories: Trajectories,
     floating: BodyOptions = AS_WRITTEN,
-    tolerance: float = 1e-3,
+    tolerance: Annotated[float | None, Parameter(show_default=False)] = None,
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
     reading: TrajectoryOptions = AS_IT_IS,
     figure: Path | None = None,
@@ -131,7 +131,8 @@ def audit_command(
     ----------
     tolerance
         Of momentum and rates relative to those that turn and move the body, and of the fall relative to its extent,
-        without unit; for example `--tolerance 1e-6`.
+        without unit; without it 0.001, and of recordings with noise, or of people, what a centimetre of wander makes of
+        it. For example `--tolerance 1e-6`.
     flight
         What is in the air: auto (where the centre of mass falls), all, or its first and last time, in s; for example
         `--flight all` or `--flight 0.4 1.2`.

@@ -261,8 +261,8 @@ class RecordingOptions:
     smooth_penalty: Annotated[
         float | None,
         _motion_option(
-            "The penalty of that smoothing, in s^3; without it one whose bias is under a fifth of the error bars. For "
-            "example `--smooth-penalty 1e-6`."
+            "The penalty of that smoothing, in s^5; without it, of each joint the likeliest for its noise. For example "
+            "`--smooth-penalty 1e-9`."
         ),
     ] = None
     close: Annotated[

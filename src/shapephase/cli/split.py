@@ -68,7 +68,7 @@ def split_command(
     from ..phases.split_text import split_lines
     from ..shape_space.body_path import path_gap
     from . import motion as motions
-    from .texts.error_bar_text import error_bar_data, error_bar_lines, error_bars
+    from .texts.error_bar_text import error_bar_data, error_bar_lines, error_bars, joint_noise
     from .texts.recording_text import fit_data, fit_lines, recording_data, recording_lines
     from .texts.result_text import gap_text, recorded_base_text, split_data, split_heading
 
@@ -109,6 +109,7 @@ def split_command(
                 up=up,
                 error_bars=error_bar_lines(result, bars, flown.recorded, errors),
                 recording=recording_lines(flown.body, flown.recorded),
+                noise=joint_noise(flown.body, errors),
                 begin=work.begin,
             )
             say_written(html)

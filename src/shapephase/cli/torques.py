@@ -47,10 +47,10 @@ def torques_command(
     from ..dynamics.torques import joint_torques
     from . import motion as motions
     from .texts.recording_text import recording_data
-    from .texts.torque_text import torque_data, torque_lines
+    from .texts.torque_text import load_bars, torque_data, torque_lines
 
     aside = check_writable(out, "--out", ".csv")
-    with steps(2) as work:
+    with steps(3) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, floating=floating)
         work.begin("inverse dynamics")
@@ -58,6 +58,8 @@ def torques_command(
         if out is not None:
             found.write_csv(out)
             say_written(out)
-    text = torque_lines(found.loads, flown.motion, flown.body, motion)
-    data = torque_data(found, flown.motion, flown.body, motion) | recording_data(flown.recorded)
+        work.begin("error bars")
+        bars, of_bars = load_bars(flown.motion, found.loads, flown.recorded)
+    text = torque_lines(found.loads, flown.motion, flown.body, motion, bars) + ([of_bars] if of_bars else [])
+    data = torque_data(found, flown.motion, flown.body, motion, bars) | recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

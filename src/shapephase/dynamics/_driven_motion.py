@@ -39,16 +39,18 @@ class Drive:
         return self.torque * self.rate
 
 
-def drive(motion: Motion | ForcedMotion, times: Array, turned: Array | None = None) -> Drive:
+def drive(
+    motion: Motion | ForcedMotion, times: Array, turned: Array | None = None, moved: Array | None = None
+) -> Drive:
     """Inverse dynamics along a motion.
 
     Parameters
     ----------
     times : (N,)
-    turned : (3,) a small turn of all attitudes, base axes, to see what it changes; None: none [rad]
+    turned, moved : small changes of attitudes, and of joints with two derivatives, as in `moving_body`
     """
     body, path = needed_body_and_path(motion, BY_JOINTS)
-    moving = moving_body(motion, body, path, times, turned)
+    moving = moving_body(motion, body, path, times, turned, moved)
     joints, frames = (moving.shapes, moving.rates, moving.accelerations), body.rate_frame(moving.shapes)
     torques, wrenches, energies = [], [], []
     for spins, slopes in zip(moving.spins, moving.spin_rates, strict=True):

@@ -45,6 +45,7 @@ class JointLoads:
     peak_time : when [s]
     peak_rate : (n,) largest size [rad/s or m/s]
     peak_power : largest size [W]
+    rate_time, power_time : (n,) and batch + (n,), when these two are [s]
     positive_work, negative_work : done by the joint, and taken up by it, the latter negative [J]
     energy_change : batch, of the kinetic energy [J]
     energy_defect : batch, by how much the work of all joints, and of a torque from outside, misses it, of the work that
@@ -70,6 +71,8 @@ class JointLoads:
     peak_time: Array
     peak_rate: Array
     peak_power: Array
+    rate_time: Array
+    power_time: Array
     positive_work: Array
     negative_work: Array
     energy_change: Array
@@ -181,19 +184,19 @@ def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     positive = np.array([[_positive(found, b, k) for k in range(body.n_rates)] for b in range(len(change))])
     positive = positive.reshape(len(change), body.n_rates)
     net, moved = found.work, found.moved
-    looked, at = _between(found.torque), _places(found.edges)
-    flat = np.abs(looked).reshape(len(change), at.size, body.n_rates)
-    place = np.argmax(flat, axis=1)
+    torques, rates, powers = (_peaks(values, found.edges) for values in (found.torque, found.rate[None], found.power))
     single = (*motion.batch, body.n_rates)
     defect = np.abs(net.sum(axis=1) + from_outside - change) / np.where(moved > 0.0, moved, 1.0)
     return JointLoads(
         joint_names=body.rate_names,
         joint_units=body.rate_units,
         mass=body.mass,
-        peak_torque=flat.max(axis=1, initial=0.0).reshape(single),
-        peak_time=at.ravel()[place].reshape(single),
-        peak_rate=np.abs(_between(found.rate[None])).max(axis=(0, 1, 2)),
-        peak_power=np.abs(_between(found.power)).max(axis=(1, 2)).reshape(single),
+        peak_torque=torques[0].reshape(single),
+        peak_time=torques[1].reshape(single),
+        peak_rate=rates[0][0],
+        peak_power=powers[0].reshape(single),
+        rate_time=rates[1][0],
+        power_time=powers[1].reshape(single),
         positive_work=positive.reshape(single),
         negative_work=(net - positive).reshape(single),
         energy_change=change.reshape(motion.batch)[()],
@@ -240,6 +243,13 @@ def _positive(panels: _Panels, which: int, joint: int) -> float:
         parts = np.diff(series.chebval(cuts, series.chebint(coefficients)))
         total += float(halves[row] * parts[parts > 0.0].sum())
     return total
+
+
+def _peaks(values: Array, edges: Array) -> tuple[Array, Array]:
+    """Largest sizes and their times: values at Gauss points (B, P, m, n) -> (B, n), (B, n)."""
+    at = _places(edges).ravel()
+    sizes = np.abs(_between(values)).reshape(len(values), at.size, -1)
+    return sizes.max(axis=1), at[sizes.argmax(axis=1)]
 
 
 def _between(values: Array) -> Array:

@@ -57,7 +57,12 @@ def needed_body_and_path(motion: Motion | ForcedMotion, what: str) -> tuple[Body
 
 
 def moving_body(
-    motion: Motion | ForcedMotion, body: Body, path: ShapePath, times: Array, turned: Array | None = None
+    motion: Motion | ForcedMotion,
+    body: Body,
+    path: ShapePath,
+    times: Array,
+    turned: Array | None = None,
+    moved: Array | None = None,
 ) -> MovingBody:
     """What joints and base do at (N,) times of a motion.
 
@@ -67,9 +72,12 @@ def moving_body(
     Parameters
     ----------
     turned : (3,) a small turn of all attitudes, base axes, to see what it changes; None: none [rad]
+    moved : (3, n) the same of shapes, rates and accelerations
     """
     shapes, rates = path.curve(times)
     accelerations = path.acceleration(times)
+    if moved is not None:
+        shapes, rates, accelerations = shapes + moved[0], rates + moved[1], accelerations + moved[2]
     inertia, matrix, inertia_rate, matrix_rate = body.sample_rates(shapes, rates)
     inverse = inverse_inertia(inertia, times)
     internal = so3.apply(matrix, rates)

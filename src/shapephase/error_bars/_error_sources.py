@@ -15,8 +15,7 @@ from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files._labels import amounts
-from ..shape_space.path_samples import path_samples
-from ..shape_space.shape_path import ShapePath
+from ..shape_space.path_samples import columns_without_samples, path_samples
 from ..shape_space.summaries import body_summary
 from .inertia_errors import InertiaErrors
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
@@ -72,7 +71,7 @@ def inputs_of(
         if given.shape in ((), (path.n_shape,)):
             each = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
             if given.ndim == 0 or isinstance(joints, str):
-                each[_without_samples(path)] = 0.0
+                each[columns_without_samples(path)] = 0.0
             samples = np.tile(each**2, through.count)
         else:
             samples = _covariance(given, "joints", numbers)
@@ -87,12 +86,6 @@ def inputs_of(
         together = _covariance(finite_array(start, "start"), "start", UNKNOWNS)
     single = _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude")
     return Inputs(samples, links, *single, start=together, fit=fit)
-
-
-def _without_samples(path: ShapePath) -> list[int]:
-    """The joints that rest where a reader was told, without a column in the file."""
-    resting = {} if path.record is None else path.record.get("at_rest", {})
-    return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
 
 
 def _by_joint(body: Body, text: str) -> Array:

@@ -17,14 +17,14 @@ from ._body_along import BodyAlong
 from .result_derivatives import described_by
 
 
-def fit_by_samples(motion: Motion, times: Array, by_attitudes: Array) -> Array:
-    """By the samples of the path: (6, N n); `by_attitudes` as `RecordedMomentum` has it."""
+def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+    """By the values of the path at its knots: (6, knots n); `by_attitudes` as `RecordedMomentum` has it."""
     body, path = described_by(motion)
     along = along_motion(motion, path, times)
     rows = _by_added_momentum(motion, along, times, by_attitudes)
     samples, there = path_samples(path), BodyAlong(body, along.times, along.shapes, along.rates)
     momenta = motion.momentum @ along.attitudes
-    return samples.by_samples(there.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None]))
+    return there.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
 
 
 def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:

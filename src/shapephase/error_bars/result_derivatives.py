@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -119,13 +120,7 @@ class Derivatives:
         WrongObjectError
             If the path is not `ShapePath.spline` or `ShapePath.waypoints` through samples, nor a recording.
         """
-        samples, by_knots = self._samples, self.by_knots
-        return ResultDerivative(
-            *(
-                samples.by_samples(part.reshape(-1, part.shape[-1])).reshape(*part.shape[:-1], -1)
-                for part in (getattr(by_knots, field.name) for field in fields(by_knots))
-            )
-        )
+        return self.at_knots(self._samples.by_samples)
 
     @cached_property
     def by_knots(self) -> ResultDerivative:
@@ -133,6 +128,13 @@ class Derivatives:
         momenta = np.zeros((len(self._along.times), 2, 3))
         momenta[:, 0] = self.motion.momentum @ self._along.attitudes
         return self._results(_changes(self._body.by_knots(self._samples, *self._weights, momenta)))
+
+    def at_knots(self, rule: Callable[[Array], Array]) -> ResultDerivative:
+        """By whatever the values at the knots follow from, of which a rule makes (k, m) of (k, knots n)."""
+        parts = (getattr(self.by_knots, field.name) for field in fields(ResultDerivative))
+        return ResultDerivative(
+            *(rule(part.reshape(-1, part.shape[-1])).reshape(*part.shape[:-1], -1) for part in parts)
+        )
 
     @cached_property
     def by_inertias(self) -> ResultDerivative:

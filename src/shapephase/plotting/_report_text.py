@@ -11,11 +11,17 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..deformation.descriptions import RigidDescription
+from ..display import number_with_bar
+from ..dynamics.loads import JointLoads
+from ..dynamics.moving_body import body_and_path
+from ..dynamics.torque_errors import LoadErrors, load_errors
 from ..dynamics.torques import joint_torques
+from ..errors import WrongObjectError
 from ..phases.phases import PhaseSplit
 from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
 from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.path_errors import path_errors, stated_noise
 from ..shape_space.shape_path import ShapePath
 from ..shape_space.summaries import body_summary, path_summary
 
@@ -93,24 +99,57 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     return words
 
 
-def torque_words(motion: Motion) -> str:
-    """Which joint bears most, in sentences. Raises as `joint_torques`."""
+def torque_words(motion: Motion, noise: Array | None = None) -> str:
+    """Which joint bears most, in sentences, of a recording with bars. Raises as `joint_torques`.
+
+    noise : of the samples of a recording (n,), where it is known
+    """
     loads = joint_torques(motion, 0.0).loads
+    bars, doubt = _load_bars(motion, loads, noise)
     parts = []
     for unit, effort, kind in (("rad", "N m", "torque"), ("m", "N", "force")):
         rows = [k for k, own in enumerate(loads.joint_units) if own == unit]
         if rows:
             most = max(rows, key=lambda k: loads.peak_torque[k])
-            limit = f", {loads.effort_share[most]:.1%} of its limit" if np.isfinite(loads.effort_limits[most]) else ""
+            off = None if bars is None else float(bars.peak_torque[most])
+            share = 100.0 / float(loads.effort_limits[most]) if np.isfinite(loads.effort_limits[most]) else 0.0
+            limit = ""
+            if share:
+                part = _bar_text(share * loads.peak_torque[most], None if off is None else share * off, ".1f")
+                limit = f", {part}% of its limit" if off is None else f", {part} % of its limit"
             parts.append(
-                f"the largest {kind} is that of {loads.joint_names[most]}, {loads.peak_torque[most]:.3g} {effort} at "
-                f"{loads.peak_time[most]:.3g} s{limit}"
+                f"the largest {kind} is that of {loads.joint_names[most]}, "
+                f"{_bar_text(loads.peak_torque[most], off, '.3g')} {effort} at {loads.peak_time[most]:.3g} s{limit}"
             )
     words = f"Of the joints {'; '.join(parts)}. " if parts else ""
     whole = float(loads.work.sum())
     if abs(whole) <= _NO_WORK * float(np.abs(loads.work).sum()):
-        return f"{words}All joints together do no work: the kinetic energy is at the end what it was at the start."
-    return f"{words}All joints together do a work of {whole:.3g} J, the change of the kinetic energy."
+        rest = "All joints together do no work: the kinetic energy is at the end what it was at the start."
+    else:
+        work = _bar_text(whole, None if bars is None else bars.total_work, ".3g")
+        rest = f"All joints together do a work of {work} J, the change of the kinetic energy."
+    return f"{words}{rest}{doubt}"
+
+
+def _load_bars(motion: Motion, loads: JointLoads, noise: Array | None) -> tuple[LoadErrors | None, str]:
+    """Bars of what the joints of a recording do, and what is to be said where they are not known."""
+    found = body_and_path(motion)
+    assert found is not None
+    if noise is None and found[1].record is None:
+        return None, ""
+    if noise is None and stated_noise(found[1]) is None:
+        return None, (
+            " How far these are off is not known: the noise of the recording is not stated (--smooth 0.3deg), and most "
+            "of a torque may be noise."
+        )
+    try:
+        return load_errors(motion, loads, noise), ""
+    except WrongObjectError as error:
+        return None, f" How far these are off is not known: {error}."
+
+
+def _bar_text(value: float, bar: float | None, usual: str) -> str:
+    return format(float(value), usual) if bar is None else number_with_bar(float(value), float(bar))
 
 
 def accuracy(motion: Motion, error_bars: Sequence[str]) -> str:
@@ -155,17 +194,37 @@ def split_rows(result: PhaseSplit) -> list[Row]:
     ]
 
 
-def joint_rows(body: Body, path: ShapePath) -> list[tuple[str, ...]]:
-    """Of each joint: name, range, limits and largest rate."""
+def joint_rows(body: Body, path: ShapePath, noise: Array | None = None) -> list[tuple[str, ...]]:
+    """Of each joint: name, range, limits and largest rate, of a recording with its bar; `noise` as for
+    `torque_words`."""
     found = path_summary(body, path)
+    bars = _rate_bars(body, path, found.fastest_at, noise)
     rows = []
     columns = zip(
         body.joint_names, body.joint_units, found.lowest, found.highest, body.joint_limits, found.fastest, strict=True
     )
-    for name, unit, low, high, (least, most), rate in columns:
+    for k, (name, unit, low, high, (least, most), rate) in enumerate(columns):
         limits = f"{_amount(least, unit)} … {_amount(most, unit)}"
-        rows.append((name, _amount(low, unit), _amount(high, unit), limits, f"{_amount(rate, unit)}/s"))
+        fastest = f"{_amount(rate, unit)}/s"
+        if bars is not None and unit == "rad":
+            fastest = f"({number_with_bar(float(np.degrees(rate)), float(np.degrees(bars[k])))})°/s"
+        elif bars is not None:
+            fastest = f"{number_with_bar(float(rate), float(bars[k]))} {unit}/s".replace(" 1/s", " /s")
+        elif path.record is not None:
+            fastest += " ± unknown"
+        rows.append((name, _amount(low, unit), _amount(high, unit), limits, fastest))
     return rows
+
+
+def _rate_bars(body: Body, path: ShapePath, times: Array, noise: Array | None) -> Array | None:
+    """Of each joint's rate at its own time: (n,); None where they are not known."""
+    route = path.matched(body.joint_names, body.name)
+    if noise is None and stated_noise(route) is None:
+        return None
+    try:
+        return np.diag(path_errors(route, times, noise).rate)
+    except WrongObjectError:
+        return None
 
 
 def part_rows(body: Body) -> list[tuple[str, ...]]:

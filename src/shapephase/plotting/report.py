@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from ..arguments import check_file_name, check_object
+from ..arrays import Array
 from ..files import write_whole
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
@@ -53,6 +54,7 @@ def write_report(
     up: str | None = None,
     error_bars: Sequence[str] = (),
     recording: Sequence[str] = (),
+    noise: Array | None = None,
     begin: Callable[[str], object] = lambda _: None,
 ) -> None:
     """Write a motion and its split as one HTML file that opens offline; whole or not at all.
@@ -71,6 +73,8 @@ def write_report(
     up : as in `motion_page`
     error_bars : lines about how far the numbers may be off by what the inputs leave open, as `split` prints them
     recording : lines about what was read of a recording and done to it, as `split` prints them
+    noise : of the samples of the joints, rms (n,) [rad or m], for bars of rates and torques; None: the one that a
+        recording was smoothed for
     begin : called with a few words before each longer step
 
     Raises
@@ -106,7 +110,7 @@ def write_report(
         begin(f"drawing {kind.replace('_', ' ')}")
         image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
         figures.append({"caption": figure.caption, "image": image, "tall": figure.height > _USUAL_HEIGHT})
-    torques = [torque_words(motion)] if scene.body is not None and scene.body.n_shape else []
+    torques = [torque_words(motion, noise)] if scene.body is not None and scene.body.n_shape else []
     page = page_html(
         "report.html",
         title=printable(title or motion.deformation.label),
@@ -126,7 +130,7 @@ def write_report(
         error_bars=[line for line in error_bars if line],
         recording=[line for line in recording if line],
         rows=figure_rows(figures),
-        joints=joint_rows(scene.body, shape_path) if scene.body is not None and shape_path is not None else (),
+        joints=joint_rows(scene.body, shape_path, noise) if scene.body is not None and shape_path is not None else (),
         parts=part_rows(scene.body) if scene.body is not None else (),
         input_rows=input_rows(motion, result.gauge, scene.body),
         conventions=CONVENTIONS,

@@ -10,6 +10,7 @@ from .connection import (
 )
 from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .many_paths import FinalAttitudes, final_attitudes
+from .path_errors import PathErrors, path_errors
 from .shape_path import ShapePath
 from .summaries import BodySummary, JointSummary, PartSummary, PathSummary, body_summary, path_summary
 
@@ -19,6 +20,7 @@ __all__ = [
     "HorizontalLift",
     "JointSummary",
     "PartSummary",
+    "PathErrors",
     "PathSummary",
     "ShapePath",
     "body_summary",
@@ -32,6 +34,7 @@ __all__ = [
     "horizontal_lift",
     "is_flat",
     "mechanical_connection",
+    "path_errors",
     "path_summary",
     "reach",
     "stokes_holonomy",

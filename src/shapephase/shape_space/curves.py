@@ -121,6 +121,10 @@ class SampleOrigin(Protocol):
         """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
         ...
 
+    def bias_by_samples(self, by_values: Array, /) -> Array:
+        """From m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:

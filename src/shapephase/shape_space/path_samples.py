@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,13 +24,15 @@ class PathBasis(NamedTuple):
     Attributes
     ----------
     pieces : (N,) the piece of each time
-    powers, slopes : (N, order) derivatives of the shape, and of its rate, by the coefficients of that piece
+    powers, slopes, bends : (N, order) derivatives of the shape, of its rate, and of its acceleration, by the
+        coefficients of that piece
     total : of all pieces
     """
 
     pieces: Integers
     powers: Array
     slopes: Array
+    bends: Array
     total: int
 
 
@@ -123,7 +126,23 @@ class PathSamples:
         powers = (times - curve.knots[piece])[:, None] ** exponents
         slopes = np.zeros_like(powers)
         slopes[:, 1:] = exponents[1:] * powers[:, :-1]
-        return PathBasis(piece, powers, slopes, curve.coefficients.shape[1])
+        bends = np.zeros_like(powers)
+        bends[:, 1:] = exponents[1:] * slopes[:, :-1]
+        return PathBasis(piece, powers, slopes, bends, curve.coefficients.shape[1])
+
+    def rows_by_knots(self, times: Array) -> Array:
+        """Shape, rate and acceleration of a joint at times (N,), by its own values at the knots: (3, N, knots).
+
+        Of a path that no geodesic closes: there joints answer to each other.
+        """
+        assert self.curve.arc is None
+        basis, count = self.basis(times), len(times)
+        order = basis.powers.shape[1]
+        by_coefficients = np.zeros((order, basis.total, 3, count))
+        rows = np.stack([basis.powers, basis.slopes, basis.bends])
+        by_coefficients[:, basis.pieces, :, np.arange(count)] = np.moveaxis(rows, 1, 0).swapaxes(1, 2)
+        found = self.by_knots_of(by_coefficients.reshape(order, basis.total, 3 * count, 1))
+        return found.reshape(3, count, -1)
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
         """From derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
@@ -154,13 +173,26 @@ class PathSamples:
     def by_samples(self, by_knots: Array) -> Array:
         """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
         origin = self._source.origin
+        return by_knots if origin is None else self._through(origin.by_samples, by_knots)
+
+    def bias_by_samples(self, by_knots: Array) -> Array:
+        """The same of derivatives by `bias`, which follows linearly from the samples, too."""
+        origin = self._source.origin
         if origin is None:
-            return by_knots
+            return np.zeros_like(by_knots)
+        return self._through(origin.bias_by_samples, by_knots)
+
+    def _through(self, rule: Callable[[Array], Array], by_knots: Array) -> Array:
         n_shape = len(self.order)
         of_curve = np.empty((self._at_knots, len(by_knots), n_shape))
         of_curve[:, :, self.order] = np.moveaxis(by_knots.reshape(len(by_knots), -1, n_shape), 1, 0)
-        found = origin.by_samples(of_curve)[:, :, self.order]
-        return np.moveaxis(found, 0, 1).reshape(len(by_knots), -1)
+        return np.moveaxis(rule(of_curve)[:, :, self.order], 0, 1).reshape(len(by_knots), -1)
+
+
+def columns_without_samples(path: ShapePath) -> list[int]:
+    """The joints that rest where a reader was told, without a column in the file."""
+    resting = {} if path.record is None else path.record.get("at_rest", {})
+    return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
 
 
 def path_samples(path: ShapePath) -> PathSamples:

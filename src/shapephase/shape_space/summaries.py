@@ -120,6 +120,7 @@ class PathSummary:
     breaks : how many times, ends included, between which it is smooth
     lowest, highest : (n,) of each joint, at 401 times and the breaks [rad or m]
     fastest : (n,) largest rate of each joint there [rad/s or m/s]
+    fastest_at : (n,) when that is [s]
     joints_beyond_limits : names of the joints that leave their limits
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
@@ -137,6 +138,7 @@ class PathSummary:
     lowest: Array
     highest: Array
     fastest: Array
+    fastest_at: Array
     joints_beyond_limits: tuple[str, ...]
     still_joints: tuple[str, ...]
     gap: Array
@@ -217,6 +219,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
         lowest=lowest,
         highest=highest,
         fastest=fastest,
+        fastest_at=times[np.abs(rates).argmax(axis=0)],
         joints_beyond_limits=tuple(names[outside].tolist()),
         still_joints=tuple(names[fastest == 0.0].tolist()),
         gap=gap,

@@ -9,9 +9,11 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
+from ...body.body import Body
 from ...phases.phase_split import PhaseSplit
 from ...plain_data import plain
 from ...reconstruction.reconstruction import Motion
+from ...shape_space.files._labels import amounts
 from ...shape_space.files.read import RecordedMotion
 from ..options import EXACT, ErrorOptions
 
@@ -48,6 +50,14 @@ def error_bars(
         attitude=options.attitude_error,
         start=fitted,
     )
+
+
+def joint_noise(body: Body, options: ErrorOptions) -> Array | None:
+    """What --joint-noise says of each joint: (n,) [rad or m]; None where it says nothing."""
+    if options.joint_noise is None:
+        return None
+    levels = amounts(options.joint_noise, "--joint-noise")
+    return np.array([levels[unit] for unit in body.joint_units])
 
 
 def error_bar_lines(
@@ -87,7 +97,7 @@ def error_bar_lines(
             f"{'± of the recorded base':24}alone; the noise of the joints is not stated (--joint-noise 0.3deg)"
         )
     if found.smoothing_bias:
-        lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most, which the bars do not hold")
+        lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most; the bars hold it")
     return lines
 
 

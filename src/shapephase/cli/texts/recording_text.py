@@ -199,11 +199,19 @@ def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str
 
 def _smoothing_lines(smoothing: Smoothing) -> list[str]:
     """How much was smoothed, and what that did to the motion itself."""
+    own = smoothing.penalty > 0.0
+    if not own.any():
+        return []
+    penalties, free = smoothing.penalty[own], smoothing.degrees_of_freedom[own]
     return [
-        f"{'  penalty':24}{smoothing.penalty:.3g} s^3; {smoothing.degrees_of_freedom:.3g} of {len(smoothing.bias)} "
-        "degrees of freedom are left to a joint",
-        f"{'  bias':24}of whatever follows from the path, {smoothing.bias_in_bars:.2g} of its error bar at most",
+        f"{'  penalty':24}{_span(penalties)} s^5; {_span(free)} degrees of freedom are left to a joint",
+        f"{'  bias':24}rms {smoothing.bias_in_bars:.2g} of the noise that is left, at most; error bars hold both",
     ]
+
+
+def _span(values: Array) -> str:
+    ends = dict.fromkeys(f"{value:.3g}" for value in (values.min(), values.max()))
+    return " to ".join(ends)
 
 
 def _closing_lines(closing: Closing) -> list[str]:

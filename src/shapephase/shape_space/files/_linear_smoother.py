@@ -1,179 +1,290 @@
-"""A smoothing spline of one penalty: a linear map of the samples."""
+"""Smoothing splines, linear maps of the samples: their penalties, their transposes, and what they take off a motion."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from math import factorial
+from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, lock_arrays
 
-_LEAST = -3.0
-"""Of the penalties that are tried, in powers of ten of the mean step cubed: next to nothing is smoothed."""
-_MOST = 10.0
-"""Of these: 300 samples are smoothed over; rounding goes into the results beyond."""
-_STEP = 0.5
-"""Between penalties that are tried, in powers of ten: it moves the width of what is smoothed by a third."""
-_PROBED = 2**15
-"""Numbers in the random vectors that a trace is estimated with; squares of that size are summed exactly."""
-_PROBES = 4
-"""Random vectors at least: the trace of a long recording is known to a few hundredths by them."""
-_FADING = 8.0
-"""Distance from an end of what is open in which a penalty fades, in widths that it smooths over."""
+ORDER = 3
+"""Of the derivative whose square is penalized: quintic splines, whose second derivative is smooth."""
+PILOT_ORDER = 5
+"""Of the smoother that knows the motion's third derivative at the ends, where a quintic spline has none."""
+_NARROWEST, _WIDEST = 10.0**-0.5, 10.0**2.5
+"""Widths that are tried, in steps of time: next to nothing is smoothed; 300 samples are, and rounding goes into the
+bias beyond."""
+_WIDTHS_A_DECADE = 6
+"""Tried; the best of them and its neighbours have the least of a parabola between them."""
+_ROUNDED = 24
+"""Widths in a decade that are used: joints whose width is the same are smoothed together."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearSmoother:
-    """f with the least sum of w (y - f)^2 + penalty * integral of f''^2, over periodic or natural cubic splines.
+    """f with the least sum of w (y - f)^2 + penalty * integral of (d^order f)^2, of each column by its own penalty.
 
-    Natural splines have no curvature at their ends, and motions have. The penalty therefore fades towards the ends,
-    with the fourth power of the distance: the width that is smoothed over is the fourth root of penalty times step.
+    Its values are those of a spline of degree 2 order - 1, natural at the ends of what is open: derivatives from the
+    order-th on are zero there.
 
     Attributes
     ----------
     times : (N,) of the samples, ascending from 0 [s]
     periodic : whether first and last sample are measurements of one value, which then weighs twice
-    penalty : [s^3]
-    fading : distance from the ends of what is open in which the penalty fades [s]
+    penalties : (n,) of each column [s^(2 order - 1)]; of zero, nothing is smoothed
+    order : of the derivative that is penalized
 
     Notes
     -----
-    Source: Reinsch 1967.
+    Source: Reinsch 1967; Wahba 1990, Spline Models for Observational Data, section 1.3.
     """
 
     times: Array
     periodic: bool
-    penalty: float
-    fading: float = 0.0
+    penalties: Array
+    order: int = ORDER
 
-    @staticmethod
-    def of_width(times: Array, periodic: bool, penalty: float) -> LinearSmoother:
-        """Fading within eight widths that this penalty smooths over."""
-        width = (penalty * times[-1] / (len(times) - 1)) ** 0.25
-        return LinearSmoother(times, periodic, penalty, 0.0 if periodic else _FADING * float(width))
+    __post_init__ = lock_arrays
 
     @property
     def count(self) -> int:
         """How many values there are."""
         return len(self.times) - self.periodic
 
-    @property
-    def degrees_of_freedom(self) -> float:
-        """The trace of the map."""
-        probes = self.probes()
-        return self.trace(probes, self(probes))
-
     def __call__(self, values: Array) -> Array:
-        """(count, k) -> (count, k)."""
-        return values - self._taken_off(values) / self.weights[:, None]
+        """The smoothed values: (count, n) -> (count, n)."""
+        return self.transposed((self.weights[:, None] * values)[:, None])[:, 0] / self.weights[:, None]
 
     def transposed(self, gradients: Array) -> Array:
-        """From derivatives by smoothed values to those by the values: (count, k) -> (count, k)."""
-        return gradients - self._taken_off(gradients / self.weights[:, None])
-
-    @cached_property
-    def weights(self) -> Array:
-        """(count,)."""
-        found = np.ones(self.count)
-        if self.periodic:
-            found[0] = 2.0
+        """From derivatives by smoothed values to those by the values: (count, m, n) -> (count, m, n)."""
+        found = gradients.copy()
+        for penalty in np.unique(self.penalties[self.penalties > 0.0]):
+            own = self.penalties == penalty
+            right = gradients[:, :, own].reshape(self.count, -1)
+            solved = self._system.solved(float(penalty), right).reshape(self.count, -1, int(own.sum()))
+            found[:, :, own] = self.weights[:, None, None] * solved
         return found
 
-    def probes(self) -> Array:
-        """Vectors p whose sums of p . S p are the trace of S, exactly or nearly: (count, k)."""
-        count = self.count
-        if count * count <= _PROBED:
-            return np.eye(count)
-        width = max(_PROBED // count, _PROBES)
-        signs = np.random.default_rng(0).choice(np.array([-1.0, 1.0]), size=(count, width))
-        return signs / np.sqrt(width)
+    def degrees_of_freedom(self) -> Array:
+        """The trace of the map of each column: (n,)."""
+        found = np.full(len(self.penalties), float(self.count))
+        for penalty in np.unique(self.penalties[self.penalties > 0.0]):
+            found[self.penalties == penalty] = self._system.trace(float(penalty))
+        return found
 
-    @staticmethod
-    def trace(probes: Array, images: Array) -> float:
-        """Of the map with these images of `probes`."""
-        return float((probes * images).sum())
+    @property
+    def weights(self) -> Array:
+        """(count,)."""
+        return self._system.weights
 
-    def _taken_off(self, values: Array) -> Array:
-        """penalty K f: (count, k) -> (count, k)."""
-        from scipy.sparse import diags_array
-        from scipy.sparse.linalg import splu
-
-        differences, gram = _roughness(self.times, self.periodic)
-        if self.fading:
-            inner = self.times[1:-1]
-            share = np.minimum(1.0, np.minimum(inner, self.times[-1] - inner) / self.fading)
-            differences = differences @ diags_array((share * (2.0 - share)) ** 2)
-        scaled = self.penalty * differences.T @ diags_array(1.0 / self.weights) @ differences
-        bends = splu((gram + scaled).tocsc()).solve(differences.T @ values)
-        return np.asarray(self.penalty * (differences @ bends), dtype=np.float64)
+    @cached_property
+    def _system(self) -> _Roughness:
+        return _Roughness(self.times, self.periodic, self.order)
 
 
-class Pilot(NamedTuple):
-    """The smoother of least expected error, and what it leaves of the samples.
+def likeliest(
+    times: Array, periodic: bool, values: Array, noise: Array, groups: list[list[int]], order: int = ORDER
+) -> LinearSmoother:
+    """The smoother of the penalties that are likeliest for samples whose noise is known.
 
-    Attributes
-    ----------
-    smoother : itself
-    motion : (count, n) the samples, smoothed twice: what is surely motion
-    taken_off : (count, n) what the second time takes off
-    """
-
-    smoother: LinearSmoother
-    motion: Array
-    taken_off: Array
-
-
-def pilot(times: Array, periodic: bool, values: Array, noise: Array) -> Pilot:
-    """The smoother for which sums of squares of the error, in units of the noise, are least as far as one can tell.
+    Of the spline as a random function, whose derivative of the order is white noise of the variance noise^2/penalty:
+    the penalty is the one of the greatest likelihood of what the samples say beyond a polynomial.
 
     Parameters
     ----------
-    values, noise : (count, n), (n,) [rad or m]
+    values, noise : (count, n), (n,) [rad or m]; a column without noise is left as it is
+    groups : columns that have one penalty together
 
     Notes
     -----
-    Source: Mallows 1973 (C_p).
+    Source: Wahba 1985, Annals of Statistics 13, 1378 (generalized maximum likelihood).
     """
-    unit = (times[-1] / (len(times) - 1)) ** 3
-    tried: dict[float, tuple[float, LinearSmoother]] = {}
-
-    def risk(power: float) -> float:
-        if power not in tried:
-            smoother = LinearSmoother.of_width(times, periodic, unit * 10.0**power)
-            probes = smoother.probes()
-            images = smoother(np.concatenate([values, probes], axis=1))
-            off = (values - images[:, : values.shape[1]]) / noise
-            freedom = smoother.trace(probes, images[:, values.shape[1] :])
-            squares = float((smoother.weights[:, None] * off**2).sum())
-            tried[power] = squares + 2.0 * len(noise) * freedom, smoother
-        return tried[power][0]
-
-    best = min(np.arange(_LEAST, _MOST + 1.0).tolist(), key=risk)
-    best = min((power for power in (best - _STEP, best, best + _STEP) if _LEAST <= power <= _MOST), key=risk)
-    smoother = tried[best][1]
-    once = smoother(values)
-    twice = smoother(once)
-    return Pilot(smoother, twice, once - twice)
+    system = _Roughness(times, periodic, order)
+    penalties = np.zeros(values.shape[1])
+    widths = _widths(len(values))
+    if not system.modes:
+        return LinearSmoother(times, periodic, penalties, order)
+    # About the first: what does not move has no digits to lose.
+    about = values - values[0]
+    squares, determinants = np.empty((len(widths), values.shape[1])), np.empty(len(widths))
+    for row, width in enumerate(widths):
+        squares[row], determinants[row] = system.likelihood(system.penalty_of(width), about)
+    for group in groups:
+        own = [column for column in group if noise[column] > 0.0]
+        if own:
+            misfit = (squares[:, own] / noise[own] ** 2).sum(axis=1)
+            width = _least(np.log10(widths), misfit + len(own) * determinants)
+            penalties[own] = system.penalty_of(10.0 ** (np.round(_ROUNDED * width) / _ROUNDED))
+    return LinearSmoother(times, periodic, penalties, order)
 
 
-def _roughness(times: Array, periodic: bool) -> tuple[Any, Any]:
-    """Sparse Q and R: R g = Q^T f gives the second derivatives g of the spline through f, whose square's integral is
-    g . R g."""
-    from scipy.sparse import coo_array
+def width_of(smoother: LinearSmoother) -> float:
+    """The largest width that is smoothed over, in steps of time."""
+    unit = float(smoother.times[-1]) / (len(smoother.times) - 1)
+    scaled = float(smoother.penalties.max(initial=0.0)) / unit ** (2 * smoother.order - 1)
+    return scaled ** (0.5 / smoother.order)
 
-    steps = np.diff(times)
-    pieces = len(steps)
-    count = pieces if periodic else pieces + 1
-    knots = np.arange(pieces) if periodic else np.arange(1, pieces)
-    before, after = steps[knots - 1], steps[knots]
-    column = np.arange(len(knots))
-    entries = np.concatenate([1.0 / before, -1.0 / before - 1.0 / after, 1.0 / after])
-    rows = np.concatenate([(knots - 1) % count, knots, (knots + 1) % count])
-    differences = coo_array((entries, (rows, np.tile(column, 3))), shape=(count, len(knots))).tocsc()
-    pairs = column if periodic else column[:-1]
-    beside, shared = (pairs + 1) % len(knots), after[: len(pairs)] / 6.0
-    entries = np.concatenate([(before + after) / 3.0, shared, shared])
-    places = (np.concatenate([column, pairs, beside]), np.concatenate([column, beside, pairs]))
-    return differences, coo_array((entries, places), shape=(len(knots), len(knots))).tocsc()
+
+def _widths(count: int) -> Array:
+    most = min(_WIDEST, max(float(count), 1.0))
+    number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
+    return _NARROWEST * 10.0 ** (np.arange(number) / _WIDTHS_A_DECADE)
+
+
+def _least(places: Array, values: Array) -> float:
+    """Where the parabola through the least of evenly placed values and its neighbours is least."""
+    best = int(np.argmin(values))
+    if best in (0, len(values) - 1):
+        return float(places[best])
+    before, here, after = values[best - 1 : best + 2]
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+    return float(places[best] + shift * (places[best] - places[best - 1]))
+
+
+class _Roughness:
+    """The integral of the squared derivative of the spline through values f, as g . R g with R g = Q^T f.
+
+    Q^T f are integrals of the derivative against B-splines M of integral one, R is their Gram matrix. Steps of time
+    are the unit, and the B-splines are scaled to squares of integral one. f is the solution of
+
+        [W     r Q] [f]   [W y]
+        [r Q^T  -R] [g] = [ 0 ],    r^2 = penalty,
+
+    whose condition grows as r: that of the normal equations for g grows as its square, and no digit would be left
+    where a hundred samples are smoothed over.
+    """
+
+    def __init__(self, times: Array, periodic: bool, order: int) -> None:
+        self._unit = float(times[-1]) / (len(times) - 1)
+        self._order = order
+        self._count = len(times) - periodic
+        self.weights = np.ones(self._count)
+        if periodic:
+            self.weights[0] = 2.0
+        self._differences, self._gram = _splines(times / self._unit, periodic, order)
+        self.modes = self._count - (1 if periodic else order)
+        """What is penalized at all: all but constants, or polynomials below the order."""
+
+    def penalty_of(self, width: float) -> float:
+        """Of a width in steps of time: what swings with it, in radians a step, is halved [s^(2 order - 1)]."""
+        return float(width ** (2 * self._order) * self._unit ** (2 * self._order - 1))
+
+    def solved(self, penalty: float, right: Array) -> Array:
+        """(W + penalty K)^-1 right: (count, k) -> (count, k)."""
+        if not self._differences.shape[1]:
+            return right / self.weights[:, None]
+        return self._with(self._factor(penalty), right)
+
+    def likelihood(self, penalty: float, values: Array) -> tuple[Array, float]:
+        """Of values (count, n): y . W (y - S y) of each (n,), and the logarithm of the determinant of the samples'
+        covariance in units of the noise, but for what no penalty changes."""
+        factor = self._factor(penalty)
+        weighted = self.weights[:, None] * values
+        off = values - self._with(factor, weighted)
+        determinant = float(np.log(np.abs(factor.U.diagonal())).sum())
+        return (weighted * off).sum(axis=0), determinant - self.modes * float(np.log(self._scaled(penalty)))
+
+    def trace(self, penalty: float) -> float:
+        """Of S = (W + penalty K)^-1 W: count minus the slope of half the determinant's logarithm by log r."""
+        step = 1e-3
+        ahead, behind = (
+            float(np.log(np.abs(self._factor(penalty * factor).U.diagonal())).sum())
+            for factor in (1.0 + step, 1.0 / (1.0 + step))
+        )
+        return self._count - (ahead - behind) / (2.0 * np.log1p(step))
+
+    def _scaled(self, penalty: float) -> float:
+        return penalty / self._unit ** (2 * self._order - 1)
+
+    def _factor(self, penalty: float) -> Any:
+        from scipy.sparse.linalg import splu
+
+        fixed, coupling = self._matrices
+        return splu((fixed + np.sqrt(self._scaled(penalty)) * coupling).tocsc())
+
+    @cached_property
+    def _matrices(self) -> tuple[Any, Any]:
+        """What no penalty changes, and what r multiplies."""
+        from scipy.sparse import block_array, block_diag, diags_array
+
+        fixed = block_diag([diags_array(self.weights), -self._gram])
+        coupling = block_array([[None, self._differences], [self._differences.T, None]])
+        places = self._places
+        return tuple(matrix.tocsc()[places][:, places].tocsc() for matrix in (fixed, coupling))
+
+    def _with(self, factor: Any, right: Array) -> Array:
+        both = np.zeros((len(self._places), right.shape[1]))
+        both[: len(right)] = right
+        solution = np.empty_like(both)
+        solution[self._places] = factor.solve(both[self._places])
+        return solution[: len(right)]
+
+    @cached_property
+    def _places(self) -> Any:
+        """Values and B-splines in the order of time, so that the matrix is a band."""
+        middles = np.arange(self._differences.shape[1]) + 0.5 * self._order
+        return np.argsort(np.concatenate([np.arange(self._count), middles]), kind="stable")
+
+
+def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
+    """Sparse Q (count, k) and R (k, k) of `_Roughness`: k B-splines, one from each knot, of so many pieces."""
+    from numpy.polynomial.legendre import leggauss
+    from scipy.sparse import coo_array, diags_array
+
+    count = len(times) - periodic
+    splines = count if periodic else max(count - order, 0)
+    # Of a loop knots go on, round after round.
+    rounds = np.arange(splines + order if periodic else count)
+    knots_in_turn = times[:count][rounds % count] + times[-1] * (rounds // count)
+    first = np.arange(splines)
+    knots = knots_in_turn[first[:, None] + np.arange(order + 1)]
+    apart = knots[:, :, None] - knots[:, None, :]
+    apart[:, range(order + 1), range(order + 1)] = 1.0
+    # The integral of M times a derivative is the divided difference times order!.
+    entries = factorial(order) / np.prod(apart, axis=2)
+    rows = (first[:, None] + np.arange(order + 1)) % count
+    shape = (count, splines)
+    differences = coo_array((entries.ravel(), (rows.ravel(), np.repeat(first, order + 1))), shape=shape).tocsc()
+    nodes, shares = leggauss(order)
+    lengths = np.diff(knots, axis=1)
+    values = np.stack([_spline_values(knots, piece, 0.5 * (nodes + 1.0)) for piece in range(order)], axis=1)
+    found: list[tuple[Array, Any, Any]] = []
+    for shift in range(order):
+        before = first if periodic else first[: splines - shift]
+        after = (before + shift) % max(splines, 1)
+        shared = [
+            0.5 * lengths[before, piece] * (shares * values[before, piece] * values[after, piece - shift]).sum(axis=1)
+            for piece in range(shift, order)
+        ]
+        found.append((sum(shared), before, after))
+        if shift:
+            found.append((sum(shared), after, before))
+    entries, rows, columns = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    gram = coo_array((entries, (rows, columns)), shape=(splines, splines)).tocsc()
+    scale = diags_array(1.0 / np.sqrt(gram.diagonal()))
+    return (differences @ scale).tocsc(), (scale @ gram @ scale).tocsc()
+
+
+def _spline_values(knots: Array, piece: int, places: Array) -> Array:
+    """B-splines of integral one at places of one of their pieces: (k, order + 1) -> (k, places).
+
+    Source: de Boor 1978, A Practical Guide to Splines, chapter X.
+    """
+    order = knots.shape[1] - 1
+    ends = knots[:, piece : piece + 2]
+    at = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * places
+    level = [np.where(k == piece, 1.0 / (ends[:, 1:] - ends[:, :1]), 0.0) * np.ones_like(places) for k in range(order)]
+    for degree in range(2, order + 1):
+        level = [
+            degree
+            / (degree - 1)
+            * ((at - knots[:, [k]]) * level[k] + (knots[:, [k + degree]] - at) * level[k + 1])
+            / (knots[:, [k + degree]] - knots[:, [k]])
+            for k in range(order - degree + 1)
+        ]
+    return level[0]

@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Array, Mask, lock_arrays
 from ...display import short_repr
 from ..curves import PiecewisePolynomial
-from ..path_samples import path_samples
+from ..path_samples import PathSamples, path_samples
 from ..shape_path import ShapePath
 from ._linear_smoother import LinearSmoother
 
@@ -22,18 +22,18 @@ class Prepared:
     Attributes
     ----------
     samples : (N, n) as recorded [rad or m]
-    bias : (knots, n) that smoothing took off the motion, as far as it is known [rad or m]
-    smoother : knows the times of the samples, and whether the spline is periodic
-    smoothed : (n,) whether a joint is smoothed
+    smoother : of columns (n,); knows the times of the samples, and whether the spline is periodic
+    pilot : a smoother of a higher order, by whose motion it is known what the other one takes off
+    inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
     drift : whether what is left between the last sample and the first is taken off evenly in time
     joint_names : n names, or None
     """
 
     samples: Array
-    bias: Array
     smoother: LinearSmoother
-    smoothed: Mask
+    pilot: LinearSmoother
+    inside: slice
     turns: Array
     drift: bool
     joint_names: tuple[str, ...] | None
@@ -42,10 +42,20 @@ class Prepared:
 
     __post_init__ = lock_arrays
 
+    @property
+    def smoothed(self) -> Mask:
+        """Which joints are smoothed: (n,)."""
+        return self.smoother.penalties > 0.0
+
     @cached_property
     def _share(self) -> Array:
         times = self.smoother.times
         return (times / times[-1])[:, None]
+
+    @property
+    def _kept(self) -> slice:
+        """Of the values that are smoothed, those at knots of the path."""
+        return slice(None) if self.smoother.periodic else self.inside
 
     def joined(self, samples: Array) -> Array:
         """Of recorded samples (N, n), the values that are smoothed: (count, n)."""
@@ -59,17 +69,23 @@ class Prepared:
         return np.concatenate([first[None], even[1:-1]])
 
     def values(self, samples: Array) -> Array:
-        """The values of the spline at its knots: (count, n)."""
+        """The values of the spline at its knots: (knots, n)."""
         found = self.joined(samples)
-        chosen = found[:, self.smoothed]
-        if chosen.size:
-            # About the first, so that what does not move stays to the last digit.
-            found[:, self.smoothed] = chosen[0] + self.smoother(chosen - chosen[0])
-        return found
+        # About the first, so that what does not move stays to the last digit.
+        smooth = found[0] + self.smoother(found - found[0])
+        return np.where(self.smoothed, smooth, found)[self._kept]
+
+    @cached_property
+    def bias(self) -> Array:
+        """As `SampleOrigin`."""
+        values = self.joined(self.samples)
+        motion = self.pilot(values - values[0])
+        return (self.smoother(motion) - motion)[self._kept]
 
     def path(self, samples: Array) -> ShapePath:
         """As `SampleOrigin`."""
-        values, periodic, times = self.values(samples), self.smoother.periodic, self.smoother.times
+        values, periodic = self.values(samples), self.smoother.periodic
+        times = self.smoother.times[self.inside]
         if periodic:
             values = np.concatenate([values, values[:1]])
         plain = ShapePath.spline(times, values, periodic, joint_names=self.joint_names)
@@ -86,10 +102,21 @@ class Prepared:
 
     def by_samples(self, by_values: Array) -> Array:
         """As `SampleOrigin`."""
-        found = by_values.copy()
-        chosen = found[:, :, self.smoothed]
-        if chosen.size:
-            found[:, :, self.smoothed] = self.smoother.transposed(chosen.reshape(len(chosen), -1)).reshape(chosen.shape)
+        return self._by_recorded(self.smoother.transposed(self._of_all(by_values)))
+
+    def bias_by_samples(self, by_values: Array) -> Array:
+        """As `SampleOrigin`."""
+        given = self._of_all(by_values)
+        return self._by_recorded(self.pilot.transposed(self.smoother.transposed(given) - given))
+
+    def _of_all(self, by_values: Array) -> Array:
+        """Derivatives by all values that are smoothed, of which those outside of the path are zero."""
+        whole = np.zeros((self.smoother.count, *by_values.shape[1:]))
+        whole[self._kept] = by_values
+        return whole
+
+    def _by_recorded(self, found: Array) -> Array:
+        """From derivatives by `joined` to those by the samples: (count, m, n) -> (N, m, n)."""
         if not self.smoother.periodic:
             return found
         last = np.where(self.smoothed, 0.5 * found[0], 0.0)
@@ -144,8 +171,19 @@ class Resampled:
     def by_samples(self, by_values: Array) -> Array:
         """As `SampleOrigin`."""
         samples = path_samples(self.inner)
-        found = samples.derivative(self.times[: self.count], by_values, np.zeros_like(by_values))
-        return np.moveaxis(found.reshape(by_values.shape[1], samples.count, -1), 0, 1)
+        return self._of_inner(samples.by_samples(self._by_knots(samples, by_values)), samples.count)
+
+    def bias_by_samples(self, by_values: Array) -> Array:
+        """As `SampleOrigin`."""
+        samples = path_samples(self.inner)
+        return self._of_inner(samples.bias_by_samples(self._by_knots(samples, by_values)), samples.count)
+
+    def _by_knots(self, samples: PathSamples, by_values: Array) -> Array:
+        return samples.by_knots(self.times[: self.count], by_values, np.zeros_like(by_values))
+
+    @staticmethod
+    def _of_inner(found: Array, count: int) -> Array:
+        return np.moveaxis(found.reshape(len(found), count, -1), 0, 1)
 
 
 def resampled(path: ShapePath, times: Array, joint_names: tuple[str, ...] | None) -> ShapePath:

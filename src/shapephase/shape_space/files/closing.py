@@ -94,9 +94,10 @@ def closed_path(
     way = ("smooth" if recorded.noise.any() else "drift") if by is None else by
     if not isinstance(way, str) or way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)
-    whole = recorded.shapes[-1] - recorded.shapes[0]
+    first, last = recorded.kept.shapes[[0, -1]]
+    whole = last - first
     for ball in body.chain.follows.balls:
-        if recorded.shapes[-1, ball.columns] @ recorded.shapes[0, ball.columns] < 0.0:
+        if last[ball.columns] @ first[ball.columns] < 0.0:
             raise TrajectoryError(
                 f"ball joint {ball.name} ends more than half a turn from its start, as its quaternion went; leave "
                 "close (--close) out"

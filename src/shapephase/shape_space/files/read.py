@@ -31,6 +31,7 @@ from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
 from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
+from ._surroundings import surrounded
 from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
@@ -154,12 +155,13 @@ def read_recorded_motion(
     rest : joint -> value [rad or m], or a text as "30deg" or "5 mm", for joints without a column
     rest_missing : whether all other joints without a column rest at zero, or at their limit next to it
     ignore_extra : whether columns that are no joints are left out
-    trim : the first and the last time to be kept, as the file tells the time (its unit, its start)
+    trim : the first and the last time to be kept, as the file tells the time (its unit, its start); what is smoothed is
+        smoothed before it is cut
     resample : the path goes through this many of its own values a second instead, evenly spaced [1/s]
     smooth : noise level of the samples, rms, a number [rad or m] or a text as "0.3deg" or "0.3deg,1mm", one for all
         joints or by joint (the others are interpolated); None: the path goes through all samples. See
         `smoothing.smoothed_path`.
-    smooth_penalty : instead of the penalty that follows from the noise [s^3]
+    smooth_penalty : instead of the penalties that follow from the noise [s^5]
     close : the largest gap between the ends of a cycle that is closed, a number [rad or m] or a text as "3deg" or
         "3deg,5mm"; None: what meets to 1e-9 runs smoothly from its end to its start, else the ends stay apart; False:
         they are not joined even then
@@ -218,6 +220,13 @@ def read_recorded_motion(
     try:
         noise = _noise_levels(smooth, body)
         samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)
+        if noise.any() and (kept is not None or free is not None):
+            samples = surrounded(
+                samples,
+                recording,
+                lambda: recording_of(table, body.joint_names, mapping, time_unit, step, None),
+                lambda part: matched(part, body, choices).shapes,
+            )
         path, smoothing, closing = _path(samples, body, within, close_by, loop=close is None, penalty=smooth_penalty)
         check_swings(path, body)
     except (TrajectoryError, ShapeError) as error:
@@ -412,8 +421,8 @@ def _smoothing_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
     """What smoothing did, as JSON can hold it."""
     rms = np.sqrt(np.mean(smoothing.bias**2, axis=0))
     return {
-        "penalty_s3": smoothing.penalty,
-        "degrees_of_freedom": smoothing.degrees_of_freedom,
+        "penalty_s5": dict(zip(body.joint_names, smoothing.penalty.tolist(), strict=True)),
+        "degrees_of_freedom": dict(zip(body.joint_names, smoothing.degrees_of_freedom.tolist(), strict=True)),
         "bias_rms": dict(zip(body.joint_names, rms.tolist(), strict=True)),
         "bias_in_bars": smoothing.bias_in_bars,
     }

@@ -1,21 +1,22 @@
-"""Smooth paths through noisy samples: a smoothing spline of one penalty, linear in the samples."""
+"""Smooth paths through noisy samples: a quintic smoothing spline for each joint, linear in the samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_flag, positive_argument
-from ...arrays import Array, finite_array, lock_arrays
+from ...arrays import Array, Mask, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
+from ..ball_columns import ball_columns
 from ..curves import CLOSED
 from ..shape_path import ShapePath
-from ._linear_smoother import LinearSmoother, pilot
+from ._linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, likeliest, width_of
 from ._recording import warn
 from ._sample_origins import Prepared
 
@@ -23,9 +24,8 @@ _FEWEST = 5
 """Samples; of fewer, what is motion and what is noise cannot be told apart."""
 _WIDEST_GAP = 5.0 * np.sqrt(2.0)
 """Largest gap of a loop in noise levels: five standard deviations of the difference of two samples."""
-_BIAS = 0.2
-"""Of what smoothing does to the motion, in standard deviations of what noise does: it widens no bar by more than
-a fiftieth."""
+_REACH = 6.0
+"""Widths that are smoothed over: what is farther from a sample counts there by exp(-6/2) of 1/6 of it, or less."""
 _EXACT = 1e-9
 """Noise below this share of the samples' spread counts as none: the samples are interpolated."""
 
@@ -37,17 +37,18 @@ class Smoothing:
     Attributes
     ----------
     noise : (n,) as stated, rms [rad or m]; zero where the path goes through the samples
-    penalty : of the integral of squared second derivatives, beside the sum of squares of samples minus path [s^3]
-    degrees_of_freedom : effective, of each joint that is smoothed, of as many as it has samples
+    penalty : (n,) of the integral of squared third derivatives, beside the sum of squares of samples minus path [s^5]
+    degrees_of_freedom : (n,) effective, of as many as there are samples, those before and after the path that were
+        smoothed with it among them
     bias : (knots, n) what was taken off the motion itself at the knots, as far as it is known [rad or m]
-    bias_in_bars : bias of a number that follows linearly from the path, at most, whichever it is: in standard
-        deviations of what the noise does to it
+    bias_in_bars : its rms, of the joint where it is largest beside what is left of the noise: in standard deviations
+        of that; error bars hold both
     residual : (n,) rms of samples minus path [rad or m]
     """
 
     noise: Array
-    penalty: float
-    degrees_of_freedom: float
+    penalty: Array
+    degrees_of_freedom: Array
     bias: Array
     bias_in_bars: float
     residual: Array
@@ -68,12 +69,11 @@ def smoothed_path(
 ) -> tuple[ShapePath, Smoothing]:
     """A C2 cubic spline near samples whose noise is known, and what smoothing did to them.
 
-    Its values at the samples' times are those of a smoothing spline, with one penalty for all joints. They are linear
-    in the samples, so that error bars go through. A noise of zero is interpolation.
+    Its values at the samples' times are those of a quintic smoothing spline with natural ends, each joint with its own
+    penalty. They are linear in the samples, so that error bars go through. A noise of zero is interpolation.
 
-    The penalty follows from the noise level: first the one of least expected error (Mallows' C_p), whose bias may be
-    as large as the bars; then less, by as much as it takes for a bias under a fifth of the bar of any number that
-    follows linearly from the path. How large it is follows from the samples smoothed twice by the first penalty.
+    The penalty is the likeliest one for the noise level. What it takes off the motion, above all at the ends, where
+    the third derivative of such a spline is zero, follows from a spline of degree nine.
 
     A periodic spline runs smoothly from its end to its start, and its ends are equal. The first and the last sample
     are then two measurements of one shape: their mean is used, with the weight of both.
@@ -85,7 +85,7 @@ def smoothed_path(
     noise : rms of each sample's noise, one or one for each joint (n,) [rad or m]
     periodic : None: periodic when the last sample equals the first to 1e-9
     joint_names : n names
-    penalty : instead of the one that follows from the noise [s^3]; what it does to the motion is told in any case
+    penalty : instead of those that follow from the noise [s^5]; what it does to the motion is known in any case
 
     Raises
     ------
@@ -102,7 +102,7 @@ def smoothed_path(
 
     Notes
     -----
-    Source: Reinsch 1967 (the spline); Mallows 1973 (C_p); own derivation (the bias).
+    Source: Reinsch 1967 (the spline); Wahba 1985 (the penalty); own derivation (the bias).
 
     Examples
     --------
@@ -130,21 +130,38 @@ class Recorded:
 
     Attributes
     ----------
-    times, shapes : (N,) ascending from 0 [s], (N, n) [rad or m]
+    times, shapes : (N,) ascending [s], (N, n) [rad or m]
     noise : (n,) rms [rad or m]
     joint_names : n names, or None
+    inside : the samples that are kept; those before and after them are there to be smoothed with them
     """
 
     times: Array
     shapes: Array
     noise: Array
     joint_names: tuple[str, ...] | None
+    inside: slice = field(default_factory=lambda: slice(None))
+
+    @property
+    def kept(self) -> Recorded:
+        """The samples that are kept, alone, from the time 0 on."""
+        return self.around(0)
+
+    def around(self, margin: int) -> Recorded:
+        """With so many samples before and after those that are kept, or as many as there are."""
+        first, past, _ = self.inside.indices(len(self.times))
+        start = max(first - margin, 0)
+        part = slice(start, min(past + margin, len(self.times)))
+        times = self.times[part]
+        inside = slice(first - start, past - start)
+        return replace(self, times=times - times[0], shapes=self.shapes[part], inside=inside)
 
     @property
     def meets(self) -> bool:
         """Whether the last sample is the first, as far as files can say, and another is between them."""
-        first, last = self.shapes[0], self.shapes[-1]
-        return len(self.times) > 2 and bool(np.all(np.abs(last - first) <= CLOSED * np.maximum(1.0, np.abs(first))))
+        shapes = self.shapes[self.inside]
+        first, last = shapes[0], shapes[-1]
+        return len(shapes) > 2 and bool(np.all(np.abs(last - first) <= CLOSED * np.maximum(1.0, np.abs(first))))
 
 
 def prepared_path(
@@ -162,64 +179,85 @@ def prepared_path(
     turns : (n,) whole turns that are taken off evenly before, and given back afterwards [rad]
     drift : whether the gap between last and first sample is taken off evenly
     """
-    times, noise = recorded.times, recorded.noise
-    given = None if penalty is None else positive_argument(penalty, "smooth_penalty", "a penalty in s^3")
+    noise = recorded.noise
+    given = None if penalty is None else positive_argument(penalty, "smooth_penalty", "a penalty in s^5")
     if given is not None and not noise.any():
         raise TrajectoryError("smooth_penalty: state the noise of the samples too (smooth, --smooth)")
-    steps = Prepared(
-        samples=recorded.shapes,
-        bias=np.zeros((len(times) - periodic, len(noise))),
-        smoother=LinearSmoother(times, periodic, 0.0),
-        smoothed=np.zeros(len(noise), dtype=bool),
-        turns=np.zeros(len(noise)) if turns is None else turns,
-        drift=drift,
-        joint_names=recorded.joint_names,
-    )
+    alone = recorded.kept
+    turned = np.zeros(len(noise)) if turns is None else turns
     if noise.any():
-        if len(times) < _FEWEST:
-            raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(times)}")
+        if len(alone.times) < _FEWEST:
+            raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(alone.times)}")
         names = recorded.joint_names or tuple(f"number {joint}" for joint in range(len(noise)))
         if periodic and not drift:
-            _check_gap(recorded.shapes[-1] - recorded.shapes[0] - steps.turns, noise, names)
-        _check_signal(steps.joined(recorded.shapes), noise, names)
-    elif not drift and not steps.turns.any():
-        plain = ShapePath.spline(times, recorded.shapes, periodic, joint_names=recorded.joint_names)
-        return plain, _report(recorded, steps, plain, 0.0)
-    steps, in_bars = _smoothed(steps, noise, given)
-    path = steps.path(recorded.shapes)
-    return path, _report(recorded, steps, path, in_bars)
+            _check_gap(alone.shapes[-1] - alone.shapes[0] - turned, noise, names)
+        _check_signal(_steps(alone, noise > 0.0, periodic, turned, drift=drift).joined(alone.shapes), noise, names)
+    elif not drift and not turned.any():
+        plain = ShapePath.spline(alone.times, alone.shapes, periodic, joint_names=recorded.joint_names)
+        return plain, _report(alone, _steps(alone, noise > 0.0, periodic, turned, drift=drift), plain)
+    samples, steps = _smoothed(recorded, given, periodic, turned, drift=drift)
+    path = steps.path(samples.shapes)
+    return path, _report(samples, steps, path)
 
 
-def _smoothed(steps: Prepared, noise: Array, given: float | None) -> tuple[Prepared, float]:
-    """The steps with the smoother that the noise asks for, and the largest bias in bars."""
-    spread = _spread(steps.joined(steps.samples))
-    steps = replace(steps, smoothed=noise > _EXACT * spread)
-    moving = steps.smoothed & (spread > 0.0)
-    if not moving.any():
-        return steps, 0.0
-    values = steps.joined(steps.samples)
-    smoother = steps.smoother
-    first = pilot(smoother.times, smoother.periodic, values[:, moving] - values[0, moving], noise[moving])
-    # Of the number that shows it most; it grows with the penalty.
-    weighted = np.sqrt(smoother.weights)[:, None] * first.taken_off / noise[moving]
-    in_bars = float(np.linalg.norm(weighted))
-    most = first.smoother.penalty
-    penalty = most * min(1.0, _BIAS / in_bars if in_bars else 1.0) if given is None else given
-    chosen = replace(first.smoother, penalty=penalty)
-    bias = np.zeros_like(values)
-    bias[:, moving] = chosen(first.motion) - first.motion
-    return replace(steps, smoother=chosen, bias=bias), in_bars * penalty / most
+def _steps(samples: Recorded, smoothed: Mask, periodic: bool, turns: Array, *, drift: bool) -> Prepared:
+    """The steps from samples to a path, their penalties yet to be found."""
+    none = LinearSmoother(samples.times, periodic, np.where(smoothed, np.inf, 0.0))
+    return Prepared(
+        samples=samples.shapes,
+        smoother=none,
+        pilot=replace(none, order=PILOT_ORDER),
+        inside=samples.inside,
+        turns=turns,
+        drift=drift,
+        joint_names=samples.joint_names,
+    )
 
 
-def _report(recorded: Recorded, steps: Prepared, path: ShapePath, in_bars: float) -> Smoothing:
-    smoother = steps.smoother
+def _smoothed(
+    recorded: Recorded, given: float | None, periodic: bool, turns: Array, *, drift: bool
+) -> tuple[Recorded, Prepared]:
+    """The samples that are smoothed together, and the steps with the smoothers that their noise asks for."""
+    samples = recorded.kept
+    spread = _spread(_steps(samples, recorded.noise > 0.0, periodic, turns, drift=drift).joined(samples.shapes))
+    noise = np.where(recorded.noise > _EXACT * spread, recorded.noise, 0.0)
+    groups = _groups(samples.joint_names, len(noise))
+
+    def smoother(part: Recorded, order: int = ORDER) -> LinearSmoother:
+        values = _steps(part, noise > 0.0, periodic, turns, drift=drift).joined(part.shapes)
+        if given is not None and order == ORDER:
+            return LinearSmoother(part.times, periodic, np.where(noise > 0.0, given, 0.0))
+        return likeliest(part.times, periodic, values, noise, groups, order)
+
+    chosen = smoother(samples)
+    if not periodic and noise.any():
+        samples = recorded.around(int(np.ceil(_REACH * width_of(chosen))))
+        chosen = smoother(samples) if len(samples.times) > chosen.count else chosen
+    steps = _steps(samples, noise > 0.0, periodic, turns, drift=drift)
+    return samples, replace(steps, smoother=chosen, pilot=smoother(samples, PILOT_ORDER))
+
+
+def _groups(joint_names: tuple[str, ...] | None, count: int) -> list[list[int]]:
+    """Columns that are smoothed alike: each by itself, the four numbers of a ball joint together."""
+    balls = [list(range(ball.start, ball.stop)) for ball in ball_columns(joint_names)]
+    taken = {column for ball in balls for column in ball}
+    return [*balls, *([column] for column in range(count) if column not in taken)]
+
+
+def _report(samples: Recorded, steps: Prepared, path: ShapePath) -> Smoothing:
+    smoother, kept = steps.smoother, samples.kept
+    noise = np.where(steps.smoothed, samples.noise, 0.0)
+    free = smoother.degrees_of_freedom()
+    bias = steps.bias
+    left = noise * np.sqrt(free / smoother.count)
+    in_bars = np.divide(np.sqrt(np.mean(bias**2, axis=0)), left, out=np.zeros(len(noise)), where=left > 0.0)
     return Smoothing(
-        noise=np.where(steps.smoothed, recorded.noise, 0.0),
-        penalty=smoother.penalty,
-        degrees_of_freedom=smoother.degrees_of_freedom if smoother.penalty else float(smoother.count),
-        bias=steps.bias,
-        bias_in_bars=in_bars,
-        residual=np.sqrt(np.mean((recorded.shapes - path.shape(recorded.times)) ** 2, axis=0)),
+        noise=noise,
+        penalty=smoother.penalties,
+        degrees_of_freedom=free,
+        bias=bias,
+        bias_in_bars=float(in_bars.max(initial=0.0)),
+        residual=np.sqrt(np.mean((kept.shapes - path.shape(kept.times)) ** 2, axis=0)),
     )
 
 
@@ -245,7 +283,7 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
     for joint in map(int, np.flatnonzero(drowned)):
         warn(
             f"joint {joint_names[joint]} moves by {spread[joint]:.6g} rms about its mean, no more than the noise level "
-            f"{noise[joint]:.6g} (both in rad or m): of what it does, little is sure"
+            f"{noise[joint]:.6g} (both in rad or m): its motion cannot be told from noise"
         )
 
 

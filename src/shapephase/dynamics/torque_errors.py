@@ -1,0 +1,196 @@
+"""Error bars of what the joints do: torques, rates, power and work, by the noise of recorded joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import check_object
+from ..arrays import Array, lock_arrays
+from ..display import short_repr
+from ..errors import ShapeError
+from ..reconstruction.forced_motion import ForcedMotion
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.path_errors import path_errors, summed_errors
+from ._driven_motion import BY_JOINTS, drive
+from .loads import JointLoads
+from .moving_body import needed_body_and_path
+from .torques import JointTorques
+
+_STEPS = (1e-5, 1.0, 1.0)
+"""By which shapes [rad or m], rates and accelerations are moved: torques are quadratic in rates, and linear in
+accelerations, of which central differences leave rounding alone."""
+_TIMES_OF_WORK = 201
+"""Even times over which errors of the power are summed: bars need few digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueErrors:
+    """Standard deviations of what the joints do at N times, to first order.
+
+    Attributes
+    ----------
+    times : (N,) [s]
+    torque, rate, power : (N, n) [N m or N], [rad/s or m/s], [W]
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 41)
+    >>> samples = sp.examples.kane_scher(0.3, 0.5).shape(times)
+    >>> path = sp.ShapePath.spline(times, samples, joint_names=cat.joint_names)
+    >>> motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 0.005])
+    >>> found = sp.torque_errors(sp.joint_torques(motion, [0.2, 0.6]), joints=1e-4)
+    >>> found.torque.shape
+    (2, 3)
+    """
+
+    times: Array
+    torque: Array
+    rate: Array
+    power: Array
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+
+@dataclass(frozen=True, eq=False)
+class LoadErrors:
+    """Standard deviations of peaks, each at its time, and of work.
+
+    Attributes
+    ----------
+    peak_torque, peak_rate, peak_power : (n,) [N m or N], [rad/s or m/s], [W]
+    work : (n,) net, of each joint [J]
+    total_work : of all joints [J]
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 41)
+    >>> samples = sp.examples.kane_scher(0.3, 0.5).shape(times)
+    >>> path = sp.ShapePath.spline(times, samples, joint_names=cat.joint_names)
+    >>> motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 0.005])
+    >>> sp.dynamics.load_errors(motion, sp.joint_torques(motion).loads, 1e-4).work.shape
+    (3,)
+    """
+
+    peak_torque: Array
+    peak_rate: Array
+    peak_power: Array
+    work: Array
+    total_work: float
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+
+class _Slopes(NamedTuple):
+    """Derivatives at N times by shape, rate and acceleration of each column of the path: (N, n_rates, n, 3)."""
+
+    torque: Array
+    rate: Array
+    power: Array
+
+
+def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> TorqueErrors:
+    """How far torques, rates and power may be off by the noise of the samples of the joints.
+
+    Attitude and momentum are taken as they are: what the noise turns them by moves a torque far less than what it does
+    to the accelerations.
+
+    Parameters
+    ----------
+    torques : of one motion along a path through samples
+    joints : standard deviation of the noise of the samples, as in `path_errors`; None: the one that the recording was
+        smoothed for
+
+    Raises
+    ------
+    ShapeError
+        For a batch, and as `path_errors`.
+    WrongObjectError
+        As `path_errors`.
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 41)
+    >>> path = sp.ShapePath.spline(times, sp.examples.kane_scher(0.3, 0.5).shape(times), joint_names=cat.joint_names)
+    >>> motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 0.005])
+    >>> found = sp.torque_errors(sp.joint_torques(motion, [0.2]), joints=1e-4)
+    >>> bool(np.all(found.power <= 1.0))
+    True
+    """
+    check_object(torques, "JointTorques", "torques")
+    return _errors_at(torques.motion, torques.times.ravel(), joints)
+
+
+def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayLike | None = None) -> LoadErrors:
+    """How far peaks, each at its time, and work may be off by the noise of the samples; arguments as `torque_errors`.
+
+    The largest of many values that noise moves is rather too large; its bar does not hold that.
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 41)
+    >>> path = sp.ShapePath.spline(times, sp.examples.kane_scher(0.3, 0.5).shape(times), joint_names=cat.joint_names)
+    >>> motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 0.005])
+    >>> found = sp.dynamics.load_errors(motion, sp.joint_torques(motion).loads, joints=1e-4)
+    >>> bool(found.total_work < found.work.sum())
+    True
+    """
+    check_object(loads, "JointLoads", "loads")
+    _check_single(motion)
+    count = len(loads.joint_names)
+    own = np.arange(count)
+    peaks = np.concatenate([loads.peak_time, loads.rate_time, loads.power_time])
+    times, place = np.unique(peaks, return_inverse=True)
+    found = _errors_at(motion, times, joints)
+    places = place.reshape(3, count)
+    each = [values[at, own] for values, at in zip((found.torque, found.rate, found.power), places, strict=True)]
+    work, total = _work_errors(motion, joints)
+    return LoadErrors(peak_torque=each[0], peak_rate=each[1], peak_power=each[2], work=work, total_work=total)
+
+
+def _check_single(motion: Motion | ForcedMotion) -> None:
+    if motion.batch:
+        raise ShapeError(f"error bars are those of one motion, this is a batch of {motion.batch}")
+
+
+def _errors_at(motion: Motion | ForcedMotion, times: Array, joints: ArrayLike | None) -> TorqueErrors:
+    _check_single(motion)
+    _, path = needed_body_and_path(motion, BY_JOINTS)
+    errors, slopes = path_errors(path, times, joints), _slopes(motion, times)
+    return TorqueErrors(
+        times=times, torque=errors.of(slopes.torque), rate=errors.of(slopes.rate), power=errors.of(slopes.power)
+    )
+
+
+def _slopes(motion: Motion | ForcedMotion, times: Array) -> _Slopes:
+    _, path = needed_body_and_path(motion, BY_JOINTS)
+    torques, rates = [], []
+    for column in range(path.n_shape):
+        for which, step in enumerate(_STEPS):
+            moved = np.zeros((3, path.n_shape))
+            moved[which, column] = step
+            ahead, behind = (drive(motion, times, moved=sign * moved) for sign in (1.0, -1.0))
+            torques.append((ahead.torque[0] - behind.torque[0]) / (2.0 * step))
+            rates.append((ahead.rate - behind.rate) / (2.0 * step))
+    shape = (len(times), -1, path.n_shape, len(_STEPS))
+    by_torque, by_rate = (np.stack(found, axis=-1).reshape(shape) for found in (torques, rates))
+    here = drive(motion, times)
+    power = here.rate[..., None, None] * by_torque + here.torque[0][..., None, None] * by_rate
+    return _Slopes(by_torque, by_rate, power)
+
+
+def _work_errors(motion: Motion | ForcedMotion, joints: ArrayLike | None) -> tuple[Array, float]:
+    """Of each joint's work, and of all together: sums of the power over even times."""
+    _, path = needed_body_and_path(motion, BY_JOINTS)
+    times = np.linspace(0.0, motion.duration, _TIMES_OF_WORK)
+    weights = np.full(len(times), times[1])
+    weights[[0, -1]] *= 0.5
+    slopes = weights[:, None, None, None] * _slopes(motion, times).power
+    both = np.concatenate([slopes, slopes.sum(axis=1, keepdims=True)], axis=1)
+    found = summed_errors(path, times, both, joints)
+    return found[:-1], float(found[-1])

@@ -1,0 +1,172 @@
+"""Error bars of a joint motion itself: of its angles, rates and accelerations, by the noise of the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import check_object, times_argument
+from ..arrays import Array, finite_array, lock_arrays
+from ..display import short_repr
+from ..errors import ShapeError, WrongObjectError
+from ..letters import what_came
+from .path_samples import PathSamples, columns_without_samples, path_samples
+from .shape_path import ShapePath
+
+_MOST_NUMBERS = 4_000_000
+"""In memory at once; more times are taken one part after the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathErrors:
+    """How far joints may be off at some times, each by the noise of its own samples.
+
+    Attributes
+    ----------
+    times : (N,) [s]
+    covariance : (N, n, 3, 3) of shape, rate and acceleration of each joint: by the noise, and by what the noise leaves
+        open of the bias
+    bias : (N, n, 3) what smoothing took off these, as far as it is known
+
+    Examples
+    --------
+    >>> times = np.linspace(0.0, 1.0, 41)
+    >>> path = sp.ShapePath.spline(times, np.sin(times)[:, None])
+    >>> print(sp.path_errors(path, [0.5], 0.01).shape.round(4))  # on a knot: that of the sample
+    [[0.01]]
+    """
+
+    times: Array
+    covariance: Array
+    bias: Array
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+    @property
+    def shape(self) -> Array:
+        """Standard deviations of the joints: (N, n) [rad or m]."""
+        return self._deviations(0)
+
+    @property
+    def rate(self) -> Array:
+        """The same of their rates: (N, n) [rad/s or m/s]."""
+        return self._deviations(1)
+
+    @property
+    def acceleration(self) -> Array:
+        """The same of their accelerations: (N, n) [rad/s^2 or m/s^2]."""
+        return self._deviations(2)
+
+    def of(self, derivative: Array) -> Array:
+        """Standard deviations of numbers that follow from all joints: (N, m, n, 3) derivatives by shape, rate and
+        acceleration -> (N, m)."""
+        by_noise = np.einsum("tmja,tjab,tmjb->tm", derivative, self.covariance, derivative)
+        return np.sqrt(by_noise + np.einsum("tmja,tja->tm", derivative, self.bias) ** 2)
+
+    def _deviations(self, which: int) -> Array:
+        return np.sqrt(self.covariance[..., which, which] + self.bias[..., which] ** 2)
+
+
+def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
+    """How far the joints, their rates and accelerations may be off, by the noise of the samples of a path.
+
+    Of a smoothed recording the bars hold what smoothing leaves of the noise and what it takes off the motion.
+
+    Parameters
+    ----------
+    path : through samples: `ShapePath.spline`, `ShapePath.waypoints`, or a recorded motion
+    t : times (N,) [s]
+    joints : standard deviation of the white noise of the samples, one or one for each joint (n,) [rad or m]; None: the
+        one that a recording was smoothed for
+
+    Raises
+    ------
+    WrongObjectError
+        If the path was not put through samples, or a geodesic closes it; without `joints`, if no noise was stated.
+    ShapeError
+        For a noise of another length, or below zero.
+    TrajectoryError
+        For times outside of the path.
+
+    Notes
+    -----
+    Source: own derivation; the bias is that of the quintic smoothing spline on the motion that one of degree nine sees
+    in the same samples.
+
+    Examples
+    --------
+    >>> times = np.linspace(0.0, 1.0, 41)
+    >>> noisy = np.sin(2.0 * np.pi * times)[:, None] + 0.01 * np.cos(40.0 * times)[:, None]
+    >>> path, told = sp.shape_space.files.smoothed_path(times, noisy, 0.01, periodic=False)
+    >>> found = sp.path_errors(path, [0.0, 0.5], 0.01)
+    >>> bool(found.rate[0, 0] > 3.0 * found.rate[1, 0])  # more is open at an end
+    True
+    """
+    check_object(path, "ShapePath", "path")
+    times = times_argument(t, path.duration).ravel()
+    samples, levels = _samples(path), _levels(path, joints)
+    rows = max(samples.count * path.n_shape, samples.curve.coefficients[..., 0].size)
+    chunks = np.array_split(times, max(1, -(-3 * len(times) * rows // _MOST_NUMBERS)))
+    parts = [_errors(samples, part, levels) for part in chunks if len(part)]
+    covariance, bias = (np.concatenate(found) for found in zip(*parts, strict=True))
+    return PathErrors(times=times, covariance=covariance, bias=bias)
+
+
+def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: ArrayLike | None = None) -> Array:
+    """Standard deviations of sums over times (N,) of (N, m, n, 3) derivatives by shape, rate and acceleration: (m,)."""
+    samples, levels = _samples(path), _levels(path, joints)
+    by_knots = np.einsum("tmja,atk->mkj", derivative, samples.rows_by_knots(times)).reshape(derivative.shape[1], -1)
+    variance = (by_knots @ samples.bias) ** 2
+    for rule in (samples.by_samples, samples.bias_by_samples):
+        answers = rule(by_knots).reshape(len(by_knots), -1, path.n_shape) * levels
+        variance += (answers**2).sum(axis=(1, 2))
+    return np.sqrt(variance)
+
+
+def _samples(path: ShapePath) -> PathSamples:
+    """Raises WrongObjectError where a path was put through none, or joints answer to each other."""
+    found = path_samples(path)
+    if found.curve.arc is not None:
+        raise WrongObjectError(
+            "error bars of rates are not known of a path that a geodesic closes; close it by drift or smooth "
+            "(close_by, --close-by)"
+        )
+    return found
+
+
+def stated_noise(path: ShapePath) -> Array | None:
+    """The noise that a recording was smoothed for: (n,) [rad or m]; None where none was stated."""
+    said = None if path.record is None else path.record.get("smooth")
+    return None if said is None else np.array([said[name] for name in path.joint_names or said])
+
+
+def _levels(path: ShapePath, joints: ArrayLike | None) -> Array:
+    given = stated_noise(path) if joints is None else finite_array(joints, "joints")
+    if given is None:
+        raise WrongObjectError(
+            "the noise of the samples is not stated: give joints, or read the recording with smooth (--smooth)"
+        )
+    if given.shape not in ((), (path.n_shape,)) or np.any(given < 0.0):
+        raise ShapeError(
+            f"joints: one standard deviation or {path.n_shape} of them, zero or above, are needed, got "
+            f"{what_came(given)}"
+        )
+    levels = np.array(np.broadcast_to(given, path.n_shape))
+    levels[columns_without_samples(path)] = 0.0
+    return levels
+
+
+def _errors(samples: PathSamples, times: Array, levels: Array) -> tuple[Array, Array]:
+    """Covariances (N, n, 3, 3) and biases (N, n, 3)."""
+    n_shape, count = len(levels), len(times)
+    rows = samples.rows_by_knots(times)
+    of_all = np.repeat(rows.reshape(3 * count, -1), n_shape, axis=1)
+    covariance = np.zeros((count, n_shape, 3, 3))
+    for rule in (samples.by_samples, samples.bias_by_samples):
+        answers = (levels * rule(of_all).reshape(3, count, -1, n_shape)).transpose(1, 3, 0, 2)
+        covariance += answers @ np.swapaxes(answers, 2, 3)
+    bias = np.einsum("atk,kj->tja", rows, samples.bias.reshape(-1, n_shape))
+    return covariance, bias
