@@ -121,6 +121,7 @@ class PathSummary:
     lowest, highest : (n,) of each joint, at 401 times and the breaks [rad or m]
     fastest : (n,) largest rate of each joint there [rad/s or m/s]
     joints_beyond_limits : names of the joints that leave their limits
+    joints_beyond_rates : names of the joints that are faster than the rate limits of the body's file
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
     is_loop : whether it closes
@@ -138,6 +139,7 @@ class PathSummary:
     highest: Array
     fastest: Array
     joints_beyond_limits: tuple[str, ...]
+    joints_beyond_rates: tuple[str, ...]
     still_joints: tuple[str, ...]
     gap: Array
     is_loop: bool
@@ -218,6 +220,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
         highest=highest,
         fastest=fastest,
         joints_beyond_limits=tuple(names[outside].tolist()),
+        joints_beyond_rates=tuple(names[fastest > (1.0 + CLOSED) * body.rate_limits].tolist()),
         still_joints=tuple(names[fastest == 0.0].tolist()),
         gap=gap,
         is_loop=bool(np.all(np.abs(gap) <= CLOSED)),
