@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src"
 CAT = "import shapephase as sp; body = sp.load_body('cat')"
 READ = f"{CAT}; path = sp.read_shape_path({str(ROOT / 'robots' / 'cat_righting.csv')!r}, body)"
-MOTION = f"{READ}; motion = sp.reconstruct(sp.articulated(body, path), [0.05, 0.0, 0.1])"
+MOTION = f"{READ}; motion = sp.reconstruct(sp.articulated(body, path), [0.0125, 0.0, 0.025])"
 HELP = "import sys, runpy; sys.argv = ['shapephase', '--help']; runpy.run_module('shapephase', run_name='__main__')"
 WORK = {
     "numpy and pinocchio": "import numpy, pinocchio",

@@ -249,12 +249,12 @@ def recorded(turns: int, rows: int) -> dict[str, float]:
         body = sp.load_body("cat")
         righting = sp.read_shape_path(ROBOTS / "cat_righting.csv", body)
     found = {}
-    momentum = np.array([0.05, 0.0, 0.1])
-    for words, path in (
-        ("cat_righting.csv", righting),
-        ("loop in 100 rows", _recording(body, 100)),
-        (f"loop in {rows} rows", _recording(body, rows)),
-        (f"loop in {rows} rows, rounded to 1e-6", _recording(body, rows, 1e-6)),
+    turning = np.array([0.05, 0.0, 0.1])
+    for words, path, momentum in (
+        ("cat_righting.csv", righting, 0.25 * turning),
+        ("loop in 100 rows", _recording(body, 100), turning),
+        (f"loop in {rows} rows", _recording(body, rows), turning),
+        (f"loop in {rows} rows, rounded to 1e-6", _recording(body, rows, 1e-6), turning),
     ):
         deformation = sp.articulated(body, path)
         try:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
-from shapephase.examples.scenarios import cat_righting
+from shapephase.examples.scenarios import MOTIONS, cat_righting
 
 FRAMES = 7
 SCALE = 330.0
@@ -43,8 +43,8 @@ def primitives():
 def main():
     """Compute, draw, write."""
     body, path = sp.load_body("cat"), cat_righting()
-    upside_down = so3.exp(np.array([np.pi, 0.0, 0.0]))
-    motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3), upside_down)
+    on_its_back = so3.matrix_from_quat(np.array(MOTIONS["cat_righting"].attitude))
+    motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3), on_its_back)
     # Postures evenly spaced in the bend's own course, which is slow at both ends.
     times = path.duration * (0.5 + 0.19 * np.linspace(-1.0, 1.0, FRAMES - 2))
     times = np.concatenate([[0.0], times, [path.duration]])

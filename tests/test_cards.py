@@ -42,7 +42,7 @@ def public_classes():
 
 def instances():
     """One of nearly every kind that takes no long search."""
-    body, path = sp.load_body("cat"), cat_righting()
+    body, path = sp.load_body("cat"), cat_righting(0.5)
     deformation = sp.articulated(body, path)
     motion = sp.reconstruct(deformation, [0.05, 0.0, 0.1])
     top = sp.EulerTop.principal((1.0, 2.0, 3.0), (0.7, 0.2, 1.5))

@@ -128,7 +128,7 @@ def test_what_was_written_is_said_unless_it_is_quiet(capfd, tmp_path):
     code, plain, said = ended(capfd, *CAT, "--out", out)
     assert code == 0
     assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", said)
-    assert sp.load_motion(out).duration == 0.5
+    assert sp.load_motion(out).duration == 2.0
     assert ended(capfd, *CAT, "--out", out, "--quiet") == (0, plain, "")
     code, shown, said = ended(capfd, *CAT, "--out", out, "-v")
     assert shown == plain

@@ -56,7 +56,7 @@ def test_json_holds_the_split(capsys):
     assert data["is_loop"] is True
     assert data["has_phase"] is True
     assert data["momentum_kg_m2_s"] == [0.01, -0.02, 0.0]
-    np.testing.assert_allclose(data["final_attitude_quat_xyzw"], motion.quat_xyzw(0.5), atol=1e-15, rtol=0)
+    np.testing.assert_allclose(data["final_attitude_quat_xyzw"], motion.quat_xyzw(motion.duration), atol=1e-15, rtol=0)
 
 
 def test_gauge_and_tolerance(capsys):
@@ -87,7 +87,7 @@ def test_every_number_of_the_table_has_its_error_beside_it(capsys):
 def test_files_in_and_out(capsys, tmp_path):
     body = sp.load_body("cat")
     path = cat_righting()
-    sp.write_shape_path(path, tmp_path / "m.npz", np.linspace(0, 0.5, 801))
+    sp.write_shape_path(path, tmp_path / "m.npz", np.linspace(0, path.duration, 801))
     run(capsys, "split", "cat", tmp_path / "m.npz", "--out", tmp_path / "result.npz", "--momentum", 0, 0, 0.02)
     motion = sp.load_motion(tmp_path / "result.npz")
     truth = sp.reconstruct(sp.articulated(body, path), [0, 0, 0.02])
@@ -144,11 +144,40 @@ def test_check_is_a_card_and_a_verdict(capsys, tmp_path):
     )
 
 
+def test_check_names_joints_that_are_too_fast(capsys, tmp_path):
+    """By a sine of 31 rad/s, and one of 29; the file of the cat states 30."""
+    times = np.linspace(0.0, 0.2, 101)
+    frequency = 2.0 * np.pi / 0.2
+    for rate, too_fast in ((31.0, ["waist_yaw"]), (29.0, [])):
+        rows = [f"{t:.17g},{rate / frequency * np.sin(frequency * t):.17g}" for t in times]
+        (tmp_path / "sway.csv").write_text("\n".join(["time,waist_yaw", *rows]))
+        data = json.loads(run(capsys, "check", "cat", tmp_path / "sway.csv", "--rest-missing", "--json"))
+        assert data["motion"]["too_fast"] == too_fast
+        assert data["verdict"] == ("usable, with 1 warning" if too_fast else "no fault found")
+        assert all("waist_yaw 31 of 30 rad/s" in warning for warning in data["warnings"])
+    assert "beyond their rates" not in run(capsys, "check", "cat", "cat_righting")
+
+
+def test_a_cat_of_the_library_begins_on_its_back(capsys):
+    """Unless an attitude is given; recordings begin at the identity."""
+    data = json.loads(run(capsys, "split", "cat", "cat_righting_twist", "--json"))
+    assert np.abs(data["initial_attitude_quat_xyzw"]) == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-15)
+    assert data["final_attitude_quat_xyzw"] == pytest.approx([0.0, 0.0, 0.0, 1.0], abs=1e-9)
+    assert "attitude at the start (1 0 0 0)" in run(capsys, "split", "cat", "cat_righting")
+    data = json.loads(run(capsys, "split", "cat", "cat_righting", "--attitude", 0, 0, 0, 1, "--json"))
+    assert data["initial_attitude_quat_xyzw"] == [0.0, 0.0, 0.0, 1.0]
+    assert np.abs(data["final_attitude_quat_xyzw"]) == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-9)
+    data = json.loads(run(capsys, "split", "cat", "cat_righting", "--momentum", 0.01, 0, 0.02, "--json"))
+    start = np.diag([1.0, -1.0, -1.0])
+    known = sp.reconstruct(sp.articulated(sp.load_body("cat"), cat_righting()), [0.01, 0.0, 0.02], start)
+    assert data["final_attitude_quat_xyzw"] == pytest.approx(known.quat_xyzw(2.0), abs=1e-12)
+
+
 def test_a_recorded_base_is_compared(capsys, tmp_path):
     """The base as it was reconstructed, written down, turned as a whole and read again: no difference."""
     body, path = sp.load_body("cat"), cat_righting()
     motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.02])
-    times = np.linspace(0.0, 0.5, 401)
+    times = np.linspace(0.0, path.duration, 401)
     turned = so3.exp(np.array([0.3, -0.2, 0.9]))
     base = so3.quat_from_matrix(turned @ motion.attitude(times))
     np.savez(

@@ -57,7 +57,7 @@ def test_a_recorded_cycle_with_noise(name: str, draws: int):
 def righting() -> tuple[sp.ShapePath, np.ndarray]:
     """The falling cat's, with a pause before and after, as recorded without noise; and its holonomy."""
     body = sp.load_body("cat")
-    slow = cat_righting().matched(body.joint_names, "cat").stretched(2.0)
+    slow = cat_righting(1.0).matched(body.joint_names, "cat")
     times = np.arange(91) / _RATE
     samples = slow.shape(np.clip(times - 0.25, 0.0, slow.duration))
     samples[-1] = samples[0]

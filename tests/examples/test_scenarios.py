@@ -1,7 +1,10 @@
 """Named motions: their known answers, the files beside the bodies, the plausibility of the bodies."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
@@ -73,6 +76,55 @@ def test_joints_stay_within_their_limits(name):
     assert np.all(shapes <= body.joint_limits[:, 1] + 1e-12)
 
 
+@pytest.mark.parametrize("name", MOTIONS)
+def test_joints_keep_the_rates_and_efforts_of_their_files(name):
+    """Limits by the URDF's own text, rates by differences of shapes; at the momentum that the motion is made for."""
+    path, body = named_motion(name), sp.load_body(MOTIONS[name].body)
+    tree = ElementTree.parse(robots_folder() / f"{MOTIONS[name].body}.urdf")
+    limits = {joint.get("name"): joint.find("limit") for joint in tree.iter("joint")}
+    stated = [limits[joint].attrib if limits.get(joint) is not None else {} for joint in path.joint_names]
+    most = np.array([float(limit.get("velocity", 0.0)) or np.inf for limit in stated])
+    times = np.linspace(0.0, path.duration, 4001)
+    rates = np.abs(np.diff(path.shape(times), axis=0)).max(axis=0) / times[1]
+    assert np.all(rates <= most), dict(zip(path.joint_names, rates / most, strict=True))
+    summary = sp.path_summary(body, path)
+    assert (summary.joints_beyond_limits, summary.joints_beyond_rates) == ((), ())
+    # The last words of a dive's description are its momentum.
+    momentum = [float(word) for word in MOTIONS[name].about.split()[-3:]] if body.name == "diver" else np.zeros(3)
+    loads = sp.joint_torques(sp.reconstruct(sp.articulated(body, path), momentum, tolerance=1e-6)).loads
+    efforts = [
+        float(limits[joint].get("effort", 0.0)) or np.inf if joint in limits else np.inf for joint in loads.joint_names
+    ]
+    assert np.all(loads.peak_torque <= efforts)
+
+
+@pytest.mark.parametrize("name", [name for name in MOTIONS if MOTIONS[name].body.startswith("cat")])
+def test_cats_begin_on_their_backs_and_end_on_their_feet(name):
+    """Where the legs' centre of mass is from the trunk's; of the cat without legs, where both halves' bellies are."""
+    path, body = named_motion(name), sp.load_body(MOTIONS[name].body)
+    start = Rotation.from_quat(MOTIONS[name].attitude).as_matrix()
+    motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3), start)
+    heights = []
+    for t in (0.0, path.duration):
+        shape = path.matched(body.joint_names, body.name).shape(t)
+        if body.name == "cat_two_halves":
+            bellies = [motion.attitude(t) @ -body.link_pose(shape, half)[:3, 2] for half in ("front", "rear")]
+            np.testing.assert_allclose(bellies[0][2], bellies[1][2], atol=1e-6, rtol=0)
+            heights.append(bellies[0][2])
+            continue
+        sums = {"leg": np.zeros(4), "trunk": np.zeros(4)}
+        for part in sp.body_summary(body).parts:
+            pose = body.link_pose(shape, part.links[0])
+            kind = next((kind for kind in sums if kind in part.links[0]), None)
+            if kind is not None:
+                sums[kind] += part.mass * np.append(pose[:3, :3] @ part.centre_of_mass + pose[:3, 3], 1.0)
+        legs, trunk = (total[:3] / total[3] for total in (sums["leg"], sums["trunk"]))
+        away = motion.attitude(t) @ (legs - trunk)
+        heights.append(away[2] / np.linalg.norm(away))
+    assert heights == pytest.approx([-heights[1], heights[1]], abs=1e-6)
+    assert heights[0] > 0.7
+
+
 def test_the_cat_rights_itself_from_rest_to_rest():
     path = cat_righting(0.7)
     assert path.duration == 0.7
@@ -87,9 +139,11 @@ def test_the_cat_that_twists_bends_less_and_rights_itself_too():
     body, paths = sp.load_body("cat"), [cat_righting(), cat_righting_twist()]
     bends = []
     for path in paths:
-        poses = np.array([body.link_pose(shape, "trunk_rear") for shape in path.shape(np.linspace(0.0, 0.5, 101))])
+        poses = np.array(
+            [body.link_pose(shape, "trunk_rear") for shape in path.shape(np.linspace(0.0, path.duration, 101))]
+        )
         bends.append(np.degrees(np.arccos(poses[:, 0, 0])).max())
-        np.testing.assert_allclose(path.rate([0.0, 0.5]), 0.0, atol=1e-12, rtol=0)
+        np.testing.assert_allclose(path.rate([0.0, path.duration]), 0.0, atol=1e-12, rtol=0)
     np.testing.assert_allclose(bends, [100.77, 91.10], atol=0.01)
     moving = sp.articulated(body, paths[1])
     end = sp.reconstruct(moving, np.zeros(3), method="dop853", tolerance=1e-10).final_attitude
@@ -137,7 +191,7 @@ def test_the_dive_of_five_stages_lands_f10(duration):
 @pytest.mark.full
 def test_a_plan_makes_the_dive_of_five_stages_too_f10():
     """With the momentum of the dive, counted in somersaults and twists, and for less than its cost."""
-    dive, body = full_dive(), sp.load_body("diver")
+    dive, body = full_dive(1.5), sp.load_body("diver")
     path = dive.deformation.description.path
     goal = sp.optimal_control.Goal(somersaults=1.5, half_twists=2)
     plan = sp.plan_reorientation(body, goal, momentum=dive.momentum, duration=1.5, start=path.shape(0.0), cost="rate")

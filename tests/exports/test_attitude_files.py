@@ -30,7 +30,7 @@ def satellite():
 @pytest.fixture(scope="module")
 def cat():
     """It turns at up to 40 rad/s, and the acceleration of its joints jumps."""
-    return sp.reconstruct(sp.articulated(body_of("cat"), cat_righting()), [0.05, 0.0, 0.1])
+    return sp.reconstruct(sp.articulated(body_of("cat"), cat_righting(0.5)), [0.05, 0.0, 0.1])
 
 
 @pytest.fixture

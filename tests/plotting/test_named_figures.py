@@ -223,7 +223,7 @@ def test_the_report_of_the_righting_opens_offline_and_the_cat_lands_on_its_feet(
     write_report(motion, sp.split(motion), out, shape_path=path, title="The cat rights itself")
     page, said, asked = opened(chromium, out)
     page.get_by_text("side", exact=True).click()
-    up, down = (furred(seen(page, time))[:, 0] for time in (0.0, 0.5))
+    up, down = (furred(seen(page, time))[:, 0] for time in (0.0, path.duration))
     assert np.median(up) - up.min() > 1.3 * (up.max() - np.median(up))
     assert down.max() - np.median(down) > 1.3 * (np.median(down) - down.min())
     assert page.locator("#sphere").count() == 0

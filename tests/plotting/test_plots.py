@@ -45,7 +45,7 @@ def satellite():
 def motions(cat, satellite):
     astronaut = sp.articulated(sp.load_body("astronaut"), astronaut_leg_swing())
     return {
-        "cat": sp.reconstruct(sp.articulated(cat, cat_righting()), [0.02, 0.01, 0.03], UPSIDE_DOWN),
+        "cat": sp.reconstruct(sp.articulated(cat, cat_righting(0.5)), [0.02, 0.01, 0.03], UPSIDE_DOWN),
         "astronaut": sp.reconstruct(astronaut, [0.5, 2.0, 3.0]),
         "satellite": sp.reconstruct(sp.articulated(satellite, satellite_sweep()), [1.0, 2.5, 4.0]),
         "spinning": sp.reconstruct(sp.articulated(satellite, satellite_sweep()), [3.0, 8.0, 30.0]),
@@ -439,7 +439,7 @@ def test_phases_in_time_end_in_those_of_the_split(motions, name):
 
 
 def test_phases_without_momentum_are_zero(cat):
-    motion = sp.reconstruct(sp.articulated(cat, cat_righting()), np.zeros(3))
+    motion = sp.reconstruct(sp.articulated(cat, cat_righting(0.5)), np.zeros(3))
     ax = plots.plot_phases(flat_axes(2.6), motion, "base", times=[0.0, 0.2, 0.5])
     assert all(beginning(ax, word).tolist() == [0.0, 0.0, 0.0] for word in ("dynamic", "geometric", "total"))
     assert "base gauge" in ax.get_legend().get_title().get_text()
@@ -516,7 +516,7 @@ def test_the_power_of_ten_stands_in_the_unit(cat):
 
 
 def test_lines_of_many_loops_are_finer(cat):
-    path = cat_righting()
+    path = cat_righting(0.5)
     few, many = (plots.plot_shape_path(flat_axes(), one, cat) for one in (path, path.repeated(60)))
     for one, other in zip(few.lines, many.lines, strict=True):
         assert other.get_linewidth() == pytest.approx(0.35 * one.get_linewidth())
@@ -525,7 +525,7 @@ def test_lines_of_many_loops_are_finer(cat):
 
 def test_a_start_upside_down_is_drawn_without_a_jump(cat):
     # A half turn at the start has two rotation vectors; the one that goes on is drawn.
-    motion = sp.reconstruct(sp.articulated(cat, cat_righting()), [0.02, 0.0, 0.0], UPSIDE_DOWN)
+    motion = sp.reconstruct(sp.articulated(cat, cat_righting(0.5)), [0.02, 0.0, 0.0], UPSIDE_DOWN)
     ax = plots.plot_attitude(flat_axes(2.6), motion)
     (x,) = drawn(ax, BLUE, 1.6)
     assert np.abs(np.diff(x[:, 1])).max() < 0.1
@@ -641,7 +641,7 @@ def test_shapes_in_time_are_grouped_by_unit(satellite):
 
 
 def test_of_many_joints_those_that_move_most_are_named(cat):
-    path = cat_righting()
+    path = cat_righting(0.5)
     ax = plots.plot_shape_path(flat_axes(2.6), path, cat)
     values = path.matched(cat.joint_names, cat.name).shape(np.asarray(ax.lines[0].get_xdata()))
     span = np.ptp(values, axis=0)
@@ -657,7 +657,7 @@ def test_of_many_joints_those_that_move_most_are_named(cat):
 
 
 def test_left_and_right_joints_share_a_colour_and_dashes_are_the_right(cat):
-    ax = plots.plot_shape_path(flat_axes(2.6), cat_righting(), cat)
+    ax = plots.plot_shape_path(flat_axes(2.6), cat_righting(0.5), cat)
     lines = dict(zip(labels(ax), ax.lines))
     for name in ("rear_{}_knee", "front_{}_elbow"):
         left, right = (lines[name.format(side)] for side in ("left", "right"))
@@ -749,7 +749,7 @@ def test_the_curvature_is_that_of_small_loops(cat):
 
 
 def test_contours_of_the_curvature_tell_its_sign_without_colours(cat):
-    ax = plots.plot_curvature(flat_axes(2.8), cat, ("waist_pitch", "waist_yaw"), path=cat_righting())
+    ax = plots.plot_curvature(flat_axes(2.8), cat, ("waist_pitch", "waist_yaw"), path=cat_righting(0.5))
     mesh, lines = ax.collections[:2]
     levels = np.asarray(lines.levels)
     assert levels.min() < 0.0 < levels.max()
@@ -770,7 +770,7 @@ def test_contours_of_the_curvature_tell_its_sign_without_colours(cat):
     (loop,) = drawn(ax, BLACK, 1.6)
     assert ax.get_xlim()[0] < loop[:, 0].min() < loop[:, 0].max() < ax.get_xlim()[1]
     assert ax.get_ylim()[0] < loop[:, 1].min() < loop[:, 1].max() < ax.get_ylim()[1]
-    path = cat_righting().matched(cat.joint_names, cat.name)
+    path = cat_righting(0.5).matched(cat.joint_names, cat.name)
     middle = path.shape(0.2)[[cat.joint_index("waist_pitch"), cat.joint_index("waist_yaw")]]
     assert np.linalg.norm(loop - middle, axis=-1).min() < 0.02
 
@@ -829,7 +829,7 @@ def test_fixed_points_are_marked_by_stability_and_index(motions):
 
 
 def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, cat):
-    motion, path = motions["cat"], cat_righting()
+    motion, path = motions["cat"], cat_righting(0.5)
     joints = ("waist_pitch", "waist_yaw")
     points = sp.fixed_points(motion.deformation, 0.02)
     figures = {
@@ -882,7 +882,7 @@ def test_lines_differ_without_colours(motions):
 
 
 def test_what_cannot_be_drawn_is_refused(motions, cat):
-    motion, path = motions["cat"], cat_righting()
+    motion, path = motions["cat"], cat_righting(0.5)
     batch = sp.reconstruct(motion.deformation, np.ones((2, 3)))
     without = sp.reconstruct(motion.deformation, np.zeros(3))
     for plot in (plots.plot_momentum_curve, plots.plot_phases, plots.plot_attitude, plots.plot_energy):

@@ -25,7 +25,7 @@ pytest.importorskip("playwright", reason="films are drawn through Playwright")
 def righting():
     """The cat falls upside down without momentum."""
     upside_down = np.diag([1.0, -1.0, -1.0])
-    return sp.reconstruct(sp.articulated(sp.load_body("cat"), cat_righting()), np.zeros(3), upside_down)
+    return sp.reconstruct(sp.articulated(sp.load_body("cat"), cat_righting(0.5)), np.zeros(3), upside_down)
 
 
 @pytest.fixture

@@ -36,7 +36,7 @@ UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 def righting():
     """The cat falls upside down without momentum."""
     return sp.reconstruct(
-        sp.articulated(sp.load_body("cat"), cat_righting()), np.zeros(3), UPSIDE_DOWN, tolerance=1e-10
+        sp.articulated(sp.load_body("cat"), cat_righting(0.5)), np.zeros(3), UPSIDE_DOWN, tolerance=1e-10
     )
 
 

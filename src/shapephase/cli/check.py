@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 
-from ..errors import ImplausibleBodyWarning
+from ..errors import ImplausibleBodyWarning, TrajectoryWarning
 from .options import (
     AS_RECORDED,
     AS_TEXT,
@@ -32,7 +32,7 @@ def check_command(
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import body_argument, joint_motion
     from .texts.recording_text import recording_data, recording_lines
-    from .texts.result_text import body_lines, path_data, path_lines, plain, record_data
+    from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
 
     loaded = body_argument(body, floating)
     for doubt in implausible(loaded):
@@ -42,6 +42,8 @@ def check_command(
     if motion is not None:
         path, recorded = joint_motion(motion, loaded, recording)
         moved = path_summary(loaded, path)
+        if moved.joints_beyond_rates:
+            warnings.warn(too_fast(loaded, moved), TrajectoryWarning, stacklevel=2)
         lines += ["", *path_lines(loaded, motion, moved, recorded), *recording_lines(loaded, recorded)]
         data["motion"] = path_data(moved) | record_data(loaded, recorded) | recording_data(recorded)
     made_from = {} if motion is None else {"joints": list(loaded.joint_names)}

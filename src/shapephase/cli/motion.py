@@ -8,9 +8,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import so3
 from ..arguments import tolerance_argument
-from ..arrays import finite_array
+from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.catalog import load_body
 from ..deformation.deformation import articulated
@@ -76,7 +78,7 @@ def flight(
     What needs no motion to be checked is checked before: also the gauge, and the link of a trail, that the command is
     to use later.
     """
-    start = so3.quat_argument(options.attitude, "attitude")
+    start = _start(motion, options)
     goal = tolerance_argument(tolerance)
     momentum = finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
     loaded = body_argument(body, floating)
@@ -106,6 +108,18 @@ def flight(
     return Flight(motion=fitted.motion, body=loaded, path=path, recorded=recorded, fitted=fitted)
 
 
+def _start(motion: str, options: FlightOptions) -> Array:
+    """The attitude at the start (3, 3): the one that is given, or that with which a motion of the library begins."""
+    if options.attitude is not None:
+        return so3.quat_argument(options.attitude, "attitude")
+    return so3.matrix_from_quat(np.array(MOTIONS[motion].attitude)) if _is_named(motion) else np.eye(3)
+
+
+def _is_named(motion: str) -> bool:
+    """Whether it is a motion of the library, and no file of that name."""
+    return motion in MOTIONS and not os.path.isfile(motion)
+
+
 def body_argument(body: str, floating: BodyOptions) -> Body:
     """The body that a command names. Raises what `load_body` raises, and ShapeError for what is rather a motion."""
     is_file = os.path.isfile(body)
@@ -120,7 +134,7 @@ def joint_motion(
     motion: str, body: Body, recording: RecordingOptions = AS_RECORDED
 ) -> tuple[ShapePath, RecordedMotion | None]:
     """The path of a motion, and its record if it comes from a file."""
-    if motion in MOTIONS and not os.path.isfile(motion):
+    if _is_named(motion):
         for field in fields(recording):
             if getattr(recording, field.name) != field.default:
                 option = f"--{field.name.replace('_', '-')}"

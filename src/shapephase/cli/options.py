@@ -154,13 +154,14 @@ class FlightOptions:
 
     momentum: Momentum = (0.0, 0.0, 0.0)
     attitude: Annotated[
-        tuple[float, float, float, float],
+        tuple[float, float, float, float] | None,
         Parameter(
             negative_iterable="",
-            show_default=_spaced,
-            help="Of the base at the start, a quaternion x y z w without unit; for example `--attitude 1 0 0 0`.",
+            show_default=False,
+            help="Of the base at the start, a quaternion x y z w without unit; if not given, that of a library's "
+            "motion (cats begin on their back), else 0 0 0 1. For example `--attitude 1 0 0 0`.",
         ),
-    ] = (0.0, 0.0, 0.0, 1.0)
+    ] = None
 
 
 def _motion_option(text: str, **more: Any) -> Parameter:

@@ -51,13 +51,14 @@ def diver_twist(duration: float = 1.5) -> ShapePath:
     return ShapePath.waypoints(times, [up, up, down, down, up, up], joint_names=body.joint_names)
 
 
-def five_stage_dive(duration: float = 1.5) -> ShapePath:
+def five_stage_dive(duration: float = 1.6) -> ShapePath:
     """A dive of the `diver` that lands: forward, one and a half somersaults and one twist, exactly.
 
     Its stages are those of Dullin and Tong: somersault, shape change, twist, the change back, somersault. As in
     `diver_twist` the left arm comes down and goes up again. Here it goes up a little faster than it came down, because
     the shoulders are not in the plane of the centre of mass: so the twist ends with the momentum exactly along the axis
-    of the somersault. `full_dive` has it with its momentum, (0, 92.37710163942651 / duration, 0) kg m^2/s.
+    of the somersault. `full_dive` has it with its momentum, (0, 92.37710163942651 / duration, 0) kg m^2/s. The arm
+    keeps its rate of 20 rad/s in 1.504 s and longer.
 
     Source: Dullin and Tong 2016 (theory.md F10); the numbers are our own.
 
@@ -65,7 +66,7 @@ def five_stage_dive(duration: float = 1.5) -> ShapePath:
     --------
     >>> dive = sp.examples.five_stage_dive()
     >>> print(dive.duration, dive.breaks.round(4), dive.shape(0.75))
-    1.5 [0.     0.2649 0.5649 0.9733 1.2351 1.5   ] [ 0.2 -3. ]
+    1.6 [0.     0.2826 0.6026 1.0382 1.3174 1.6   ] [ 0.2 -3. ]
     """
     period = positive_argument(duration)
     body = load_body("diver")
@@ -77,7 +78,7 @@ def five_stage_dive(duration: float = 1.5) -> ShapePath:
     return ShapePath.waypoints(times, [up, up, down, down, up, up], joint_names=body.joint_names)
 
 
-def full_dive(duration: float = 1.5) -> Example:
+def full_dive(duration: float = 1.6) -> Example:
     """F10: `five_stage_dive` with its momentum: half a turn about y in all, after 1.5 somersaults and a twist.
 
     Source: Dullin and Tong 2016; theory.md F10.

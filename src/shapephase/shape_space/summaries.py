@@ -122,6 +122,7 @@ class PathSummary:
     fastest : (n,) largest rate of each joint there [rad/s or m/s]
     fastest_at : (n,) when that is [s]
     joints_beyond_limits : names of the joints that leave their limits
+    joints_beyond_rates : names of the joints that are faster than the rate limits of the body's file
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
     is_loop : whether it closes
@@ -140,6 +141,7 @@ class PathSummary:
     fastest: Array
     fastest_at: Array
     joints_beyond_limits: tuple[str, ...]
+    joints_beyond_rates: tuple[str, ...]
     still_joints: tuple[str, ...]
     gap: Array
     is_loop: bool
@@ -221,6 +223,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
         fastest=fastest,
         fastest_at=times[np.abs(rates).argmax(axis=0)],
         joints_beyond_limits=tuple(names[outside].tolist()),
+        joints_beyond_rates=tuple(names[fastest > (1.0 + CLOSED) * body.rate_limits].tolist()),
         still_joints=tuple(names[fastest == 0.0].tolist()),
         gap=gap,
         is_loop=bool(np.all(np.abs(gap) <= CLOSED)),

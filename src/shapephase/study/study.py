@@ -76,7 +76,8 @@ class Study:
     draws : of each point of the grids
     seed : of the random numbers
     chunk : cases that are computed and stored together
-    momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w
+    momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w,
+        None: the identity, also along motions of the library that commands begin otherwise
     time_limit : of one case [s]; None: none
     root, root_body, packages : what floats of the bodies' files, and where their packages are, as for `load_body`
     length_unit, person_mass : of the bodies' BVH files, as for `load_body` [m, kg]

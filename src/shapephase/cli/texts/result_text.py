@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import so3
 from ...arrays import Array
 from ...body.body import Body
 from ...phases.phase_split import PhaseSplit
@@ -21,9 +22,11 @@ from ...shape_space.summaries import BodySummary, PathSummary
 def split_heading(body: Body, motion_name: str, motion: Motion) -> str:
     """The first line of the table of a split."""
     momentum = " ".join(f"{v:g}" for v in motion.momentum)
+    start = so3.quat_from_matrix(motion.initial_attitude)
+    turned = "" if start[3] == 1.0 else f", attitude at the start ({' '.join(f'{v:.6g}' for v in start + 0.0)})"
     return (
         f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_shape} joints, {body.mass:.6g} kg, "
-        f"momentum ({momentum}) kg m^2/s"
+        f"momentum ({momentum}) kg m^2/s{turned}"
     )
 
 
@@ -34,6 +37,7 @@ def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit)
         "motion": motion_name,
         "duration_s": motion.duration,
         "momentum_kg_m2_s": motion.momentum.tolist(),
+        "initial_attitude_quat_xyzw": so3.quat_from_matrix(motion.initial_attitude).tolist(),
         "final_attitude_quat_xyzw": motion.quat_xyzw(motion.duration).tolist(),
         **result.to_dict(),
         "error_estimate_rad": float(motion.error_estimate),
@@ -136,9 +140,28 @@ def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMo
         lines.insert(1, f"{'recorded':24}{len(recorded.times)} samples, {recorded.format}")
         if recorded.base_attitude is not None:
             lines.append(f"{'base':24}recorded too")
-    for title, names in (("beyond their limits", summary.joints_beyond_limits), ("at rest", summary.still_joints)):
+    for title, names in (
+        ("beyond their limits", summary.joints_beyond_limits),
+        ("beyond their rates", summary.joints_beyond_rates),
+        ("at rest", summary.still_joints),
+    ):
         lines += [f"{title:24}{', '.join(names)}"] if names else []
     return lines
+
+
+def too_fast(body: Body, summary: PathSummary) -> str:
+    """Which joints move faster than the body's file allows, and what to do about it."""
+    rows = [body.joint_index(name) for name in summary.joints_beyond_rates]
+    rows.sort(key=lambda k: -summary.fastest[k] / body.rate_limits[k])
+    rates = [
+        f"{body.joint_names[k]} {summary.fastest[k]:.4g} of {body.rate_limits[k]:.4g} {body.joint_units[k]}/s"
+        for k in rows[:_MOST_NAMED]
+    ]
+    more = [f"{len(rows) - _MOST_NAMED} more"] if len(rows) > _MOST_NAMED else []
+    return (
+        f"joints move faster than the limits of the body's file: {', '.join(rates + more)}; see to the times and "
+        "units, slow the motion down, or state other limits (velocity)"
+    )
 
 
 def _pieces(count: int) -> str:
@@ -176,9 +199,11 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
     return [text], {"recorded_base_difference_rad": angle, "recorded_base_difference_time_s": when}
 
 
+# Joints that a warning names.
+_MOST_NAMED = 4
 # After the point of a direction.
 _DIRECTION_DIGITS = 7
-_PATH_KEYS = {"joints_beyond_limits": "beyond", "still_joints": "resting"}
+_PATH_KEYS = {"joints_beyond_limits": "beyond", "joints_beyond_rates": "too_fast", "still_joints": "resting"}
 """JSON keys that are shorter than the names of the fields."""
 
 

@@ -69,7 +69,7 @@ class RecordedMotion:
     >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
     >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat"))
     >>> print(recorded.format, recorded.times[-1])
-    CSV 0.5
+    CSV 2.0
     """
 
     path: ShapePath
@@ -198,7 +198,7 @@ def read_recorded_motion(
     >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
     >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat"))
     >>> print(recorded.path.duration, recorded.residual.max())
-    0.5 0.0
+    2.0 0.0
     """
     check_object(body, "Body", "body")
     kept, flying = trim_argument(trim), flight_argument(flight)
@@ -349,7 +349,7 @@ def write_shape_path(
     --------
     >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
     >>> print(sp.read_shape_path("cat.csv", sp.load_body("cat")).duration)
-    0.5
+    2.0
     """
     check_object(path, "ShapePath", "path")
     check_file_name(file, "file")
