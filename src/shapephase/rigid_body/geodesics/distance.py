@@ -35,8 +35,10 @@ from .left_invariant import LeftInvariantMetric
 
 _FRACTIONS = (0.35, 0.7, 1.05, 1.4)
 """Sizes of the starts, in parts of the largest momenta along the axes; a loop that closes is at about sqrt(2)."""
-_FEW, _MANY = 48, 384
-"""Directions of a search, and of the last where the others find nothing as short as the upper bound."""
+_FEW = 48
+"""Directions of a search."""
+_MANY = 384
+"""Directions of the last, where the others find nothing as short as the upper bound."""
 _MOST_SEARCHES = 4
 """Searches with starts scaled to the last one's length; the second rarely finds anything shorter."""
 _STEPS = 60
@@ -221,10 +223,10 @@ def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array
     return best[0]
 
 
-def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, size: float) -> tuple[Array, float]:
+def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, length: float) -> tuple[Array, float]:
     """The shortest of those that arrive from `count` directions at lengths like this; infinite if there is none."""
-    momenta, residuals = _arrivals(metric, _starts(count), target, size)
-    close = _CLOSE + _ROUNDING / _reach(metric, size).min()
+    momenta, residuals = _arrivals(metric, _starts(count), target, length)
+    close = _CLOSE + _ROUNDING / _reach(metric, length).min()
     lengths = np.where(residuals < close, np.sqrt(np.sum(metric.inverse_moments * momenta**2, axis=-1)), np.inf)
     best = int(np.argmin(lengths))
     return momenta[best], float(lengths[best])
@@ -236,25 +238,26 @@ def _starts(count: int) -> Array:
     return np.concatenate([fraction * directions for fraction in _FRACTIONS])
 
 
-def _reach(metric: LeftInvariantMetric, size: float) -> Array:
+def _reach(metric: LeftInvariantMetric, length: float) -> Array:
     """How far ways of this length can turn about each principal axis: (3,) [rad]."""
     first, middle, _ = metric.moments
-    straight = size * np.sqrt(metric.inverse_moments)
-    straight[2] = max(straight[2], size * size / (4.0 * np.pi * np.sqrt(first * middle)))
+    straight = length * np.sqrt(metric.inverse_moments)
+    straight[2] = max(straight[2], length * length / (4.0 * np.pi * np.sqrt(first * middle)))
     return np.minimum(straight, np.pi)
 
 
-def _largest_momenta(metric: LeftInvariantMetric, size: float) -> Array:
+def _largest_momenta(metric: LeftInvariantMetric, length: float) -> Array:
     """Along each principal axis, of shortest ways of this length in a unit of time: (3,) [kg m^2/s]."""
     first, middle, third = metric.inverse_moments
     # A way that turns further than half round the first axis comes to itself with more momentum than a small loop.
-    loop = 2.0 * np.pi / np.sqrt((first - third) * (middle - third)) * max(1.0, size * np.sqrt(first) / np.pi)
-    return np.append(size * np.sqrt(metric.moments[:2]), min(size * np.sqrt(metric.moments[2]), loop))
+    loop = 2.0 * np.pi / np.sqrt((first - third) * (middle - third)) * max(1.0, length * np.sqrt(first) / np.pi)
+    return np.append(length * np.sqrt(metric.moments[:2]), min(length * np.sqrt(metric.moments[2]), loop))
 
 
-def _arrivals(metric: LeftInvariantMetric, starts: Array, target: Array, size: float) -> tuple[Array, Array]:
+def _arrivals(metric: LeftInvariantMetric, starts: Array, target: Array, length: float) -> tuple[Array, Array]:
     """Where the steps lead from every start: momenta, and the errors of their ends in parts of `_reach`."""
-    inverse_moments, units, weights = metric.inverse_moments, _largest_momenta(metric, size), 1.0 / _reach(metric, size)
+    inverse_moments, units = metric.inverse_moments, _largest_momenta(metric, length)
+    weights = 1.0 / _reach(metric, length)
     times, momenta = np.ones(len(starts)), starts * units
     # Half as much again as the longest start is room for steps.
     largest = 1.5 * float(np.linalg.norm(starts, axis=-1).max())
@@ -270,8 +273,8 @@ def _arrivals(metric: LeftInvariantMetric, starts: Array, target: Array, size: f
         normal += (damping[rows] * scale)[:, None, None] * np.eye(3)
         step = np.linalg.solve(normal, so3.transpose(z) @ errors[rows][..., None])[..., 0]
         trial = _bent_step(momenta[rows] / units, step)
-        length = np.linalg.norm(trial, axis=-1, keepdims=True)
-        trial *= units * np.minimum(1.0, largest / np.maximum(length, largest))
+        norms = np.linalg.norm(trial, axis=-1, keepdims=True)
+        trial *= units * np.minimum(1.0, largest / np.maximum(norms, largest))
         error = _rotation_errors(inverse_moments, trial, target) * weights
         missed = np.linalg.norm(error, axis=-1)
         better = missed < sizes[rows]
