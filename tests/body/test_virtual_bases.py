@@ -178,6 +178,12 @@ def test_a_floating_joint_from_a_massless_root_is_the_base(load_urdf):
     np.testing.assert_array_equal(body.locked_inertia([0.3]), plain.locked_inertia([0.3]))
 
 
+def test_frames_without_mass_do_not_hold_the_body(load_urdf):
+    camera = '<link name="camera"/>' + joint("pan", "continuous", "world", "camera")
+    with pytest.raises(ModelFileError, match="joint 'turn': the only joint between 'world'"):
+        load_urdf(chain(SIX[3], body=PARTS + camera).replace('"yaw"', '"turn"'))
+
+
 @pytest.mark.parametrize("kind", ["floating", "planar"])
 def test_inside_a_body_they_are_refused(kind, load_urdf):
     text = f'<robot name="r">{PARTS}<link name="ball">{LIGHT}</link>{joint("loose", kind, "leg", "ball")}</robot>'

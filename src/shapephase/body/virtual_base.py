@@ -6,7 +6,7 @@ the base, such a link would turn by whatever its joint does, and the body would 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -66,18 +66,18 @@ def free_base(
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     link, way = first, list[Joint]()
-    while True:
-        fixed, moving = _rigid_part(link, below)
-        if any(links[name].mass for name in (link, *(joint.child for joint in fixed))) or len(moving) != 1:
+    fixed, moving = _rigid_part(link, below)
+    while not _has_mass(links, (link, *(joint.child for joint in fixed))):
+        # Frames that move and carry nothing, as those of cameras, do not hold the body.
+        carrying = [joint for joint in moving if _has_mass(links, _below(joint.child, below))]
+        if len(carrying) != 1:
             break
-        way += [*_leading(fixed, link, moving[0].parent), *moving]
-        link = moving[0].child
-        if moving[0].kind == ANYWHERE:
+        way += [*_leading(fixed, link, carrying[0].parent), *carrying]
+        link = carrying[0].child
+        if carrying[0].kind == ANYWHERE:
             way = []
             break
-    if not any(links[name].mass for name in _below(link, below)):
-        # Nothing has mass, which has an error of its own.
-        link, way = first, []
+        fixed, moving = _rigid_part(link, below)
     kept = _below(link, below)
     own = tuple(joint for joint in joints if joint.parent in kept)
     moved = [joint for joint in way if joint.kind != "fixed"]
@@ -98,10 +98,11 @@ def free_base(
         raise ModelFileError(f"{moved[0].where}: joint {moved[0].name!r}: {fault}")
     notes = [f"{moved[0].where}: {note}"] if note else []
     fixed, moving = _rigid_part(link, below)
-    if len(moving) > 1 and not any(links[name].mass for name in (link, *(joint.child for joint in fixed))):
-        listed = ", ".join(repr(joint.name) for joint in moving)
+    carrying = [joint for joint in moving if _has_mass(links, _below(joint.child, below))]
+    if len(carrying) > 1 and not _has_mass(links, (link, *(joint.child for joint in fixed))):
+        listed = ", ".join(repr(joint.name) for joint in carrying)
         notes.append(
-            f"{moving[0].where}: joints {listed} move on {link!r}, which has no mass: it is the free base; what is "
+            f"{carrying[0].where}: joints {listed} move on {link!r}, which has no mass: it is the free base; what is "
             "bolted down there does not float"
         )
     return FreeBase(link, tuple(part for joint in way for part in _single_axes(joint)), own, tuple(notes))
@@ -176,6 +177,10 @@ def _rigid_part(link: str, below: Mapping[str, list[Joint]]) -> tuple[list[Joint
             else:
                 moving.append(joint)
     return fixed, moving
+
+
+def _has_mass(links: Mapping[str, Link], names: Iterable[str]) -> bool:
+    return any(links[name].mass for name in names)
 
 
 def _leading(fixed: Sequence[Joint], link: str, to: str) -> list[Joint]:

@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays as drawn
 import shapephase as sp
 from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
 from shapephase.shape_space.files.read import read_recorded_motion, read_shape_path, write_shape_path
+from support.independent import mujoco_model
 from support.motion_writers import (
     NANO,
     Sample,
@@ -109,8 +110,15 @@ def qpos_with_free_joint(file, s):
     np.savez(file, qpos=qpos, time=s.ns / NANO + 3.0, joint_names=s.names)
 
 
+def in_mujocos_order(s):
+    """The columns in the order in which MuJoCo itself compiles the satellite's file."""
+    model = mujoco_model("satellite")
+    names = [model.joint(k).name for k in range(model.njnt) if model.joint(k).name in SATELLITE.joint_names]
+    return s.in_body_order[:, [SATELLITE.joint_names.index(name) for name in names]]
+
+
 def qpos_without_names(file, s):
-    np.savez(file, qpos=s.in_body_order, time=s.ns / NANO)
+    np.savez(file, qpos=in_mujocos_order(s), time=s.ns / NANO)
 
 
 WRITERS = {
@@ -166,10 +174,10 @@ def test_the_file_inside_a_rosbag2_folder_is_read_alone(tmp_path, folder, part):
 
 def test_qpos_as_a_bare_array_takes_its_step_from_the_caller(tmp_path):
     sample = Sample.random(SATELLITE)
-    np.save(tmp_path / "q.npy", sample.in_body_order)
+    np.save(tmp_path / "q.npy", in_mujocos_order(sample))
     path = read_shape_path(tmp_path / "q.npy", SATELLITE, timestep=0.002)
     np.testing.assert_allclose(path.breaks, 0.002 * np.arange(len(sample.ns)), atol=1e-16, rtol=0)
-    np.savez(tmp_path / "q.npz", qpos=sample.in_body_order, timestep=0.002)
+    np.savez(tmp_path / "q.npz", qpos=in_mujocos_order(sample), timestep=0.002)
     np.testing.assert_array_equal(read_shape_path(tmp_path / "q.npz", SATELLITE).breaks, path.breaks)
     with pytest.raises(TrajectoryError, match="times of qpos come from one of"):
         read_shape_path(tmp_path / "q.npy", SATELLITE)

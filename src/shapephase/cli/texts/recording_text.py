@@ -122,8 +122,7 @@ def _unit_lines(record: Any) -> list[str]:
 def _column_lines(body: Body, record: Any) -> list[str]:
     """Columns under other names, joints without a column, columns without a joint."""
     lines = []
-    if record["joint_order"] is not None:
-        order = record["joint_order"]
+    if (order := record.get("joint_order")) is not None:
         lines.append(f"{'joints without names':24}{order['means']} ({order['order']}): {', '.join(order['joints'])}")
     renamed = [f"{name} from {column!r}" for name, column in record["columns"].items() if not column.startswith(name)]
     if renamed:

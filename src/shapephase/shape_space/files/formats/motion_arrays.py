@@ -85,7 +85,7 @@ def _simulated(arrays: dict[str, Any], where: Path, body: Body, timestep: float 
         raise TrajectoryError(f"{where}: both 'shapes' and 'qpos' are there; keep one")
     kind = "qpos" if "qpos" in arrays else "joint_pos"
     values = _array(arrays[kind], where, kind, (None, None))
-    times = _simulated_times(arrays, where, len(values), timestep)
+    times = _simulated_times(arrays, kind, where, len(values), timestep)
     quaternions, positions = _first_body(arrays, where, len(values))
     named, found = arrays.get("joint_names"), None
     if named is not None:
@@ -138,12 +138,12 @@ def _placed(
     return found, quaternions if which else quaternions[:, _SCALAR_FIRST]
 
 
-def _simulated_times(arrays: dict[str, Any], where: Path, count: int, timestep: float | None) -> Array:
+def _simulated_times(arrays: dict[str, Any], kind: str, where: Path, count: int, timestep: float | None) -> Array:
     given = [name for name in ("time", "timestep", "fps") if name in arrays] + ["argument"] * (timestep is not None)
     if len(given) != 1:
         raise TrajectoryError(
-            f"{where}: the times come from one of the array 'time', the arrays 'timestep' and 'fps' of one number and "
-            f"the argument timestep; {'none' if not given else 'more than one'} is there"
+            f"{where}: the times of {kind} come from one of the array 'time', the arrays 'timestep' and 'fps' of one "
+            f"number and the argument timestep; {'none' if not given else 'more than one'} is there"
         )
     if given == ["time"]:
         return _array(arrays["time"], where, "time", (count,), "s")
