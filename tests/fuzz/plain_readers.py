@@ -19,7 +19,7 @@ _UNIT_WORDS = re.compile(r"[\s\[\]()°]*[^\W\d_]*[\s\[\]()°]*")
 
 CLOCK = "\0time"
 """The label of times that are no column of the file."""
-IN_BODY_ORDER = ("\0first", "\0second", "\0third")
+IN_MUJOCOS_ORDER = ("\0first", "\0second", "\0third")
 """The labels of joints without names."""
 Columns = dict[str, list[float]]
 
@@ -193,7 +193,7 @@ def _qpos(qpos: np.ndarray, arrays: dict) -> Columns:
     times = arrays.get("time", np.arange(len(qpos)) * np.ravel(arrays.get("timestep", [np.nan]))[0])
     if not np.isfinite(np.asarray(times, dtype=float)).all():
         raise NotKnown
-    return {CLOCK: list(times)} | dict(zip(IN_BODY_ORDER, qpos[:, -3:].T.tolist(), strict=True))
+    return {CLOCK: list(times)} | dict(zip(IN_MUJOCOS_ORDER, qpos[:, -3:].T.tolist(), strict=True))
 
 
 def _of_arrays(entries: dict) -> Columns:
@@ -312,6 +312,6 @@ def plain_columns(file: Path, joint_names: Sequence[str]) -> Columns | None:
         found = reader(file.read_bytes())
     except NotKnown:
         return None
-    # MuJoCo's qpos has no names: its columns are in the body's order.
-    own = dict(zip(IN_BODY_ORDER, joint_names, strict=False))
+    # MuJoCo's qpos has no names: its columns are in the order of the body's file.
+    own = dict(zip(IN_MUJOCOS_ORDER, joint_names, strict=False))
     return {own.get(name, name): values for name, values in found.items()}

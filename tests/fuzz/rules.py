@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .engine_rules import biomod_faults, yeadon_faults
+from .pieces import JOINTS
 from .plain_readers import NotPlain, plain_columns, strict_number
 
 FARTHEST = 1e6
@@ -61,7 +62,7 @@ def motion_faults(file: Path, body: Any, recorded: Any, options: Mapping[str, An
         yield "a position that is not finite"
     json.dumps(dict(record), allow_nan=False)
     try:
-        columns = plain_columns(file, body.joint_names)
+        columns = plain_columns(file, JOINTS if set(JOINTS) == set(body.joint_names) else body.joint_names)
     except NotPlain as fault:
         yield f"a plain reader does not take it: {fault}"
         return

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .pieces import JOINTS
 from .plain_readers import NotPlain, delimited
 
 _SAME = 1e-12
@@ -43,7 +44,9 @@ def trajectory_faults(file: Path, body: Any, run: Any) -> Iterator[str]:
     if kind is None:
         return
     places = found[kind]
-    names = [str(name) for name in np.ravel(found["joint_names"])] if "joint_names" in found else list(body.joint_names)
+    # MuJoCo compiles the file of `pieces` in its own order.
+    nameless = JOINTS if kind == "qpos" else body.joint_names
+    names = [str(name) for name in np.ravel(found.get("joint_names", nameless))]
     if len(set(names)) != len(names):
         yield f"joint names {names}"
         return

@@ -252,7 +252,7 @@ def _causes(found: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
 
     if inputs.samples is not None:
         samples, by_fit = path_samples(found.path), _fit_by_knots(found.motion, inputs)
-        for rule in (samples.by_samples, samples.bias_by_samples):
+        for rule in samples.rules:
             yield moving_the_fit(found.at_knots(rule), rule(by_fit), inputs.samples)
         # What is known of the bias is one number of variance one, times itself.
         taken = samples.bias[:, None]

@@ -120,7 +120,7 @@ def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: Arra
     samples, levels = _samples(path), _levels(path, joints)
     by_knots = np.einsum("tmja,atk->mkj", derivative, samples.rows_by_knots(times)).reshape(derivative.shape[1], -1)
     variance = (by_knots @ samples.bias) ** 2
-    for rule in (samples.by_samples, samples.bias_by_samples):
+    for rule in samples.rules:
         answers = rule(by_knots).reshape(len(by_knots), -1, path.n_shape) * levels
         variance += (answers**2).sum(axis=(1, 2))
     return np.sqrt(variance)
@@ -165,7 +165,7 @@ def _errors(samples: PathSamples, times: Array, levels: Array) -> tuple[Array, A
     rows = samples.rows_by_knots(times)
     of_all = np.repeat(rows.reshape(3 * count, -1), n_shape, axis=1)
     covariance = np.zeros((count, n_shape, 3, 3))
-    for rule in (samples.by_samples, samples.bias_by_samples):
+    for rule in samples.rules:
         answers = (levels * rule(of_all).reshape(3, count, -1, n_shape)).transpose(1, 3, 0, 2)
         covariance += answers @ np.swapaxes(answers, 2, 3)
     bias = np.einsum("atk,kj->tja", rows, samples.bias.reshape(-1, n_shape))
