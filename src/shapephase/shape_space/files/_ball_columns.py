@@ -57,9 +57,8 @@ def with_quaternions(
         lacking = [f"{joint}.r{axis}" for axis in _AXES if axis not in found]
         if lacking:
             raise TrajectoryError(f"{table.where}: ball joint {joint} turns about three axes; add {', '.join(lacking)}")
-        turned = np.broadcast_to(np.eye(3), (len(recording.times), 3, 3))
-        for axis, (_, angles) in found.items():
-            turned = turned @ so3.exp(angles[:, None] * np.eye(3)[_AXES.index(axis)])
+        angles = np.stack([values for _, values in found.values()], axis=-1)
+        turned = so3.matrix_from_euler(angles, "".join(found))
         taken = [text for text, _ in found.values()]
         columns, said = {text: each for text, each in table.columns.items() if text not in taken}, ", ".join(taken)
         for part, values in zip("xyzw", so3.quat_from_matrix(turned).T, strict=True):

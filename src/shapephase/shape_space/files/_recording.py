@@ -44,6 +44,7 @@ class Table:
     base_position : (N, 3) [m] or None
     unread : name -> what it is, of arrays and other entries of the file that are no columns
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
+    zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
     """
 
     where: str
@@ -61,6 +62,7 @@ class Table:
     base_position: Array | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
     unnamed: Sequence[str] = ()
+    zero_pose: bool = False
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""
@@ -81,7 +83,9 @@ class Table:
             for name in ("times", "clock", "base_quat_xyzw", "base_position")
         }
         columns = {label: values[samples] for label, values in self.columns.items()}
-        return replace(self, columns=columns, rows=[self.rows[k] for k in places], faults=faults, **part)
+        zero_pose = self.zero_pose and places[:1] == [0]
+        rows = [self.rows[k] for k in places]
+        return replace(self, columns=columns, rows=rows, faults=faults, zero_pose=zero_pose, **part)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
 from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
+from ._sample_steps import warn_of_fast_turns, without_first_pose
 from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
@@ -203,7 +204,10 @@ def read_recorded_motion(
     choices = JointChoices(
         names=mapping, base=base, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
     )
-    recording, motion, free = in_flight(recording, matched(recording, body, choices), body, flying)
+    motion = matched(recording, body, choices)
+    recording, motion = without_first_pose(recording, motion, body)
+    warn_of_fast_turns(recording, motion, body)
+    recording, motion, free = in_flight(recording, motion, body, flying)
     try:
         noise = _noise_levels(smooth, body)
         samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)
