@@ -159,8 +159,10 @@ CHAIN = {  # a bone and what hangs on it: offsets in axes of the room, while the
     "Head": ("Chest", (0.0, 25.0, 0.0)),
     "LeftArm": ("Chest", (18.0, 18.0, 0.0)),
     "LeftForeArm": ("LeftArm", (28.0, 0.0, 0.0)),
+    "LeftHand": ("LeftForeArm", (25.0, 0.0, 0.0)),
     "RightArm": ("Chest", (-18.0, 18.0, 0.0)),
     "RightForeArm": ("RightArm", (-28.0, 0.0, 0.0)),
+    "RightHand": ("RightForeArm", (-25.0, 0.0, 0.0)),
     "LeftUpLeg": ("Hips", (9.0, -5.0, 0.0)),
     "LeftLeg": ("LeftUpLeg", (0.0, -42.0, 0.0)),
     "LeftFoot": ("LeftLeg", (0.0, -42.0, 0.0)),
@@ -169,7 +171,7 @@ CHAIN = {  # a bone and what hangs on it: offsets in axes of the room, while the
     "RightFoot": ("RightLeg", (0.0, -42.0, 0.0)),
 }
 ENDS = {"Head": (0.0, 20.0, 0.0), **dict.fromkeys(("LeftFoot", "RightFoot"), (0.0, -4.0, 15.0)),
-        "LeftForeArm": (25.0, 0.0, 0.0), "RightForeArm": (-25.0, 0.0, 0.0)}  # fmt: skip
+        "LeftHand": (8.0, 0.0, 0.0), "RightHand": (-8.0, 0.0, 0.0)}  # fmt: skip
 CENTIMETRE = {"length_unit": 0.01}
 
 
@@ -277,7 +279,7 @@ def test_a_first_pose_of_zero_angles_is_left_out(tmp_path):
     poses, count, rate = swinging(61, 60.0), 61, 60.0
     without = loaded(tmp_path / "without.bvh", person({}, poses, count, 1.0 / rate))[1]
     text = person({}, preceded(poses, Rotation.identity()), count + 1, 1.0 / rate)
-    with pytest.warns(TrajectoryWarning, match=r"line 95: left out: all angles are zero, and LeftArm goes 75 deg"):
+    with pytest.warns(TrajectoryWarning, match=r"line 105: left out: all angles are zero, and LeftArm goes 75 deg"):
         body, found = loaded(tmp_path / "with.bvh", text)
     np.testing.assert_allclose(found.times, without.times, rtol=0, atol=1e-15)
     starts = without.path.shape(without.path.breaks)
@@ -338,3 +340,16 @@ def test_what_hangs_beside_the_base_is_no_part_of_the_body(tmp_path):
     np.testing.assert_allclose(found.base_attitude, turn.as_matrix() @ expected.base_attitude, rtol=0, atol=1e-14)
     np.testing.assert_allclose(found.base_position, turn.apply(expected.base_position), rtol=0, atol=1e-14)
     np.testing.assert_allclose(body.locked_inertia(body.shape()), same.locked_inertia(same.shape()), atol=1e-14)
+
+
+def test_what_is_written_of_a_person_is_read_back(tmp_path):
+    """A motion exported, with one bone for a ball joint by its name: the same person in the same motion."""
+    body, recorded = loaded(tmp_path / "squats.bvh", person({}, squats(9), 9))
+    motion = sp.reconstruct(sp.articulated(body, recorded.path), [1.0, 2.0, 3.0])
+    sp.exports.write_bvh(motion, tmp_path / "again.bvh", rate=100.0, up="y", scale=100.0)
+    again = load(tmp_path / "again.bvh", **CENTIMETRE)
+    found = sp.read_recorded_motion(tmp_path / "again.bvh", again, close=False)
+    assert again.joint_names == body.joint_names
+    np.testing.assert_allclose(again.locked_inertia(again.shape()), body.locked_inertia(body.shape()), atol=1e-12)
+    np.testing.assert_allclose(found.path.shape(found.times), recorded.path.shape(found.times), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.base_attitude, motion.attitude(found.times), rtol=0, atol=1e-14)
